@@ -1,0 +1,64 @@
+//! Memory that vectors are read from and written to without crossing cache lines.
+
+use std::ops::{Deref, DerefMut};
+
+/// Bytes of a cache line, and of the longest vector.
+const LINE: usize = 64;
+
+/// Numbers of which the first lies at the beginning of a cache line.
+#[derive(Debug, Default)]
+pub(crate) struct Aligned {
+    values: Vec<f64>,
+    first: usize,
+    len: usize,
+}
+
+impl Aligned {
+    /// So many zeros.
+    pub(crate) fn zeros(len: usize) -> Self {
+        let values = vec![0.0; len + LINE / size_of::<f64>()];
+        let first = values.as_ptr().align_offset(LINE).min(values.len() - len);
+        Self { values, first, len }
+    }
+}
+
+impl Clone for Aligned {
+    fn clone(&self) -> Self {
+        let mut other = Self::zeros(self.len);
+        other.copy_from_slice(self);
+        other
+    }
+}
+
+impl Deref for Aligned {
+    type Target = [f64];
+
+    #[inline(always)]
+    fn deref(&self) -> &[f64] {
+        &self.values[self.first..self.first + self.len]
+    }
+}
+
+impl DerefMut for Aligned {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [f64] {
+        &mut self.values[self.first..self.first + self.len]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_begins_at_a_cache_line_wherever_it_is() {
+        for len in [0, 1, 7, 8, 1000] {
+            let values = Aligned::zeros(len);
+            assert_eq!(values.len(), len);
+            let moved = Box::new(values.clone());
+            for one in [&values, &*moved] {
+                assert_eq!(one.as_ptr().align_offset(LINE), 0);
+            }
+        }
+    }
+}

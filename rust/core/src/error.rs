@@ -1,0 +1,81 @@
+//! Misuse of a call. What the data holds is never an error: see [`crate::status`].
+
+use thiserror::Error;
+
+/// Why a call was refused. Every message states the rule, the value that broke it and what would be right.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum Error {
+    /// A window of local polynomials holds fewer samples than the shortest that leaves a choice of order.
+    #[error("window_length must be at least {least} samples; got {window_length}; give {least} or more")]
+    WindowTooShort {
+        /// What was asked for, samples.
+        window_length: usize,
+        /// The shortest allowed, samples.
+        least: usize,
+    },
+    /// A window longer than the record.
+    #[error(
+        "window_length must be less than or equal to the length of the record; got {window_length} samples for a record of {samples}; \
+         use a window of at most {samples} samples or a longer record"
+    )]
+    WindowTooLong {
+        /// What was asked for, samples.
+        window_length: usize,
+        /// Length of the record, samples.
+        samples: usize,
+    },
+    /// A polynomial order beyond what double precision supports.
+    #[error(
+        "{name} must be at most {most}; got {order}; polynomials of a higher order do more harm than good: shorten the window"
+    )]
+    OrderTooHigh {
+        /// The argument.
+        name: &'static str,
+        /// What was asked for.
+        order: usize,
+        /// The highest allowed.
+        most: usize,
+    },
+    /// A polynomial of this order is not determined by a window of this length.
+    #[error(
+        "order must be less than window_length; got order {order} for a window of {window_length} samples; \
+         lower the order or lengthen the window"
+    )]
+    OrderNotDetermined {
+        /// What was asked for.
+        order: usize,
+        /// Length of the window, samples.
+        window_length: usize,
+    },
+    /// No regressors, or more than the kernels hold.
+    #[error("the number of regressors must be between 1 and {most}; got {regressors}; drop or combine some")]
+    Regressors {
+        /// How many there are.
+        regressors: usize,
+        /// The most allowed.
+        most: usize,
+    },
+    /// No row would be left to judge the fit by.
+    #[error(
+        "window must hold more rows than there are regressors; got {window} rows for {regressors} regressors; \
+         use {} or more", .regressors + 1
+    )]
+    RowsTooFew {
+        /// Rows in a window.
+        window: usize,
+        /// How many regressors there are.
+        regressors: usize,
+    },
+    /// The work was cancelled by whoever watched it.
+    #[error("the work was cancelled")]
+    Cancelled,
+    /// The system did not give the threads.
+    #[error("could not start {threads} threads ({cause}); ask for fewer workers")]
+    Threads {
+        /// How many were wanted.
+        threads: usize,
+        /// What the system said.
+        cause: String,
+    },
+}

@@ -1,0 +1,61 @@
+//! Where results go: which samples the elements of an output belong to, and how outputs are cut into pieces.
+
+use std::ops::Range;
+
+/// Which samples of a record the elements of an output belong to: element `k` to sample `first + k · step`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Elements {
+    /// Sample of the first element.
+    pub first: usize,
+    /// Samples from one element to the next.
+    pub step: usize,
+}
+
+impl Elements {
+    /// The sample that an element belongs to.
+    #[must_use]
+    pub fn sample(self, element: usize) -> usize {
+        self.first + element * self.step
+    }
+
+    /// The elements that belong to some of the samples.
+    #[must_use]
+    pub fn of(self, samples: Range<usize>) -> Range<usize> {
+        let element = |sample: usize| sample.saturating_sub(self.first).div_ceil(self.step);
+        element(samples.start)..element(samples.end)
+    }
+
+    /// The same, counted from an element on.
+    pub(crate) fn from(self, element: usize) -> Self {
+        Self { first: self.sample(element), step: self.step }
+    }
+
+    /// Copies results of consecutive samples, of which the first is `sample`, to the elements that belong to them.
+    ///
+    /// An empty output is one that is not wanted.
+    #[inline(always)]
+    pub(crate) fn put<T: Copy>(self, output: &mut [T], sample: usize, results: &[T]) {
+        let elements = self.of(sample..sample + results.len());
+        if output.is_empty() || elements.is_empty() {
+            return;
+        }
+        let skipped = self.sample(elements.start) - sample;
+        let output = &mut output[elements];
+        if self.step == 1 {
+            output.copy_from_slice(&results[skipped..]);
+        } else {
+            for (value, &result) in output.iter_mut().zip(results[skipped..].iter().step_by(self.step)) {
+                *value = result;
+            }
+        }
+    }
+}
+
+/// Cuts off the first values, or none of an output that is not wanted.
+#[allow(clippy::mut_mut, reason = "the slice itself moves on")]
+pub(crate) fn split_off<'a, T>(values: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+    let count = count.min(values.len());
+    let (front, rest) = std::mem::take(values).split_at_mut(count);
+    *values = rest;
+    front
+}

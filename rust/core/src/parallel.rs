@@ -1,0 +1,218 @@
+//! Work cut into pieces, done by several threads. The only user of rayon.
+//!
+//! The calling thread never joins the pool: it watches, so that it can show progress and be interrupted. The pool belongs to this
+//! process; a process that was forked makes its own, since threads do not survive a fork.
+
+use std::num::NonZeroUsize;
+use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicUsize, Ordering};
+use std::sync::{Condvar, Mutex, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::error::Error;
+
+/// The calling thread looks up at least this often.
+const WATCH: Duration = Duration::from_millis(50);
+
+/// Called on the calling thread, at least every 50 ms and at the end, with the work done so far and all of it. Returning `false`
+/// cancels what is left.
+pub type Watch<'a> = dyn FnMut(usize, usize) -> bool + 'a;
+
+/// How many threads a request means: itself, or all processors that this process may use.
+#[must_use]
+pub fn workers(request: Option<NonZeroUsize>) -> NonZeroUsize {
+    request.unwrap_or_else(|| thread::available_parallelism().unwrap_or(NonZeroUsize::MIN))
+}
+
+/// A piece of work and how much of the whole it is.
+#[derive(Debug)]
+pub(crate) struct Piece<P> {
+    pub(crate) size: usize,
+    pub(crate) content: P,
+}
+
+/// Does every piece once, each thread with its own scratch. With one worker, or one piece, no other thread is bothered.
+pub(crate) fn run<P: Send, S>(
+    pieces: Vec<Piece<P>>,
+    workers: NonZeroUsize,
+    scratch: impl Fn() -> S + Sync,
+    work: impl Fn(P, &mut S) + Sync,
+    watch: &mut Watch<'_>,
+) -> Result<(), Error> {
+    let total = pieces.iter().map(|piece| piece.size).sum();
+    let workers = workers.get().min(pieces.len());
+    let finished = if workers <= 1 {
+        run_here(pieces, total, scratch, work, watch)
+    } else {
+        run_in_pool(pieces, total, workers, &scratch, &work, watch)?
+    };
+    if finished && watch(total, total) { Ok(()) } else { Err(Error::Cancelled) }
+}
+
+fn run_here<P, S>(
+    pieces: Vec<Piece<P>>,
+    total: usize,
+    scratch: impl Fn() -> S,
+    work: impl Fn(P, &mut S),
+    watch: &mut Watch<'_>,
+) -> bool {
+    let mut scratch = scratch();
+    let mut done = 0;
+    let mut last = Instant::now();
+    for Piece { size, content } in pieces {
+        work(content, &mut scratch);
+        done += size;
+        if last.elapsed() >= WATCH {
+            if !watch(done, total) {
+                return false;
+            }
+            last = Instant::now();
+        }
+    }
+    true
+}
+
+fn run_in_pool<P: Send, S>(
+    pieces: Vec<Piece<P>>,
+    total: usize,
+    workers: usize,
+    scratch: &(impl Fn() -> S + Sync),
+    work: &(impl Fn(P, &mut S) + Sync),
+    watch: &mut Watch<'_>,
+) -> Result<bool, Error> {
+    let queue = Mutex::new(pieces.into_iter());
+    let done = AtomicUsize::new(0);
+    let cancelled = AtomicBool::new(false);
+    let active = Active { count: Mutex::new(workers), none_left: Condvar::new() };
+    pool(workers)?.in_place_scope(|scope| {
+        for _ in 0..workers {
+            scope.spawn(|_| {
+                let _leaving = Leaving(&active);
+                let mut scratch = scratch();
+                while !cancelled.load(Ordering::Relaxed) {
+                    let Some(piece) = queue.lock().unwrap_or_else(PoisonError::into_inner).next() else { break };
+                    work(piece.content, &mut scratch);
+                    done.fetch_add(piece.size, Ordering::Relaxed);
+                }
+            });
+        }
+        while active.wait() {
+            if !watch(done.load(Ordering::Relaxed), total) {
+                cancelled.store(true, Ordering::Relaxed);
+            }
+        }
+    });
+    Ok(!cancelled.into_inner())
+}
+
+/// Threads that still work on a call.
+struct Active {
+    count: Mutex<usize>,
+    none_left: Condvar,
+}
+
+impl Active {
+    /// Waits until no thread is left or it is time to look up, and returns whether one is left.
+    fn wait(&self) -> bool {
+        let count = self.count.lock().unwrap_or_else(PoisonError::into_inner);
+        let (count, _) =
+            self.none_left.wait_timeout_while(count, WATCH, |count| *count > 0).unwrap_or_else(PoisonError::into_inner);
+        *count > 0
+    }
+}
+
+/// Counts a thread out when it is done, also when it panics.
+struct Leaving<'a>(&'a Active);
+
+impl Drop for Leaving<'_> {
+    fn drop(&mut self) {
+        let mut count = self.0.count.lock().unwrap_or_else(PoisonError::into_inner);
+        *count -= 1;
+        if *count == 0 {
+            self.0.none_left.notify_one();
+        }
+    }
+}
+
+/// A pool and the process that made it.
+struct Owned {
+    process: u32,
+    pool: ThreadPool,
+}
+
+/// The newest pool. Read and replaced without a lock, so that a fork at any moment leaves a child that can go on.
+static POOL: AtomicPtr<Owned> = AtomicPtr::new(std::ptr::null_mut());
+
+/// The pool of this process, with at least so many threads.
+///
+/// A pool that is outgrown, or belonged to the process before a fork, is forgotten, not freed: its threads may be at work, or gone.
+fn pool(threads: usize) -> Result<&'static ThreadPool, Error> {
+    let process = std::process::id();
+    loop {
+        let current = POOL.load(Ordering::Acquire);
+        // SAFETY: what was ever stored came from a leaked box and is never freed or changed.
+        if let Some(owned) = unsafe { current.as_ref() }
+            && owned.process == process
+            && owned.pool.current_num_threads() >= threads
+        {
+            return Ok(&owned.pool);
+        }
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .thread_name(|index| format!("tvident-{index}"))
+            .build()
+            .map_err(|error| Error::Threads { threads, cause: error.to_string() })?;
+        let fresh = Box::into_raw(Box::new(Owned { process, pool }));
+        if POOL.compare_exchange(current, fresh, Ordering::AcqRel, Ordering::Acquire).is_err() {
+            // SAFETY: another thread was faster, so nobody else has seen this box.
+            drop(unsafe { Box::from_raw(fresh) });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pieces(count: usize) -> Vec<Piece<usize>> {
+        (0..count).map(|content| Piece { size: 1, content }).collect()
+    }
+
+    fn threads(count: usize) -> NonZeroUsize {
+        NonZeroUsize::new(count).expect("not zero")
+    }
+
+    #[test]
+    fn every_piece_is_done_once_by_any_number_of_workers() {
+        for workers in [1, 2, 3, 40] {
+            let sum = AtomicUsize::new(0);
+            let work = |content: usize, (): &mut ()| {
+                sum.fetch_add(content, Ordering::Relaxed);
+            };
+            let mut last = (0, 0);
+            let result = run(pieces(1000), threads(workers), || (), work, &mut |done, total| {
+                last = (done, total);
+                true
+            });
+            assert_eq!(result, Ok(()));
+            assert_eq!(sum.into_inner(), 999 * 1000 / 2);
+            assert_eq!(last, (1000, 1000));
+        }
+    }
+
+    #[test]
+    fn a_watch_that_says_no_cancels_within_a_few_pieces() {
+        for workers in [1, 2] {
+            let count = AtomicUsize::new(0);
+            let work = |_, (): &mut ()| {
+                count.fetch_add(1, Ordering::Relaxed);
+                thread::sleep(Duration::from_millis(5));
+            };
+            let result = run(pieces(1000), threads(workers), || (), work, &mut |_, _| false);
+            assert_eq!(result, Err(Error::Cancelled));
+            assert!(count.into_inner() < 100);
+        }
+    }
+}

@@ -1,0 +1,494 @@
+//! Least squares in every window of rows.
+//!
+//! A window of `w` rows that begins in one block of `w` rows and ends in the next is a suffix of the one and a prefix of the other. So
+//! every window's factor is one merge of two factors that were built by appending rows only (see the module `triangle`): a row enters once
+//! and leaves with its block, and nothing is subtracted.
+//!
+//! Windows are numbered by their first row, which may lie up to a window before the record; rows that do not exist are zero and say
+//! nothing. Blocks lie on a grid of absolute row numbers and lanes keep apart, so any cutting of a record gives the same bits.
+
+use std::num::NonZeroUsize;
+use std::ops::Range;
+
+use crate::aligned::Aligned;
+use crate::error::Error;
+use crate::output::{Elements, split_off};
+use crate::parallel::{self, Piece, Watch};
+use crate::samples::{Samples, all_usable, is_usable};
+use crate::simd::{Instructions, Kernel, Lanes, dispatch};
+use crate::status::Status;
+use crate::strips::Strips;
+use crate::tile::{TILE, Tile};
+use crate::triangle::{
+    Few, MOST_REGRESSORS, Many, Shape, append, covariance, empty, invert, load, merge, solve, squared_norm, store,
+};
+
+/// Suffix factors kept at a time. Longer windows keep one in so many and build the others again.
+const SEGMENT: usize = 2048;
+
+/// Rows in a piece of work, about.
+const PIECE: usize = 1 << 14;
+
+/// A condition number from which on parameters have lost half of their digits.
+pub const HALF_OF_THE_DIGITS: f64 = 1e8;
+
+/// The plan of least squares with some regressors and right-hand sides in windows of some rows.
+#[derive(Clone, Debug)]
+pub struct RollingLeastSquares {
+    window: usize,
+    regressors: usize,
+    sides: usize,
+    covariances: Vec<(usize, usize)>,
+    ill_conditioned: f64,
+    instructions: Instructions,
+}
+
+/// Rows of equations: one record for every regressor, then one for every right-hand side.
+pub struct Equations<'a> {
+    /// All of the same length.
+    pub columns: Vec<&'a dyn Samples>,
+    /// The rows that are equations; those before and after do not count.
+    pub rows: Range<usize>,
+}
+
+/// Where results are written. Windows belong to the row at their centre: row `i` to the rows `i - w/2 … i - w/2 + w - 1`.
+///
+/// An empty slice stands for what is not wanted.
+#[derive(Debug, Default)]
+pub struct Regressions<'a> {
+    /// Which rows the elements of every slice belong to.
+    pub elements: Elements,
+    /// Parameters: one slice for every regressor and, within it, right-hand side.
+    pub parameters: Vec<&'a mut [f64]>,
+    /// Their standard errors.
+    pub errors: Vec<&'a mut [f64]>,
+    /// Covariances of the pairs asked for, one slice for every pair and, within it, right-hand side.
+    pub covariances: Vec<&'a mut [f64]>,
+    /// Residual sum of squares of every right-hand side.
+    pub residuals: Vec<&'a mut [f64]>,
+    /// Standard deviation of the residuals of every right-hand side.
+    pub deviations: Vec<&'a mut [f64]>,
+    /// Condition number of the regressors, each scaled to the same norm.
+    pub condition: &'a mut [f64],
+    /// Bits of [`Status`].
+    pub status: &'a mut [u16],
+}
+
+impl Regressions<'_> {
+    /// Cuts off what belongs to the rows before `row`.
+    pub(crate) fn split_off_before(&mut self, row: usize) -> Self {
+        let (elements, count) = (self.elements, self.elements.of(0..row).len());
+        self.elements = elements.from(count);
+        Regressions {
+            elements,
+            parameters: self.parameters.iter_mut().map(|values| split_off(values, count)).collect(),
+            errors: self.errors.iter_mut().map(|values| split_off(values, count)).collect(),
+            covariances: self.covariances.iter_mut().map(|values| split_off(values, count)).collect(),
+            residuals: self.residuals.iter_mut().map(|values| split_off(values, count)).collect(),
+            deviations: self.deviations.iter_mut().map(|values| split_off(values, count)).collect(),
+            condition: split_off(&mut self.condition, count),
+            status: split_off(&mut self.status, count),
+        }
+    }
+}
+
+/// Memory of one thread.
+#[derive(Debug)]
+pub struct Scratch {
+    /// One column of a run's rows.
+    column: Vec<f64>,
+    /// Rows of the run that hold a value that cannot be used, in order.
+    unusable: Vec<usize>,
+    strips: Vec<Strips>,
+    suffixes: Aligned,
+    checkpoints: Aligned,
+    tile: Tile,
+}
+
+impl RollingLeastSquares {
+    /// Prepares windows of `window` rows of `regressors` regressors and `sides` right-hand sides. Of every pair of regressors in
+    /// `covariances` the covariance is wanted too. Condition numbers above `ill_conditioned` are flagged.
+    ///
+    /// # Errors
+    /// If there are no regressors or more than 16, or no more rows than regressors.
+    pub fn new(
+        window: usize,
+        regressors: usize,
+        sides: usize,
+        covariances: Vec<(usize, usize)>,
+        ill_conditioned: f64,
+        instructions: Instructions,
+    ) -> Result<Self, Error> {
+        if !(1..=MOST_REGRESSORS).contains(&regressors) {
+            return Err(Error::Regressors { regressors, most: MOST_REGRESSORS });
+        }
+        if window <= regressors {
+            return Err(Error::RowsTooFew { window, regressors });
+        }
+        Ok(Self { window, regressors, sides, covariances, ill_conditioned, instructions })
+    }
+
+    /// Windows that are worked on side by side: a record may be cut anywhere, but multiples of this waste nothing.
+    #[must_use]
+    pub fn stride(&self) -> usize {
+        self.window * self.instructions.lanes()
+    }
+
+    /// Memory for one thread.
+    #[must_use]
+    pub fn scratch(&self) -> Scratch {
+        let lanes = self.instructions.lanes();
+        let columns = self.regressors + self.sides;
+        let strips = Strips::new(self.window, self.window, lanes);
+        let factor = Many { regressors: self.regressors, sides: self.sides }.size() * lanes;
+        Scratch {
+            column: vec![0.0; strips.samples()],
+            unusable: Vec::new(),
+            strips: vec![strips; columns],
+            suffixes: Aligned::zeros(self.window.min(SEGMENT) * factor),
+            checkpoints: Aligned::zeros((self.window.div_ceil(SEGMENT) - 1) * factor),
+            tile: Tile::new(self.fields(), lanes),
+        }
+    }
+
+    /// Solves the windows around all rows, in parallel. Every element of the outputs must belong to a row.
+    ///
+    /// The numbers do not depend on the number of workers.
+    ///
+    /// # Errors
+    /// If the watch cancels.
+    pub fn run(
+        &self,
+        equations: &Equations<'_>,
+        mut regressions: Regressions<'_>,
+        workers: NonZeroUsize,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Error> {
+        let rows = equations.columns.first().map_or(0, |column| column.len());
+        let mut pieces = Vec::new();
+        for piece in self.pieces(rows, PIECE) {
+            let part = regressions.split_off_before(piece.end);
+            pieces.push(Piece { size: piece.len(), content: (piece, part) });
+        }
+        let work = |(rows, mut part): (Range<usize>, Regressions<'_>), scratch: &mut Scratch| {
+            self.solve(equations, rows, &mut part, scratch);
+        };
+        parallel::run(pieces, workers, || self.scratch(), work, watch)
+    }
+
+    /// Solves the windows around some rows.
+    pub fn solve(
+        &self,
+        equations: &Equations<'_>,
+        rows: Range<usize>,
+        regressions: &mut Regressions<'_>,
+        scratch: &mut Scratch,
+    ) {
+        let mut window = self.first_row(rows.start);
+        let end = self.first_row(rows.end);
+        while window < end {
+            let first = window - window % self.window;
+            let next = end.min(first + self.stride());
+            let run = Run { plan: self, base: first, windows: window..next, rows: equations.rows.clone() };
+            match (self.regressors, self.sides) {
+                (1, 1) => dispatch(self.instructions, Work { run, shape: Few::<1>, equations, scratch, regressions }),
+                (2, 1) => dispatch(self.instructions, Work { run, shape: Few::<2>, equations, scratch, regressions }),
+                (3, 1) => dispatch(self.instructions, Work { run, shape: Few::<3>, equations, scratch, regressions }),
+                (4, 1) => dispatch(self.instructions, Work { run, shape: Few::<4>, equations, scratch, regressions }),
+                (regressors, sides) => {
+                    dispatch(
+                        self.instructions,
+                        Work { run, shape: Many { regressors, sides }, equations, scratch, regressions },
+                    );
+                }
+            }
+            window = next;
+        }
+    }
+
+    /// Number of columns of a row, the right-hand sides included.
+    pub(crate) fn columns(&self) -> usize {
+        self.regressors + self.sides
+    }
+
+    /// Cuts the rows of a record into pieces of about so many, so that no run is cut.
+    pub(crate) fn pieces(&self, rows: usize, about: usize) -> Vec<Range<usize>> {
+        let piece = about.next_multiple_of(self.stride());
+        let mut pieces = Vec::new();
+        let mut first = 0;
+        while first < rows {
+            let end = ((self.first_row(first) / piece + 1) * piece - self.first_row(0)).min(rows);
+            pieces.push(first..end);
+            first = end;
+        }
+        pieces
+    }
+
+    /// The rows that lie in the windows around some rows.
+    pub(crate) fn rows_needed(&self, around: Range<usize>, rows: usize) -> Range<usize> {
+        around.start.saturating_sub(self.window / 2)..(around.end + self.window).min(rows)
+    }
+
+    /// First row of the window around a row, counted from one window before the record.
+    fn first_row(&self, row: usize) -> usize {
+        row + self.window - self.window / 2
+    }
+
+    /// Numbers known of every window: parameters, variances over the noise's, covariances likewise, residuals, squared condition.
+    fn fields(&self) -> usize {
+        self.regressors * self.sides + self.regressors + self.covariances.len() + self.sides + 1
+    }
+}
+
+/// Blocks of windows side by side: lane `l` works on those that begin at `base + l w`, of which `windows` are wanted.
+struct Run<'a> {
+    plan: &'a RollingLeastSquares,
+    base: usize,
+    windows: Range<usize>,
+    /// Rows that are equations.
+    rows: Range<usize>,
+}
+
+impl Run<'_> {
+    /// Lays out the rows of the run. Those that are no equations, or hold what cannot be used, become zero.
+    #[inline(always)]
+    fn load<S: Lanes>(&self, simd: S, equations: &Equations<'_>, scratch: &mut Scratch) {
+        let Scratch { column, unusable, strips, .. } = scratch;
+        let before = self.plan.window;
+        let end = self.base + column.len();
+        let present = (self.rows.start + before).clamp(self.base, end)..(self.rows.end + before).clamp(self.base, end);
+        let places = present.start - self.base..present.end - self.base;
+        unusable.clear();
+        for (strips, record) in strips.iter_mut().zip(&equations.columns) {
+            column[..places.start].fill(0.0);
+            column[places.end..].fill(0.0);
+            record.read(present.start.saturating_sub(before), &mut column[places.clone()]);
+            if !all_usable(column) {
+                unusable.extend((0..column.len()).filter(|&row| !is_usable(column[row])));
+            }
+            strips.fill(simd, column);
+        }
+        unusable.sort_unstable();
+        unusable.dedup();
+        for strips in strips {
+            for &row in unusable.iter() {
+                strips.clear(row);
+            }
+        }
+    }
+
+    /// How many equations a window holds.
+    fn count(&self, window: usize) -> usize {
+        let first = window.max(self.rows.start + self.plan.window);
+        let end = (window + self.plan.window).min(self.rows.end + self.plan.window);
+        end.saturating_sub(first)
+    }
+
+    /// Writes out the windows of one lane at `places` of the tile, of which the first is `window`.
+    #[inline(always)]
+    fn write_lane(
+        &self,
+        fields: &mut [f64],
+        unusable: &[usize],
+        places: Range<usize>,
+        window: usize,
+        regressions: &mut Regressions<'_>,
+    ) {
+        let plan = self.plan;
+        let (p, q, pairs) = (plan.regressors, plan.sides, plan.covariances.len());
+        let row = window + plan.window / 2 - plan.window;
+        let elements = regressions.elements;
+
+        let (parameters, rest) = fields.split_at_mut(p * q * TILE);
+        let (variances, rest) = rest.split_at_mut((p + pairs) * TILE);
+        let (residuals, condition) = rest.split_at_mut(q * TILE);
+        let (errors, covariances) = variances.split_at(p * TILE);
+
+        let mut statuses = [0_u16; TILE];
+        let mut freedom = [0.0; TILE];
+        let greatest = 1.0 / (f64::EPSILON * plan.window as f64);
+        for place in places.clone() {
+            let window = window + place - places.start;
+            let count = self.count(window);
+            let mut status = if count < plan.window { Status::EDGE } else { Status::GOOD };
+            let rows = window - self.base..window - self.base + plan.window;
+            let hit =
+                unusable.get(unusable.partition_point(|&bad| bad < rows.start)).is_some_and(|bad| *bad < rows.end);
+            condition[place] = condition[place].sqrt();
+            if hit || 2 * count < plan.window {
+                status |= Status::INVALID;
+            } else if count <= p || condition[place].is_nan() || condition[place] >= greatest {
+                status |= Status::INVALID | Status::RANK_DEFICIENT;
+                condition[place] = f64::INFINITY;
+            } else if condition[place] > plan.ill_conditioned {
+                status |= Status::ILL_CONDITIONED;
+            }
+            if status.contains(Status::INVALID) {
+                parameters.iter_mut().skip(place).step_by(TILE).for_each(|value| *value = f64::NAN);
+                residuals.iter_mut().skip(place).step_by(TILE).for_each(|value| *value = f64::NAN);
+                if !status.contains(Status::RANK_DEFICIENT) {
+                    condition[place] = f64::NAN;
+                }
+            }
+            statuses[place] = status.bits();
+            freedom[place] = 1.0 / count.saturating_sub(p) as f64;
+        }
+        let mut scaled = [0.0; TILE];
+        for (side, residual) in residuals.chunks_exact(TILE).enumerate() {
+            for (i, variance) in errors.chunks_exact(TILE).enumerate() {
+                for place in places.clone() {
+                    scaled[place] = (variance[place] * residual[place] * freedom[place]).sqrt();
+                }
+                put(elements, &mut regressions.errors, i * q + side, row, &scaled[places.clone()]);
+            }
+            for (pair, covariance) in covariances.chunks_exact(TILE).enumerate() {
+                for place in places.clone() {
+                    scaled[place] = covariance[place] * residual[place] * freedom[place];
+                }
+                put(elements, &mut regressions.covariances, pair * q + side, row, &scaled[places.clone()]);
+            }
+            for place in places.clone() {
+                scaled[place] = (residual[place] * freedom[place]).sqrt();
+            }
+            put(elements, &mut regressions.deviations, side, row, &scaled[places.clone()]);
+            put(elements, &mut regressions.residuals, side, row, &residual[places.clone()]);
+        }
+        for (index, values) in parameters.chunks_exact(TILE).enumerate() {
+            put(elements, &mut regressions.parameters, index, row, &values[places.clone()]);
+        }
+        elements.put(regressions.condition, row, &condition[places.clone()]);
+        elements.put(regressions.status, row, &statuses[places]);
+    }
+}
+
+/// Writes to one of several outputs that may not be wanted.
+#[inline(always)]
+fn put(elements: Elements, outputs: &mut [&mut [f64]], index: usize, row: usize, results: &[f64]) {
+    if let Some(output) = outputs.get_mut(index) {
+        elements.put(output, row, results);
+    }
+}
+
+/// The kernel of a run.
+struct Work<'a, 'b, 'c, H: Shape> {
+    run: Run<'a>,
+    shape: H,
+    equations: &'a Equations<'a>,
+    scratch: &'b mut Scratch,
+    regressions: &'b mut Regressions<'c>,
+}
+
+impl<H: Shape> Kernel for Work<'_, '_, '_, H> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(mut self, simd: S) {
+        self.run.load(simd, self.equations, self.scratch);
+        let window = self.run.plan.window;
+        let size = self.shape.size() * S::F64_LANES;
+        let segments = window.div_ceil(SEGMENT);
+        let mut row = self.shape.factor(simd.splat_f64s(0.0));
+        let mut suffix = empty(simd, self.shape);
+        for segment in (1..segments).rev() {
+            let rows = segment * SEGMENT..window.min((segment + 1) * SEGMENT);
+            for offset in rows.rev() {
+                self.append(simd, &mut suffix, offset, 0, &mut row);
+            }
+            store(simd, self.shape, &mut self.scratch.checkpoints[(segment - 1) * size..], &suffix);
+        }
+        let mut prefix = empty(simd, self.shape);
+        for segment in 0..segments {
+            let rows = segment * SEGMENT..window.min((segment + 1) * SEGMENT);
+            suffix = empty(simd, self.shape);
+            if segment + 1 < segments {
+                load(simd, self.shape, &self.scratch.checkpoints[segment * size..], &mut suffix);
+            }
+            for offset in rows.clone().rev() {
+                self.append(simd, &mut suffix, offset, 0, &mut row);
+                store(simd, self.shape, &mut self.scratch.suffixes[(offset - rows.start) * size..], &suffix);
+            }
+            for offset in rows.clone() {
+                load(simd, self.shape, &self.scratch.suffixes[(offset - rows.start) * size..], &mut suffix);
+                let place = offset % TILE;
+                self.finish(simd, &mut suffix, &prefix, place, &mut row);
+                if place + 1 == TILE || offset + 1 == window {
+                    self.write::<S>(place + 1, offset - place);
+                }
+                self.append(simd, &mut prefix, offset, 1, &mut row);
+            }
+        }
+    }
+}
+
+impl<H: Shape> Work<'_, '_, '_, H> {
+    /// Appends the row at an offset of each lane's block, or of the block after it.
+    #[inline(always)]
+    fn append<S: Lanes>(
+        &self,
+        simd: S,
+        factor: &mut H::Factor<S::f64s>,
+        offset: usize,
+        block: usize,
+        row: &mut H::Factor<S::f64s>,
+    ) {
+        for column in 0..self.shape.regressors() + self.shape.sides() {
+            row[column] = self.scratch.strips[column].in_block(simd, offset, block);
+        }
+        append(simd, self.shape, factor, row, 0, simd.splat_f64s(1.0));
+    }
+
+    /// Merges the prefix of each lane's window into its suffix and solves.
+    #[inline(always)]
+    fn finish<S: Lanes>(
+        &mut self,
+        simd: S,
+        factor: &mut H::Factor<S::f64s>,
+        prefix: &H::Factor<S::f64s>,
+        place: usize,
+        values: &mut H::Factor<S::f64s>,
+    ) {
+        let shape = self.shape;
+        let (p, q) = (shape.regressors(), shape.sides());
+        let tile = &mut self.scratch.tile;
+        merge(simd, shape, factor, prefix, values);
+        for side in 0..q {
+            solve(simd, shape, factor, side, values);
+            for i in 0..p {
+                tile.put(simd, i * q + side, place, values[i]);
+            }
+        }
+        invert(simd, shape, factor, values);
+        let mut field = p * q;
+        let mut squares = simd.splat_f64s(0.0);
+        for i in 0..p {
+            let variance = covariance(simd, shape, values, i, i);
+            squares = simd.mul_add_f64s(squared_norm(simd, shape, factor, i), variance, squares);
+            tile.put(simd, field, place, variance);
+            field += 1;
+        }
+        for &(i, j) in &self.run.plan.covariances {
+            tile.put(simd, field, place, covariance(simd, shape, values, i.min(j), i.max(j)));
+            field += 1;
+        }
+        for side in 0..q {
+            tile.put(simd, field, place, factor[shape.row(p) + side]);
+            field += 1;
+        }
+        tile.put(simd, field, place, simd.mul_f64s(squares, simd.splat_f64s(p as f64)));
+    }
+
+    /// Writes out the first `count` windows of the tile, of which the first is at `offset` of each lane's block.
+    #[inline(always)]
+    fn write<S: Lanes>(&mut self, count: usize, offset: usize) {
+        let places = 0..count;
+        for lane in 0..S::F64_LANES {
+            let first = self.run.base + lane * self.run.plan.window + offset;
+            let wanted = self.run.windows.start.max(first)..self.run.windows.end.min(first + count);
+            if !wanted.is_empty() {
+                let fields = self.scratch.tile.lane::<S>(lane, &places);
+                let places = wanted.start - first..wanted.end - first;
+                self.run.write_lane(fields, &self.scratch.unusable, places, wanted.start, self.regressions);
+            }
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! Parameters that are the same over the whole record: one least-squares problem with very many rows.
+//!
+//! The rows are summarised piece by piece by the triangular factor of their QR decomposition, and the factors of pieces are stacked and
+//! decomposed again. Factors of other records, or of other machines, could be stacked in the same way. The pieces lie on a grid of
+//! absolute sample numbers and are stacked in its order, so the result does not depend on who worked on which.
+
+use faer::linalg::solvers::Qr;
+use faer::{Mat, MatRef};
+
+/// The triangular factor `R` of rows `[a | b]`, of which there were `rows`.
+#[derive(Clone, Debug)]
+pub(crate) struct Summary {
+    factor: Mat<f64>,
+    rows: usize,
+}
+
+/// Parameters that are the same over the whole record.
+#[derive(Clone, Debug)]
+pub struct SharedParameters {
+    /// The values.
+    pub values: Vec<f64>,
+    /// Their covariance, row by row: ordinary least squares, for residuals that are independent and of one variance.
+    pub covariance: Vec<f64>,
+    /// Standard deviation of the residuals.
+    pub residual: f64,
+    /// Condition number of the regressors, each scaled to the same norm.
+    pub condition: f64,
+}
+
+impl Summary {
+    /// Summarises no rows of so many columns, the right-hand side included.
+    pub(crate) fn empty(columns: usize) -> Self {
+        Self { factor: Mat::zeros(0, columns), rows: 0 }
+    }
+
+    /// Summarises rows given column by column.
+    pub(crate) fn of(columns: &[Vec<f64>], keep: impl Fn(usize) -> bool) -> Self {
+        let kept: Vec<usize> = (0..columns.first().map_or(0, Vec::len)).filter(|&row| keep(row)).collect();
+        let rows = Mat::from_fn(kept.len(), columns.len(), |row, column| columns[column][kept[row]]);
+        Self { rows: kept.len(), factor: triangle(rows.as_ref()) }
+    }
+
+    /// Adds the rows that another summary stands for.
+    pub(crate) fn add(&mut self, other: &Self) {
+        let (above, below) = (self.factor.nrows(), other.factor.nrows());
+        let stacked = Mat::from_fn(above + below, self.factor.ncols(), |row, column| {
+            if row < above { self.factor[(row, column)] } else { other.factor[(row - above, column)] }
+        });
+        self.factor = triangle(stacked.as_ref());
+        self.rows += other.rows;
+    }
+
+    /// Solves, or gives nothing where the rows do not determine the parameters.
+    pub(crate) fn solve(&self) -> Option<SharedParameters> {
+        let p = self.factor.ncols() - 1;
+        if self.rows <= p || self.factor.nrows() < p {
+            return None;
+        }
+        let norms: Vec<f64> = (0..p).map(|j| self.factor.col(j).norm_l2()).collect();
+        if norms.contains(&0.0) {
+            return None;
+        }
+        let scaled = Mat::from_fn(p, p, |i, j| self.factor[(i, j)] / norms[j]);
+        let mut inverse = Mat::<f64>::identity(p, p);
+        faer::linalg::triangular_solve::solve_upper_triangular_in_place(
+            scaled.as_ref(),
+            inverse.as_mut(),
+            faer::Par::Seq,
+        );
+        let condition = (p as f64).sqrt() * inverse.norm_l2();
+        if condition.is_nan() || condition * f64::EPSILON * self.rows as f64 >= 1.0 {
+            return None;
+        }
+        let side = |i: usize| self.factor[(i, p)];
+        let values = (0..p).map(|i| (i..p).map(|j| inverse[(i, j)] * side(j)).sum::<f64>() / norms[i]).collect();
+        let residual = if self.factor.nrows() > p { side(p).abs() / ((self.rows - p) as f64).sqrt() } else { 0.0 };
+        let gram = &inverse * inverse.transpose();
+        let entry = |i: usize, j: usize| residual * residual * gram[(i, j)] / (norms[i] * norms[j]);
+        let covariance = (0..p * p).map(|index| entry(index / p, index % p)).collect();
+        Some(SharedParameters { values, covariance, residual, condition })
+    }
+}
+
+/// The upper triangular factor of a matrix: as many rows as it has columns, or fewer where it has fewer rows.
+fn triangle(rows: MatRef<'_, f64>) -> Mat<f64> {
+    Qr::new(rows).thin_R().to_owned()
+}

@@ -1,0 +1,64 @@
+//! What happened in one window. Data never raises: it gets a status, and the rest of the record goes on.
+
+use std::ops::{BitOr, BitOrAssign};
+
+/// Flags of one window. Zero is good.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(transparent)]
+pub struct Status(u16);
+
+impl Status {
+    /// Nothing to report.
+    pub const GOOD: Self = Self(0);
+    /// There is no number here: it is NaN. The only flag that goes with NaN.
+    pub const INVALID: Self = Self(1);
+    /// Near an end of the record: evaluated off the centre of its window, or with fewer equations.
+    pub const EDGE: Self = Self(1 << 1);
+    /// The lowest candidate order was chosen; the paper advises a longer window.
+    pub const LOWEST_ORDER: Self = Self(1 << 3);
+    /// The highest candidate order was chosen; the paper advises a shorter window or a higher `max_order`.
+    pub const HIGHEST_ORDER: Self = Self(1 << 4);
+    /// The residual is at the floor set by rounding or quantisation: there is no noise to weigh orders against.
+    pub const EXACT: Self = Self(1 << 5);
+    /// The equations do not determine the parameters. Goes with [`Status::INVALID`].
+    pub const RANK_DEFICIENT: Self = Self(1 << 6);
+    /// The equations hardly tell the parameters apart.
+    pub const ILL_CONDITIONED: Self = Self(1 << 7);
+
+    /// Every flag that exists, with its name.
+    pub const NAMED: [(&'static str, Self); 7] = [
+        ("INVALID", Self::INVALID),
+        ("EDGE", Self::EDGE),
+        ("LOWEST_ORDER", Self::LOWEST_ORDER),
+        ("HIGHEST_ORDER", Self::HIGHEST_ORDER),
+        ("EXACT", Self::EXACT),
+        ("RANK_DEFICIENT", Self::RANK_DEFICIENT),
+        ("ILL_CONDITIONED", Self::ILL_CONDITIONED),
+    ];
+
+    /// The flags as a number, as they are stored in arrays.
+    #[must_use]
+    pub const fn bits(self) -> u16 {
+        self.0
+    }
+
+    /// Whether every flag of `other` is set.
+    #[must_use]
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+}
+
+impl BitOr for Status {
+    type Output = Self;
+
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+impl BitOrAssign for Status {
+    fn bitor_assign(&mut self, other: Self) {
+        self.0 |= other.0;
+    }
+}

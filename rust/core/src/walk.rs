@@ -1,0 +1,230 @@
+//! The walk over the samples of a record: projection, choice of order and derivatives of every window in one pass.
+//!
+//! A record's windows are numbered by their first sample. Block `g` holds the windows `g B … (g+1) B - 1`; its start lies in its
+//! middle, at `g B + B/2`, or at the record's last window where that comes first. Blocks are worked on in runs, as many side by side
+//! as there are lanes. Which blocks share a run does not matter, since lanes keep apart, so any cutting of a record gives the same bits.
+
+use std::fmt::Debug;
+use std::ops::Range;
+
+use crate::aligned::Aligned;
+use crate::basis::Basis;
+use crate::finish::{Finish, Functional};
+use crate::local_polynomials::{Estimates, Options};
+use crate::projection::Projection;
+use crate::samples::Samples;
+use crate::simd::{Instructions, MOST_LANES, dispatch};
+use crate::status::Status;
+use crate::stretch::Stretch;
+use crate::strips::Strips;
+use crate::sweep::{Direction, Fill, STEPS, Start, Sweep, replace, states};
+use crate::tile::{TILE, Tile};
+use crate::write::{Write, fill};
+
+/// Samples copied out of a record at a time, about: several runs of short windows.
+const STRETCH: usize = 1 << 13;
+
+/// What an engine can do, whatever the number of its degrees.
+pub(crate) trait Walk: Debug + Send + Sync {
+    fn block(&self) -> usize;
+    fn scratch(&self) -> Scratch;
+    fn functionals(&self) -> &[Functional];
+    fn walk(&self, record: &dyn Samples, windows: Range<usize>, estimates: &mut Estimates<'_>, scratch: &mut Scratch);
+}
+
+/// Plan of the walk with kernels of `D` degrees, which follow the residual or do not.
+#[derive(Debug)]
+pub(crate) struct Engine<const D: usize, const RESIDUAL: bool> {
+    projection: Projection<D>,
+    finish: Finish,
+    instructions: Instructions,
+}
+
+/// Memory of one thread.
+#[derive(Debug)]
+pub(crate) struct Scratch {
+    stretch: Stretch,
+    strips: Strips,
+    /// What is taken off each lane's samples.
+    references: [f64; MOST_LANES],
+    /// The start of each lane's block, and the windows that a sweep has come to.
+    start: Aligned,
+    state: Aligned,
+    /// States between stepping and finishing.
+    states: Aligned,
+    tile: Tile,
+}
+
+impl<const D: usize, const RESIDUAL: bool> Engine<D, RESIDUAL> {
+    pub(crate) fn new(options: &Options, basis: &Basis) -> Self {
+        Self {
+            projection: Projection::new(basis),
+            finish: Finish::new(options, basis),
+            instructions: options.instructions,
+        }
+    }
+
+    /// Samples of a window before the one it is said to be around: its centre, or the last one before that.
+    fn before_centre(&self) -> usize {
+        (self.projection.length() - 1) / 2
+    }
+}
+
+impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
+    fn block(&self) -> usize {
+        self.projection.block()
+    }
+
+    fn functionals(&self) -> &[Functional] {
+        self.finish.functionals()
+    }
+
+    fn scratch(&self) -> Scratch {
+        let lanes = self.instructions.lanes();
+        Scratch {
+            stretch: Stretch::default(),
+            strips: Strips::new(self.block(), self.projection.length(), lanes),
+            references: [0.0; MOST_LANES],
+            start: Aligned::zeros(states::<D>(1, lanes)),
+            state: Aligned::zeros(states::<D>(1, lanes)),
+            states: Aligned::zeros(states::<D>(STEPS, lanes)),
+            tile: Tile::new(self.finish.fields(RESIDUAL), lanes),
+        }
+    }
+
+    fn walk(&self, record: &dyn Samples, windows: Range<usize>, estimates: &mut Estimates<'_>, scratch: &mut Scratch) {
+        let (block, backward, lanes) = (self.block(), self.projection.backward(), self.instructions.lanes());
+        let last = record.len() - self.projection.length();
+        debug_assert!(windows.end <= last + 1, "a window must lie in the record");
+        // The last block's start may have to move down to the last window; that block then runs alone.
+        let moved = if last % block < backward { last - last % block } else { last + 1 };
+        // What a run reads, and how much of it is not read again by the next.
+        let (read, advance) = (scratch.strips.samples().cast_signed(), (lanes * block).cast_signed());
+        scratch.stretch.load(record, 0..0);
+        let mut window = windows.start;
+        while window < windows.end {
+            let first = window - window % block;
+            let (base, end) = if first >= moved {
+                (last.cast_signed() - backward.cast_signed(), windows.end)
+            } else {
+                (first.cast_signed(), windows.end.min(moved).min(first + lanes * block))
+            };
+            if !scratch.stretch.holds(&(base..base + read)) {
+                let runs =
+                    (STRETCH.cast_signed() / advance).clamp(1, (windows.end - window).cast_signed() / advance + 1);
+                scratch.stretch.load(record, base..base + read + (runs - 1) * advance);
+            }
+            let run = Run { engine: self, base, windows: window..end };
+            run.work(scratch, estimates);
+            run.invalidate(scratch.stretch.unusable(base..base + read), estimates);
+            window = end;
+        }
+    }
+}
+
+/// Blocks side by side: lane `l` works on the windows that begin at `base + l B`, of which `windows` are wanted.
+struct Run<'a, const D: usize, const RESIDUAL: bool> {
+    engine: &'a Engine<D, RESIDUAL>,
+    base: isize,
+    windows: Range<usize>,
+}
+
+impl<const D: usize, const RESIDUAL: bool> Run<'_, D, RESIDUAL> {
+    /// Finishes the windows of the run, from the start of every block forwards, then backwards.
+    ///
+    /// The kernels are called one by one, not from one another: in one function they would spill each other's registers.
+    fn work(&self, scratch: &mut Scratch, estimates: &mut Estimates<'_>) {
+        let Engine { projection, finish, instructions } = self.engine;
+        let (instructions, backward, rows) = (*instructions, projection.backward(), self.rows());
+        let Scratch { stretch, strips, references, start, state, states, tile } = scratch;
+        self.take_references(stretch, references);
+        dispatch(instructions, Fill { samples: stretch.from(self.base, strips.samples()), strips });
+        dispatch(instructions, Start { projection, strips, references, row: backward, state: start });
+        let forwards = rows.end.saturating_sub(backward);
+        let backwards = backward.saturating_sub(rows.start);
+        for (direction, count) in [(Direction::Forward, forwards), (Direction::Backward, backwards)] {
+            state.copy_from_slice(start);
+            direction.turn::<D>(state);
+            let (mut done, mut ready) = (0, direction == Direction::Forward);
+            while done < count {
+                let windows = done..count.min((done / TILE + 1) * TILE);
+                let places = direction.places(&windows);
+                let sweep = Sweep::<D, RESIDUAL> {
+                    projection,
+                    finish,
+                    strips,
+                    references,
+                    state,
+                    states,
+                    tile,
+                    direction,
+                    windows,
+                    ready,
+                };
+                let lost;
+                (done, lost) = dispatch(instructions, sweep);
+                ready = lost != 0;
+                if ready {
+                    // The next window of some lanes is projected afresh.
+                    let mut fresh = state.clone();
+                    let row = direction.row(backward, done);
+                    dispatch(instructions, Start { projection, strips, references, row, state: &mut fresh });
+                    direction.turn::<D>(&mut fresh);
+                    replace(state, &fresh, lost, instructions.lanes());
+                } else {
+                    let first = direction.lowest_row(backward, done);
+                    let offset = self.base + first.cast_signed();
+                    let write = Write {
+                        tile,
+                        fixed_order: finish.fixed_order(RESIDUAL),
+                        places,
+                        offset,
+                        block: projection.block(),
+                        windows: self.windows.clone(),
+                        before: self.engine.before_centre(),
+                        estimates,
+                    };
+                    dispatch(instructions, write);
+                }
+            }
+        }
+    }
+
+    /// Takes a reference for each lane: the sample at the centre of its start, or the nearest to it that is a number.
+    fn take_references(&self, stretch: &Stretch, references: &mut [f64; MOST_LANES]) {
+        let projection = &self.engine.projection;
+        let half = projection.length() / 2;
+        let centre = self.base + (projection.backward() + half).cast_signed();
+        for (lane, reference) in references[..self.engine.instructions.lanes()].iter_mut().enumerate() {
+            *reference = stretch.nearest_usable(centre + (lane * projection.block()).cast_signed(), half);
+        }
+    }
+
+    /// The rows of windows that any lane needs.
+    fn rows(&self) -> Range<usize> {
+        let block = self.engine.block();
+        let row = |window: usize| (window.cast_signed() - self.base).unsigned_abs();
+        let (first, end) = (row(self.windows.start), row(self.windows.end));
+        if end <= block { first..end } else { 0..block }
+    }
+
+    /// Makes the windows that hold a sample that cannot be used NaN.
+    fn invalidate(&self, unusable: &[usize], estimates: &mut Estimates<'_>) {
+        let (before, length) = (self.engine.before_centre(), self.engine.projection.length());
+        let mut from = self.windows.start;
+        for &sample in unusable {
+            let first = (sample + 1).saturating_sub(length).max(from);
+            let end = (sample + 1).min(self.windows.end);
+            if first < end {
+                let elements = estimates.elements.of(first + before..end + before);
+                for derivative in &mut estimates.derivatives {
+                    fill(derivative, &elements, f64::NAN);
+                }
+                fill(estimates.order, &elements, 0);
+                fill(estimates.sigma, &elements, f64::NAN);
+                fill(estimates.status, &elements, Status::INVALID.bits());
+                from = end;
+            }
+        }
+    }
+}
