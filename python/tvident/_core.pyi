@@ -1,0 +1,107 @@
+from collections.abc import Callable
+from typing import final
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = [
+    "LocalPolynomials",
+    "Motions",
+    "available_instructions",
+    "force_instructions",
+    "identify_constant",
+    "identify_windowed",
+    "instructions",
+    "rolling_least_squares",
+    "status_flags",
+]
+
+@final
+class LocalPolynomials:
+    def __new__(
+        cls,
+        window_length: int,
+        order: int | None,
+        max_order: int,
+        criterion: str,
+        derivatives: list[int],
+        delta: float,
+        noise: bool,
+    ) -> LocalPolynomials: ...
+    @property
+    def orders(self) -> int: ...
+    def estimate(
+        self,
+        samples: npt.NDArray[np.number],
+        *,
+        ends: bool = True,
+        step: int = 1,
+        workers: int | None = None,
+        progress: Callable[[int, int], object] | None = None,
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint8], npt.NDArray[np.uint16], npt.NDArray[np.float64]]: ...
+    def scores(self, samples: npt.NDArray[np.number], sample: int) -> npt.NDArray[np.float64]: ...
+    def gains(self) -> npt.NDArray[np.float64]: ...
+    def end_errors(self, samples: npt.NDArray[np.number], last: bool) -> npt.NDArray[np.float64]: ...
+
+@final
+class Motions:
+    def __new__(
+        cls,
+        angle: npt.NDArray[np.number],
+        torque: npt.NDArray[np.number],
+        coefficients: list[npt.NDArray[np.number] | float | None],
+        terms: list[npt.NDArray[np.number] | str],
+    ) -> Motions: ...
+
+def identify_windowed(
+    plan: LocalPolynomials,
+    motions: Motions,
+    equations: int,
+    pairs: list[tuple[int, int]],
+    *,
+    step: int = 1,
+    workers: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> tuple[
+    npt.NDArray[np.float64],
+    npt.NDArray[np.float64],
+    npt.NDArray[np.float64],
+    npt.NDArray[np.float64],
+    npt.NDArray[np.float64],
+    npt.NDArray[np.uint16],
+    npt.NDArray[np.uint8],
+]: ...
+def identify_constant(
+    plan: LocalPolynomials,
+    motions: Motions,
+    *,
+    step: int = 1,
+    workers: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> tuple[
+    npt.NDArray[np.float64],
+    npt.NDArray[np.float64],
+    npt.NDArray[np.float64],
+    npt.NDArray[np.float64],
+    npt.NDArray[np.uint16],
+    npt.NDArray[np.uint8],
+]: ...
+def rolling_least_squares(
+    regressors: npt.NDArray[np.number],
+    sides: npt.NDArray[np.number],
+    window: int,
+    *,
+    step: int = 1,
+    workers: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> tuple[
+    npt.NDArray[np.float64],
+    npt.NDArray[np.float64],
+    npt.NDArray[np.float64],
+    npt.NDArray[np.float64],
+    npt.NDArray[np.uint16],
+]: ...
+def status_flags() -> list[tuple[str, int]]: ...
+def available_instructions() -> list[str]: ...
+def instructions() -> str: ...
+def force_instructions(name: str | None) -> None: ...

@@ -1,0 +1,389 @@
+"""The command ``tvident``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+import click
+import numpy as np
+import numpy.typing as npt
+
+import tvident
+from tvident import recordings, table
+from tvident.arguments import NanPolicy
+from tvident.derivatives import Criterion
+from tvident.identification import Preset
+from tvident.rig import Excitation, Pattern
+from tvident.status import describe
+
+Decorated = TypeVar("Decorated", bound=Callable[..., Any])
+
+
+class _Command(click.Group):
+    """Turns what the library and files raise into one line and an exit status."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except recordings.FileError as error:
+            raise click.ClickException(str(error)) from None
+        except KeyError as error:
+            raise click.UsageError(str(error.args[0])) from None
+        except (ValueError, TypeError, ImportError) as error:
+            raise click.UsageError(str(error)) from None
+        except OSError as error:
+            raise click.ClickException(f"{error.filename or 'the output'}: {error.strerror}") from None
+
+
+@click.group(cls=_Command, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(package_name="tvident", message="%(version)s")
+def main() -> None:
+    """Identify inertia, damping and stiffness that change while they are measured; differentiate noisy recordings.
+
+    Files may be text columns (CSV), NPY, NPZ or MATLAB. Channels are called by name, or by number from 0. Results go to files or standard
+    output, messages and progress to standard error.
+    """
+
+
+def _options(*options: Callable[[Decorated], Decorated]) -> Callable[[Decorated], Decorated]:
+    def decorate(function: Decorated) -> Decorated:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return decorate
+
+
+_TIME = _options(
+    click.option("--sample-rate", type=float, help="Samples per second."),
+    click.option("--delta", type=float, help="Sample period in seconds."),
+    click.option("--time", "time_channel", metavar="NAME", help="Channel that holds the time in seconds."),
+)
+_RUN = _options(
+    click.option("--step", type=int, default=1, show_default=True, help="Every how many samples a result is wanted."),
+    click.option(
+        "--nan-policy",
+        type=click.Choice(get_args(NanPolicy)),
+        default="propagate",
+        show_default=True,
+        help="Missing values.",
+    ),
+    click.option("--workers", type=int, help="Threads; by default all processors."),
+    click.option("--progress/--no-progress", default=None, help="Show progress; by default on a terminal."),
+    click.option(
+        "-o", "--output", type=click.Path(dir_okay=False), help="CSV or NPZ file for the results, or - for CSV here."
+    ),
+    click.option("--plot", type=click.Path(dir_okay=False), help="Picture of the results: PNG, PDF or SVG."),
+)
+_CRITERION = click.option("--criterion", type=click.Choice(get_args(Criterion)), help="What chooses the order.")
+
+
+@main.command()
+@click.option("--folder", type=click.Path(file_okay=False, path_type=Path), default="tvident-demo", show_default=True)
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the simulated recording.")
+def demo(folder: Path, seed: int) -> None:
+    """Identify a simulated recording, compare with the truth and draw the paper's figures."""
+    figures = _figures()
+    recording = tvident.simulate_torsional_rig(seed=seed)
+    result = tvident.identify(recording.angle, recording.torque, sample_rate=recording.sample_rate)
+    valid = np.isfinite(result.stiffness)
+    rows = [("parameter", "unit", "true (median)", "identified (median)", "error of the median", "rms error")]
+    units = {"inertia": "kg m^2", "damping": "N m s/rad", "stiffness": "N m/rad"}
+    for name, unit in units.items():
+        true, found = getattr(recording, name)[valid], getattr(result, name)[valid]
+        middle, median = float(np.median(true)), float(np.median(found))
+        scatter = float(np.sqrt(np.mean((found - true) ** 2)) / np.mean(true))
+        rows.append((name, unit, f"{middle:.5g}", f"{median:.5g}", f"{median / middle - 1:+.2%}", f"{scatter:.2%}"))
+    click.echo(
+        f"Simulated rig: {recording.time.size} samples at {recording.sample_rate:g} Hz, a slider changes the stiffness."
+    )
+    click.echo("\n".join(["", *table.aligned(rows), "", *describe(result.status), ""]))
+
+    folder.mkdir(parents=True, exist_ok=True)
+    middle_sample = recording.time.size // 2
+    noise = 0.05 * recording.angle.std() * np.random.default_rng(seed + 1).standard_normal(recording.angle.size)
+    window: dict[str, Any] = {"sample_rate": recording.sample_rate}
+    pictures = {
+        "recording.png": figures.plot_recording(recording),
+        "window.png": figures.plot_window(recording.angle, middle_sample, **window),
+        "window-with-noise.png": figures.plot_window(recording.angle + noise, middle_sample, **window),
+        "parameters.png": figures.plot_identification(result, recording),
+    }
+    for name, picture in pictures.items():
+        _save_figure(picture, folder / name)
+    recording.save(folder / "recording.csv")
+    result.save(folder / "result.csv")
+    click.echo(f"Written to {folder}: {', '.join([*pictures, 'recording.csv', 'result.csv'])}")
+
+
+@main.command()
+@click.argument("output", type=click.Path(dir_okay=False))
+@click.option("--duration", type=float, default=20.0, show_default=True, help="Seconds.")
+@click.option("--sample-rate", type=float, default=1000.0, show_default=True, help="Samples per second.")
+@click.option("--seed", type=int, default=0, show_default=True, help="The same seed gives the same recording.")
+@click.option(
+    "--pattern", type=click.Choice(get_args(Pattern)), default="slider", show_default=True, help="How stiffness moves."
+)
+@click.option(
+    "--excitation", type=click.Choice(get_args(Excitation)), default="multisine", show_default=True, help="Torque."
+)
+@click.option("--torque-snr-db", type=float, default=20.0, show_default=True, help="Torque over its noise, dB.")
+@click.option(
+    "--angle-noise", type=float, default=1e-4, show_default=True, help="Noise over the angle's standard deviation."
+)
+@click.option("--encoder-counts", type=int, help="Counts a turn, instead of noise.")
+def simulate(output: str, **options: Any) -> None:
+    """Write a simulated recording of the paper's rig, with its truth, to OUTPUT (CSV or NPZ)."""
+    table.check_ending(Path(output))
+    recording = tvident.simulate_torsional_rig(**options)
+    recording.save(output)
+    click.echo(f"{recording.time.size} samples written to {output}", err=True)
+
+
+@main.command()
+@click.argument("file", type=click.Path())
+def info(file: str) -> None:
+    """List the channels of FILE: how many samples, their range, and what is missing."""
+    channels = recordings.read(file)
+    rows: list[tuple[str, ...]] = [
+        ("channel", "type", "samples", "mean", "std", "least", "greatest", "missing", "remark")
+    ]
+    for name, values in channels.items():
+        finite = values[np.isfinite(values)] if values.dtype.kind == "f" else values
+        numbers = (finite.mean(), finite.std(), finite.min(), finite.max()) if finite.size else (np.nan,) * 4
+        shown = [f"{float(number):.5g}" for number in numbers]
+        rows.append(
+            (name, str(values.dtype), str(values.size), *shown, str(values.size - finite.size), _remark(values))
+        )
+    click.echo("\n".join(table.aligned(rows)))
+
+
+def _remark(values: npt.NDArray[Any]) -> str:
+    """Return what a channel looks like: uniform time, a single number, a constant."""
+    if values.ndim == 0:
+        return "a number"
+    steps = np.diff(values.astype(np.float64))
+    if steps.size and (steps > 0).all():
+        period = (values[-1] - values[0]) / steps.size
+        grid = values[0] + period * np.arange(values.size)
+        if np.abs(values - grid).max() <= 1e-3 * period:
+            return f"uniform: {1 / period:.6g} per unit"
+        return "increasing"
+    return "constant" if steps.size and not steps.any() else ""
+
+
+@main.command()
+@click.argument("file", type=click.Path())
+@click.option("--channel", required=True, metavar="NAME", help="Channel to differentiate.")
+@click.option("--window-length", default="201", show_default=True, help="Samples, odd, or a duration such as '0.2 s'.")
+@_TIME
+@click.option("--max-order", type=int, default=15, show_default=True, help="Highest candidate order.")
+@click.option("--order", type=int, help="Fixes the order.")
+@_CRITERION
+@click.option("--max-deriv", type=int, default=2, show_default=True, help="Highest derivative.")
+@_RUN
+def derivatives(
+    file: str,
+    channel: str,
+    window_length: str,
+    sample_rate: float | None,
+    delta: float | None,
+    time_channel: str | None,
+    output: str | None,
+    plot: str | None,
+    progress: bool | None,  # noqa: FBT001 - click passes options by name
+    **options: Any,
+) -> None:
+    """Differentiate a channel of FILE with a polynomial order chosen in every window."""
+    _check_output(output, plot)
+    channels = recordings.read(file)
+    samples = _channel(channels, channel, file)
+    times = None if time_channel is None else _channel(channels, time_channel, file)
+    fit = tvident.fit_local_polynomials(
+        samples,
+        _length(window_length),
+        delta=delta,
+        sample_rate=sample_rate,
+        t=times,
+        progress=_progress(progress),
+        **_given(options),
+    )
+    period = tvident.arguments.sample_period(samples.size, delta=delta, sample_rate=sample_rate, t=times)
+    start = 0.0 if times is None else float(times[0])
+    step = int(options["step"])
+    names = ["value", *(f"derivative_{d}" for d in range(1, fit.derivatives.shape[0]))]
+    columns: dict[str, npt.NDArray[Any]] = {"time": start + np.arange(0, samples.size, step) * period}
+    for name, values, errors in zip(names, fit.derivatives, fit.stderr, strict=True):
+        columns |= {name: values, f"{name}_stderr": errors}
+    columns |= {"sigma": fit.sigma, "order": fit.order, "status": fit.status}
+    counts = np.bincount(fit.order.ravel())
+    orders = ", ".join(f"{order}: {count / fit.order.size:.0%}" for order, count in enumerate(counts) if count)
+    words = [f"{samples.size} samples, windows of {window_length}; orders {orders}", "", *describe(fit.status)]
+    _give(columns, {"time": "s"}, "\n".join(words), output)
+    if plot is not None:
+        _save_figure(_figures().plot_derivatives(columns["time"], fit, channel), Path(plot))
+
+
+@main.command()
+@click.argument("file", type=click.Path(), required=False)
+@click.option("--angle", required=True, metavar="NAME", help="Channel of the angle, or a file that holds it alone.")
+@click.option("--torque", required=True, metavar="NAME", help="Channel of the torque, or a file that holds it alone.")
+@click.option("--angle-scale", metavar="SCALE", help="Number or variable to multiply the angle by.")
+@click.option("--torque-scale", metavar="SCALE", help="Number or variable to multiply the torque by.")
+@_TIME
+@click.option(
+    "--preset", type=click.Choice(get_args(Preset)), default="paper", show_default=True, help="What is not given."
+)
+@click.option("--window-length", metavar="LENGTH", help="Window of the polynomials: samples, odd, or '0.2 s'.")
+@click.option("--max-order", type=int, help="Highest candidate order.")
+@_CRITERION
+@click.option("--equations", metavar="LENGTH", help="Equations solved together: a number, or '0.2 s'.")
+@click.option("--inertia", metavar="KIND", help="windowed, constant, a known number, or a channel.")
+@click.option("--damping", metavar="KIND", help="The same for damping; 0 leaves it out.")
+@click.option("--stiffness", metavar="KIND", help="The same for stiffness.")
+@click.option(
+    "--term", "terms", multiple=True, metavar="TERM[:KIND]", help="offset, coulomb or cubic; may be repeated."
+)
+@_RUN
+def identify(
+    file: str | None,
+    angle: str,
+    torque: str,
+    angle_scale: str | None,
+    torque_scale: str | None,
+    time_channel: str | None,
+    inertia: str | None,
+    damping: str | None,
+    stiffness: str | None,
+    terms: tuple[str, ...],
+    window_length: str | None,
+    equations: str | None,
+    output: str | None,
+    plot: str | None,
+    progress: bool | None,  # noqa: FBT001 - click passes options by name
+    **options: Any,
+) -> None:
+    """Identify inertia, damping and stiffness from the angle and torque in FILE."""
+    _check_output(output, plot)
+    channels = {} if file is None else recordings.read(file)
+    known = {"inertia": inertia, "damping": damping, "stiffness": stiffness}
+    result = tvident.identify(
+        _scaled(_source(channels, angle, file), angle_scale, channels, file),
+        _scaled(_source(channels, torque, file), torque_scale, channels, file),
+        t=None if time_channel is None else _channel(channels, time_channel, file),
+        window_length=None if window_length is None else _length(window_length),
+        equations=None if equations is None else _length(equations),
+        terms=[_term(term) for term in terms],
+        progress=_progress(progress),
+        **{name: _parameter(value, channels, file) for name, value in known.items() if value is not None},
+        **_given(options),
+    )
+    words = [result.summary()]
+    for name, (value, error) in result.constants.items():
+        words.append(f"{name} = {value:.8g} ± {error:.2g} {tvident.result.UNITS.get(name, '')}".rstrip())
+    _give(result.columns(), tvident.result.UNITS, "\n".join(words), output)
+    if plot is not None:
+        _save_figure(result.plot(), Path(plot))
+
+
+def _channel(channels: recordings.Channels, name: str, file: str | None) -> npt.NDArray[Any]:
+    """Return a channel that holds one value a sample."""
+    values = recordings.channel(channels, name, file or "the command line")
+    if values.ndim != 1:
+        raise click.UsageError(f"channel {name!r} must hold one value for every sample; it is a single number")
+    return values
+
+
+def _source(channels: recordings.Channels, name: str, file: str | None) -> npt.NDArray[Any]:
+    """Return a channel by name, or the only channel of a file of that name."""
+    if file is not None and not Path(name).is_file():
+        return _channel(channels, name, file)
+    if file is None and Path(name).suffix == "":
+        raise click.UsageError(f"channel {name!r} needs a FILE to be in; name the file first")
+    alone = recordings.read(name)
+    if len(alone) != 1:
+        raise click.UsageError(
+            f"{name} must hold one channel; it has {', '.join(alone)}; give it as FILE and name the channel"
+        )
+    return _channel(alone, next(iter(alone)), name)
+
+
+def _scaled(
+    values: npt.NDArray[Any], scale: str | None, channels: recordings.Channels, file: str | None
+) -> npt.NDArray[Any]:
+    """Multiply by a number, or by a variable of the file."""
+    if scale is None:
+        return values
+    try:
+        factor: Any = float(scale)
+    except ValueError:
+        factor = recordings.channel(channels, scale, file or "the command line")
+    return np.asarray(values * factor)
+
+
+def _parameter(value: str, channels: recordings.Channels, file: str | None) -> Any:
+    """Return a kind, a number, or a channel."""
+    if value in {"windowed", "constant"}:
+        return value
+    try:
+        return float(value)
+    except ValueError:
+        return recordings.channel(channels, value, file or "the command line")
+
+
+def _term(text: str) -> Any:
+    """Return a term from ``name`` or ``name:kind``."""
+    name, _, kind = text.partition(":")
+    return (name, kind) if kind else name
+
+
+def _length(text: str) -> int | str:
+    """Return a number of samples, or a duration as it is."""
+    return int(text) if text.strip().lstrip("+-").isdigit() else text
+
+
+def _given(options: dict[str, Any]) -> dict[str, Any]:
+    """Return the options that were given."""
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def _progress(wanted: bool | None) -> bool:  # noqa: FBT001 - an option's value
+    """Return whether to show progress: on a terminal, unless told otherwise."""
+    return sys.stderr.isatty() if wanted is None else wanted
+
+
+def _check_output(output: str | None, plot: str | None) -> None:
+    """Refuse what cannot be written before any work is done."""
+    if output is not None and output != "-":
+        table.check_ending(Path(output))
+    if plot is not None:
+        _figures()
+        if Path(plot).suffix.lower() not in {".png", ".pdf", ".svg"}:
+            raise click.UsageError(f"--plot must end in .png, .pdf or .svg; got {plot!r}; rename it")
+
+
+def _give(columns: dict[str, npt.NDArray[Any]], units: dict[str, str], words: str, output: str | None) -> None:
+    """Write results to a file and words to standard output, or results to standard output and words to standard error."""
+    if output == "-":
+        table.write_csv(sys.stdout.buffer, columns, units)
+    elif output is not None:
+        table.write(output, columns, units)
+    click.echo(words, err=output == "-")
+
+
+def _figures() -> Any:
+    """Return the module of figures, set up to draw without a screen."""
+    from tvident import figures  # noqa: PLC0415 - matplotlib is optional
+
+    import_module("matplotlib.pyplot").switch_backend("agg")
+    return figures
+
+
+def _save_figure(figure: Any, path: Path) -> None:
+    """Write a picture, which appears whole or not at all."""
+    with table.replaced(path) as file:
+        figure.savefig(file, format=path.suffix.lower().lstrip("."))

@@ -1,0 +1,257 @@
+"""Derivatives of noisy samples: local polynomials of an order chosen in every window."""
+
+from __future__ import annotations
+
+from functools import cached_property, lru_cache
+from typing import Any, Literal, TypeAlias, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _core, arguments
+from tvident.progress import reporter
+
+Criterion: TypeAlias = Literal["aicc", "aicc-textbook", "aic", "bic"]
+
+HIGHEST_ORDER = 15
+"""No polynomial order above this is offered."""
+
+_SHORTEST_WINDOW = 5
+
+
+@lru_cache(maxsize=8)
+def _plan(
+    window_length: int,
+    order: int | None,
+    max_order: int,
+    criterion: str,
+    derivatives: tuple[int, ...],
+    delta: float,
+    noise: bool,  # noqa: FBT001 - the key of the cache
+    instructions: str,  # noqa: ARG001 - likewise: a plan is made for the instructions in force
+) -> _core.LocalPolynomials:
+    return _core.LocalPolynomials(window_length, order, max_order, criterion, list(derivatives), delta, noise)
+
+
+def plan(
+    window_length: int,
+    *,
+    order: int | None,
+    max_order: int = HIGHEST_ORDER,
+    criterion: str = "aicc",
+    derivatives: tuple[int, ...],
+    delta: float,
+    noise: bool,
+) -> _core.LocalPolynomials:
+    """Return the tables for windows of one length, made once and kept for the next call."""
+    return _plan(window_length, order, max_order, criterion, derivatives, delta, noise, _core.instructions())
+
+
+class LocalPolynomialFit:
+    r"""What :func:`fit_local_polynomials` found.
+
+    Attributes
+    ----------
+    derivatives : ndarray of float64, shape (max_deriv + 1, \*y.shape)
+        Value, first, second, … derivative, in the unit of ``y`` per second to the power of the derivative.
+    order : ndarray of uint8, shape y.shape
+        Order chosen in the window around each sample. Near the ends each derivative may take a lower one (see Notes of
+        :func:`fit_local_polynomials`).
+    sigma : ndarray of float64, shape y.shape
+        Standard deviation of the noise in each window, in the unit of ``y``: the root of RSS/(M - n - 1).
+    status : ndarray of uint16, shape y.shape
+        Flags of :class:`tvident.Status`, 0 where all is well.
+    """
+
+    def __init__(
+        self,
+        samples: npt.NDArray[Any],
+        core_plan: _core.LocalPolynomials,
+        window_length: int,
+        axis: int,
+        step: int,
+        outputs: tuple[npt.NDArray[np.float64], npt.NDArray[np.uint8], npt.NDArray[np.uint16], npt.NDArray[np.float64]],
+    ) -> None:
+        self._samples = samples
+        self._plan = core_plan
+        self._window_length = window_length
+        self._axis = axis % samples.ndim
+        self._step = step
+        derivatives, order, status, sigma = outputs
+        self.derivatives: npt.NDArray[np.float64] = self._in_place(derivatives)
+        self.order: npt.NDArray[np.uint8] = self._in_place(order)
+        self.status: npt.NDArray[np.uint16] = self._in_place(status)
+        self.sigma: npt.NDArray[np.float64] = self._in_place(sigma)
+
+    def _in_place(self, array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Put the axis of the samples, last so far, where the user has it."""
+        return np.moveaxis(array, -1, self._axis - self._samples.ndim)
+
+    @cached_property
+    def stderr(self) -> npt.NDArray[np.float64]:
+        """Standard errors, in the shape and units of ``derivatives``; computed when first asked for.
+
+        They are ``sigma`` times the gain of the filter of the chosen order; that the order was chosen by the same samples, and what
+        the polynomial could not follow, is not in them.
+        """
+        order = np.moveaxis(self.order, self._axis, -1)
+        sigma = np.moveaxis(self.sigma, self._axis, -1)
+        errors = self._plan.gains()[:, order] * sigma
+        samples, half = self._samples.shape[-1], self._window_length // 2
+        for last in (False, True):
+            places = np.arange(samples - half, samples) if last else np.arange(half)
+            kept = places[places % self._step == 0]
+            for index in np.ndindex(self._samples.shape[:-1]):
+                at_end = self._plan.end_errors(self._samples[index], last)
+                errors[(slice(None), *index, kept // self._step)] = at_end[:, kept - places[0]]
+        return self._in_place(errors)
+
+    def scores(self, i: int) -> npt.NDArray[np.float64]:
+        r"""Return the criterion of every candidate order in the window around sample ``i``: equation (8) of the paper.
+
+        Parameters
+        ----------
+        i : int
+            Sample number along the axis of time; negative numbers count from the end. Near an end this is the first or last full
+            window.
+
+        Returns
+        -------
+        ndarray of float64, shape (orders, \*y.shape without the axis)
+            Infinite for orders that are no candidates; NaN where the window holds a value that is no number.
+
+        Raises
+        ------
+        IndexError
+            If there is no such sample.
+        """
+        samples = self._samples.shape[-1]
+        place = arguments.whole_number("i", i)
+        if not -samples <= place < samples:
+            raise IndexError(f"i must be a sample number below {samples}; got {place}; count from 0")
+        leading = self._samples.shape[:-1]
+        scores = np.empty((self._plan.orders, *leading))
+        for index in np.ndindex(leading):
+            scores[(slice(None), *index)] = self._plan.scores(self._samples[index], place % samples)
+        return scores
+
+    def __repr__(self) -> str:
+        orders = f"orders {self.order.min()}…{self.order.max()}" if self.order.size else "no samples"
+        return f"<LocalPolynomialFit of {self._samples.shape[-1]} samples, windows of {self._window_length}, {orders}>"
+
+
+def fit_local_polynomials(
+    y: npt.ArrayLike,
+    window_length: int | str,
+    *,
+    delta: float | None = None,
+    sample_rate: float | None = None,
+    t: npt.ArrayLike | None = None,
+    max_order: int = HIGHEST_ORDER,
+    order: int | None = None,
+    criterion: Criterion = "aicc",
+    max_deriv: int = 2,
+    axis: int = -1,
+    step: int = 1,
+    nan_policy: arguments.NanPolicy = "propagate",
+    workers: int | None = None,
+    progress: arguments.Progress = None,
+) -> LocalPolynomialFit:
+    r"""Differentiate noisy samples with a polynomial order chosen in every window.
+
+    Around every sample :math:`t_i` a polynomial :math:`\sum_{j \le n} \alpha_j (t - t_i)^j` is fitted to the window of ``M`` samples by
+    least squares (equation (2) of the paper) for every order ``n``, and the order that minimises Akaike's criterion
+
+    .. math:: AICc_n = M \ln σ_n^2 + 2K + \frac{2K(K+1)}{M-K-1}, \quad K = n + 1, \quad σ_n^2 = RSS_n / (M - 1)
+
+    (equations (8) and (9)) gives the value and its derivatives.
+
+    Parameters
+    ----------
+    y : array_like
+        Samples: real numbers of any type, any shape.
+    window_length : int or str
+        Samples in a window, ``M = 2N + 1``: odd, at least 5; or a duration such as ``"0.2 s"``.
+    delta : float, optional
+        Sample period in seconds, 1 by default. Give at most one of `delta`, `sample_rate` and `t`.
+    sample_rate : float, optional
+        Samples per second.
+    t : array_like, optional
+        Time of every sample in seconds, uniform within rounding.
+    max_order : int, optional
+        Highest candidate order, at most 15. Orders that a short window cannot judge are left out.
+    order : int, optional
+        Fixes the order: the classic Savitzky–Golay filter, with noise and errors.
+    criterion : {"aicc", "aicc-textbook", "aic", "bic"}, optional
+        What is minimised. ``"aicc"`` counts parameters as the paper does; ``"aicc-textbook"`` counts the noise variance too.
+    max_deriv : int, optional
+        Highest derivative wanted.
+    axis : int, optional
+        Axis of time.
+    step : int, optional
+        Every how many samples an estimate is wanted: the same numbers as ``[::step]`` of all of them.
+    nan_policy : {"propagate", "raise"}, optional
+        Windows that hold a value that is not a finite number are NaN, and no others; or raise.
+    workers : int, optional
+        Threads; by default ``TVIDENT_WORKERS`` or all processors that this process may use. The numbers do not depend on it.
+    progress : bool or callable, optional
+        Show a bar, or call a function with the samples done and all of them. What it raises cancels the work.
+
+    Returns
+    -------
+    LocalPolynomialFit
+        ``derivatives``, ``order``, ``sigma``, ``status``, ``stderr`` and ``scores(i)``.
+
+    Raises
+    ------
+    ValueError
+        If the window is even, shorter than 5 samples or longer than the record, if an order is too high, if `t` is not uniform, or
+        if a name is unknown.
+    TypeError
+        If `y` is complex or holds no numbers, or a number is not whole.
+
+    Notes
+    -----
+    The first and last ``N`` samples are evaluated off the centre of the first and last full window, where noise is amplified more. Each
+    derivative takes there the order with the least estimated squared bias plus variance, at most ``order``; the status says EDGE.
+
+    The cost is some 15 ns a sample and thread at any window length on a processor with AVX-512, about twice that with AVX2.
+
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: identification of a time-varying mechanical system using the Akaike information criterion.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tvident
+    >>> t = np.arange(2000) / 1000
+    >>> y = np.sin(2 * np.pi * 3 * t) + 1e-3 * np.random.default_rng(0).standard_normal(t.size)
+    >>> fit = tvident.fit_local_polynomials(y, 201, sample_rate=1000)
+    >>> fit.derivatives.shape
+    (3, 2000)
+    >>> error = fit.derivatives[2] + (2 * np.pi * 3) ** 2 * np.sin(2 * np.pi * 3 * t)
+    >>> bool(np.sqrt(np.mean(error[100:-100] ** 2)) < 0.01 * (2 * np.pi * 3) ** 2)
+    True
+    """
+    array = arguments.real_array("y", y)
+    samples = arguments.along_axis("y", array, axis)
+    count = samples.shape[-1]
+    period = arguments.sample_period(count, delta=delta, sample_rate=sample_rate, t=t)
+    length = arguments.window_length("window_length", window_length, period, odd=True)
+    arguments.check_window("window_length", length, count, least=_SHORTEST_WINDOW)
+    arguments.one_of("criterion", criterion, get_args(Criterion))
+    arguments.check_nan("y", array, nan_policy)
+    core_plan = plan(
+        length,
+        order=None if order is None else arguments.whole_number("order", order, least=0),
+        max_order=arguments.whole_number("max_order", max_order, least=0),
+        criterion=criterion,
+        derivatives=tuple(range(arguments.whole_number("max_deriv", max_deriv, least=0) + 1)),
+        delta=period,
+        noise=True,
+    )
+    every = arguments.whole_number("step", step, least=1)
+    with reporter(progress, "local polynomials") as report:
+        outputs = core_plan.estimate(samples, step=every, workers=arguments.worker_count(workers), progress=report)
+    return LocalPolynomialFit(samples, core_plan, length, axis, every, outputs)

@@ -1,0 +1,246 @@
+"""The paper's figures, and those of results. Needs matplotlib: install ``tvident[plot]``."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident.derivatives import LocalPolynomialFit, fit_local_polynomials
+from tvident.result import UNITS, Identification
+from tvident.rig import Recording
+
+try:
+    import matplotlib as mpl
+    from matplotlib import pyplot as plt
+    from matplotlib.ticker import MaxNLocator
+except ImportError as error:  # pragma: no cover - the extra is installed where tests run
+    raise ImportError(
+        "plots need matplotlib, which is not installed; install it with: pip install 'tvident[plot]'"
+    ) from error
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+INK, FAINT, FOUND, TRUTH, ACCENT = "#22303c", "#c9d1d8", "#1f6fb2", "#e2711d", "#2a9d6f"
+"""Colours: text and frames, recorded samples, what was found, what is true, what was chosen."""
+
+_STYLE: Any = {
+    "figure.dpi": 110,
+    "savefig.dpi": 160,
+    "font.size": 9.5,
+    "axes.titlesize": 10.5,
+    "axes.titlelocation": "left",
+    "axes.titleweight": "bold",
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.8,
+    "axes.grid": True,
+    "grid.color": "#e8ecef",
+    "grid.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "lines.linewidth": 1.3,
+    "legend.frameon": False,
+}
+
+_SYMBOLS = {"inertia": "Inertia $I$", "damping": "Damping $C$", "stiffness": "Stiffness $K$"}
+
+
+@contextmanager
+def _style() -> Iterator[None]:
+    with mpl.rc_context(_STYLE):
+        yield
+
+
+def _unit(name: str) -> str:
+    """Return a unit as it is printed."""
+    return UNITS.get(name, "").replace("^2", "²").replace("^3", "³").replace(" ", "·")
+
+
+def plot_recording(recording: Recording) -> Figure:
+    """Draw slider position, torque and angle over time: figure 2 of the paper.
+
+    Parameters
+    ----------
+    recording : Recording
+        From :func:`tvident.simulate_torsional_rig`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    with _style():
+        figure, axes = plt.subplots(3, 1, sharex=True, figsize=(8, 5.4), layout="constrained")
+        channels = (
+            ("Slider position", recording.slider_position, "m", ACCENT),
+            ("Torque", recording.torque, "N·m", INK),
+            ("Angle", recording.angle, "rad", FOUND),
+        )
+        for ax, (title, values, unit, colour) in zip(axes, channels, strict=True):
+            ax.plot(recording.time, values, color=colour, linewidth=0.9)
+            ax.set_title(title)
+            ax.set_ylabel(unit)
+            ax.margins(x=0)
+        axes[-1].set_xlabel("time (s)")
+        return figure
+
+
+def plot_window(
+    y: npt.ArrayLike, i: int, window_length: int = 201, *, sample_rate: float = 1.0, max_order: int = 15
+) -> Figure:
+    """Draw a window with the polynomial chosen for it and the criterion over the order: figures 4 and 5 of the paper.
+
+    Parameters
+    ----------
+    y : array_like, shape (n,)
+        Samples.
+    i : int
+        Sample at the window's centre.
+    window_length : int, optional
+        Samples in the window, odd.
+    sample_rate : float, optional
+        Samples per second.
+    max_order : int, optional
+        Highest candidate order.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    samples = np.asarray(y, dtype=np.float64)
+    half = window_length // 2
+    centre = int(np.clip(i, half, samples.size - 1 - half))
+    window = samples[centre - half : centre + half + 1]
+    fit = fit_local_polynomials(window, window_length, sample_rate=sample_rate, max_order=max_order)
+    with _style():
+        figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
+        _draw_window(left, fit, window, centre, sample_rate)
+        _draw_scores(right, fit.scores(half))
+        return figure
+
+
+def _draw_window(ax: Axes, fit: LocalPolynomialFit, window: npt.NDArray[Any], centre: int, sample_rate: float) -> None:
+    half = window.size // 2
+    order = int(fit.order[half])
+    time = (centre + np.arange(-half, half + 1)) / sample_rate
+    polynomial = fit_local_polynomials(window, window.size, sample_rate=sample_rate, order=order, max_deriv=0)
+    ax.plot(time, window, ".", color=FAINT, markersize=4, label="samples")
+    ax.plot(time, polynomial.derivatives[0], color=FOUND, label=f"polynomial of order {order}")
+    ax.plot(time[half], polynomial.derivatives[0, half], "o", color=ACCENT, markersize=5)
+    ax.set_title(f"Window of {window.size} samples")
+    ax.set_xlabel("time (s)")
+    ax.set_ylabel("angle (rad)")
+    ax.legend(loc="best")
+
+
+def _draw_scores(ax: Axes, scores: npt.NDArray[np.float64]) -> None:
+    candidates = np.isfinite(scores)
+    orders = np.arange(scores.size)
+    best = int(np.where(candidates, scores, np.inf).argmin())
+    ax.plot(orders[candidates], scores[candidates], "-o", color=INK, markersize=3.5, linewidth=1)
+    ax.plot(best, scores[best], "o", color=ACCENT, markersize=8)
+    ax.annotate(
+        f"n = {best}", (best, scores[best]), xytext=(0, 10), textcoords="offset points", ha="center", color=ACCENT
+    )
+    ax.set_title("Akaike's criterion by order")
+    ax.set_xlabel("order n")
+    ax.set_ylabel("AICc")
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.margins(y=0.15)
+
+
+def plot_derivatives(time: npt.NDArray[np.float64], fit: LocalPolynomialFit, name: str = "y") -> Figure:
+    """Draw a channel and its derivatives over time, with bands of two standard errors, and the order chosen.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Seconds.
+    fit : LocalPolynomialFit
+        Of a single record.
+    name : str, optional
+        What the channel is called.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    count = fit.derivatives.shape[0]
+    with _style():
+        figure = plt.figure(figsize=(8, 1.4 + 1.6 * count), layout="constrained")
+        axes = figure.subplots(count + 1, 1, sharex=True)
+        for d, ax in enumerate(axes[:-1]):
+            _draw_parameter(ax, time, fit.derivatives[d], fit.stderr[d])
+            ax.set_title(name if d == 0 else f"{name}: derivative {d}")
+        axes[-1].plot(time, fit.order, ".", color=INK, markersize=1.5)
+        axes[-1].set_title("Order")
+        axes[-1].yaxis.set_major_locator(MaxNLocator(integer=True))
+        axes[-1].set_xlabel("time (s)")
+        return figure
+
+
+def plot_identification(result: Identification, truth: Recording | None = None) -> Figure:
+    """Draw inertia, damping and stiffness over time, with bands of two standard errors: figure 6 of the paper.
+
+    Parameters
+    ----------
+    result : Identification
+        Of a single record.
+    truth : Recording, optional
+        A simulated recording: its true values are drawn too.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    ValueError
+        If the result holds several records.
+    """
+    if result.inertia.ndim != 1:
+        raise ValueError(
+            f"only a single record can be drawn; this one has shape {result.inertia.shape}; take one record"
+        )
+    extra = list(result.terms)
+    shown = [name for name in _SYMBOLS if result.settings["kinds"][name] != "known"] + extra
+    with _style():
+        figure, axes = plt.subplots(
+            len(shown), 1, sharex=True, squeeze=False, figsize=(8, 1.4 + 1.7 * len(shown)), layout="constrained"
+        )
+        for ax, name in zip(axes[:, 0], shown, strict=True):
+            values = result.terms[name] if name in result.terms else getattr(result, name)
+            _draw_parameter(ax, result.time, values, result.stderr[name])
+            if truth is not None and hasattr(truth, name):
+                ax.plot(truth.time, getattr(truth, name), "--", color=TRUTH, label="truth")
+            ax.set_title(_SYMBOLS.get(name, name.capitalize()))
+            ax.set_ylabel(_unit(name))
+        axes[0, 0].legend(loc="upper right", ncols=3)
+        axes[-1, 0].set_xlabel("time (s)")
+        return figure
+
+
+def _draw_parameter(
+    ax: Axes, time: npt.NDArray[np.float64], values: npt.NDArray[np.float64], errors: npt.NDArray[np.float64]
+) -> None:
+    # More points than a screen has columns only cost time.
+    every = max(1, time.size // 20_000)
+    time, values, errors = time[::every], values[::every], errors[::every]
+    ax.fill_between(time, values - 2 * errors, values + 2 * errors, color=FOUND, alpha=0.2, linewidth=0)
+    ax.plot(time, values, color=FOUND, label="identified")
+    finite = values[np.isfinite(values)]
+    if finite.size:
+        low, high = np.percentile(finite, [1, 99])
+        room = 0.35 * (high - low) or 0.1 * abs(high) or 1.0
+        ax.set_ylim(low - room, high + room)
+    ax.margins(x=0)

@@ -1,0 +1,233 @@
+"""What an identification found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import table
+from tvident.status import Status, describe
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = npt.NDArray[np.float64]
+
+UNITS = {
+    "time": "s",
+    "inertia": "kg m^2",
+    "damping": "N m s/rad",
+    "stiffness": "N m/rad",
+    "natural_frequency": "Hz",
+    "damping_ratio": "1",
+    "offset": "N m",
+    "coulomb": "N m",
+    "cubic": "N m/rad^3",
+    "condition": "1",
+    "residual_std": "N m",
+}
+"""Units of results for an angle in rad and a torque in N m."""
+
+
+class StandardErrors(Mapping[str, Array]):
+    """Standard errors by name; those that need work are computed when asked for."""
+
+    def __init__(self, known: dict[str, Array], computed: dict[str, Callable[[], Array]]) -> None:
+        self._known = known
+        self._computed = computed
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self._known and name in self._computed:
+            self._known[name] = self._computed[name]()
+        return self._known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(dict.fromkeys([*self._known, *self._computed]))
+
+    def __len__(self) -> int:
+        return len(self._known | self._computed)
+
+    def __repr__(self) -> str:
+        return f"<StandardErrors of {', '.join(self)}>"
+
+
+class Identification:
+    r"""What :func:`tvident.identify` found. ``n`` is the number of samples, or of every ``step``-th of them.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+        Seconds.
+    inertia, damping, stiffness : ndarray of float64, shape (\*, n)
+        Identified, constant or known values. NaN only where the status has INVALID.
+    terms : dict of str to ndarray, shape (\*, n)
+        Factors of further terms.
+    constants : dict of str to (value, stderr)
+        Parameters that are constant over the record.
+    stderr : mapping of str to ndarray, shape (\*, n)
+        Standard errors of all of these, ``"natural_frequency"`` and ``"damping_ratio"``. They are those of ordinary least squares, which
+        takes the equations as independent; derivatives from overlapping windows are not, so they are too small.
+    condition : ndarray, shape (\*, n)
+        Condition number of the equations, their columns scaled to the same norm: how hard the parameters are to tell apart.
+    residual_std : ndarray, shape (\*, n)
+        Standard deviation of what is left of the torque.
+    order : ndarray of uint8, shape (\*, n)
+        Order of the polynomial around each sample.
+    status : ndarray of uint16, shape (\*, n)
+        Flags of :class:`tvident.Status`.
+    settings : dict
+        What was used.
+    """
+
+    def __init__(
+        self,
+        *,
+        time: Array,
+        values: dict[str, Array],
+        errors: dict[str, Array],
+        covariances: dict[frozenset[str], Array],
+        constants: dict[str, tuple[Any, Any]],
+        terms: list[str],
+        condition: Array,
+        residual_std: Array,
+        order: npt.NDArray[np.uint8],
+        status: npt.NDArray[np.uint16],
+        settings: dict[str, Any],
+    ) -> None:
+        self.time = time
+        self.inertia = values["inertia"]
+        self.damping = values["damping"]
+        self.stiffness = values["stiffness"]
+        self.terms = {name: values[name] for name in terms}
+        self.constants = constants
+        self.condition = condition
+        self.residual_std = residual_std
+        self.order = order
+        self.status = status
+        self.settings = settings
+        self._covariances = covariances
+        computed = {"natural_frequency": self._frequency_error, "damping_ratio": self._ratio_error}
+        self.stderr = StandardErrors(errors, computed)
+
+    @cached_property
+    def natural_frequency(self) -> Array:
+        """Undamped natural frequency √(K/I)/2π in Hz; NaN where K/I is negative."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(np.sqrt(self.stiffness / self.inertia) / (2 * np.pi))
+
+    @cached_property
+    def damping_ratio(self) -> Array:
+        """Damping ratio C/(2√(KI)); NaN where KI is negative."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(self.damping / (2 * np.sqrt(self.stiffness * self.inertia)))
+
+    def _frequency_error(self) -> Array:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            f = self.natural_frequency
+            return self._propagate({"inertia": -f / (2 * self.inertia), "stiffness": f / (2 * self.stiffness)})
+
+    def _ratio_error(self) -> Array:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            ratio = self.damping_ratio
+            gradient = {
+                "inertia": -ratio / (2 * self.inertia),
+                "damping": 1 / (2 * np.sqrt(self.stiffness * self.inertia)),
+                "stiffness": -ratio / (2 * self.stiffness),
+            }
+            return self._propagate(gradient)
+
+    def _propagate(self, gradient: dict[str, Array]) -> Array:
+        """Return the standard error of a function with the given gradient: the delta method."""
+        variance = sum((slope * self.stderr[name]) ** 2 for name, slope in gradient.items())
+        for pair, covariance in self._covariances.items():
+            if pair <= gradient.keys():
+                one, other = pair
+                variance = variance + 2 * gradient[one] * gradient[other] * covariance
+        return np.asarray(np.sqrt(variance))
+
+    def columns(self) -> dict[str, npt.NDArray[Any]]:
+        """Return everything that has one value a sample, by name: what :meth:`save` writes.
+
+        Raises
+        ------
+        ValueError
+            If there are several records.
+        """
+        if self.inertia.ndim != 1:
+            raise ValueError(
+                f"only a single record has columns; this one has shape {self.inertia.shape}; take one record"
+            )
+        columns: dict[str, npt.NDArray[Any]] = {"time": self.time}
+        values = {"inertia": self.inertia, "damping": self.damping, "stiffness": self.stiffness, **self.terms}
+        values |= {"natural_frequency": self.natural_frequency, "damping_ratio": self.damping_ratio}
+        for name, value in values.items():
+            columns[name] = value
+            columns[f"{name}_stderr"] = self.stderr[name]
+        columns |= {"condition": self.condition, "residual_std": self.residual_std}
+        return columns | {"order": self.order, "status": self.status}
+
+    def save(self, path: str | Path) -> None:
+        """Write every column to a CSV or NPZ file, with units in the header.
+
+        Parameters
+        ----------
+        path : str or Path
+            A name that ends in ``.csv`` or ``.npz``. The file appears whole or not at all.
+
+        Raises
+        ------
+        ValueError
+            If the ending is another one, or there are several records.
+        """
+        table.write(path, self.columns(), UNITS)
+
+    def summary(self) -> str:
+        """Return a table of what was found, and what the statuses advise, in words."""
+        s = self.settings
+        n, seconds = self.time.size, float(self.time[-1] - self.time[0]) if self.time.size else 0.0
+        order = s["max_order"] if s["order"] is None else s["order"]
+        lines = [
+            f"{n} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz, preset {s['preset']}",
+            f"windows of {s['window_length']} samples, orders up to {order} by {s['criterion']}, {s['equations']} equations",
+            "",
+        ]
+        rows = [("parameter", "kind", "median", "5 %", "95 %", "std. error", "unit")]
+        values = {"inertia": self.inertia, "damping": self.damping, "stiffness": self.stiffness, **self.terms}
+        for name, value in values.items():
+            kind = s["kinds"][name]
+            finite, error = value[np.isfinite(value)], self.stderr[name]
+            numbers = np.percentile(finite, [50, 5, 95]) if finite.size else [np.nan] * 3
+            error = error[np.isfinite(error)]
+            shown = [f"{number:.5g}" for number in numbers] + [f"{np.median(error):.2g}" if error.size else "nan"]
+            if kind != "windowed":
+                shown[1] = shown[2] = ""
+            rows.append((name, kind, *shown, UNITS.get(name, "")))
+        lines += table.aligned(rows)
+        lines += ["", *describe(self.status)]
+        return "\n".join(lines)
+
+    def plot(self) -> Figure:
+        """Draw inertia, damping and stiffness over time with bands of two standard errors.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is missing: install ``tvident[plot]``.
+        """
+        from tvident import figures  # noqa: PLC0415 - matplotlib is optional
+
+        return figures.plot_identification(self)
+
+    def __repr__(self) -> str:
+        kinds = ", ".join(f"{name} {kind}" for name, kind in self.settings["kinds"].items())
+        invalid = float(np.mean(self.status & Status.INVALID != 0)) if self.status.size else 0.0
+        return f"<Identification of {self.time.size} samples: {kinds}; {invalid:.1%} invalid>"

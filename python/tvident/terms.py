@@ -1,0 +1,104 @@
+"""What stands in the equation of motion: inertia, damping, stiffness and further terms, each of a kind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import arguments
+
+Kind: TypeAlias = Literal["windowed", "constant"]
+Parameter: TypeAlias = Kind | float | npt.ArrayLike
+TermName: TypeAlias = Literal["offset", "coulomb", "cubic"]
+
+COEFFICIENTS = ("inertia", "damping", "stiffness")
+"""Coefficients of the equation of motion, in the order of its derivatives from the second down."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """A term of one's own on the left-hand side of the equation of motion, with an unknown factor.
+
+    Parameters
+    ----------
+    name : str
+        What the factor is called in results.
+    function : callable
+        Function of ``(t, angle, velocity)``: times of shape (n,), smoothed angle and its derivative of the angle's shape. Returns an
+        array of that shape.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tvident import Term
+    >>> drag = Term("drag", lambda t, angle, velocity: velocity * np.abs(velocity))
+    """
+
+    name: str
+    function: Callable[[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]], npt.ArrayLike]
+
+    def values(
+        self, t: npt.NDArray[Any], angle: npt.NDArray[Any], velocity: npt.NDArray[Any]
+    ) -> npt.NDArray[np.number]:
+        """Return the term at every sample."""
+        values = np.asarray(self.function(t, angle, velocity))
+        if values.shape != angle.shape:
+            raise ValueError(
+                f"the function of term {self.name!r} must return an array of shape {angle.shape}; got {values.shape}; "
+                "return one value for every sample"
+            )
+        return arguments.real_array(f"term {self.name!r}", values)
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A column of the equations: its name, its kind and, for a term of the user's own, the term."""
+
+    name: str
+    kind: Kind
+    own: Term | None = None
+
+
+def parameter(name: str, value: object, shape: tuple[int, ...]) -> Kind | float | npt.NDArray[np.number]:
+    """Return how a coefficient comes about: a kind of unknown, a number, or an array of the angle's shape."""
+    if isinstance(value, str):
+        kinds = get_args(Kind)
+        if value not in kinds:
+            raise ValueError(
+                f"{name} must be 'windowed', 'constant', a number or an array; got {value!r}; use one of these"
+            )
+        return "constant" if value == "constant" else "windowed"
+    array = np.asarray(value)
+    if array.ndim == 0 and array.dtype.kind in "iuf":
+        number = float(array)
+        if not np.isfinite(number):
+            raise ValueError(f"{name} must be finite; got {number}; give a number, or 'windowed' where it is unknown")
+        return number
+    known = arguments.real_array(name, array)
+    try:
+        return np.broadcast_to(known, shape)
+    except ValueError:
+        raise ValueError(
+            f"a known {name} must have one value for every sample; got shape {known.shape} for an angle of shape {shape}; "
+            "resample it"
+        ) from None
+
+
+def all_terms(terms: Sequence[object], default: Kind) -> list[Unknown]:
+    """Return every further term with its name and kind."""
+    if isinstance(terms, str | Term):
+        raise TypeError(f"terms must be a sequence of terms; got {terms!r}; write ({terms!r},)")
+    found: list[Unknown] = []
+    for given in terms:
+        term, kind = given if isinstance(given, tuple) and len(given) == 2 else (given, default)  # noqa: PLR2004 - a pair
+        arguments.one_of("the kind of a term", kind, get_args(Kind))
+        own = term if isinstance(term, Term) else None
+        name = arguments.one_of("a term", term, get_args(TermName)) if own is None else own.name
+        if any(name == other.name for other in found) or name in COEFFICIENTS:
+            raise ValueError(f"every term must have a name of its own; {name!r} comes twice; drop or rename one")
+        found.append(Unknown(name, kind, own))
+    return found

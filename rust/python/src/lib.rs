@@ -1,0 +1,66 @@
+//! The Python module `tvident._core`: NumPy arrays in, NumPy arrays out, no arithmetic.
+
+#![allow(
+    clippy::needless_pass_by_value,
+    clippy::too_many_arguments,
+    reason = "what Python passes arrives by value, and keyword arguments are many"
+)]
+
+mod identification;
+mod local_polynomials;
+mod records;
+mod rolling;
+mod watch;
+
+use pyo3::prelude::*;
+
+/// The compiled core of tvident.
+#[pymodule(gil_used = false)]
+mod _core {
+    use pyo3::exceptions::PyValueError;
+    use pyo3::prelude::*;
+    use tvident::{Instructions, Status};
+
+    #[pymodule_export]
+    use crate::identification::{Motions, identify_constant, identify_windowed};
+    #[pymodule_export]
+    use crate::local_polynomials::LocalPolynomials;
+    #[pymodule_export]
+    use crate::rolling::rolling_least_squares;
+
+    /// Every flag of a status: name and bits.
+    #[pyfunction]
+    fn status_flags() -> Vec<(&'static str, u16)> {
+        Status::NAMED.iter().map(|(name, flag)| (*name, flag.bits())).collect()
+    }
+
+    /// Vector instructions that this processor has, the fastest first.
+    #[pyfunction]
+    fn available_instructions() -> Vec<String> {
+        Instructions::available().iter().map(|one| format!("{one:?}").to_lowercase()).collect()
+    }
+
+    /// Vector instructions that new plans use.
+    #[pyfunction]
+    fn instructions() -> String {
+        format!("{:?}", Instructions::current()).to_lowercase()
+    }
+
+    /// Makes new plans use other instructions, or the fastest again after None. Meant for tests.
+    #[pyfunction]
+    #[pyo3(signature = (name))]
+    fn force_instructions(name: Option<&str>) -> PyResult<()> {
+        let choice = match name {
+            None => None,
+            Some(name) => {
+                let named = Instructions::available().into_iter().find(|one| format!("{one:?}").to_lowercase() == name);
+                Some(
+                    named
+                        .ok_or_else(|| PyValueError::new_err(format!("this processor has no instructions {name:?}")))?,
+                )
+            }
+        };
+        Instructions::force(choice);
+        Ok(())
+    }
+}

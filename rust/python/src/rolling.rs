@@ -1,0 +1,66 @@
+//! `tvident._core.rolling_least_squares`.
+
+use std::num::NonZeroUsize;
+
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArray};
+use pyo3::prelude::*;
+use tvident::parallel::workers as threads;
+use tvident::rolling::HALF_OF_THE_DIGITS;
+use tvident::{Elements, Equations, Instructions, Regressions, RollingLeastSquares, Samples};
+
+use crate::records::records;
+use crate::watch::{exception, watched};
+
+/// Parameters, standard errors, residual sums of squares, condition numbers and statuses of every window.
+type Outputs<'py> = (
+    Bound<'py, PyArray3<f64>>,
+    Bound<'py, PyArray3<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<u16>>,
+);
+
+/// Least squares in every window of rows; regressors and right-hand sides have the rows along their last axis.
+#[pyfunction]
+#[pyo3(signature = (regressors, sides, window, *, step=1, workers=None, progress=None))]
+pub(crate) fn rolling_least_squares<'py>(
+    regressors: &Bound<'py, PyUntypedArray>,
+    sides: &Bound<'py, PyUntypedArray>,
+    window: usize,
+    step: usize,
+    workers: Option<NonZeroUsize>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Outputs<'py>> {
+    let py = regressors.py();
+    let (regressors, sides) = (records(regressors)?, records(sides)?);
+    let (p, q) = (regressors.len(), sides.len());
+    let columns: Vec<&dyn Samples> = regressors.iter().chain(&sides).map(|record| record as &dyn Samples).collect();
+    let rows = columns.first().map_or(0, |column| column.len());
+    let plan = RollingLeastSquares::new(window, p, q, Vec::new(), HALF_OF_THE_DIGITS, Instructions::current());
+    let plan = plan.map_err(|error| exception(&error))?;
+    let count = rows.div_ceil(step);
+
+    let parameters = PyArray3::zeros(py, [p, q, count], false);
+    let errors = PyArray3::zeros(py, [p, q, count], false);
+    let residuals = PyArray2::zeros(py, [q, count], false);
+    let condition = PyArray1::zeros(py, [count], false);
+    let status = PyArray1::zeros(py, [count], false);
+    {
+        let (mut parameters, mut errors) = (parameters.readwrite(), errors.readwrite());
+        let (mut residuals, mut condition, mut status) =
+            (residuals.readwrite(), condition.readwrite(), status.readwrite());
+        let regressions = Regressions {
+            elements: Elements { first: 0, step },
+            parameters: parameters.as_slice_mut()?.chunks_exact_mut(count).collect(),
+            errors: errors.as_slice_mut()?.chunks_exact_mut(count).collect(),
+            covariances: Vec::new(),
+            residuals: residuals.as_slice_mut()?.chunks_exact_mut(count).collect(),
+            deviations: Vec::new(),
+            condition: condition.as_slice_mut()?,
+            status: status.as_slice_mut()?,
+        };
+        let equations = Equations { columns, rows: 0..rows };
+        watched(py, progress, |watch| plan.run(&equations, regressions, threads(workers), watch))?;
+    }
+    Ok((parameters, errors, residuals, condition, status))
+}

@@ -1,0 +1,40 @@
+//! Work without the interpreter's lock, watched from the thread that called.
+
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use tvident::Error;
+use tvident::parallel::Watch;
+
+/// Runs `work` with the interpreter's lock released. The watch that it must call takes the lock back for a moment, lets signals such
+/// as Ctrl-C in, and calls `progress(done, total)`; whatever either of them raises cancels the work and is raised here.
+pub(crate) fn watched(
+    py: Python<'_>,
+    progress: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&mut Watch<'_>) -> Result<(), Error> + Send,
+) -> PyResult<()> {
+    let progress = progress.map(|progress| progress.clone().unbind());
+    let (outcome, raised) = py.detach(|| {
+        let mut raised = None;
+        let mut watch = |done: usize, total: usize| {
+            let looked = Python::attach(|py| {
+                py.check_signals()?;
+                progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (done, total)).map(|_| ()))
+            });
+            raised = looked.err();
+            raised.is_none()
+        };
+        (work(&mut watch), raised)
+    });
+    match raised {
+        Some(error) => Err(error),
+        None => outcome.map_err(|error| exception(&error)),
+    }
+}
+
+/// The exception that says what an error says.
+pub(crate) fn exception(error: &Error) -> PyErr {
+    match error {
+        Error::Cancelled | Error::Threads { .. } => PyRuntimeError::new_err(error.to_string()),
+        _ => PyValueError::new_err(error.to_string()),
+    }
+}
