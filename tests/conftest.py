@@ -1,0 +1,21 @@
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+# A slow machine is no failure; the seed is fixed, so that a green run stays green. `make soak` looks further.
+settings.register_profile("check", deadline=None, derandomize=True, print_blob=True)
+settings.register_profile("soak", deadline=None, max_examples=2000, print_blob=True)
+settings.load_profile(os.environ.get("TVIDENT_HYPOTHESIS", "check"))
+
+
+@pytest.fixture(scope="session")
+def folder_of_recordings() -> Path:
+    """Give the folder of real recordings, which are not part of the project."""
+    folder = Path(os.environ.get("TVIDENT_DATA", Path(__file__).parents[2] / "shared" / "data"))
+    if not folder.is_dir():
+        pytest.skip(f"no recordings at {folder}; set TVIDENT_DATA to where they are")
+    return folder

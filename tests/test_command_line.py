@@ -1,0 +1,252 @@
+from __future__ import annotations
+
+import csv
+import fcntl
+import os
+import pty
+import select
+import signal
+import struct
+import subprocess
+import sys
+import termios
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import tvident
+from tvident import recordings
+
+TVIDENT = str(Path(sys.executable).with_name("tvident"))
+
+
+def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    command = [TVIDENT, *map(str, arguments)]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recording") / "rig.csv"
+    done = run("simulate", path, "--duration", 5, "--seed", 3)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == ""
+    return path
+
+
+def test_the_demo_prints_a_table_and_writes_pictures(tmp_path: Path) -> None:
+    done = run("demo", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "stiffness  N m/rad" in done.stdout
+    written = {path.name for path in (tmp_path / "tvident-demo").iterdir()}
+    pictures = {"recording.png", "window.png", "window-with-noise.png", "parameters.png"}
+    assert written == pictures | {"recording.csv", "result.csv"}
+    for name in pictures:
+        assert (tmp_path / "tvident-demo" / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_simulated_recording_is_the_librarys(recording: Path) -> None:
+    expected = tvident.simulate_torsional_rig(5.0, seed=3)
+    channels = recordings.read(recording)
+    assert list(channels)[:3] == ["time [s]", "angle [rad]", "torque [N m]"]
+    np.testing.assert_array_equal(channels["angle [rad]"], expected.angle)
+    np.testing.assert_array_equal(channels["stiffness [N m/rad]"], expected.stiffness)
+
+
+def test_info_lists_the_channels(recording: Path) -> None:
+    done = run("info", recording)
+    assert done.returncode == 0
+    assert "uniform: 1000 per unit" in done.stdout
+    assert "angle [rad]" in done.stdout
+
+
+@pytest.mark.parametrize("ending", ["csv", "npz"])
+def test_results_are_the_librarys_with_names_and_units(recording: Path, tmp_path: Path, ending: str) -> None:
+    output, picture = tmp_path / f"result.{ending}", tmp_path / "result.png"
+    done = run(
+        *("identify", recording, "--angle", "angle", "--torque", "torque", "--time", "time", "--equations", "0.3 s"),
+        *("--window-length", 101, "--damping", 0, "--term", "offset", "-o", output, "--plot", picture),
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert "stiffness  windowed" in done.stdout
+    channels = recordings.read(recording)
+    expected = tvident.identify(
+        channels["angle [rad]"],
+        channels["torque [N m]"],
+        t=channels["time [s]"],
+        window_length=101,
+        equations=300,
+        damping=0,
+        terms=["offset"],
+    )
+    found = recordings.read(output)
+    np.testing.assert_array_equal(found["stiffness [N m/rad]"], expected.stiffness)
+    np.testing.assert_array_equal(found["stiffness_stderr [N m/rad]"], expected.stderr["stiffness"])
+    np.testing.assert_array_equal(found["offset [N m]"], expected.terms["offset"])
+    np.testing.assert_array_equal(found["status"], expected.status)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_derivatives_of_a_channel(recording: Path, tmp_path: Path) -> None:
+    output, picture = tmp_path / "d.csv", tmp_path / "d.svg"
+    done = run(
+        *("derivatives", recording, "--channel", "angle", "--window-length", "0.1 s", "--sample-rate", 1000),
+        *("--step", 5, "-o", output, "--plot", picture),
+    )
+    assert done.returncode == 0, done.stderr
+    expected = tvident.fit_local_polynomials(recordings.read(recording)["angle [rad]"], 101, sample_rate=1000, step=5)
+    found = recordings.read(output)
+    np.testing.assert_array_equal(found["derivative_2"], expected.derivatives[2])
+    np.testing.assert_array_equal(found["derivative_1_stderr"], expected.stderr[1])
+    np.testing.assert_array_equal(found["order"], expected.order)
+    np.testing.assert_allclose(found["time [s]"], np.arange(0, 5, 0.005))
+    assert "<svg" in picture.read_text()
+
+
+def test_results_may_go_to_standard_output(recording: Path) -> None:
+    done = run("identify", recording, "--angle", "angle", "--torque", "torque", "--sample-rate", 1000, "-o", "-")
+    assert done.returncode == 0
+    rows = list(csv.reader(done.stdout.splitlines()))
+    assert rows[0][:2] == ["time [s]", "inertia [kg m^2]"]
+    assert len(rows) == 5001
+    assert "stiffness  windowed" in done.stderr
+
+
+def test_two_files_of_one_channel_each(recording: Path, tmp_path: Path) -> None:
+    channels = recordings.read(recording)
+    np.save(tmp_path / "a.npy", channels["angle [rad]"])
+    np.save(tmp_path / "t.npy", channels["torque [N m]"] / 2)
+    done = run(
+        *(
+            "identify",
+            "--angle",
+            "a.npy",
+            "--torque",
+            "t.npy",
+            "--torque-scale",
+            2,
+            "--sample-rate",
+            1000,
+            "-o",
+            "r.npz",
+        ),
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    expected = tvident.identify(channels["angle [rad]"], channels["torque [N m]"], sample_rate=1000)
+    found = recordings.read(tmp_path / "r.npz")
+    np.testing.assert_allclose(found["inertia [kg m^2]"], expected.inertia)
+
+
+def test_known_parameters_may_be_channels_and_kinds_may_be_given(recording: Path) -> None:
+    common = ("identify", recording, "--angle", "angle", "--torque", "torque", "--sample-rate", 1000)
+    kinds = ("--stiffness", "stiffness", "--inertia", "constant", "--damping", "constant", "--term", "offset:constant")
+    done = run(*common, *kinds)
+    assert done.returncode == 0, done.stderr
+    inertia = next(line for line in done.stdout.splitlines() if line.startswith("inertia ="))
+    assert abs(float(inertia.split()[2]) / 0.0123 - 1) < 0.01
+
+
+GOOD = ("--angle", "angle", "--torque", "torque", "--sample-rate", "1000")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        (("identify", "FILE", *GOOD, "--window-length", "200"), 2, "window_length must be odd"),
+        (("identify", "FILE", *GOOD, "--window-length", "9999"), 2, "less than or equal to the length of the record"),
+        (("identify", "FILE", *GOOD[:4], "--sample-rate", "-1"), 2, "sample_rate must be positive and finite; got -1"),
+        (("identify", "FILE", *GOOD[:4]), 2, "needs the sample period"),
+        (
+            ("identify", "FILE", "--angle", "angel", *GOOD[2:]),
+            2,
+            "has no channel 'angel'; it has time [s], angle [rad]",
+        ),
+        (("identify", "FILE", *GOOD, "--term", "friction"), 2, "a term must be 'offset', 'coulomb' or 'cubic'"),
+        (("identify", "FILE", *GOOD, "--stiffness", "nonsense"), 2, "has no channel 'nonsense'"),
+        (("identify", "FILE", *GOOD, "-o", "result.xlsx"), 2, "files that end in .csv or .npz"),
+        (("identify", "FILE", *GOOD, "--plot", "result.gif"), 2, "--plot must end in .png, .pdf or .svg"),
+        (("identify", "FILE", *GOOD, "--preset", "magic"), 2, "'magic' is not"),
+        (("identify", "FILE", *GOOD, "--no-such-option"), 2, "No such option"),
+        (("identify", *GOOD), 2, "channel 'angle' needs a FILE"),
+        (("identify", "missing.csv", *GOOD), 1, "missing.csv: there is no such file"),
+        (("identify", "FILE", *GOOD, "-o", "no/such/folder/r.csv"), 1, "No such file or directory"),
+        (("info", "broken.npz"), 1, "broken.npz: cannot be read as .npz"),
+        (("info", "nothing.xyz"), 1, "the ending must be one of"),
+        (("derivatives", "FILE", "--channel", "angle", "--order", "16"), 2, "order must be at most 15; got 16"),
+        (("derivatives", "FILE", "--channel", "angle", "--time", "angle"), 2, "t must increase"),
+        (("simulate", "rig.txt"), 2, "files that end in .csv or .npz"),
+        (("simulate", "rig.csv", "--duration", "-3"), 2, "duration must be positive"),
+    ],
+)
+def test_misuse_is_one_line_and_a_status(
+    recording: Path, tmp_path: Path, arguments: tuple[str, ...], status: int, message: str
+) -> None:
+    (tmp_path / "broken.npz").write_bytes(b"nonsense")
+    done = run(*(recording if argument == "FILE" else argument for argument in arguments), cwd=tmp_path)
+    assert done.returncode == status, done.stderr
+    assert message in " ".join(done.stderr.split())
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    assert {path.name for path in tmp_path.iterdir()} == {"broken.npz"}
+
+
+def long_recording(folder: Path, samples: int) -> None:
+    generator = np.random.default_rng(0)
+    np.save(folder / "a.npy", generator.standard_normal(samples))
+    np.save(folder / "t.npy", generator.standard_normal(samples))
+
+
+def test_progress_is_shown_on_a_terminal_and_not_in_a_pipe(tmp_path: Path) -> None:
+    long_recording(tmp_path, 400_000)
+    command = [TVIDENT, "identify", "--angle", "a.npy", "--torque", "t.npy", "--sample-rate", "1000"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stderr == ""
+    parent, child = pty.openpty()
+    fcntl.ioctl(child, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=child)
+    os.close(child)
+    shown = b""
+    while True:
+        if select.select([parent], [], [], 0.2)[0]:
+            try:
+                shown += os.read(parent, 4096)
+            except OSError:
+                break
+        elif process.poll() is not None:
+            break
+    os.close(parent)
+    process.communicate()
+    assert b"identification" in shown
+    assert b"100%" in shown
+
+
+def test_an_interrupt_stops_at_once_and_leaves_no_half_written_file(tmp_path: Path) -> None:
+    # Killed while it computes or writes: whichever, there is a whole file or none.
+    long_recording(tmp_path, 3_000_000)
+    command: list[Any] = [
+        TVIDENT,
+        "identify",
+        "--angle",
+        "a.npy",
+        "--torque",
+        "t.npy",
+        "--sample-rate",
+        "1000",
+        "-o",
+        "r.csv",
+    ]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(2.5)
+    process.send_signal(signal.SIGINT)
+    started = time.perf_counter()
+    _, errors = process.communicate(timeout=20)
+    assert time.perf_counter() - started < 2
+    assert process.returncode == 1
+    assert "Aborted" in errors
+    assert "Traceback" not in errors
+    assert {path.name for path in tmp_path.iterdir()} == {"a.npy", "t.npy"}
