@@ -107,8 +107,8 @@ pub(crate) fn choose<S: Lanes, const D: usize>(simd: S, tables: &Tables, state: 
     let mut best = simd.splat_f64s(f64::MAX);
     unroll!(rev N < D, {
         if N < TABLE {
-            let score = simd.mul_f64s(simd.max_f64s(residual, floor), simd.splat_f64s(tables.weights[N]));
-            best = simd.min_f64s(tagged(simd, score, simd.splat_u64s(tables.tags[N])), best);
+            let score = simd.mul_f64s(simd.max_f64s(residual, floor), simd.splat_f64s(tables.weights[N % TABLE]));
+            best = simd.min_f64s(tagged(simd, score, simd.splat_u64s(tables.tags[N % TABLE])), best);
             residual = simd.mul_add_f64s(state.coefficients[N], state.coefficients[N], residual);
         }
     });

@@ -174,7 +174,7 @@ fn weighted<S: Lanes, const J: usize>(
 ) -> S::f64s {
     let more = simd.mul_add_f64s(simd.splat_f64s(functional.weights[J]), coefficient, sum);
     match order {
-        Some(order) if J > 0 => {
+        Some(order) if J != 0 => {
             let reached = simd.less_than_or_equal_f64s(simd.splat_f64s(J as f64), order);
             simd.select_f64s(reached, more, sum)
         }

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use crate::status::Status;
+
 /// Which samples of a record the elements of an output belong to: element `k` to sample `first + k · step`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Elements {
@@ -48,6 +50,35 @@ impl Elements {
                 *value = result;
             }
         }
+    }
+}
+
+/// Where kernels write, field by field. An empty slice stands for what is not wanted.
+#[derive(Debug)]
+pub(crate) struct Outputs<'a> {
+    pub(crate) elements: Elements,
+    pub(crate) values: Vec<&'a mut [f64]>,
+    pub(crate) order: &'a mut [u8],
+    /// Bits of [`Status`].
+    pub(crate) status: &'a mut [u16],
+}
+
+impl Outputs<'_> {
+    /// Makes some samples NaN, with a status.
+    pub(crate) fn invalidate(&mut self, samples: Range<usize>, status: Status) {
+        let elements = self.elements.of(samples);
+        for values in &mut self.values {
+            fill(values, &elements, f64::NAN);
+        }
+        fill(self.order, &elements, 0);
+        fill(self.status, &elements, status.bits());
+    }
+}
+
+/// Fills some elements of an output that may not be wanted.
+fn fill<T: Copy>(output: &mut [T], elements: &Range<usize>, value: T) {
+    if !output.is_empty() {
+        output[elements.clone()].fill(value);
     }
 }
 

@@ -12,16 +12,17 @@ use std::ops::Range;
 
 use crate::aligned::Aligned;
 use crate::error::Error;
-use crate::output::{Elements, split_off};
+use crate::output::{Elements, Outputs, split_off};
 use crate::parallel::{self, Piece, Watch};
 use crate::samples::{Samples, all_usable, is_usable};
-use crate::simd::{Instructions, Kernel, Lanes, dispatch};
+use crate::simd::{Instructions, Kernel, Lanes, MOST_LANES, dispatch};
 use crate::status::Status;
 use crate::strips::Strips;
-use crate::tile::{TILE, Tile};
+use crate::tile::Tile;
 use crate::triangle::{
     Few, MOST_REGRESSORS, Many, Shape, append, covariance, empty, invert, load, merge, solve, squared_norm, store,
 };
+use crate::write::Write;
 
 /// Suffix factors kept at a time. Longer windows keep one in so many and build the others again.
 const SEGMENT: usize = 2048;
@@ -147,7 +148,7 @@ impl RollingLeastSquares {
             strips: vec![strips; columns],
             suffixes: Aligned::zeros(self.window.min(SEGMENT) * factor),
             checkpoints: Aligned::zeros((self.window.div_ceil(SEGMENT) - 1) * factor),
-            tile: Tile::new(self.fields(), lanes),
+            tile: Tile::new(Slots::of(self).fields(), lanes.next_multiple_of(8), lanes),
         }
     }
 
@@ -184,22 +185,22 @@ impl RollingLeastSquares {
         regressions: &mut Regressions<'_>,
         scratch: &mut Scratch,
     ) {
+        let mut outputs = Slots::of(self).outputs(regressions);
         let mut window = self.first_row(rows.start);
         let end = self.first_row(rows.end);
         while window < end {
             let first = window - window % self.window;
             let next = end.min(first + self.stride());
             let run = Run { plan: self, base: first, windows: window..next, rows: equations.rows.clone() };
+            let outputs = &mut outputs;
             match (self.regressors, self.sides) {
-                (1, 1) => dispatch(self.instructions, Work { run, shape: Few::<1>, equations, scratch, regressions }),
-                (2, 1) => dispatch(self.instructions, Work { run, shape: Few::<2>, equations, scratch, regressions }),
-                (3, 1) => dispatch(self.instructions, Work { run, shape: Few::<3>, equations, scratch, regressions }),
-                (4, 1) => dispatch(self.instructions, Work { run, shape: Few::<4>, equations, scratch, regressions }),
+                (1, 1) => dispatch(self.instructions, Work { run, shape: Few::<1>, equations, scratch, outputs }),
+                (2, 1) => dispatch(self.instructions, Work { run, shape: Few::<2>, equations, scratch, outputs }),
+                (3, 1) => dispatch(self.instructions, Work { run, shape: Few::<3>, equations, scratch, outputs }),
+                (4, 1) => dispatch(self.instructions, Work { run, shape: Few::<4>, equations, scratch, outputs }),
                 (regressors, sides) => {
-                    dispatch(
-                        self.instructions,
-                        Work { run, shape: Many { regressors, sides }, equations, scratch, regressions },
-                    );
+                    let shape = Many { regressors, sides };
+                    dispatch(self.instructions, Work { run, shape, equations, scratch, outputs });
                 }
             }
             window = next;
@@ -233,10 +234,50 @@ impl RollingLeastSquares {
     fn first_row(&self, row: usize) -> usize {
         row + self.window - self.window / 2
     }
+}
 
-    /// Numbers known of every window: parameters, variances over the noise's, covariances likewise, residuals, squared condition.
-    fn fields(&self) -> usize {
-        self.regressors * self.sides + self.regressors + self.covariances.len() + self.sides + 1
+/// Where the fields of a window are in the tile.
+#[derive(Clone, Copy, Debug)]
+struct Slots {
+    errors: usize,
+    covariances: usize,
+    residuals: usize,
+    deviations: usize,
+    condition: usize,
+}
+
+impl Slots {
+    fn of(plan: &RollingLeastSquares) -> Self {
+        let (p, q, pairs) = (plan.regressors, plan.sides, plan.covariances.len());
+        let errors = p * q;
+        let covariances = errors + p * q;
+        let residuals = covariances + pairs * q;
+        Self { errors, covariances, residuals, deviations: residuals + q, condition: residuals + 2 * q }
+    }
+
+    /// All fields: the last holds flags.
+    fn fields(self) -> usize {
+        self.condition + 2
+    }
+
+    /// The outputs in the order of the fields.
+    fn outputs<'a>(self, regressions: &'a mut Regressions<'_>) -> Outputs<'a> {
+        let Regressions { elements, parameters, errors, covariances, residuals, deviations, condition, status } =
+            regressions;
+        let mut values: Vec<&'a mut [f64]> = Vec::with_capacity(self.fields());
+        let groups = [
+            (parameters, self.errors),
+            (errors, self.covariances),
+            (covariances, self.residuals),
+            (residuals, self.deviations),
+            (deviations, self.condition),
+        ];
+        for (group, end) in groups {
+            values.extend(group.iter_mut().map(|values| &mut **values));
+            values.resize_with(end, Default::default);
+        }
+        values.push(condition);
+        Outputs { elements: *elements, values, order: Default::default(), status }
     }
 }
 
@@ -284,88 +325,44 @@ impl Run<'_> {
         end.saturating_sub(first)
     }
 
-    /// Writes out the windows of one lane at `places` of the tile, of which the first is `window`.
-    #[inline(always)]
-    fn write_lane(
-        &self,
-        fields: &mut [f64],
-        unusable: &[usize],
-        places: Range<usize>,
-        window: usize,
-        regressions: &mut Regressions<'_>,
-    ) {
-        let plan = self.plan;
-        let (p, q, pairs) = (plan.regressors, plan.sides, plan.covariances.len());
-        let row = window + plan.window / 2 - plan.window;
-        let elements = regressions.elements;
-
-        let (parameters, rest) = fields.split_at_mut(p * q * TILE);
-        let (variances, rest) = rest.split_at_mut((p + pairs) * TILE);
-        let (residuals, condition) = rest.split_at_mut(q * TILE);
-        let (errors, covariances) = variances.split_at(p * TILE);
-
-        let mut statuses = [0_u16; TILE];
-        let mut freedom = [0.0; TILE];
-        let greatest = 1.0 / (f64::EPSILON * plan.window as f64);
-        for place in places.clone() {
-            let window = window + place - places.start;
-            let count = self.count(window);
-            let mut status = if count < plan.window { Status::EDGE } else { Status::GOOD };
-            let rows = window - self.base..window - self.base + plan.window;
-            let hit =
-                unusable.get(unusable.partition_point(|&bad| bad < rows.start)).is_some_and(|bad| *bad < rows.end);
-            condition[place] = condition[place].sqrt();
-            if hit || 2 * count < plan.window {
-                status |= Status::INVALID;
-            } else if count <= p || condition[place].is_nan() || condition[place] >= greatest {
-                status |= Status::INVALID | Status::RANK_DEFICIENT;
-                condition[place] = f64::INFINITY;
-            } else if condition[place] > plan.ill_conditioned {
-                status |= Status::ILL_CONDITIONED;
-            }
-            if status.contains(Status::INVALID) {
-                parameters.iter_mut().skip(place).step_by(TILE).for_each(|value| *value = f64::NAN);
-                residuals.iter_mut().skip(place).step_by(TILE).for_each(|value| *value = f64::NAN);
-                if !status.contains(Status::RANK_DEFICIENT) {
-                    condition[place] = f64::NAN;
-                }
-            }
-            statuses[place] = status.bits();
-            freedom[place] = 1.0 / count.saturating_sub(p) as f64;
-        }
-        let mut scaled = [0.0; TILE];
-        for (side, residual) in residuals.chunks_exact(TILE).enumerate() {
-            for (i, variance) in errors.chunks_exact(TILE).enumerate() {
-                for place in places.clone() {
-                    scaled[place] = (variance[place] * residual[place] * freedom[place]).sqrt();
-                }
-                put(elements, &mut regressions.errors, i * q + side, row, &scaled[places.clone()]);
-            }
-            for (pair, covariance) in covariances.chunks_exact(TILE).enumerate() {
-                for place in places.clone() {
-                    scaled[place] = covariance[place] * residual[place] * freedom[place];
-                }
-                put(elements, &mut regressions.covariances, pair * q + side, row, &scaled[places.clone()]);
-            }
-            for place in places.clone() {
-                scaled[place] = (residual[place] * freedom[place]).sqrt();
-            }
-            put(elements, &mut regressions.deviations, side, row, &scaled[places.clone()]);
-            put(elements, &mut regressions.residuals, side, row, &residual[places.clone()]);
-        }
-        for (index, values) in parameters.chunks_exact(TILE).enumerate() {
-            put(elements, &mut regressions.parameters, index, row, &values[places.clone()]);
-        }
-        elements.put(regressions.condition, row, &condition[places.clone()]);
-        elements.put(regressions.status, row, &statuses[places]);
+    /// The window that begins in row 0 of a lane.
+    fn first(&self, lane: usize) -> usize {
+        self.base + lane * self.plan.window
     }
-}
 
-/// Writes to one of several outputs that may not be wanted.
-#[inline(always)]
-fn put(elements: Elements, outputs: &mut [&mut [f64]], index: usize, row: usize, results: &[f64]) {
-    if let Some(output) = outputs.get_mut(index) {
-        elements.put(output, row, results);
+    /// Whether every row of every window is an equation.
+    fn is_full(&self, lanes: usize) -> bool {
+        self.count(self.base) == self.plan.window && self.count(self.first(lanes) - 1) == self.plan.window
+    }
+
+    /// Says of the windows with missing rows that they lie at an edge, and takes back those that are less than half full or hold what
+    /// cannot be used.
+    fn mark(&self, unusable: &[usize], full: bool, outputs: &mut Outputs<'_>) {
+        if full && unusable.is_empty() {
+            return;
+        }
+        let plan = self.plan;
+        for window in self.windows.clone() {
+            let row = window + plan.window / 2 - plan.window;
+            let count = self.count(window);
+            let edge = if count < plan.window { Status::EDGE } else { Status::GOOD };
+            let rows = window - self.base..window - self.base + plan.window;
+            let next = unusable.partition_point(|&bad| bad < rows.start);
+            if 2 * count < plan.window || unusable.get(next).is_some_and(|bad| *bad < rows.end) {
+                outputs.invalidate(row..row + 1, edge | Status::INVALID);
+            } else if count <= plan.regressors {
+                outputs.invalidate(row..row + 1, edge | Status::INVALID | Status::RANK_DEFICIENT);
+                let elements = outputs.elements.of(row..row + 1);
+                if let Some(condition) = outputs.values.last_mut().filter(|condition| !condition.is_empty()) {
+                    condition[elements].fill(f64::INFINITY);
+                }
+            } else if edge != Status::GOOD {
+                let elements = outputs.elements.of(row..row + 1);
+                if !outputs.status.is_empty() {
+                    outputs.status[elements].iter_mut().for_each(|status| *status |= edge.bits());
+                }
+            }
+        }
     }
 }
 
@@ -375,7 +372,7 @@ struct Work<'a, 'b, 'c, H: Shape> {
     shape: H,
     equations: &'a Equations<'a>,
     scratch: &'b mut Scratch,
-    regressions: &'b mut Regressions<'c>,
+    outputs: &'b mut Outputs<'c>,
 }
 
 impl<H: Shape> Kernel for Work<'_, '_, '_, H> {
@@ -396,6 +393,8 @@ impl<H: Shape> Kernel for Work<'_, '_, '_, H> {
             }
             store(simd, self.shape, &mut self.scratch.checkpoints[(segment - 1) * size..], &suffix);
         }
+        let full = self.run.is_full(S::F64_LANES);
+        let places = self.scratch.tile.places();
         let mut prefix = empty(simd, self.shape);
         for segment in 0..segments {
             let rows = segment * SEGMENT..window.min((segment + 1) * SEGMENT);
@@ -409,14 +408,15 @@ impl<H: Shape> Kernel for Work<'_, '_, '_, H> {
             }
             for offset in rows.clone() {
                 load(simd, self.shape, &self.scratch.suffixes[(offset - rows.start) * size..], &mut suffix);
-                let place = offset % TILE;
-                self.finish(simd, &mut suffix, &prefix, place, &mut row);
-                if place + 1 == TILE || offset + 1 == window {
-                    self.write::<S>(place + 1, offset - place);
+                self.finish(simd, &mut suffix, &prefix, offset, full, &mut row);
+                if (offset + 1) % places == 0 || offset + 1 == window {
+                    // The last windows are written together with some that were written before, to fill the vectors.
+                    self.write(simd, (offset + 1).saturating_sub(places)..offset + 1);
                 }
                 self.append(simd, &mut prefix, offset, 1, &mut row);
             }
         }
+        self.run.mark(&self.scratch.unusable, full, self.outputs);
     }
 }
 
@@ -444,51 +444,92 @@ impl<H: Shape> Work<'_, '_, '_, H> {
         simd: S,
         factor: &mut H::Factor<S::f64s>,
         prefix: &H::Factor<S::f64s>,
-        place: usize,
+        offset: usize,
+        full: bool,
         values: &mut H::Factor<S::f64s>,
     ) {
-        let shape = self.shape;
+        let (shape, plan) = (self.shape, self.run.plan);
         let (p, q) = (shape.regressors(), shape.sides());
+        let slots = Slots::of(plan);
+        let freedom = self.freedom(simd, offset, full);
         let tile = &mut self.scratch.tile;
         merge(simd, shape, factor, prefix, values);
-        for side in 0..q {
-            solve(simd, shape, factor, side, values);
-            for i in 0..p {
-                tile.put(simd, i * q + side, place, values[i]);
-            }
-        }
+
+        // The squared condition number comes first: where it has no digits nothing has.
         invert(simd, shape, factor, values);
-        let mut field = p * q;
         let mut squares = simd.splat_f64s(0.0);
         for i in 0..p {
             let variance = covariance(simd, shape, values, i, i);
             squares = simd.mul_add_f64s(squared_norm(simd, shape, factor, i), variance, squares);
-            tile.put(simd, field, place, variance);
-            field += 1;
         }
-        for &(i, j) in &self.run.plan.covariances {
-            tile.put(simd, field, place, covariance(simd, shape, values, i.min(j), i.max(j)));
-            field += 1;
+        let condition = simd.sqrt_f64s(simd.mul_f64s(squares, simd.splat_f64s(p as f64)));
+        let greatest = simd.splat_f64s(1.0 / (f64::EPSILON * plan.window as f64));
+        let determined = simd.less_than_f64s(condition, greatest);
+        let ill = simd.greater_than_f64s(condition, simd.splat_f64s(plan.ill_conditioned));
+        let flags = simd.select_f64s(ill, code(simd, Status::ILL_CONDITIONED), simd.splat_f64s(0.0));
+        let deficient = code(simd, Status::INVALID | Status::RANK_DEFICIENT);
+        let condition = simd.select_f64s(determined, condition, simd.splat_f64s(f64::INFINITY));
+        tile.put(simd, slots.condition, offset, condition);
+        tile.put(simd, slots.condition + 1, offset, simd.select_f64s(determined, flags, deficient));
+
+        let nothing = simd.select_f64s(determined, simd.splat_f64s(0.0), simd.splat_f64s(f64::NAN));
+        for side in 0..q {
+            let residual = simd.add_f64s(factor[shape.row(p) + side], nothing);
+            let variance = simd.mul_f64s(residual, freedom);
+            tile.put(simd, slots.residuals + side, offset, residual);
+            for (pair, &(i, j)) in plan.covariances.iter().enumerate() {
+                let one = covariance(simd, shape, values, i.min(j), i.max(j));
+                tile.put(simd, slots.covariances + pair * q + side, offset, simd.mul_f64s(one, variance));
+            }
+            let deviation = simd.sqrt_f64s(variance);
+            tile.put(simd, slots.deviations + side, offset, deviation);
+            for i in 0..p {
+                let error = simd.mul_f64s(simd.sqrt_f64s(covariance(simd, shape, values, i, i)), deviation);
+                tile.put(simd, slots.errors + i * q + side, offset, error);
+            }
         }
         for side in 0..q {
-            tile.put(simd, field, place, factor[shape.row(p) + side]);
-            field += 1;
-        }
-        tile.put(simd, field, place, simd.mul_f64s(squares, simd.splat_f64s(p as f64)));
-    }
-
-    /// Writes out the first `count` windows of the tile, of which the first is at `offset` of each lane's block.
-    #[inline(always)]
-    fn write<S: Lanes>(&mut self, count: usize, offset: usize) {
-        let places = 0..count;
-        for lane in 0..S::F64_LANES {
-            let first = self.run.base + lane * self.run.plan.window + offset;
-            let wanted = self.run.windows.start.max(first)..self.run.windows.end.min(first + count);
-            if !wanted.is_empty() {
-                let fields = self.scratch.tile.lane::<S>(lane, &places);
-                let places = wanted.start - first..wanted.end - first;
-                self.run.write_lane(fields, &self.scratch.unusable, places, wanted.start, self.regressions);
+            solve(simd, shape, factor, side, values);
+            for i in 0..p {
+                tile.put(simd, i * q + side, offset, simd.add_f64s(values[i], nothing));
             }
         }
     }
+
+    /// One over the degrees of freedom of each lane's window.
+    #[inline(always)]
+    fn freedom<S: Lanes>(&self, simd: S, offset: usize, full: bool) -> S::f64s {
+        let (plan, p) = (self.run.plan, self.shape.regressors());
+        if full {
+            return simd.splat_f64s(1.0 / (plan.window - p) as f64);
+        }
+        let mut freedom = [0.0; MOST_LANES];
+        for (lane, freedom) in freedom[..S::F64_LANES].iter_mut().enumerate() {
+            *freedom = 1.0 / self.run.count(self.run.first(lane) + offset).saturating_sub(p) as f64;
+        }
+        simd.load(&freedom, 0)
+    }
+
+    /// Writes out the windows at some offsets of each lane's block.
+    #[inline(always)]
+    fn write<S: Lanes>(&mut self, simd: S, rows: Range<usize>) {
+        let plan = self.run.plan;
+        let write = Write {
+            tile: &self.scratch.tile,
+            rows,
+            base: self.run.base.cast_signed(),
+            block: plan.window,
+            windows: self.run.windows.clone(),
+            ahead: (plan.window / 2).cast_signed() - plan.window.cast_signed(),
+            fixed_order: None,
+            outputs: &mut *self.outputs,
+        };
+        write.run(simd);
+    }
+}
+
+/// Flags as the tile holds them.
+#[inline(always)]
+fn code<S: Lanes>(simd: S, status: Status) -> S::f64s {
+    simd.splat_f64s(256.0 * f64::from(status.bits()))
 }

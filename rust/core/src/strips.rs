@@ -37,25 +37,24 @@ impl Strips {
     /// Lays out the samples of a run.
     #[inline(always)]
     pub(crate) fn fill<S: Lanes>(&mut self, simd: S, samples: &[f64]) {
-        let (lanes, block) = (S::F64_LANES, self.block);
+        let (lanes, block, columns) = (S::F64_LANES, self.block, self.columns);
         let mut square = [simd.splat_f64s(0.0); crate::simd::MOST_LANES];
-        let whole_rows = block - block % lanes;
-        let whole_columns = self.columns - self.columns % lanes;
-        for column in (0..whole_columns).step_by(lanes) {
-            for row in (0..whole_rows).step_by(lanes) {
+        if block < lanes {
+            for (index, &value) in samples.iter().enumerate() {
+                self.values[index % block * columns + index / block] = value;
+            }
+            return;
+        }
+        // The last squares overlap those before them where rows or columns are no multiple of the lanes.
+        for column in (0..columns).step_by(lanes).map(|column| column.min(columns - lanes)) {
+            for row in (0..block).step_by(lanes).map(|row| row.min(block - lanes)) {
                 for (lane, vector) in square[..lanes].iter_mut().enumerate() {
                     *vector = simd.load(samples, (column + lane) * block + row);
                 }
                 simd.transpose(&mut square[..lanes]);
                 for (lane, &vector) in square[..lanes].iter().enumerate() {
-                    simd.store(&mut self.values, (row + lane) * self.columns + column, vector);
+                    simd.store(&mut self.values, (row + lane) * columns + column, vector);
                 }
-            }
-        }
-        for column in 0..self.columns {
-            let first = if column < whole_columns { whole_rows } else { 0 };
-            for (row, &value) in samples[column * block..(column + 1) * block].iter().enumerate().skip(first) {
-                self.values[row * self.columns + column] = value;
             }
         }
     }

@@ -42,29 +42,20 @@ impl Direction {
         }
     }
 
-    /// The lowest row in the tile once the windows before `done` are finished.
-    pub(crate) fn lowest_row(self, start: usize, done: usize) -> usize {
+    /// One more than the last window that shares a tile with the window `index`.
+    pub(crate) fn end_of_tile(self, start: usize, index: usize) -> usize {
+        let row = self.row(start, index);
         match self {
-            Self::Forward => self.row(start, (done - 1) / TILE * TILE),
-            Self::Backward => self.row(start, done - 1),
+            Self::Forward => index + TILE - row % TILE,
+            Self::Backward => index + row % TILE + 1,
         }
     }
 
-    /// The place of a window in the tile, in which rows always go upwards.
-    #[inline(always)]
-    fn place(self, index: usize) -> usize {
+    /// The rows of some windows.
+    pub(crate) fn rows(self, start: usize, windows: Range<usize>) -> Range<usize> {
         match self {
-            Self::Forward => index % TILE,
-            Self::Backward => TILE - 1 - index % TILE,
-        }
-    }
-
-    /// The places in the tile up to the last of some windows.
-    pub(crate) fn places(self, windows: &Range<usize>) -> Range<usize> {
-        let last = self.place(windows.end - 1);
-        match self {
-            Self::Forward => 0..last + 1,
-            Self::Backward => last..TILE,
+            Self::Forward => start + windows.start..start + windows.end,
+            Self::Backward => start - windows.end..start - windows.start,
         }
     }
 
@@ -73,7 +64,9 @@ impl Direction {
         if self == Self::Backward {
             let lanes = state.len() / states::<D>(1, 1);
             for coefficient in state[..D * lanes].chunks_exact_mut(lanes).skip(1).step_by(2) {
-                coefficient.iter_mut().for_each(|value| *value = -*value);
+                for value in coefficient {
+                    *value = -*value;
+                }
             }
         }
     }
@@ -123,6 +116,8 @@ pub(crate) struct Sweep<'a, const D: usize, const RESIDUAL: bool> {
     pub(crate) states: &'a mut [f64],
     pub(crate) tile: &'a mut Tile,
     pub(crate) direction: Direction,
+    /// The row of the start, and the windows to go through, counted from it.
+    pub(crate) start: usize,
     pub(crate) windows: Range<usize>,
     /// Whether the state is that of the first window already.
     pub(crate) ready: bool,
@@ -142,8 +137,8 @@ impl<const D: usize, const RESIDUAL: bool> Kernel for Sweep<'_, D, RESIDUAL> {
             let (come_to, lost) = self.step(simd, reference, first..end);
             for index in first..come_to {
                 let state = State::<S, D>::load(simd, self.states, index - first);
-                let place = self.direction.place(index);
-                self.finish.finish::<S, D, RESIDUAL>(simd, &state, reference, backward, self.tile, place);
+                let row = self.direction.row(self.start, index);
+                self.finish.finish::<S, D, RESIDUAL>(simd, &state, reference, backward, self.tile, row);
             }
             if lost != 0 {
                 return (come_to, lost);
@@ -159,7 +154,7 @@ impl<const D: usize, const RESIDUAL: bool> Sweep<'_, D, RESIDUAL> {
     #[inline(always)]
     fn step<S: Lanes>(&mut self, simd: S, reference: S::f64s, windows: Range<usize>) -> (usize, u32) {
         let (projection, strips) = (self.projection, self.strips);
-        let (length, start) = (projection.length(), projection.backward());
+        let (length, start) = (projection.length(), self.start);
         let mut state = State::load(simd, self.state, 0);
         let mut first = windows.start;
         if self.ready {

@@ -1,8 +1,9 @@
 //! The walk over the samples of a record: projection, choice of order and derivatives of every window in one pass.
 //!
-//! A record's windows are numbered by their first sample. Block `g` holds the windows `g B … (g+1) B - 1`; its start lies in its
-//! middle, at `g B + B/2`, or at the record's last window where that comes first. Blocks are worked on in runs, as many side by side
-//! as there are lanes. Which blocks share a run does not matter, since lanes keep apart, so any cutting of a record gives the same bits.
+//! A record's windows are numbered by their first sample. Span `g` holds the windows `g S … (g+1) S - 1`; its start lies in its
+//! middle, at `g S + S/2`, or at the record's last window where that comes first. Blocks are one span, or several short ones, and are
+//! worked on in runs, as many side by side as there are lanes. Which spans share a run does not matter, since lanes keep apart, so
+//! any cutting of a record gives the same bits.
 
 use std::fmt::Debug;
 use std::ops::Range;
@@ -11,6 +12,7 @@ use crate::aligned::Aligned;
 use crate::basis::Basis;
 use crate::finish::{Finish, Functional};
 use crate::local_polynomials::{Estimates, Options};
+use crate::output::Outputs;
 use crate::projection::Projection;
 use crate::samples::Samples;
 use crate::simd::{Instructions, MOST_LANES, dispatch};
@@ -19,7 +21,7 @@ use crate::stretch::Stretch;
 use crate::strips::Strips;
 use crate::sweep::{Direction, Fill, STEPS, Start, Sweep, replace, states};
 use crate::tile::{TILE, Tile};
-use crate::write::{Write, fill};
+use crate::write::Write;
 
 /// Samples copied out of a record at a time, about: several runs of short windows.
 const STRETCH: usize = 1 << 13;
@@ -88,7 +90,7 @@ impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
             start: Aligned::zeros(states::<D>(1, lanes)),
             state: Aligned::zeros(states::<D>(1, lanes)),
             states: Aligned::zeros(states::<D>(STEPS, lanes)),
-            tile: Tile::new(self.finish.fields(RESIDUAL), lanes),
+            tile: Tile::new(self.finish.fields(RESIDUAL), TILE, lanes),
         }
     }
 
@@ -96,17 +98,24 @@ impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
         let (block, backward, lanes) = (self.block(), self.projection.backward(), self.instructions.lanes());
         let last = record.len() - self.projection.length();
         debug_assert!(windows.end <= last + 1, "a window must lie in the record");
-        // The last block's start may have to move down to the last window; that block then runs alone.
-        let moved = if last % block < backward { last - last % block } else { last + 1 };
+        // The last span's start may have to move down to the last window; that span then runs alone.
+        let in_span = last % self.projection.span();
+        let moved = if in_span < backward { last - in_span } else { last + 1 };
         // What a run reads, and how much of it is not read again by the next.
         let (read, advance) = (scratch.strips.samples().cast_signed(), (lanes * block).cast_signed());
         scratch.stretch.load(record, 0..0);
+        let Estimates { elements, derivatives, order, status, sigma } = estimates;
+        let mut values: Vec<&mut [f64]> = derivatives.iter_mut().map(|values| &mut **values).collect();
+        if RESIDUAL {
+            values.push(sigma);
+        }
+        let mut outputs = Outputs { elements: *elements, values, order, status };
         let mut window = windows.start;
         while window < windows.end {
-            let first = window - window % block;
-            let (base, end) = if first >= moved {
+            let (base, end) = if window >= moved {
                 (last.cast_signed() - backward.cast_signed(), windows.end)
             } else {
+                let first = window - window % block;
                 (first.cast_signed(), windows.end.min(moved).min(first + lanes * block))
             };
             if !scratch.stretch.holds(&(base..base + read)) {
@@ -115,14 +124,14 @@ impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
                 scratch.stretch.load(record, base..base + read + (runs - 1) * advance);
             }
             let run = Run { engine: self, base, windows: window..end };
-            run.work(scratch, estimates);
-            run.invalidate(scratch.stretch.unusable(base..base + read), estimates);
+            run.work(scratch, &mut outputs);
+            run.invalidate(scratch.stretch.unusable(base..base + read), &mut outputs);
             window = end;
         }
     }
 }
 
-/// Blocks side by side: lane `l` works on the windows that begin at `base + l B`, of which `windows` are wanted.
+/// Blocks side by side: lane `l` works on the windows that begin from `base + l B` on, of which `windows` are wanted.
 struct Run<'a, const D: usize, const RESIDUAL: bool> {
     engine: &'a Engine<D, RESIDUAL>,
     base: isize,
@@ -130,71 +139,84 @@ struct Run<'a, const D: usize, const RESIDUAL: bool> {
 }
 
 impl<const D: usize, const RESIDUAL: bool> Run<'_, D, RESIDUAL> {
-    /// Finishes the windows of the run, from the start of every block forwards, then backwards.
+    /// Finishes the windows of the run, span by span, from the start forwards, then backwards.
     ///
     /// The kernels are called one by one, not from one another: in one function they would spill each other's registers.
-    fn work(&self, scratch: &mut Scratch, estimates: &mut Estimates<'_>) {
+    fn work(&self, scratch: &mut Scratch, outputs: &mut Outputs<'_>) {
         let Engine { projection, finish, instructions } = self.engine;
-        let (instructions, backward, rows) = (*instructions, projection.backward(), self.rows());
-        let Scratch { stretch, strips, references, start, state, states, tile } = scratch;
-        self.take_references(stretch, references);
+        let (instructions, span, wanted) = (*instructions, projection.span(), self.rows());
+        let Scratch { stretch, strips, references, start: at_start, state, states, tile } = scratch;
         dispatch(instructions, Fill { samples: stretch.from(self.base, strips.samples()), strips });
-        dispatch(instructions, Start { projection, strips, references, row: backward, state: start });
-        let forwards = rows.end.saturating_sub(backward);
-        let backwards = backward.saturating_sub(rows.start);
-        for (direction, count) in [(Direction::Forward, forwards), (Direction::Backward, backwards)] {
-            state.copy_from_slice(start);
-            direction.turn::<D>(state);
-            let (mut done, mut ready) = (0, direction == Direction::Forward);
-            while done < count {
-                let windows = done..count.min((done / TILE + 1) * TILE);
-                let places = direction.places(&windows);
-                let sweep = Sweep::<D, RESIDUAL> {
-                    projection,
-                    finish,
-                    strips,
-                    references,
-                    state,
-                    states,
-                    tile,
-                    direction,
-                    windows,
-                    ready,
-                };
-                let lost;
-                (done, lost) = dispatch(instructions, sweep);
-                ready = lost != 0;
-                if ready {
-                    // The next window of some lanes is projected afresh.
-                    let mut fresh = state.clone();
-                    let row = direction.row(backward, done);
-                    dispatch(instructions, Start { projection, strips, references, row, state: &mut fresh });
-                    direction.turn::<D>(&mut fresh);
-                    replace(state, &fresh, lost, instructions.lanes());
-                } else {
-                    let first = direction.lowest_row(backward, done);
-                    let offset = self.base + first.cast_signed();
-                    let write = Write {
+        // A short block is written whole, with its spans together; a long one tile by tile.
+        let whole = projection.block() <= TILE;
+        for first in (wanted.start - wanted.start % span..wanted.end).step_by(span) {
+            let start = first + projection.backward();
+            self.take_references(stretch, start, references);
+            dispatch(instructions, Start { projection, strips, references, row: start, state: at_start });
+            let forwards = wanted.end.min(first + span).saturating_sub(start);
+            let backwards = start.saturating_sub(wanted.start.max(first));
+            for (direction, count) in [(Direction::Forward, forwards), (Direction::Backward, backwards)] {
+                state.copy_from_slice(at_start);
+                direction.turn::<D>(state);
+                let (mut done, mut ready, mut written) = (0, direction == Direction::Forward, 0);
+                while done < count {
+                    let end = count.min(direction.end_of_tile(start, done));
+                    let sweep = Sweep::<D, RESIDUAL> {
+                        projection,
+                        finish,
+                        strips,
+                        references,
+                        state,
+                        states,
                         tile,
-                        fixed_order: finish.fixed_order(RESIDUAL),
-                        places,
-                        offset,
-                        block: projection.block(),
-                        windows: self.windows.clone(),
-                        before: self.engine.before_centre(),
-                        estimates,
+                        direction,
+                        start,
+                        windows: done..end,
+                        ready,
                     };
-                    dispatch(instructions, write);
+                    let lost;
+                    (done, lost) = dispatch(instructions, sweep);
+                    ready = lost != 0;
+                    if ready {
+                        // The next window of some lanes is projected afresh.
+                        let mut fresh = state.clone();
+                        let row = direction.row(start, done);
+                        dispatch(instructions, Start { projection, strips, references, row, state: &mut fresh });
+                        direction.turn::<D>(&mut fresh);
+                        replace(state, &fresh, lost, instructions.lanes());
+                    } else if !whole {
+                        self.write(tile, direction.rows(start, written..done), outputs);
+                        written = done;
+                    }
                 }
             }
         }
+        if whole {
+            self.write(tile, wanted, outputs);
+        }
     }
 
-    /// Takes a reference for each lane: the sample at the centre of its start, or the nearest to it that is a number.
-    fn take_references(&self, stretch: &Stretch, references: &mut [f64; MOST_LANES]) {
+    /// Writes out some rows, which the tile holds.
+    fn write(&self, tile: &Tile, rows: Range<usize>, outputs: &mut Outputs<'_>) {
+        let Engine { projection, finish, instructions } = self.engine;
+        let write = Write {
+            tile,
+            rows,
+            base: self.base,
+            block: projection.block(),
+            windows: self.windows.clone(),
+            ahead: self.engine.before_centre().cast_signed(),
+            fixed_order: finish.fixed_order(RESIDUAL),
+            outputs,
+        };
+        dispatch(*instructions, write);
+    }
+
+    /// Takes a reference for each lane: the sample at the centre of the start in a row, or the nearest to it that is a number.
+    fn take_references(&self, stretch: &Stretch, start: usize, references: &mut [f64; MOST_LANES]) {
         let projection = &self.engine.projection;
         let half = projection.length() / 2;
-        let centre = self.base + (projection.backward() + half).cast_signed();
+        let centre = self.base + (start + half).cast_signed();
         for (lane, reference) in references[..self.engine.instructions.lanes()].iter_mut().enumerate() {
             *reference = stretch.nearest_usable(centre + (lane * projection.block()).cast_signed(), half);
         }
@@ -209,20 +231,14 @@ impl<const D: usize, const RESIDUAL: bool> Run<'_, D, RESIDUAL> {
     }
 
     /// Makes the windows that hold a sample that cannot be used NaN.
-    fn invalidate(&self, unusable: &[usize], estimates: &mut Estimates<'_>) {
+    fn invalidate(&self, unusable: &[usize], outputs: &mut Outputs<'_>) {
         let (before, length) = (self.engine.before_centre(), self.engine.projection.length());
         let mut from = self.windows.start;
         for &sample in unusable {
             let first = (sample + 1).saturating_sub(length).max(from);
             let end = (sample + 1).min(self.windows.end);
             if first < end {
-                let elements = estimates.elements.of(first + before..end + before);
-                for derivative in &mut estimates.derivatives {
-                    fill(derivative, &elements, f64::NAN);
-                }
-                fill(estimates.order, &elements, 0);
-                fill(estimates.sigma, &elements, f64::NAN);
-                fill(estimates.status, &elements, Status::INVALID.bits());
+                outputs.invalidate(first + before..end + before, Status::INVALID);
                 from = end;
             }
         }

@@ -2,32 +2,25 @@
 
 use std::ops::Range;
 
-use crate::local_polynomials::Estimates;
-use crate::simd::{Kernel, Lanes};
-use crate::status::Status;
+use crate::output::Outputs;
+use crate::simd::{Kernel, Lanes, MOST_LANES};
 use crate::tile::{TILE, Tile};
 
-/// Fills some elements of an output that may not be wanted.
-pub(crate) fn fill<T: Copy>(output: &mut [T], elements: &Range<usize>, value: T) {
-    if !output.is_empty() {
-        output[elements.clone()].fill(value);
-    }
-}
-
-/// Writes out the windows of the tile at `places`.
+/// Writes out some windows of every lane, which the tile holds.
 pub(crate) struct Write<'a, 'b> {
-    pub(crate) tile: &'a mut Tile,
-    /// The order of every window, where the tile holds neither noise nor order.
-    pub(crate) fixed_order: Option<u8>,
-    pub(crate) places: Range<usize>,
-    /// The window at the first place in lane 0, and the windows from one lane to the next.
-    pub(crate) offset: isize,
+    pub(crate) tile: &'a Tile,
+    /// The windows of each lane's block.
+    pub(crate) rows: Range<usize>,
+    /// The window in row 0 of lane 0, and the windows from one lane to the next.
+    pub(crate) base: isize,
     pub(crate) block: usize,
     /// Windows that are wanted.
     pub(crate) windows: Range<usize>,
-    /// Samples from a window's first to the one it is around.
-    pub(crate) before: usize,
-    pub(crate) estimates: &'a mut Estimates<'b>,
+    /// The sample of window `w` is `w + ahead`.
+    pub(crate) ahead: isize,
+    /// The order of every window, where the tile holds no codes.
+    pub(crate) fixed_order: Option<u8>,
+    pub(crate) outputs: &'a mut Outputs<'b>,
 }
 
 impl Kernel for Write<'_, '_> {
@@ -35,87 +28,89 @@ impl Kernel for Write<'_, '_> {
 
     #[inline(always)]
     fn run<S: Lanes>(mut self, simd: S) {
-        let (lanes, places) = (S::F64_LANES, self.places.clone());
-        let windows = self.windows.start.cast_signed()..self.windows.end.cast_signed();
-        let end = self.offset + ((lanes - 1) * self.block + places.len()).cast_signed();
-        let squares = places.start % lanes == 0 && places.end % lanes == 0;
-        let plain =
-            self.estimates.elements.step == 1 && self.estimates.order.is_empty() == self.estimates.status.is_empty();
-        if squares && plain && windows.start <= self.offset && end <= windows.end {
+        let lanes = S::F64_LANES;
+        let first = self.base + self.rows.start.cast_signed();
+        let end = self.base + (self.rows.end + (lanes - 1) * self.block).cast_signed();
+        let wanted = self.windows.start.cast_signed() <= first && end <= self.windows.end.cast_signed();
+        if wanted && self.rows.len() >= lanes && self.outputs.elements.step == 1 {
             self.write_squares(simd);
-            return;
-        }
-        for lane in 0..lanes {
-            let offset = self.offset + (lane * self.block).cast_signed();
-            let wanted = (windows.start - offset).max(0)..(windows.end - offset).min(places.len().cast_signed());
-            if !wanted.is_empty() {
-                let window = (offset + wanted.start).unsigned_abs();
-                let wanted = places.start + wanted.start.unsigned_abs()..places.start + wanted.end.unsigned_abs();
-                self.write_lane::<S>(lane, wanted, window);
-            }
+        } else {
+            self.write_lanes::<S>();
         }
     }
 }
 
 impl Write<'_, '_> {
-    /// Writes out all lanes' windows, a whole number of squares, to neighbouring elements.
+    /// Writes out all windows to neighbouring elements. The last square overlaps the one before it where need be.
     #[inline(always)]
     fn write_squares<S: Lanes>(&mut self, simd: S) {
-        let Self { tile, places, block, estimates, .. } = self;
-        let fields = estimates.derivatives.len();
-        let offset = self.offset.unsigned_abs() + self.before - estimates.elements.first;
-        for group in places.clone().step_by(S::F64_LANES) {
-            let first = offset + group - places.start;
-            for (field, derivative) in estimates.derivatives.iter_mut().enumerate() {
-                let square = tile.square(simd, field, group);
-                for (lane, &vector) in square[..S::F64_LANES].iter().enumerate() {
-                    simd.store(derivative, first + lane * *block, vector);
+        let Self { tile, rows, block, outputs, .. } = self;
+        let lanes = S::F64_LANES;
+        let zero = self.base + self.ahead - outputs.elements.first.cast_signed();
+        for row in rows.clone().step_by(lanes).map(|row| row.min(rows.end - lanes)) {
+            let first = (zero + row.cast_signed()).unsigned_abs();
+            for (field, values) in outputs.values.iter_mut().enumerate() {
+                if values.is_empty() {
+                    continue;
+                }
+                let square = tile.square(simd, field, row);
+                for (lane, &vector) in square[..lanes].iter().enumerate() {
+                    simd.store(values, first + lane * *block, vector);
                 }
             }
-            if self.fixed_order.is_none() && !estimates.sigma.is_empty() {
-                let square = tile.square(simd, fields, group);
-                for (lane, &vector) in square[..S::F64_LANES].iter().enumerate() {
-                    simd.store(estimates.sigma, first + lane * *block, vector);
-                }
-            }
-            if estimates.order.is_empty() {
+            if outputs.status.is_empty() && outputs.order.is_empty() {
                 continue;
             }
-            if let Some(order) = self.fixed_order {
-                for lane in 0..S::F64_LANES {
-                    let place = first + lane * *block..first + lane * *block + S::F64_LANES;
-                    fill(estimates.order, &place, order);
-                    fill(estimates.status, &place, Status::GOOD.bits());
+            let (mut orders, mut statuses) = ([self.fixed_order.unwrap_or(0); MOST_LANES], [0; MOST_LANES]);
+            let codes = match self.fixed_order {
+                Some(_) => [simd.splat_f64s(0.0); MOST_LANES],
+                None => tile.square(simd, outputs.values.len(), row),
+            };
+            for (lane, &codes) in codes[..lanes].iter().enumerate() {
+                if self.fixed_order.is_none() {
+                    simd.split(codes, &mut orders, &mut statuses);
                 }
-            } else {
-                let square = tile.square(simd, fields + 1, group);
-                for (lane, &vector) in square[..S::F64_LANES].iter().enumerate() {
-                    let place = first + lane * *block..first + lane * *block + S::F64_LANES;
-                    simd.split(vector, &mut estimates.order[place.clone()], &mut estimates.status[place]);
+                let elements = first + lane * *block..first + lane * *block + lanes;
+                if !outputs.order.is_empty() {
+                    outputs.order[elements.clone()].copy_from_slice(&orders[..lanes]);
+                }
+                if !outputs.status.is_empty() {
+                    outputs.status[elements].copy_from_slice(&statuses[..lanes]);
                 }
             }
         }
     }
 
-    /// Writes out the windows of one lane at `places` of the tile, of which the first is `window`.
+    /// Writes out what is wanted of every lane to whatever elements there are.
     #[inline(always)]
-    fn write_lane<S: Lanes>(&mut self, lane: usize, places: Range<usize>, window: usize) {
-        let column = self.tile.lane::<S>(lane, &places);
-        let (estimates, sample) = (&mut *self.estimates, window + self.before);
-        let elements = estimates.elements;
-        let mut fields = column.chunks_exact(TILE);
-        for (to, from) in estimates.derivatives.iter_mut().zip(&mut fields) {
-            elements.put(to, sample, &from[places.clone()]);
-        }
-        let (mut orders, mut statuses) = ([self.fixed_order.unwrap_or(0); TILE], [Status::GOOD.bits(); TILE]);
-        if let (None, Some(sigma), Some(codes)) = (self.fixed_order, fields.next(), fields.next()) {
-            elements.put(estimates.sigma, sample, &sigma[places.clone()]);
-            for place in places.clone() {
-                (orders[place], statuses[place]) = parts(codes[place]);
+    fn write_lanes<S: Lanes>(&mut self) {
+        let Self { tile, rows, outputs, .. } = self;
+        let lanes = S::F64_LANES;
+        for lane in 0..lanes {
+            let zero = self.base + (lane * self.block).cast_signed();
+            let row =
+                |window: usize| (window.cast_signed() - zero).clamp(rows.start.cast_signed(), rows.end.cast_signed());
+            let wanted = row(self.windows.start).unsigned_abs()..row(self.windows.end).unsigned_abs();
+            for first in wanted.clone().step_by(TILE) {
+                let part = first..wanted.end.min(first + TILE);
+                let sample = (zero + self.ahead + first.cast_signed()).unsigned_abs();
+                let mut column = [0.0; TILE];
+                for (field, values) in outputs.values.iter_mut().enumerate().filter(|(_, values)| !values.is_empty()) {
+                    for (value, row) in column.iter_mut().zip(part.clone()) {
+                        *value = tile.one(field, row, lane, lanes);
+                    }
+                    outputs.elements.put(values, sample, &column[..part.len()]);
+                }
+                let (mut orders, mut statuses) = ([self.fixed_order.unwrap_or(0); TILE], [0; TILE]);
+                if self.fixed_order.is_none() {
+                    for ((order, status), row) in orders.iter_mut().zip(&mut statuses).zip(part.clone()) {
+                        (*order, *status) = parts(tile.one(outputs.values.len(), row, lane, lanes));
+                    }
+                }
+                outputs.elements.put(outputs.order, sample, &orders[..part.len()]);
+                outputs.elements.put(outputs.status, sample, &statuses[..part.len()]);
             }
         }
-        elements.put(estimates.order, sample, &orders[places.clone()]);
-        elements.put(estimates.status, sample, &statuses[places]);
     }
 }
 
