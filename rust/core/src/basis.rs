@@ -13,6 +13,9 @@
 
 use crate::double_double::DoubleDouble;
 
+/// The most degrees that any kernel has.
+pub(crate) const MOST_DEGREES: usize = 20;
+
 /// The orthonormal polynomials of one window length, tabulated on the window and ready to be evaluated anywhere.
 #[derive(Clone, Debug)]
 pub struct Basis {
@@ -20,6 +23,8 @@ pub struct Basis {
     degrees: usize,
     /// `b_0 = 0, b_1, …, b_degrees` of the recurrence.
     recurrence: Vec<DoubleDouble>,
+    /// `b_j` and `1/b_{j+1}` in working precision.
+    steps: Vec<(f64, f64)>,
     /// `q_j` at the positions that are not negative, position by position.
     values: Vec<f64>,
 }
@@ -49,7 +54,9 @@ impl Basis {
     #[must_use]
     pub fn new(length: usize, degrees: usize) -> Self {
         assert!((1..=length).contains(&degrees), "{degrees} polynomials are not independent on {length} samples");
-        let mut basis = Self { length, degrees, recurrence: recurrence(length, degrees), values: Vec::new() };
+        let recurrence = recurrence(length, degrees);
+        let steps = recurrence.windows(2).map(|b| (b[0].to_f64(), (DoubleDouble::ONE / b[1]).to_f64())).collect();
+        let mut basis = Self { length, degrees, recurrence, steps, values: Vec::new() };
         let rows = length - length / 2;
         let mut values = Vec::with_capacity(rows * degrees);
         for row in 0..rows {
@@ -129,37 +136,18 @@ impl Basis {
         differences
     }
 
-    /// The matrix `D` of the derivative: `q_j'(x) = Σ_{i<j} D[j][i] q_i(x)`, row by row.
+    /// The `derivative`-th derivative of every polynomial at a sample of the window from the derivative below it.
     ///
-    /// Strictly lower triangular: the rest is stored as zeros.
-    #[must_use]
-    pub fn derivative_matrix(&self) -> Vec<f64> {
-        self.expansion(DoubleDouble::ZERO, |j, i, _| if i == j { DoubleDouble::ONE } else { DoubleDouble::ZERO })
-    }
-
-    /// The rows `L_j` that expand `ℓ_j(x) = Σ_i L[j][i] q_i(x)`, where the `ℓ_j` obey the recurrence of the basis but for a
-    /// source: `b_{j+1} ℓ_{j+1} = x ℓ_j + source_j - b_j ℓ_{j-1}`, and `x q_i = b_{i+1} q_{i+1} + b_i q_{i-1}`.
-    ///
-    /// `source(j, i, L[j][i])` is the source's own expansion; `first` is `L[0][0]`.
-    fn expansion(&self, first: DoubleDouble, source: impl Fn(usize, usize, DoubleDouble) -> DoubleDouble) -> Vec<f64> {
-        let (n, b) = (self.degrees, &self.recurrence);
-        let mut rows = vec![DoubleDouble::ZERO; n * n];
-        rows[0] = first;
-        for j in 0..n - 1 {
-            for i in 0..=j + 1 {
-                let entry =
-                    |row: usize, column: usize| if column < n { rows[row * n + column] } else { DoubleDouble::ZERO };
-                let mut value = source(j, i, entry(j, i)) + b[i + 1] * entry(j, i + 1);
-                if i > 0 {
-                    value = value + b[i] * entry(j, i - 1);
-                }
-                if j > 0 {
-                    value = value - b[j] * entry(j - 1, i);
-                }
-                rows[(j + 1) * n + i] = value / b[j + 1];
-            }
+    /// One recurrence in working precision, `O(degrees)`: for many positions, where [`Basis::evaluate`] would be slow.
+    pub(crate) fn differentiate(&self, index: usize, derivative: usize, values: &mut [f64; MOST_DEGREES]) {
+        let (x, d) = (self.position(index), derivative as f64);
+        // The derivative of q_j and of the one before it, while `values` still holds the lower derivative from q_j on.
+        let (mut last, mut current) = (0.0, 0.0);
+        for (value, &(b, inverse)) in values.iter_mut().zip(&self.steps) {
+            let next = (x * current + d * *value - b * last) * inverse;
+            *value = current;
+            (last, current) = (current, next);
         }
-        rows.iter().map(|value| value.to_f64()).collect()
     }
 
     /// `q_j^{(derivative)}(position)` for every degree, to twice the precision.
@@ -215,6 +203,30 @@ mod tests {
         for (index, expected) in slope.into_iter().enumerate() {
             assert!((basis.value(0, index) - 1.0 / 5_f64.sqrt()).abs() < f64::EPSILON);
             assert!((basis.value(1, index) - expected).abs() < f64::EPSILON);
+        }
+    }
+
+    #[test]
+    fn derivatives_in_working_precision_are_as_good_as_it() {
+        for length in [5, 17, 18, 51, 201, 2001, 20_001] {
+            let basis = Basis::new(length, length.min(MOST_DEGREES));
+            for index in (0..length).step_by(1 + length / 50) {
+                let mut values = std::array::from_fn(|j| if j < basis.degrees() { basis.value(j, index) } else { 0.0 });
+                for derivative in 1..4 {
+                    basis.differentiate(index, derivative, &mut values);
+                    let expected = basis.evaluate(basis.position(index), derivative);
+                    let mut size = 0.0_f64;
+                    for (j, (value, expected)) in values.iter().zip(&expected).enumerate() {
+                        size = size.max(expected.abs());
+                        let error = (value - expected).abs();
+                        // Three roundings a degree, and derivatives upon each other.
+                        assert!(
+                            error <= 100.0 * f64::EPSILON * size,
+                            "degree {j}, derivative {derivative}, sample {index} of {length}"
+                        );
+                    }
+                }
+            }
         }
     }
 

@@ -12,7 +12,7 @@
 
 use std::ops::Range;
 
-use crate::basis::Basis;
+use crate::basis::{Basis, MOST_DEGREES};
 use crate::local_polynomials::{Estimates, Options, Order};
 use crate::samples::Samples;
 use crate::status::Status;
@@ -33,8 +33,6 @@ pub(crate) struct Ends {
     order: Order,
     derivatives: Vec<usize>,
     delta: f64,
-    /// The derivative matrix of the basis, row by row.
-    slopes: Vec<f64>,
 }
 
 /// A derivative at one position and its standard error.
@@ -45,13 +43,8 @@ pub(crate) struct Estimate {
 }
 
 impl Ends {
-    pub(crate) fn new(options: &Options, basis: &Basis) -> Self {
-        Self {
-            order: options.order,
-            derivatives: options.derivatives.clone(),
-            delta: options.delta,
-            slopes: basis.derivative_matrix(),
-        }
+    pub(crate) fn new(options: &Options) -> Self {
+        Self { order: options.order, derivatives: options.derivatives.clone(), delta: options.delta }
     }
 
     /// Writes the estimates of the given samples, all of them at one end of the record.
@@ -68,9 +61,9 @@ impl Ends {
             let sample = estimates.elements.sample(element);
             let mut status = Status::EDGE;
             if let Some(fit) = &fit {
-                for (slot, estimate) in self.evaluate(basis, fit, sample - first) {
+                self.evaluate(basis, fit, sample - first, |slot, estimate| {
                     estimates.derivatives[slot][element] = estimate.value;
-                }
+                });
                 status |= fit.status;
             } else {
                 estimates.derivatives.iter_mut().for_each(|derivative| derivative[element] = f64::NAN);
@@ -94,9 +87,7 @@ impl Ends {
         let mut errors = vec![vec![f64::NAN; places.len()]; self.derivatives.len()];
         if let Some(fit) = fit {
             for (column, place) in places.enumerate() {
-                for (slot, estimate) in self.evaluate(basis, &fit, place) {
-                    errors[slot][column] = estimate.error;
-                }
+                self.evaluate(basis, &fit, place, |slot, estimate| errors[slot][column] = estimate.error);
             }
         }
         errors
@@ -114,29 +105,29 @@ impl Ends {
         (first, Window::project(basis, &samples).map(|window| Fit::new(window, self.order, length)))
     }
 
-    /// Every derivative at sample `place` of the window.
-    fn evaluate<'a>(
-        &'a self,
-        basis: &'a Basis,
-        fit: &'a Fit,
-        place: usize,
-    ) -> impl Iterator<Item = (usize, Estimate)> + 'a {
+    /// Gives every derivative at sample `place` of the window to `give`, with its place among those asked for.
+    fn evaluate(&self, basis: &Basis, fit: &Fit, place: usize, mut give: impl FnMut(usize, Estimate)) {
         let degrees = basis.degrees();
         let highest = self.derivatives.iter().max().copied().unwrap_or(0);
-        let mut polynomials: Vec<f64> = (0..degrees).map(|j| basis.value(j, place)).collect();
+        let mut polynomials = [0.0; MOST_DEGREES];
+        for (degree, value) in polynomials[..degrees].iter_mut().enumerate() {
+            *value = basis.value(degree, place);
+        }
         let mut scale = 1.0;
-        (0..=highest).flat_map(move |derivative| {
+        for derivative in 0..=highest {
             if derivative > 0 {
                 scale /= self.delta;
-                polynomials =
-                    (0..degrees).map(|j| (0..j).map(|i| self.slopes[j * degrees + i] * polynomials[i]).sum()).collect();
+                basis.differentiate(place, derivative, &mut polynomials);
             }
-            let Estimate { value, error } = fit.best(&polynomials, derivative);
-            let level = if derivative == 0 { fit.window.reference } else { 0.0 };
-            let estimate = Estimate { value: value * scale + level, error: error * scale };
-            let slots = self.derivatives.iter().enumerate().filter(move |(_, wanted)| **wanted == derivative);
-            slots.map(move |(slot, _)| (slot, estimate))
-        })
+            let mut wanted =
+                self.derivatives.iter().enumerate().filter(|(_, wanted)| **wanted == derivative).peekable();
+            if wanted.peek().is_some() {
+                let Estimate { value, error } = fit.best(&polynomials, derivative);
+                let level = if derivative == 0 { fit.window.reference } else { 0.0 };
+                wanted
+                    .for_each(|(slot, _)| give(slot, Estimate { value: value * scale + level, error: error * scale }));
+            }
+        }
     }
 }
 
@@ -172,27 +163,31 @@ impl Fit {
     }
 
     /// The sum `Σ c_j q_j` up to the best order for it, with its standard error. Orders below `lowest` are not looked at.
-    fn best(&self, polynomials: &[f64], lowest: usize) -> Estimate {
-        let sums = |order: usize| {
-            let terms = self.window.coefficients.iter().zip(polynomials).take(order + 1);
-            terms.fold((0.0, 0.0), |(value, gain), (c, q)| (value + c * q, gain + q * q))
-        };
-        let (top_value, top_gain) = sums(self.order);
+    fn best(&self, polynomials: &[f64; MOST_DEGREES], lowest: usize) -> Estimate {
+        // Value and gain of every order.
+        let mut sums = [(0.0, 0.0); MOST_DEGREES];
+        let (mut value, mut gain) = (0.0, 0.0);
+        for ((sum, c), q) in sums[..=self.order].iter_mut().zip(&self.window.coefficients).zip(polynomials) {
+            value += c * q;
+            gain += q * q;
+            *sum = (value, gain);
+        }
+        let (top_value, top_gain) = (value, gain);
         let top = Estimate { value: top_value, error: self.sigma * top_gain.sqrt() };
         let variance = self.sigma * self.sigma;
         if !self.chosen || variance.is_nan() {
             return top;
         }
-        let mut best = (variance * top_gain, top);
-        for order in (lowest..self.order).rev() {
-            let (value, gain) = sums(order);
+        let mut best = (variance * top_gain, self.order);
+        for (order, &(value, gain)) in sums[..self.order].iter().enumerate().skip(lowest).rev() {
             let bias = ((value - top_value).powi(2) - variance * (top_gain - gain)).max(0.0);
             let error = bias + variance * gain;
             if error <= best.0 {
-                best = (error, Estimate { value, error: self.sigma * gain.sqrt() });
+                best = (error, order);
             }
         }
-        best.1
+        let (value, gain) = sums[best.1];
+        Estimate { value, error: self.sigma * gain.sqrt() }
     }
 }
 

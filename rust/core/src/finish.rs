@@ -1,15 +1,12 @@
 //! What becomes of a window's coefficients: its order, its noise and linear functions such as derivatives.
 
-use crate::basis::Basis;
+use crate::basis::{Basis, MOST_DEGREES};
 use crate::criterion::{Tables, choose};
 use crate::local_polynomials::{Options, Order};
 use crate::projection::State;
 use crate::simd::{Lanes, TABLE, unroll};
 use crate::status::Status;
 use crate::tile::Tile;
-
-/// The most degrees that any kernel has.
-const MOST_DEGREES: usize = 20;
 
 /// A linear function of a window's coefficients that is even or odd in time.
 #[derive(Clone, Debug)]

@@ -142,7 +142,7 @@ impl LocalPolynomials {
             (false, ..=16) => Box::new(Engine::<16, false>::new(&options, &basis)),
             (false, _) => Box::new(Engine::<20, false>::new(&options, &basis)),
         };
-        let ends = Ends::new(&options, &basis);
+        let ends = Ends::new(&options);
         Ok(Self { options, basis, ends, engine })
     }
 

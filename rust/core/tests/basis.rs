@@ -91,19 +91,6 @@ proptest! {
     }
 
     #[test]
-    fn the_derivative_matrix_differentiates(length in 5_usize..400, position in -1.0..1.0_f64, d in 0_usize..3) {
-        let basis = Basis::new(length, length.min(20));
-        let (degrees, matrix) = (basis.degrees(), basis.derivative_matrix());
-        let x = position * length as f64 / 2.0;
-        let (lower, higher) = (basis.evaluate(x, d), basis.evaluate(x, d + 1));
-        for j in 0..degrees {
-            let terms = || (0..j).map(|i| matrix[j * degrees + i] * lower[i]);
-            let scale: f64 = terms().map(f64::abs).sum();
-            prop_assert!((terms().sum::<f64>() - higher[j]).abs() <= 40.0 * f64::EPSILON * scale);
-        }
-    }
-
-    #[test]
     fn polynomials_are_even_or_odd(length in 5_usize..400, d in 0_usize..4) {
         let basis = Basis::new(length, length.min(20));
         for index in 0..length {
