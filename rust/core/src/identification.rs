@@ -101,7 +101,7 @@ impl Chunk {
             sigma: &mut [],
         };
         plan.estimate(motion.angle, samples, &mut estimates, &mut self.polynomials)?;
-        motion.rows(self.first, &self.derivatives, &mut self.known, &mut self.columns);
+        motion.rows(self.first, &mut self.derivatives, &mut self.known, &mut self.columns);
         Ok(())
     }
 }

@@ -49,28 +49,24 @@ impl Motion<'_> {
     }
 
     /// Builds the rows of the samples from `first` on: one column an unknown, in the order of inertia, damping, stiffness and terms,
-    /// then the right-hand side. `derivatives` are the angle and its first and second derivative at these samples.
+    /// then the right-hand side. `derivatives` are the angle and its first and second derivative at these samples; those that are
+    /// columns as they are change places with them and are not copied.
     pub(crate) fn rows(
         &self,
         first: usize,
-        derivatives: &[Vec<f64>; 3],
+        derivatives: &mut [Vec<f64>; 3],
         known: &mut Vec<f64>,
         columns: &mut [Vec<f64>],
     ) {
         let [angle, velocity, acceleration] = derivatives;
         let count = angle.len();
         let Some((side, unknowns)) = columns.split_last_mut() else { return };
-        let mut unknowns = unknowns.iter_mut();
         side.resize(count, 0.0);
         self.torque.read(first, side);
         known.resize(count, 0.0);
-        for (coefficient, factor) in self.coefficients.iter().zip([acceleration, velocity, angle]) {
+        for (coefficient, factor) in self.coefficients.iter().zip([&*acceleration, velocity, angle]) {
             match *coefficient {
-                Coefficient::Unknown => {
-                    if let Some(column) = unknowns.next() {
-                        column.clone_from(factor);
-                    }
-                }
+                Coefficient::Unknown => {}
                 Coefficient::Number(number) => {
                     if number != 0.0 {
                         side.iter_mut().zip(factor).for_each(|(side, factor)| *side -= number * factor);
@@ -84,15 +80,23 @@ impl Motion<'_> {
                 }
             }
         }
-        for (term, column) in self.terms.iter().zip(unknowns) {
+        let (coefficients, terms) = unknowns.split_at_mut(unknowns.len() - self.terms.len());
+        for (term, column) in self.terms.iter().zip(terms) {
             column.resize(count, 0.0);
             match *term {
                 Term::Offset => column.fill(1.0),
-                Term::Coulomb => column.iter_mut().zip(velocity).for_each(|(value, &velocity)| *value = sign(velocity)),
-                Term::Cubic => column.iter_mut().zip(angle).for_each(|(value, &angle)| *value = angle * angle * angle),
+                Term::Coulomb => {
+                    column.iter_mut().zip(&*velocity).for_each(|(value, &velocity)| *value = sign(velocity))
+                }
+                Term::Cubic => {
+                    column.iter_mut().zip(&*angle).for_each(|(value, &angle)| *value = angle * angle * angle)
+                }
                 Term::Record(record) => record.read(first, column),
             }
         }
+        let factors = self.coefficients.iter().zip([acceleration, velocity, angle]);
+        let unknown = factors.filter(|(coefficient, _)| matches!(coefficient, Coefficient::Unknown));
+        unknown.zip(coefficients).for_each(|((_, factor), column)| std::mem::swap(factor, column));
     }
 }
 

@@ -406,14 +406,26 @@ impl<H: Shape> Kernel for Work<'_, '_, '_, H> {
                 self.append(simd, &mut suffix, offset, 0, &mut row);
                 store(simd, self.shape, &mut self.scratch.suffixes[(offset - rows.start) * size..], &suffix);
             }
-            for offset in rows.clone() {
-                load(simd, self.shape, &self.scratch.suffixes[(offset - rows.start) * size..], &mut suffix);
-                self.finish(simd, &mut suffix, &prefix, offset, full, &mut row);
-                if (offset + 1) % places == 0 || offset + 1 == window {
-                    // The last windows are written together with some that were written before, to fill the vectors.
-                    self.write(simd, (offset + 1).saturating_sub(places)..offset + 1);
+            // Merging waits for the step before, solving for nothing: apart, each keeps the processor busy.
+            let mut first = rows.start;
+            while first < rows.end {
+                let some = first..rows.end.min(first - first % places + places);
+                for offset in some.clone() {
+                    let place = (offset - rows.start) * size;
+                    load(simd, self.shape, &self.scratch.suffixes[place..], &mut suffix);
+                    merge(simd, self.shape, &mut suffix, &prefix, &mut row);
+                    store(simd, self.shape, &mut self.scratch.suffixes[place..], &suffix);
+                    self.append(simd, &mut prefix, offset, 1, &mut row);
                 }
-                self.append(simd, &mut prefix, offset, 1, &mut row);
+                for offset in some.clone() {
+                    load(simd, self.shape, &self.scratch.suffixes[(offset - rows.start) * size..], &mut suffix);
+                    self.finish(simd, &suffix, offset, full, &mut row);
+                }
+                // The last windows are written together with some that were written before, to fill the vectors.
+                if some.end % places == 0 || some.end == window {
+                    self.write(simd, some.end.saturating_sub(places)..some.end);
+                }
+                first = some.end;
             }
         }
         self.run.mark(&self.scratch.unusable, full, self.outputs);
@@ -437,13 +449,12 @@ impl<H: Shape> Work<'_, '_, '_, H> {
         append(simd, self.shape, factor, row, 0, simd.splat_f64s(1.0));
     }
 
-    /// Merges the prefix of each lane's window into its suffix and solves.
+    /// Solves each lane's window.
     #[inline(always)]
     fn finish<S: Lanes>(
         &mut self,
         simd: S,
-        factor: &mut H::Factor<S::f64s>,
-        prefix: &H::Factor<S::f64s>,
+        factor: &H::Factor<S::f64s>,
         offset: usize,
         full: bool,
         values: &mut H::Factor<S::f64s>,
@@ -453,8 +464,6 @@ impl<H: Shape> Work<'_, '_, '_, H> {
         let slots = Slots::of(plan);
         let freedom = self.freedom(simd, offset, full);
         let tile = &mut self.scratch.tile;
-        merge(simd, shape, factor, prefix, values);
-
         // The squared condition number comes first: where it has no digits nothing has.
         invert(simd, shape, factor, values);
         let mut squares = simd.splat_f64s(0.0);
