@@ -86,10 +86,14 @@ impl Motion<'_> {
             match *term {
                 Term::Offset => column.fill(1.0),
                 Term::Coulomb => {
-                    column.iter_mut().zip(&*velocity).for_each(|(value, &velocity)| *value = sign(velocity))
+                    for (value, &velocity) in column.iter_mut().zip(&*velocity) {
+                        *value = sign(velocity);
+                    }
                 }
                 Term::Cubic => {
-                    column.iter_mut().zip(&*angle).for_each(|(value, &angle)| *value = angle * angle * angle)
+                    for (value, &angle) in column.iter_mut().zip(&*angle) {
+                        *value = angle * angle * angle;
+                    }
                 }
                 Term::Record(record) => record.read(first, column),
             }
