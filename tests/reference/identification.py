@@ -20,14 +20,23 @@ def derivatives(angle: Array, half: int, delta: float, orders: npt.NDArray[np.ui
     return found
 
 
+def scaled(A: Array) -> Array:
+    """Give every column the same norm."""
+    return A / np.maximum(np.linalg.norm(A, axis=0), np.finfo(np.float64).tiny)
+
+
 def windowed(A: Array, torque: Array, equations: int) -> list[Solution | None]:
-    """Solve (3), (4) around every sample, from the rows that exist; nothing where they are fewer than half of a window."""
+    """Solve (3), (4) around every sample, from the rows that exist.
+
+    There is nothing where they are fewer than half of a window, or do not determine the unknowns.
+    """
     usable = np.asarray(np.isfinite(A).all(axis=1))
     solutions: list[Solution | None] = []
     for i in range(torque.size):
         rows = window_rows(i, equations, torque.size)
         kept = usable[rows]
-        if 2 * kept.sum() < equations or kept.sum() <= A.shape[1]:
+        too_few = 2 * kept.sum() < equations or kept.sum() <= A.shape[1]
+        if too_few or np.linalg.matrix_rank(scaled(A[rows][kept])) < A.shape[1]:
             solutions.append(None)
         else:
             solutions.append(solve(A[rows][kept], torque[rows][kept]))
