@@ -56,6 +56,62 @@ class StandardErrors(Mapping[str, Array]):
         return f"<StandardErrors of {', '.join(self)}>"
 
 
+class _Oscillator:
+    """What follows from inertia, damping and stiffness, computed when asked for.
+
+    It stands apart from the result, so that nothing in a result leads back to it: a circle would keep hundreds of megabytes until the
+    garbage collector comes by.
+    """
+
+    def __init__(
+        self,
+        inertia: Array,
+        damping: Array,
+        stiffness: Array,
+        errors: dict[str, Array],
+        covariances: dict[frozenset[str], Array],
+    ) -> None:
+        self._inertia = inertia
+        self._damping = damping
+        self._stiffness = stiffness
+        self._errors = errors
+        self._covariances = covariances
+
+    @cached_property
+    def natural_frequency(self) -> Array:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(np.sqrt(self._stiffness / self._inertia) / (2 * np.pi))
+
+    @cached_property
+    def damping_ratio(self) -> Array:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(self._damping / (2 * np.sqrt(self._stiffness * self._inertia)))
+
+    def natural_frequency_error(self) -> Array:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            f = self.natural_frequency
+            return self._propagate({"inertia": -f / (2 * self._inertia), "stiffness": f / (2 * self._stiffness)})
+
+    def damping_ratio_error(self) -> Array:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            ratio = self.damping_ratio
+            gradient = {
+                "inertia": -ratio / (2 * self._inertia),
+                "damping": 1 / (2 * np.sqrt(self._stiffness * self._inertia)),
+                "stiffness": -ratio / (2 * self._stiffness),
+            }
+            return self._propagate(gradient)
+
+    def _propagate(self, gradient: dict[str, Array]) -> Array:
+        """Return the standard error of a function with the given gradient: the delta method."""
+        variance = sum((slope * self._errors[name]) ** 2 for name, slope in gradient.items())
+        for pair, covariance in self._covariances.items():
+            if pair <= gradient.keys():
+                one, other = pair
+                variance = variance + 2 * gradient[one] * gradient[other] * covariance
+        return np.asarray(np.sqrt(variance))
+
+
 class Identification:
     r"""What :func:`tvident.identify` found. ``n`` is the number of samples, or of every ``step``-th of them.
 
@@ -110,45 +166,22 @@ class Identification:
         self.order = order
         self.status = status
         self.settings = settings
-        self._covariances = covariances
-        computed = {"natural_frequency": self._frequency_error, "damping_ratio": self._ratio_error}
+        self._oscillator = _Oscillator(self.inertia, self.damping, self.stiffness, errors, covariances)
+        computed = {
+            "natural_frequency": self._oscillator.natural_frequency_error,
+            "damping_ratio": self._oscillator.damping_ratio_error,
+        }
         self.stderr = StandardErrors(errors, computed)
 
-    @cached_property
+    @property
     def natural_frequency(self) -> Array:
         """Undamped natural frequency √(K/I)/2π in Hz; NaN where K/I is negative."""
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return np.asarray(np.sqrt(self.stiffness / self.inertia) / (2 * np.pi))
+        return self._oscillator.natural_frequency
 
-    @cached_property
+    @property
     def damping_ratio(self) -> Array:
         """Damping ratio C/(2√(KI)); NaN where KI is negative."""
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return np.asarray(self.damping / (2 * np.sqrt(self.stiffness * self.inertia)))
-
-    def _frequency_error(self) -> Array:
-        with np.errstate(invalid="ignore", divide="ignore"):
-            f = self.natural_frequency
-            return self._propagate({"inertia": -f / (2 * self.inertia), "stiffness": f / (2 * self.stiffness)})
-
-    def _ratio_error(self) -> Array:
-        with np.errstate(invalid="ignore", divide="ignore"):
-            ratio = self.damping_ratio
-            gradient = {
-                "inertia": -ratio / (2 * self.inertia),
-                "damping": 1 / (2 * np.sqrt(self.stiffness * self.inertia)),
-                "stiffness": -ratio / (2 * self.stiffness),
-            }
-            return self._propagate(gradient)
-
-    def _propagate(self, gradient: dict[str, Array]) -> Array:
-        """Return the standard error of a function with the given gradient: the delta method."""
-        variance = sum((slope * self.stderr[name]) ** 2 for name, slope in gradient.items())
-        for pair, covariance in self._covariances.items():
-            if pair <= gradient.keys():
-                one, other = pair
-                variance = variance + 2 * gradient[one] * gradient[other] * covariance
-        return np.asarray(np.sqrt(variance))
+        return self._oscillator.damping_ratio
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """Return everything that has one value a sample, by name: what :meth:`save` writes.
