@@ -6,6 +6,8 @@ BIN := $(VENV)/bin
 RUST := $(shell find rust -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 READY := $(VENV)/.ready
 BUILT := $(VENV)/.built
+BENCH := .venv-bench
+BENCH_BUILT := $(BENCH)/.built
 export CARGO_TERM_COLOR ?= auto
 
 .PHONY: help
@@ -47,9 +49,13 @@ format: $(READY)  ## format all sources
 wheel: $(READY)  ## build the wheel that users install, in dist/
 	$(BIN)/maturin build --release --locked --out dist
 
+.PHONY: bench
+bench: $(BENCH_BUILT)  ## how fast it is beside its peers: BENCH_OPTIONS="--quick", "--only identify", "--store", "--help"
+	PYTHONPATH=benches:tests $(BENCH)/bin/python -m speed $(BENCH_OPTIONS)
+
 .PHONY: clean
 clean:  ## remove everything that was made
-	rm -rf $(VENV) target dist tvident-demo
+	rm -rf $(VENV) $(BENCH) target dist tvident-demo
 
 $(READY): requirements-development.txt
 	$(PYTHON) -m venv $(VENV)
@@ -58,4 +64,16 @@ $(READY): requirements-development.txt
 
 $(BUILT): $(READY) $(RUST) pyproject.toml
 	$(BIN)/maturin develop --profile checked --locked --quiet
+	@touch $@
+
+$(BENCH)/.ready: requirements-bench.txt
+	$(PYTHON) -m venv $(BENCH)
+	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --requirement requirements-bench.txt
+	@touch $@
+
+# A wheel as users install it, in an environment of its own: the checked build of the tests stays where it is.
+$(BENCH_BUILT): $(BENCH)/.ready $(RUST) pyproject.toml $(wildcard python/tvident/*.py)
+	rm -rf target/bench-wheel
+	$(BENCH)/bin/maturin build --release --locked --quiet --out target/bench-wheel
+	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bench-wheel/*.whl
 	@touch $@
