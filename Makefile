@@ -53,6 +53,10 @@ wheel: $(READY)  ## build the wheel that users install, in dist/
 bench: $(BENCH_BUILT)  ## how fast it is beside its peers: BENCH_OPTIONS="--quick", "--only identify", "--store", "--help"
 	PYTHONPATH=benches:tests $(BENCH)/bin/python -m speed $(BENCH_OPTIONS)
 
+.PHONY: record-instructions
+record-instructions: $(READY)  ## write down the instructions that a window costs, for the tests to compare with (needs valgrind)
+	$(BIN)/python benches/instruction_counts.py
+
 .PHONY: clean
 clean:  ## remove everything that was made
 	rm -rf $(VENV) $(BENCH) target dist tvident-demo
