@@ -174,25 +174,84 @@ GOOD = ("--angle", "angle", "--torque", "torque", "--sample-rate", "1000")
         (("identify", "FILE", *GOOD, "--no-such-option"), 2, "No such option"),
         (("identify", *GOOD), 2, "channel 'angle' needs a FILE"),
         (("identify", "missing.csv", *GOOD), 1, "missing.csv: there is no such file"),
-        (("identify", "FILE", *GOOD, "-o", "no/such/folder/r.csv"), 1, "No such file or directory"),
+        (("identify", "FILE", *GOOD, "--time", "time"), 2, "only one of --sample-rate, --delta, --time; got"),
+        (("identify", "FILE", *GOOD, "-o", "FILE"), 2, "results must not replace the recording"),
+        (("identify", "FILE", *GOOD, "-o", "no/such/folder/r.csv"), 1, "no/such/folder: there is no such folder"),
+        (("identify", "FILE", *GOOD, "--plot", "no/such/folder/r.png"), 1, "no/such/folder: there is no such folder"),
+        (("identify", "FILE", *GOOD, "-o", "folder.csv"), 2, "'folder.csv' is a directory"),
+        (("identify", "FILE", *GOOD, "--angle-scale", "inf"), 2, "a scale must be finite; got inf"),
+        (("identify", "few.npz", *GOOD, "--angle-scale", "few"), 2, "'few' has 3 values for 300 samples"),
+        (("identify", "FILE", *GOOD, "--step", "99999999999999999999"), 2, "step must be less than 2^63"),
+        (("info", "folder.csv"), 1, "folder.csv: this is a folder; name a file in it"),
+        (("info", "folder"), 1, "folder: this is a folder; name a file in it"),
+        (("info", "decimal-commas.csv"), 1, "with a point as the decimal sign"),
         (("info", "broken.npz"), 1, "broken.npz: cannot be read as .npz"),
         (("info", "nothing.xyz"), 1, "the ending must be one of"),
         (("derivatives", "FILE", "--channel", "angle", "--order", "16"), 2, "order must be at most 15; got 16"),
         (("derivatives", "FILE", "--channel", "angle", "--time", "angle"), 2, "t must increase"),
         (("simulate", "rig.txt"), 2, "files that end in .csv or .npz"),
         (("simulate", "rig.csv", "--duration", "-3"), 2, "duration must be positive"),
+        (("simulate", "rig.csv", "--duration", "1e12"), 1, "more memory than there is"),
+        (("simulate", "no/such/folder/rig.csv"), 1, "no/such/folder: there is no such folder"),
+        (("demo", "--folder", "broken.npz/demo"), 1, "broken.npz/demo: Not a directory"),
     ],
 )
 def test_misuse_is_one_line_and_a_status(
     recording: Path, tmp_path: Path, arguments: tuple[str, ...], status: int, message: str
 ) -> None:
     (tmp_path / "broken.npz").write_bytes(b"nonsense")
+    (tmp_path / "decimal-commas.csv").write_text("a;b\n1,5;2,5\n2,5;3,5\n")
+    np.savez(tmp_path / "few.npz", angle=np.arange(300.0), torque=np.arange(300.0), few=np.arange(3.0))
+    for folder in ("folder", "folder.csv"):
+        (tmp_path / folder).mkdir()
+    before = {path.name for path in tmp_path.iterdir()}
     done = run(*(recording if argument == "FILE" else argument for argument in arguments), cwd=tmp_path)
     assert done.returncode == status, done.stderr
     assert message in " ".join(done.stderr.split())
     assert "Traceback" not in done.stderr
     assert done.stdout == ""
-    assert {path.name for path in tmp_path.iterdir()} == {"broken.npz"}
+    assert {path.name for path in tmp_path.iterdir()} == before
+
+
+def test_a_channel_is_found_beside_a_file_of_its_name(recording: Path, tmp_path: Path) -> None:
+    (tmp_path / "angle").write_text("not a recording")
+    done = run("identify", recording, *GOOD, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+def test_without_matplotlib_all_but_pictures_is_there(recording: Path, tmp_path: Path) -> None:
+    # A module of that name that cannot be imported stands for one that is not installed.
+    (tmp_path / "absent").mkdir()
+    (tmp_path / "absent" / "matplotlib.py").write_text("raise ImportError")
+    environment = os.environ | {"PYTHONPATH": str(tmp_path / "absent")}
+
+    def run_without(*arguments: object) -> subprocess.CompletedProcess[str]:
+        command = [TVIDENT, *map(str, arguments)]
+        return subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+
+    done = run_without("identify", recording, *GOOD, "-o", "result.csv")
+    assert done.returncode == 0, done.stderr
+    refused = run_without("identify", recording, *GOOD, "-o", "other.csv", "--plot", "picture.png")
+    assert refused.returncode == 2
+    assert "pip install 'tvident[plot]'" in refused.stderr
+    assert not (tmp_path / "other.csv").exists()
+    demo = run_without("demo")
+    assert demo.returncode == 2
+    assert "stiffness  N m/rad" in demo.stdout
+    assert "pip install 'tvident[plot]'" in demo.stderr
+    assert {path.name for path in (tmp_path / "tvident-demo").iterdir()} == {"recording.csv", "result.csv"}
+
+
+def test_a_reader_that_has_had_enough_is_no_error(recording: Path) -> None:
+    command = [TVIDENT, "identify", str(recording), *GOOD, "-o", "-"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        assert process.stdout.read(4) == b"time"
+        process.stdout.close()
+        errors = process.stderr.read().decode()
+    assert "Error" not in errors
+    assert "Traceback" not in errors
 
 
 def long_recording(folder: Path, samples: int) -> None:

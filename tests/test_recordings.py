@@ -37,6 +37,12 @@ def test_columns_of_text_in_many_dialects(tmp_path: Path, name: str, text: str) 
     assert_holds(path, {"t": [0, 1, 2], "a": [1.5, 2.5, -0.3]})
 
 
+def test_text_of_older_programs(tmp_path: Path) -> None:
+    path = tmp_path / "western.csv"
+    path.write_bytes("Zeit;Winkel [°]\n0;1.5\n1;2.5\n".encode("latin-1"))
+    assert_holds(path, {"Zeit": [0, 1], "Winkel [°]": [1.5, 2.5]})
+
+
 def test_text_without_names_and_with_gaps(tmp_path: Path) -> None:
     path = tmp_path / "bare.csv"
     path.write_text("1,2\n3,\n5,6\n")

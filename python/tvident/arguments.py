@@ -19,6 +19,8 @@ NanPolicy: TypeAlias = Literal["propagate", "raise"]
 
 _READ_AS_THEY_ARE = frozenset(np.dtype(code) for code in ("f8", "f4", "i8", "i4", "i2", "i1", "u8", "u4", "u2", "u1"))
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0}
+# No whole number this large fits into the core's.
+_BEYOND_COUNTING = 1 << 63
 # How far a time stamp may lie from a uniform grid, as a fraction of the sample period: what printing with a few digits does.
 _JITTER = 1e-3
 
@@ -71,7 +73,10 @@ def whole_number(name: str, value: object, *, least: int | None = None) -> int:
         raise TypeError(f"{name} must be a whole number; got {value!r}; {cure}")
     if least is not None and value < least:
         raise ValueError(f"{name} must be at least {least}; got {value}; pass {least} or more")
-    return int(value)
+    number = int(value)
+    if number >= _BEYOND_COUNTING:
+        raise ValueError(f"{name} must be less than 2^63; got {number}; pass a smaller number")
+    return number
 
 
 def positive_number(name: str, value: object) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 from collections.abc import Callable
 from importlib import import_module
@@ -24,18 +25,28 @@ Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 
 
 class _Command(click.Group):
-    """Turns what the library and files raise into one line and an exit status."""
+    """Turns what the library and files raise into one line and an exit status: 2 for misuse, 1 for what cannot be read, written or done."""
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
+        except (click.exceptions.Exit, click.Abort):
+            raise
         except recordings.FileError as error:
             raise click.ClickException(str(error)) from None
         except KeyError as error:
             raise click.UsageError(str(error.args[0])) from None
         except (ValueError, TypeError, ImportError) as error:
             raise click.UsageError(str(error)) from None
+        except MemoryError:
+            raise click.ClickException(
+                "the work needs more memory than there is; cut the recording into pieces, or ask for every --step-th result"
+            ) from None
+        except RuntimeError as error:
+            raise click.ClickException(str(error)) from None
         except OSError as error:
+            if error.errno == errno.EPIPE:
+                raise  # whoever reads the output has had enough: click ends without a word
             raise click.ClickException(f"{error.filename or 'the output'}: {error.strerror}") from None
 
 
@@ -87,7 +98,7 @@ _CRITERION = click.option("--criterion", type=click.Choice(get_args(Criterion)),
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the simulated recording.")
 def demo(folder: Path, seed: int) -> None:
     """Identify a simulated recording, compare with the truth and draw the paper's figures."""
-    figures = _figures()
+    folder.mkdir(parents=True, exist_ok=True)
     recording = tvident.simulate_torsional_rig(seed=seed)
     result = tvident.identify(recording.angle, recording.torque, sample_rate=recording.sample_rate)
     valid = np.isfinite(result.stiffness)
@@ -103,10 +114,13 @@ def demo(folder: Path, seed: int) -> None:
     )
     click.echo("\n".join(["", *table.aligned(rows), "", *describe(result.status), ""]))
 
-    folder.mkdir(parents=True, exist_ok=True)
-    middle_sample = recording.time.size // 2
+    recording.save(folder / "recording.csv")
+    result.save(folder / "result.csv")
+    click.echo(f"Written to {folder}: recording.csv, result.csv")
     noise = 0.05 * recording.angle.std() * np.random.default_rng(seed + 1).standard_normal(recording.angle.size)
+    middle_sample = recording.time.size // 2
     window: dict[str, Any] = {"sample_rate": recording.sample_rate}
+    figures = _figures()
     pictures = {
         "recording.png": figures.plot_recording(recording),
         "window.png": figures.plot_window(recording.angle, middle_sample, **window),
@@ -115,9 +129,7 @@ def demo(folder: Path, seed: int) -> None:
     }
     for name, picture in pictures.items():
         _save_figure(picture, folder / name)
-    recording.save(folder / "recording.csv")
-    result.save(folder / "result.csv")
-    click.echo(f"Written to {folder}: {', '.join([*pictures, 'recording.csv', 'result.csv'])}")
+    click.echo(f"Drawn in {folder}: {', '.join(pictures)}")
 
 
 @main.command()
@@ -138,7 +150,7 @@ def demo(folder: Path, seed: int) -> None:
 @click.option("--encoder-counts", type=int, help="Counts a turn, instead of noise.")
 def simulate(output: str, **options: Any) -> None:
     """Write a simulated recording of the paper's rig, with its truth, to OUTPUT (CSV or NPZ)."""
-    table.check_ending(Path(output))
+    table.check_place(Path(output))
     recording = tvident.simulate_torsional_rig(**options)
     recording.save(output)
     click.echo(f"{recording.time.size} samples written to {output}", err=True)
@@ -199,7 +211,8 @@ def derivatives(
     **options: Any,
 ) -> None:
     """Differentiate a channel of FILE with a polynomial order chosen in every window."""
-    _check_output(output, plot)
+    _check_output(output, plot, file)
+    _check_time(sample_rate, delta, time_channel)
     channels = recordings.read(file)
     samples = _channel(channels, channel, file)
     times = None if time_channel is None else _channel(channels, time_channel, file)
@@ -268,7 +281,9 @@ def identify(
     **options: Any,
 ) -> None:
     """Identify inertia, damping and stiffness from the angle and torque in FILE."""
-    _check_output(output, plot)
+    _check_output(output, plot, file, angle, torque)
+    if not _check_time(options["sample_rate"], options["delta"], time_channel):
+        raise click.UsageError("identify needs the sample period; got none; give --sample-rate, --delta or --time")
     channels = {} if file is None else recordings.read(file)
     known = {"inertia": inertia, "damping": damping, "stiffness": stiffness}
     result = tvident.identify(
@@ -300,9 +315,13 @@ def _channel(channels: recordings.Channels, name: str, file: str | None) -> npt.
 
 def _source(channels: recordings.Channels, name: str, file: str | None) -> npt.NDArray[Any]:
     """Return a channel by name, or the only channel of a file of that name."""
-    if file is not None and not Path(name).is_file():
-        return _channel(channels, name, file)
-    if file is None and Path(name).suffix == "":
+    if file is not None:
+        try:
+            return _channel(channels, name, file)
+        except KeyError:
+            if not Path(name).is_file():
+                raise
+    elif Path(name).suffix == "":
         raise click.UsageError(f"channel {name!r} needs a FILE to be in; name the file first")
     alone = recordings.read(name)
     if len(alone) != 1:
@@ -322,6 +341,14 @@ def _scaled(
         factor: Any = float(scale)
     except ValueError:
         factor = recordings.channel(channels, scale, file or "the command line")
+    else:
+        if not np.isfinite(factor):
+            raise click.UsageError(f"a scale must be finite; got {scale}; give a number such as 0.001")
+    if np.ndim(factor) and factor.shape != values.shape:
+        raise click.UsageError(
+            f"a scale must be one number, or have one value for every sample; {scale!r} has {factor.size} values "
+            f"for {values.size} samples; use another variable"
+        )
     return np.asarray(values * factor)
 
 
@@ -356,14 +383,28 @@ def _progress(wanted: bool | None) -> bool:  # noqa: FBT001 - an option's value
     return sys.stderr.isatty() if wanted is None else wanted
 
 
-def _check_output(output: str | None, plot: str | None) -> None:
-    """Refuse what cannot be written before any work is done."""
+def _check_time(sample_rate: float | None, delta: float | None, time_channel: str | None) -> bool:
+    """Return whether the sample period was given; refuse several."""
+    ways = {"--sample-rate": sample_rate, "--delta": delta, "--time": time_channel}
+    given = [name for name, value in ways.items() if value is not None]
+    if len(given) > 1:
+        raise click.UsageError(f"give only one of {', '.join(ways)}; got {' and '.join(given)}; drop all but one")
+    return bool(given)
+
+
+def _check_output(output: str | None, plot: str | None, *sources: str | None) -> None:
+    """Refuse what cannot be written, or would write over a recording, before any work is done."""
     if output is not None and output != "-":
-        table.check_ending(Path(output))
+        place = Path(output)
+        table.check_place(place)
+        recorded = [Path(source) for source in sources if source is not None and Path(source).is_file()]
+        if place.exists() and any(place.samefile(source) for source in recorded):
+            raise click.UsageError(f"results must not replace the recording; got {output!r}; give another file")
     if plot is not None:
         _figures()
         if Path(plot).suffix.lower() not in {".png", ".pdf", ".svg"}:
             raise click.UsageError(f"--plot must end in .png, .pdf or .svg; got {plot!r}; rename it")
+        table.check_folder(Path(plot))
 
 
 def _give(columns: dict[str, npt.NDArray[Any]], units: dict[str, str], words: str, output: str | None) -> None:

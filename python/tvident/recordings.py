@@ -41,18 +41,25 @@ def read(path: str | Path) -> Channels:
         If the file cannot be read, or holds no numbers.
     """
     path = Path(path)
+    if path.is_dir():
+        raise FileError(f"{path}: this is a folder; name a file in it")
     readers = dict.fromkeys(TEXT, _read_text) | {".npy": _read_npy, ".npz": _read_npz, ".mat": _read_matlab}
     if path.suffix.lower() not in readers:
         known = ", ".join((*TEXT, *NUMPY, *MATLAB))
-        raise FileError(f"{path}: the ending must be one of {known}; got {path.suffix or 'none'!r}; convert the file")
+        got = repr(path.suffix) if path.suffix else "none"
+        raise FileError(f"{path}: the ending must be one of {known}; got {got}; convert or rename the file")
     try:
         channels = readers[path.suffix.lower()](path)
     except FileNotFoundError:
         raise FileError(f"{path}: there is no such file; check the name and the folder") from None
+    except PermissionError:
+        raise FileError(f"{path}: may not be read; check its permissions") from None
     except (OSError, ValueError, EOFError, KeyError, TypeError, zipfile.BadZipFile) as error:
         raise FileError(f"{path}: cannot be read as {path.suffix} ({error}); check that it is whole") from None
     if not channels:
-        raise FileError(f"{path}: holds no numbers; export the channels as columns of numbers")
+        raise FileError(
+            f"{path}: holds no numbers; export the channels as columns of numbers with a point as the decimal sign"
+        )
     return channels
 
 
@@ -77,7 +84,8 @@ def channel(channels: Mapping[str, npt.NDArray[Any]], name: str, source: str) ->
 
 def _read_text(path: Path) -> Channels:
     """Read columns of numbers, with or without names, separated by commas, semicolons, tabs or blanks."""
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
+    encoding = _encoding(path)
+    with path.open(encoding=encoding) as file:
         lines = [line for _, line in zip(range(200), file, strict=False)]
     for separator in (",", ";", "\t", None):
         start, width = _first_numbers(lines, separator)
@@ -90,12 +98,23 @@ def _read_text(path: Path) -> Channels:
         path,
         delimiter=separator,
         skip_header=start,
-        encoding="utf-8-sig",
+        encoding=encoding,
         comments="#",
         ndmin=2,
         invalid_raise=True,
     )
     return dict(zip(names, numbers.T, strict=True))
+
+
+def _encoding(path: Path) -> str:
+    """Return how a text is encoded: UTF-8, or else the Western European alphabet of older programs."""
+    with path.open(encoding="utf-8-sig") as file:
+        try:
+            for _ in file:
+                pass
+        except UnicodeDecodeError:
+            return "latin-1"
+    return "utf-8-sig"
 
 
 def _cells(line: str, separator: str | None) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,7 +26,7 @@ def header(name: str, units: Mapping[str, str]) -> str:
 def write(path: str | Path, columns: Mapping[str, npt.NDArray[Any]], units: Mapping[str, str]) -> None:
     """Write columns to a CSV or NPZ file, which appears whole or not at all."""
     path = Path(path)
-    check_ending(path)
+    check_place(path)
     with replaced(path) as file:
         if path.suffix == ".npz":
             named = {header(name, units): values for name, values in columns.items()}
@@ -34,11 +35,22 @@ def write(path: str | Path, columns: Mapping[str, npt.NDArray[Any]], units: Mapp
             write_csv(file, columns, units)
 
 
-def check_ending(path: Path) -> None:
-    """Check that tables can be written to files of this kind."""
+def check_place(path: Path) -> None:
+    """Check that tables can be written to files of this kind, and that there is a folder for it."""
     if path.suffix not in ENDINGS:
         raise ValueError(
             f"results are written to files that end in {' or '.join(ENDINGS)}; got {path.name!r}; rename it"
+        )
+    check_folder(path)
+
+
+def check_folder(path: Path) -> None:
+    """Check that there is a folder for a file, and no folder of its name."""
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, "this is a folder; give the name of a file", str(path))
+    if not path.parent.is_dir():
+        raise FileNotFoundError(
+            errno.ENOENT, "there is no such folder; make it first, or write elsewhere", str(path.parent)
         )
 
 
@@ -55,7 +67,12 @@ def write_csv(file: IO[bytes], columns: Mapping[str, npt.NDArray[Any]], units: M
 @contextmanager
 def replaced(path: Path) -> Iterator[IO[bytes]]:
     """Give a file to write to that takes the place of another when all went well, and vanishes otherwise."""
-    descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    check_folder(path)
+    try:
+        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    except OSError as error:
+        # Nobody knows the name of the file that was to be renamed.
+        raise type(error)(error.errno, error.strerror, str(path)) from None
     try:
         with os.fdopen(descriptor, "wb") as file:
             yield file
