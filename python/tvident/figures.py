@@ -27,30 +27,42 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-INK, FAINT, FOUND, TRUTH, ACCENT = "#22303c", "#c9d1d8", "#1f6fb2", "#e2711d", "#2a9d6f"
-"""Colours: text and frames, recorded samples, what was found, what is true, what was chosen."""
+INK, MUTED, FAINT = "#22303c", "#5b6b79", "#c3ccd4"
+"""Colours of titles, of labels, of frames and recorded samples."""
+FOUND, TRUTH, ACCENT = "#2f7fc1", "#d9480f", "#2a9d6f"
+"""Colours of what was found, what is true, what was chosen."""
 
 _STYLE: Any = {
     "figure.dpi": 110,
+    "figure.constrained_layout.h_pad": 0.08,
+    "figure.constrained_layout.w_pad": 0.08,
     "savefig.dpi": 160,
     "font.size": 9.5,
     "axes.titlesize": 10.5,
     "axes.titlelocation": "left",
     "axes.titleweight": "bold",
-    "axes.edgecolor": INK,
-    "axes.labelcolor": INK,
+    "axes.titlepad": 7,
+    "axes.edgecolor": FAINT,
+    "axes.labelcolor": MUTED,
     "text.color": INK,
-    "xtick.color": INK,
-    "ytick.color": INK,
+    "xtick.color": FAINT,
+    "ytick.color": FAINT,
+    "xtick.labelcolor": MUTED,
+    "ytick.labelcolor": MUTED,
+    "ytick.major.size": 0,
     "axes.spines.top": False,
     "axes.spines.right": False,
+    "axes.spines.left": False,
     "axes.linewidth": 0.8,
     "axes.grid": True,
+    "axes.grid.axis": "y",
     "grid.color": "#e8ecef",
-    "grid.linewidth": 0.7,
+    "grid.linewidth": 0.8,
     "axes.axisbelow": True,
     "lines.linewidth": 1.3,
+    "lines.solid_joinstyle": "round",
     "legend.frameon": False,
+    "legend.labelcolor": INK,
 }
 
 _SYMBOLS = {"inertia": "Inertia $I$", "damping": "Damping $C$", "stiffness": "Stiffness $K$"}
@@ -83,15 +95,17 @@ def plot_recording(recording: Recording) -> Figure:
         figure, axes = plt.subplots(3, 1, sharex=True, figsize=(8, 5.4), layout="constrained")
         channels = (
             ("Slider position", recording.slider_position, "m", ACCENT),
-            ("Torque", recording.torque, "N·m", INK),
+            ("Torque", recording.torque, "N·m", MUTED),
             ("Angle", recording.angle, "rad", FOUND),
         )
         for ax, (title, values, unit, colour) in zip(axes, channels, strict=True):
             ax.plot(recording.time, values, color=colour, linewidth=0.9)
             ax.set_title(title)
             ax.set_ylabel(unit)
+            ax.yaxis.set_major_locator(MaxNLocator(4))
             ax.margins(x=0)
         axes[-1].set_xlabel("time (s)")
+        figure.align_ylabels()
         return figure
 
 
@@ -147,7 +161,7 @@ def _draw_scores(ax: Axes, scores: npt.NDArray[np.float64]) -> None:
     candidates = np.isfinite(scores)
     orders = np.arange(scores.size)
     best = int(np.where(candidates, scores, np.inf).argmin())
-    ax.plot(orders[candidates], scores[candidates], "-o", color=INK, markersize=3.5, linewidth=1)
+    ax.plot(orders[candidates], scores[candidates], "-o", color=MUTED, markersize=3.5, linewidth=1)
     ax.plot(best, scores[best], "o", color=ACCENT, markersize=8)
     ax.annotate(
         f"n = {best}", (best, scores[best]), xytext=(0, 10), textcoords="offset points", ha="center", color=ACCENT
@@ -186,6 +200,7 @@ def plot_derivatives(time: npt.NDArray[np.float64], fit: LocalPolynomialFit, nam
         axes[-1].set_title("Order")
         axes[-1].yaxis.set_major_locator(MaxNLocator(integer=True))
         axes[-1].set_xlabel("time (s)")
+        figure.align_ylabels()
         return figure
 
 
@@ -216,17 +231,20 @@ def plot_identification(result: Identification, truth: Recording | None = None) 
     shown = [name for name in _SYMBOLS if result.settings["kinds"][name] != "known"] + extra
     with _style():
         figure, axes = plt.subplots(
-            len(shown), 1, sharex=True, squeeze=False, figsize=(8, 1.4 + 1.7 * len(shown)), layout="constrained"
+            len(shown), 1, sharex=True, squeeze=False, figsize=(8.4, 1.2 + 1.8 * len(shown)), layout="constrained"
         )
         for ax, name in zip(axes[:, 0], shown, strict=True):
             values = result.terms[name] if name in result.terms else getattr(result, name)
             _draw_parameter(ax, result.time, values, result.stderr[name])
             if truth is not None and hasattr(truth, name):
-                ax.plot(truth.time, getattr(truth, name), "--", color=TRUTH, label="truth")
+                ax.plot(truth.time, getattr(truth, name), color=TRUTH, linewidth=1.2, label="truth")
             ax.set_title(_SYMBOLS.get(name, name.capitalize()))
             ax.set_ylabel(_unit(name))
-        axes[0, 0].legend(loc="upper right", ncols=3)
+        # Beside the first title, where no line runs through it.
+        place: Any = {"loc": "lower right", "bbox_to_anchor": (1, 0.97), "borderaxespad": 0.2}
+        axes[0, 0].legend(ncols=3, handlelength=1.4, columnspacing=1.4, **place)
         axes[-1, 0].set_xlabel("time (s)")
+        figure.align_ylabels()
         return figure
 
 
@@ -236,11 +254,14 @@ def _draw_parameter(
     # More points than a screen has columns only cost time.
     every = max(1, time.size // 20_000)
     time, values, errors = time[::every], values[::every], errors[::every]
-    ax.fill_between(time, values - 2 * errors, values + 2 * errors, color=FOUND, alpha=0.2, linewidth=0)
-    ax.plot(time, values, color=FOUND, label="identified")
+    band: Any = {"color": FOUND, "alpha": 0.22, "linewidth": 0, "label": "± 2 standard errors"}
+    ax.fill_between(time, values - 2 * errors, values + 2 * errors, **band)
+    ax.plot(time, values, color=FOUND, linewidth=1.0, label="identified")
+    ax.yaxis.set_major_locator(MaxNLocator(5))
     finite = values[np.isfinite(values)]
     if finite.size:
         low, high = np.percentile(finite, [1, 99])
         room = 0.35 * (high - low) or 0.1 * abs(high) or 1.0
         ax.set_ylim(low - room, high + room)
-    ax.margins(x=0)
+    if time.size > 1:
+        ax.set_xlim(time[0], time[-1])
