@@ -1,0 +1,31 @@
+"""From a file to a file: ``python own_file.py recording.csv``. Without a file it makes one first."""
+
+import sys
+
+import numpy as np
+
+import tvident
+from tvident import recordings
+
+if len(sys.argv) > 1:
+    path = sys.argv[1]
+else:
+    path = "recording.csv"
+    tvident.simulate_torsional_rig(duration=10.0).save(path)
+
+channels = recordings.read(path)  # text columns, NPY, NPZ or MATLAB
+print(f"{path} holds {', '.join(channels)}")
+time = recordings.channel(channels, "time", path)
+angle = recordings.channel(channels, "angle", path)
+torque = recordings.channel(channels, "torque", path)
+
+# What could not be recorded is NaN: windows that hold it have no result, and no others. Here the cable was loose for 19 ms.
+angle[4001:4020] = np.nan
+
+result = tvident.identify(angle, torque, t=time)
+missing = result.status & tvident.Status.INVALID != 0
+print(result.summary())
+print(f"no result for {missing[1000:-1000].sum()} samples in the middle")
+
+result.save("identified.npz")
+result.plot().savefig("identified.png")
