@@ -39,6 +39,18 @@ lint: $(BUILT)  ## formatters, linters, type checkers
 	$(BIN)/mypy
 	$(BIN)/stubtest tvident._core
 
+.PHONY: soak
+soak: CASES ?= 20000
+soak: $(BUILT)  ## the properties of both languages with many more cases, drawn anew: an hour or more
+	PROPTEST_CASES=$(CASES) cargo test --workspace --profile checked
+	TVIDENT_HYPOTHESIS=soak $(BIN)/python -m pytest --hypothesis-show-statistics
+
+.PHONY: docs
+docs: $(BUILT)  ## make anew what documents show of the program: the picture, the command line's help
+	$(BIN)/tvident demo
+	cp tvident-demo/parameters.png docs/identified.png
+	$(BIN)/python docs/command_line_reference.py docs/command-line.md
+
 .PHONY: format
 format: $(READY)  ## format all sources
 	cargo fmt --all

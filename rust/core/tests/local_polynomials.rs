@@ -104,7 +104,7 @@ const TIE: f64 = 1e-6;
 const SCALE: f64 = 1e-9;
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases / 6, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn every_window_is_as_if_projected_alone(

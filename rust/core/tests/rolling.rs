@@ -98,7 +98,7 @@ fn tolerance(condition: f64, rows: usize) -> f64 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases / 4, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn every_window_is_as_if_solved_alone(seed in 0_u64..1 << 40, p in 1_usize..=8, q in 1_usize..=3, w in 2_usize..80, more in 0_usize..200) {
