@@ -94,7 +94,13 @@ _CRITERION = click.option("--criterion", type=click.Choice(get_args(Criterion)),
 
 
 @main.command()
-@click.option("--folder", type=click.Path(file_okay=False, path_type=Path), default="tvident-demo", show_default=True)
+@click.option(
+    "--folder",
+    type=click.Path(file_okay=False, path_type=Path),
+    default="tvident-demo",
+    show_default=True,
+    help="Where pictures and data are written.",
+)
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the simulated recording.")
 def demo(folder: Path, seed: int) -> None:
     """Identify a simulated recording, compare with the truth and draw the paper's figures."""
@@ -188,7 +194,7 @@ def _remark(values: npt.NDArray[Any]) -> str:
     return "constant" if steps.size and not steps.any() else ""
 
 
-@main.command()
+@main.command(epilog="Example: tvident derivatives rig.csv --channel angle --time time -o derivatives.csv")
 @click.argument("file", type=click.Path())
 @click.option("--channel", required=True, metavar="NAME", help="Channel to differentiate.")
 @click.option("--window-length", default="201", show_default=True, help="Samples, odd, or a duration such as '0.2 s'.")
@@ -241,7 +247,7 @@ def derivatives(
         _save_figure(_figures().plot_derivatives(columns["time"], fit, channel), Path(plot))
 
 
-@main.command()
+@main.command(epilog="Example: tvident identify rig.csv --angle angle --torque torque --time time -o result.csv")
 @click.argument("file", type=click.Path(), required=False)
 @click.option("--angle", required=True, metavar="NAME", help="Channel of the angle, or a file that holds it alone.")
 @click.option("--torque", required=True, metavar="NAME", help="Channel of the torque, or a file that holds it alone.")
