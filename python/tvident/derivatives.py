@@ -61,6 +61,16 @@ class LocalPolynomialFit:
         Standard deviation of the noise in each window, in the unit of ``y``: the root of RSS/(M - n - 1).
     status : ndarray of uint16, shape y.shape
         Flags of :class:`tvident.Status`, 0 where all is well.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tvident
+    >>> t = np.arange(1000) / 1000
+    >>> fit = tvident.fit_local_polynomials(np.sin(20 * t), 101, sample_rate=1000)
+    >>> value, velocity, acceleration = fit.derivatives
+    >>> bool(abs(velocity[500] - 20 * np.cos(20 * t[500])) < 1e-6)
+    True
     """
 
     def __init__(
@@ -89,10 +99,20 @@ class LocalPolynomialFit:
 
     @cached_property
     def stderr(self) -> npt.NDArray[np.float64]:
-        """Standard errors, in the shape and units of ``derivatives``; computed when first asked for.
+        r"""Standard errors: ndarray of float64 in the shape and units of ``derivatives``; computed when first asked for.
 
-        They are ``sigma`` times the gain of the filter of the chosen order; that the order was chosen by the same samples, and what
-        the polynomial could not follow, is not in them.
+        They are ``sigma`` times the gain of the filter of the chosen order, :math:`\sqrt{\sum_{j \le n} q_j^{(d)}(x)^2}/Δ^d`; that the
+        order was chosen by the same samples, and what the polynomial could not follow, is not in them. The cost is that of looking up
+        a table of gains.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import tvident
+        >>> noise = np.random.default_rng(0).standard_normal(1000)
+        >>> fit = tvident.fit_local_polynomials(noise, 101, order=0, max_deriv=0)
+        >>> np.round(fit.stderr[0, 500] * np.sqrt(101) / fit.sigma[500], 6)
+        np.float64(1.0)
         """
         order = np.moveaxis(self.order, self._axis, -1)
         sigma = np.moveaxis(self.sigma, self._axis, -1)
@@ -124,6 +144,22 @@ class LocalPolynomialFit:
         ------
         IndexError
             If there is no such sample.
+        TypeError
+            If `i` is not a whole number.
+
+        Notes
+        -----
+        The cost is that of projecting one window: O(window · orders).
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import tvident
+        >>> t = np.arange(1000) / 1000
+        >>> y = t**3 + 1e-3 * np.random.default_rng(0).standard_normal(t.size)
+        >>> scores = tvident.fit_local_polynomials(y, 601, sample_rate=1000).scores(500)
+        >>> scores.shape, int(scores.argmin())
+        ((16,), 3)
         """
         samples = self._samples.shape[-1]
         place = arguments.whole_number("i", i)
@@ -171,13 +207,14 @@ def fit_local_polynomials(
     y : array_like
         Samples: real numbers of any type, any shape.
     window_length : int or str
-        Samples in a window, ``M = 2N + 1``: odd, at least 5; or a duration such as ``"0.2 s"``.
+        Samples in a window, ``M = 2N + 1``: odd, at least 5; or a duration such as ``"0.2 s"``, of which the nearest odd number of
+        samples is taken.
     delta : float, optional
         Sample period in seconds, 1 by default. Give at most one of `delta`, `sample_rate` and `t`.
     sample_rate : float, optional
         Samples per second.
     t : array_like, optional
-        Time of every sample in seconds, uniform within rounding.
+        Time of every sample in seconds, shape (n,), uniform to a thousandth of the sample period.
     max_order : int, optional
         Highest candidate order, at most 15. Orders that a short window cannot judge are left out.
     order : int, optional
@@ -200,7 +237,8 @@ def fit_local_polynomials(
     Returns
     -------
     LocalPolynomialFit
-        ``derivatives``, ``order``, ``sigma``, ``status``, ``stderr`` and ``scores(i)``.
+        ``derivatives`` of shape (max_deriv + 1, \*y.shape) in the unit of `y` per second to the power of the derivative, ``order``,
+        ``sigma``, ``status``, ``stderr`` and ``scores(i)``.
 
     Raises
     ------

@@ -90,6 +90,13 @@ def plot_recording(recording: Recording) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import tvident
+    >>> from tvident import figures
+    >>> figure = figures.plot_recording(tvident.simulate_torsional_rig(duration=2.0))
+    >>> figure.savefig("recording.png")
     """
     with _style():
         figure, axes = plt.subplots(3, 1, sharex=True, figsize=(8, 5.4), layout="constrained")
@@ -130,6 +137,19 @@ def plot_window(
     Returns
     -------
     matplotlib.figure.Figure
+
+    Raises
+    ------
+    ValueError
+        If the window is even, too short or longer than the record, or the order is too high.
+
+    Examples
+    --------
+    >>> import tvident
+    >>> from tvident import figures
+    >>> rig = tvident.simulate_torsional_rig(duration=2.0)
+    >>> figure = figures.plot_window(rig.angle, 1000, sample_rate=1000)
+    >>> figure.savefig("window.png")
     """
     samples = np.asarray(y, dtype=np.float64)
     half = window_length // 2
@@ -188,7 +208,22 @@ def plot_derivatives(time: npt.NDArray[np.float64], fit: LocalPolynomialFit, nam
     Returns
     -------
     matplotlib.figure.Figure
+
+    Raises
+    ------
+    ValueError
+        If there are several records.
+
+    Examples
+    --------
+    >>> import tvident
+    >>> from tvident import figures
+    >>> rig = tvident.simulate_torsional_rig(duration=2.0)
+    >>> fit = tvident.fit_local_polynomials(rig.angle, 201, sample_rate=1000)
+    >>> figures.plot_derivatives(rig.time, fit, "angle").savefig("derivatives.png")
     """
+    if fit.order.ndim != 1:
+        raise ValueError(f"only a single record can be drawn; this one has shape {fit.order.shape}; take one record")
     count = fit.derivatives.shape[0]
     with _style():
         figure = plt.figure(figsize=(8, 1.4 + 1.6 * count), layout="constrained")
@@ -222,6 +257,14 @@ def plot_identification(result: Identification, truth: Recording | None = None) 
     ------
     ValueError
         If the result holds several records.
+
+    Examples
+    --------
+    >>> import tvident
+    >>> from tvident import figures
+    >>> rig = tvident.simulate_torsional_rig(duration=2.0)
+    >>> result = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
+    >>> figures.plot_identification(result, rig).savefig("parameters.png")
     """
     if result.inertia.ndim != 1:
         raise ValueError(

@@ -39,6 +39,19 @@ def read(path: str | Path) -> Channels:
     ------
     FileError
         If the file cannot be read, or holds no numbers.
+
+    Notes
+    -----
+    Channels are arrays of shape (n,), or single numbers; each column of a matrix is a channel. Units are not converted: they are part of
+    the name where the file has them there. Text costs some 0.4 µs a number, NPY and NPZ next to nothing.
+
+    Examples
+    --------
+    >>> import tvident
+    >>> from tvident import recordings
+    >>> tvident.simulate_torsional_rig(duration=1.0).save("rig.npz")
+    >>> list(recordings.read("rig.npz"))[:3]
+    ['time [s]', 'angle [rad]', 'torque [N m]']
     """
     path = Path(path)
     if path.is_dir():
@@ -66,10 +79,32 @@ def read(path: str | Path) -> Channels:
 def channel(channels: Mapping[str, npt.NDArray[Any]], name: str, source: str) -> npt.NDArray[Any]:
     """Return a channel by its name, without its unit where it has one, or by its number.
 
+    Parameters
+    ----------
+    channels : mapping of str to ndarray
+        What :func:`read` returned.
+    name : str
+        Name with or without the unit in brackets, or number from 0.
+    source : str
+        What the file is called in the message.
+
+    Returns
+    -------
+    ndarray, shape (n,) or ()
+        In the unit of the file.
+
     Raises
     ------
     KeyError
         If there is no such channel: the message lists what there is.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tvident import recordings
+    >>> channels = {"time [s]": np.arange(3.0), "angle [rad]": np.ones(3)}
+    >>> recordings.channel(channels, "angle", "rig.npz")
+    array([1., 1., 1.])
     """
     without_units = {re.sub(r"\s*[\[(][^\])]*[\])]\s*$", "", key): key for key in channels}
     for key in (name, without_units.get(name)):

@@ -30,6 +30,16 @@ class RollingRegression:
         Condition number of the regressors in the window, each scaled to the same norm: √p·‖S⁻¹‖ in the Frobenius norm.
     status : ndarray of uint16, shape (n,)
         Flags of :class:`tvident.Status`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tvident import Status, rolling_least_squares
+    >>> regression = rolling_least_squares(np.ones(100), np.arange(100.0), 11)
+    >>> float(np.round(regression.params[50, 0], 6)), float(np.round(regression.rss[50], 6))
+    (50.0, 110.0)
+    >>> Status(int(regression.status[2]))
+    <Status.EDGE: 2>
     """
 
     params: npt.NDArray[np.float64]
@@ -85,7 +95,12 @@ def rolling_least_squares(
     Notes
     -----
     Equations (3) and (4) of the paper are of this kind. Factors are updated by rotations without square roots. The cost for three
-    regressors is some 30 ns a row and thread, whatever the window.
+    regressors is some 30 ns a row and thread, whatever the window; it grows with the square of their number.
+
+    References
+    ----------
+    W. M. Gentleman: Least squares computations by Givens transformations without square roots, Journal of the Institute of Mathematics
+    and its Applications 12 (1973).
 
     Examples
     --------

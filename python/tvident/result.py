@@ -138,6 +138,16 @@ class Identification:
         Flags of :class:`tvident.Status`.
     settings : dict
         What was used.
+
+    Examples
+    --------
+    >>> import tvident
+    >>> rig = tvident.simulate_torsional_rig(duration=3.0)
+    >>> result = tvident.identify(rig.angle, rig.torque, sample_rate=rig.sample_rate, inertia=0.0123)
+    >>> bool(abs(result.stiffness[1500] / rig.stiffness[1500] - 1) < 0.02)
+    True
+    >>> sorted(result.stderr)
+    ['damping', 'damping_ratio', 'inertia', 'natural_frequency', 'stiffness']
     """
 
     def __init__(
@@ -175,16 +185,22 @@ class Identification:
 
     @property
     def natural_frequency(self) -> Array:
-        """Undamped natural frequency √(K/I)/2π in Hz; NaN where K/I is negative."""
+        r"""Undamped natural frequency √(K/I)/2π in Hz, shape (\*, n); NaN where K/I is negative."""
         return self._oscillator.natural_frequency
 
     @property
     def damping_ratio(self) -> Array:
-        """Damping ratio C/(2√(KI)); NaN where KI is negative."""
+        r"""Damping ratio C/(2√(KI)), shape (\*, n), without unit; NaN where KI is negative."""
         return self._oscillator.damping_ratio
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """Return everything that has one value a sample, by name: what :meth:`save` writes.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (n,)
+            Time, parameters and terms with their standard errors, and what is known of the equations. Units stand in
+            ``tvident.result.UNITS``.
 
         Raises
         ------
@@ -216,11 +232,19 @@ class Identification:
         ------
         ValueError
             If the ending is another one, or there are several records.
+        OSError
+            If there is no such folder, or the file cannot be written.
         """
         table.write(path, self.columns(), UNITS)
 
     def summary(self) -> str:
-        """Return a table of what was found, and what the statuses advise, in words."""
+        """Return a table of what was found, and what the statuses advise, in words.
+
+        Returns
+        -------
+        str
+            Median, range and median standard error of every parameter; then how often each flag of the status occurs.
+        """
         s = self.settings
         n, seconds = self.time.size, float(self.time[-1] - self.time[0]) if self.time.size else 0.0
         order = s["max_order"] if s["order"] is None else s["order"]
@@ -255,6 +279,8 @@ class Identification:
         ------
         ImportError
             If matplotlib is missing: install ``tvident[plot]``.
+        ValueError
+            If there are several records.
         """
         from tvident import figures  # noqa: PLC0415 - matplotlib is optional
 

@@ -34,7 +34,7 @@ def savgol_filter(
     Parameters
     ----------
     x : array_like
-        Samples. Float32 stays float32, any other real type becomes float64.
+        Samples, of any shape and unit. Float32 stays float32, any other real type becomes float64.
     window_length : int
         Samples in a window, odd or even. With an even window the result belongs half a sample later, as in SciPy.
     polyorder : int or "aicc"
@@ -43,7 +43,7 @@ def savgol_filter(
     deriv : int, optional
         Derivative wanted, 0 for the smoothed samples.
     delta : float, optional
-        Sample period.
+        Sample period in seconds.
     axis : int, optional
         Axis of time.
     mode : {"interp", "mirror", "constant", "nearest", "wrap"}, optional
@@ -54,7 +54,8 @@ def savgol_filter(
     Returns
     -------
     ndarray, same shape as `x`
-        Filtered samples. Windows that hold a value that is no finite number are NaN, and no others.
+        Filtered samples, in the unit of `x` per second to the power of `deriv`. Windows that hold a value that is no finite number are
+        NaN, and no others.
 
     Raises
     ------
@@ -66,7 +67,13 @@ def savgol_filter(
 
     Notes
     -----
-    Equation (2) of the paper with a fixed order. The cost is a few ns a sample at any window length.
+    Equation (2) of the paper with a fixed order. The cost is a few ns a sample at any window length, and more where the order is
+    chosen: see :func:`fit_local_polynomials`.
+
+    References
+    ----------
+    A. Savitzky, M. J. E. Golay: Smoothing and differentiation of data by simplified least squares procedures, Analytical Chemistry 36
+    (1964).
 
     Examples
     --------

@@ -28,14 +28,18 @@ class Term:
     name : str
         What the factor is called in results.
     function : callable
-        Function of ``(t, angle, velocity)``: times of shape (n,), smoothed angle and its derivative of the angle's shape. Returns an
-        array of that shape.
+        Function of ``(t, angle, velocity)``: times in s of shape (n,), smoothed angle in rad and velocity in rad/s of the angle's shape.
+        Returns an array of that shape. The unit of the factor is N m over that of the function.
 
     Examples
     --------
     >>> import numpy as np
-    >>> from tvident import Term
-    >>> drag = Term("drag", lambda t, angle, velocity: velocity * np.abs(velocity))
+    >>> import tvident
+    >>> drag = tvident.Term("drag", lambda t, angle, velocity: velocity * np.abs(velocity))
+    >>> rig = tvident.simulate_torsional_rig(duration=3.0)
+    >>> result = tvident.identify(rig.angle, rig.torque, sample_rate=1000, inertia=0.0123, terms=[drag])
+    >>> result.terms["drag"].shape
+    (3000,)
     """
 
     name: str
@@ -44,7 +48,15 @@ class Term:
     def values(
         self, t: npt.NDArray[Any], angle: npt.NDArray[Any], velocity: npt.NDArray[Any]
     ) -> npt.NDArray[np.number]:
-        """Return the term at every sample."""
+        """Return the term at every sample, in the angle's shape.
+
+        Raises
+        ------
+        ValueError
+            If the function returns another shape.
+        TypeError
+            If it returns no real numbers.
+        """
         values = np.asarray(self.function(t, angle, velocity))
         if values.shape != angle.shape:
             raise ValueError(
