@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from functools import lru_cache
-from math import lcm
+from math import lcm, log
 
 import numpy as np
 import numpy.typing as npt
@@ -94,3 +94,8 @@ class Window:
         for j in range(order + 1):
             rest -= Fraction(self._products[j] ** 2, self._grid.norms[j])
         return rest / self._unit**2
+
+    def score(self, order: int) -> float:
+        """Return the criterion (8) of an order; rounded where the logarithm is taken."""
+        m, k = len(self._grid.values[0]), order + 1
+        return m * log(self.rss(order) / (m - 1)) + 2 * k + 2 * k * (k + 1) / (m - k - 1)
