@@ -1,0 +1,211 @@
+//! Any cutting of a record gives the same bits: every kind of plan, on every path of instructions, with samples that are no number and
+//! glitches that make lanes start afresh.
+
+use std::num::NonZeroUsize;
+
+use proptest::prelude::*;
+use tvident::rolling::HALF_OF_THE_DIGITS;
+use tvident::{
+    Criterion, Elements, Equations, Estimates, Instructions, LocalPolynomials, Options, Order, Regressions,
+    RollingLeastSquares, Samples,
+};
+
+/// Outputs of one kind each, element for element.
+#[derive(Clone, Debug)]
+struct Outputs {
+    numbers: Vec<Vec<f64>>,
+    order: Vec<u8>,
+    status: Vec<u16>,
+}
+
+impl Outputs {
+    fn new(kinds: usize, count: usize) -> Self {
+        Self { numbers: vec![vec![0.0; count]; kinds], order: vec![0; count], status: vec![0; count] }
+    }
+
+    /// Every bit, so that NaN equals itself.
+    fn bits(&self) -> (Vec<Vec<u64>>, &[u8], &[u16]) {
+        let bits = |values: &Vec<f64>| values.iter().map(|value| value.to_bits()).collect();
+        (self.numbers.iter().map(bits).collect(), &self.order, &self.status)
+    }
+}
+
+/// Where a range of so many is cut: at any places, in order.
+fn pieces(cuts: &[usize], count: usize) -> Vec<std::ops::Range<usize>> {
+    let mut bounds = vec![0, count];
+    bounds.extend(cuts.iter().map(|cut| cut % (count + 1)));
+    bounds.sort_unstable();
+    bounds.windows(2).map(|pair| pair[0]..pair[1]).collect()
+}
+
+/// Slices of all the numbers, the last of them apart.
+fn slices(numbers: &mut [Vec<f64>], elements: std::ops::Range<usize>) -> Vec<&mut [f64]> {
+    numbers.iter_mut().map(|values| &mut values[elements.clone()]).collect()
+}
+
+fn estimate(options: &Options, record: &[f64], cuts: &[usize], step: usize) -> Outputs {
+    let plan = LocalPolynomials::new(options.clone()).expect("valid options");
+    let mut all = Outputs::new(options.derivatives.len() + 1, record.len().div_ceil(step));
+    let mut scratch = plan.scratch();
+    for samples in pieces(cuts, record.len()) {
+        let elements = samples.start.div_ceil(step)..samples.end.div_ceil(step);
+        let mut derivatives = slices(&mut all.numbers, elements.clone());
+        let sigma = derivatives.pop().expect("there is one more than derivatives");
+        let diagnostics = options.noise;
+        let mut estimates = Estimates {
+            elements: Elements { first: elements.start * step, step },
+            derivatives,
+            order: if diagnostics { &mut all.order[elements.clone()] } else { &mut [] },
+            status: if diagnostics { &mut all.status[elements] } else { &mut [] },
+            sigma: if diagnostics { sigma } else { &mut [] },
+        };
+        plan.estimate(&record, samples, &mut estimates, &mut scratch).expect("the record is long enough");
+    }
+    all
+}
+
+/// The same by several threads.
+fn estimate_in_parallel(options: &Options, record: &[f64], workers: usize) -> Outputs {
+    let plan = LocalPolynomials::new(options.clone()).expect("valid options");
+    let mut all = Outputs::new(options.derivatives.len() + 1, record.len());
+    let mut derivatives = slices(&mut all.numbers, 0..record.len());
+    let sigma = derivatives.pop().expect("there is one more than derivatives");
+    let estimates = Estimates {
+        elements: Elements { first: 0, step: 1 },
+        derivatives,
+        order: if options.noise { &mut all.order } else { &mut [] },
+        status: if options.noise { &mut all.status } else { &mut [] },
+        sigma: if options.noise { sigma } else { &mut [] },
+    };
+    let workers = NonZeroUsize::new(workers).expect("not zero");
+    plan.run(vec![(&record, estimates)], true, workers, &mut |_, _| true).expect("the record is long enough");
+    all
+}
+
+struct Problem {
+    columns: Vec<Vec<f64>>,
+    regressors: usize,
+    window: usize,
+}
+
+fn solve(problem: &Problem, cuts: &[usize], instructions: Instructions) -> Outputs {
+    let (p, n) = (problem.regressors, problem.columns[0].len());
+    let q = problem.columns.len() - p;
+    let pairs: Vec<(usize, usize)> = (1..p).map(|i| (0, i)).collect();
+    let kinds = [p * q, p * q, pairs.len() * q, q, q, 1];
+    let plan = RollingLeastSquares::new(problem.window, p, q, pairs, HALF_OF_THE_DIGITS, instructions).expect("valid");
+    let columns: Vec<&[f64]> = problem.columns.iter().map(Vec::as_slice).collect();
+    let equations = Equations { columns: columns.iter().map(|column| column as &dyn Samples).collect(), rows: 0..n };
+    let mut all = Outputs::new(kinds.iter().sum(), n);
+    let mut scratch = plan.scratch();
+    for rows in pieces(cuts, n) {
+        let mut numbers = slices(&mut all.numbers, rows.clone()).into_iter();
+        let [parameters, errors, covariances, residuals, deviations, mut condition] =
+            kinds.map(|count| numbers.by_ref().take(count).collect::<Vec<_>>());
+        let mut regressions = Regressions {
+            elements: Elements { first: rows.start, step: 1 },
+            parameters,
+            errors,
+            covariances,
+            residuals,
+            deviations,
+            condition: condition.pop().expect("there is one"),
+            status: &mut all.status[rows.clone()],
+        };
+        plan.solve(&equations, rows, &mut regressions, &mut scratch);
+    }
+    all
+}
+
+/// Two waves and noise, with some bad samples.
+fn record(seed: u64, n: usize, bad: &[(usize, f64)]) -> Vec<f64> {
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    let mut noise = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let mut samples: Vec<f64> =
+        (0..n).map(|i| (i as f64 * 0.05).sin() + 0.5 * (i as f64 * 0.17).cos() + 0.01 * noise()).collect();
+    for (place, value) in bad {
+        samples[place % n] = *value;
+    }
+    samples
+}
+
+fn bad_samples() -> impl Strategy<Value = Vec<(usize, f64)>> {
+    let values = prop::sample::select(vec![f64::NAN, f64::INFINITY, 1e300, 1e8, -1e8, 0.0]);
+    prop::collection::vec((any::<usize>(), values), 0..4)
+}
+
+fn orders() -> impl Strategy<Value = Order> {
+    let criteria = prop::sample::select(vec![Criterion::Aicc, Criterion::AiccTextbook, Criterion::Aic, Criterion::Bic]);
+    prop_oneof![
+        (0_usize..=15).prop_map(Order::Fixed),
+        (criteria, 0_usize..=15).prop_map(|(criterion, highest)| Order::Chosen { criterion, highest }),
+    ]
+}
+
+fn paths() -> impl Strategy<Value = Instructions> {
+    prop::sample::select(Instructions::available())
+}
+
+/// Window lengths: mostly short, sometimes longer than a span or a segment of suffixes.
+fn lengths() -> impl Strategy<Value = usize> {
+    prop_oneof![6 => 5_usize..80, 2 => 80_usize..400, 1 => 400_usize..3000]
+}
+
+fn options(length: usize, order: Order, derivatives: Vec<usize>, noise: bool, instructions: Instructions) -> Options {
+    let order = match order {
+        Order::Fixed(order) => Order::Fixed(order.min(length - 1)),
+        chosen @ Order::Chosen { .. } => chosen,
+    };
+    let noise = noise || matches!(order, Order::Chosen { .. });
+    Options { window_length: length, order, derivatives, delta: 1e-3, noise, instructions }
+}
+
+fn cuts() -> impl Strategy<Value = Vec<usize>> {
+    prop::collection::vec(any::<usize>(), 1..6)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn of_local_polynomials(
+        (seed, length, more) in (any::<u64>(), lengths(), 0_usize..3000),
+        (order, derivatives) in (orders(), prop::collection::vec(0_usize..4, 1..4)),
+        (noise, step) in (any::<bool>(), 1_usize..5),
+        (bad, cuts, path) in (bad_samples(), cuts(), paths()),
+    ) {
+        let record = record(seed, length + more, &bad);
+        let options = options(length, order, derivatives, noise, path);
+        let (whole, cut) = (estimate(&options, &record, &[], step), estimate(&options, &record, &cuts, step));
+        prop_assert!(whole.bits() == cut.bits());
+    }
+
+    #[test]
+    fn of_local_polynomials_among_threads(
+        (seed, length, more) in (any::<u64>(), lengths(), 30_000_usize..60_000),
+        (order, noise, workers) in (orders(), any::<bool>(), 1_usize..6),
+        (bad, path) in (bad_samples(), paths()),
+    ) {
+        let record = record(seed, length + more, &bad);
+        let options = options(length, order, vec![0, 2], noise, path);
+        let (whole, cut) = (estimate(&options, &record, &[], 1), estimate_in_parallel(&options, &record, workers));
+        prop_assert!(whole.bits() == cut.bits());
+    }
+
+    #[test]
+    fn of_least_squares(
+        (seed, length, more) in (any::<u64>(), lengths(), 0_usize..3000),
+        (p, q) in (1_usize..=6, 1_usize..=2),
+        (bad, cuts, path) in (bad_samples(), cuts(), paths()),
+    ) {
+        let (window, n) = (length + p, length + p + more);
+        let columns = (0..p + q).map(|j| record(seed ^ j as u64, n, &bad[..bad.len().min(j)])).collect();
+        let problem = Problem { columns, regressors: p, window };
+        prop_assert!(solve(&problem, &[], path).bits() == solve(&problem, &cuts, path).bits());
+    }
+}
