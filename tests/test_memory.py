@@ -1,13 +1,25 @@
 from __future__ import annotations
 
 import gc
+import subprocess
+import sys
 import weakref
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tvident
+
+MIB = 2**20
+HOUR = 3_600_000
+"""Samples of an hour at 1 kHz."""
+HELD_FOR_AN_HOUR = 400 * MIB
+"""Promised: what `identify` holds above its inputs, all results kept."""
+SCRATCH = 8 * MIB
+"""Promised: scratch of a thread for windows up to 10 000."""
+LONGEST = 10_000
 
 
 @pytest.mark.parametrize("name", ["fit_local_polynomials", "rolling_least_squares", "identify"])
@@ -28,3 +40,29 @@ def test_a_result_goes_when_it_is_let_go(name: str) -> None:
         assert gone() is None
     finally:
         gc.enable()
+
+
+def risen_by(name: str, samples: int, window: int, workers: int) -> int:
+    """Return the bytes by which a call raises the peak of a process of its own."""
+    if not Path("/proc/self/clear_refs").exists():
+        pytest.skip("only Linux keeps a record of the most memory held that can be cleared")
+    command = [sys.executable, str(Path(__file__).with_name("peak_memory.py")), name, str(samples), str(window)]
+    finished = subprocess.run([*command, str(workers)], check=True, capture_output=True, text=True)
+    return int(finished.stdout)
+
+
+def test_an_hour_fits_into_400_mib_with_all_its_results() -> None:
+    assert risen_by("the paper's preset", HOUR, 201, workers=2) < HELD_FOR_AN_HOUR
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("window", [201, 3000, LONGEST])
+@pytest.mark.parametrize(
+    "name", ["fit_local_polynomials", "rolling_least_squares", "identify, window", "identify, equations"]
+)
+def test_scratch_of_a_thread_stays_small(name: str, window: int, workers: int) -> None:
+    samples = 320_000  # four rounds of 10 000 windows in the lanes of the widest vectors: work for two threads
+    risen = risen_by(name, samples, window, workers)
+    # The time of every sample is a result; it is computed from their numbers.
+    in_numpy = 2 * 8 * samples if name.startswith("identify") else 0
+    assert risen - in_numpy < workers * SCRATCH
