@@ -74,3 +74,17 @@ def test_it_works_inside_other_thread_pools() -> None:
     with ThreadPoolExecutor(5) as pool:
         for found in pool.map(_in_child, [y] * 10):
             np.testing.assert_array_equal(found, expected)
+
+
+def test_what_progress_raises_is_raised_however_long_the_threads_take_to_stop() -> None:
+    # With 16 regressors and windows of 10 000 rows a piece takes longer than the watch waits, so it looks again after the call.
+    A = np.random.default_rng(0).standard_normal((320_000, 16))
+    calls = []
+
+    def refuse(done: int, total: int) -> None:
+        calls.append((done, total))
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        tvident.rolling_least_squares(A, A[:, 0], 10_000, workers=2, progress=refuse)
+    assert len(calls) == 1

@@ -16,6 +16,10 @@ pub(crate) fn watched(
     let (outcome, raised) = py.detach(|| {
         let mut raised = None;
         let mut watch = |done: usize, total: usize| {
+            if raised.is_some() {
+                // Threads are still at their last pieces; what was raised first is what counts.
+                return false;
+            }
             let looked = Python::attach(|py| {
                 py.check_signals()?;
                 progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (done, total)).map(|_| ()))
