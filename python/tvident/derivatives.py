@@ -17,6 +17,8 @@ HIGHEST_ORDER = 15
 """No polynomial order above this is offered."""
 
 _SHORTEST_WINDOW = 5
+_BLOCK = 1 << 20
+"""Samples that NumPy works on at a time."""
 
 
 @lru_cache(maxsize=8)
@@ -116,7 +118,13 @@ class LocalPolynomialFit:
         """
         order = np.moveaxis(self.order, self._axis, -1)
         sigma = np.moveaxis(self.sigma, self._axis, -1)
-        errors = self._plan.gains()[:, order] * sigma
+        gains = self._plan.gains()
+        errors = np.empty((gains.shape[0], *order.shape))
+        # In blocks, so that Ctrl-C is heard between them and no second array of this size is needed.
+        block = max(1, _BLOCK * order.shape[-1] // order.size)
+        for first in range(0, order.shape[-1], block):
+            part = (..., slice(first, first + block))
+            np.multiply(gains[:, order[part]], sigma[part], out=errors[part])
         samples, half = self._samples.shape[-1], self._window_length // 2
         for last in (False, True):
             places = np.arange(samples - half, samples) if last else np.arange(half)
