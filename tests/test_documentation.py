@@ -199,6 +199,11 @@ def test_limits_are_the_stated_ones() -> None:
     clean = tvident.simulate_torsional_rig(torque_snr_db=200, angle_noise=1e-9)
     alone = tvident.identify(clean.angle, clean.torque, sample_rate=1000)
     assert errors(alone, clean) == pytest.approx({"inertia": 6.4, "damping": 25, "stiffness": 7.0}, rel=MEASURED)
+    noisy_rig = tvident.simulate_torsional_rig(angle_noise=0.1)
+    pulled = tvident.identify(noisy_rig.angle, noisy_rig.torque, sample_rate=1000)
+    assert errors(pulled, noisy_rig)["stiffness"] == pytest.approx(26, rel=MEASURED)
+    for found, true in ((pulled.inertia, noisy_rig.inertia), (pulled.stiffness, noisy_rig.stiffness)):
+        assert np.nanmean(found / true) == pytest.approx(1 - 0.12, rel=0.01)
     # Two standard errors cover the truth in 55 % of the windows.
     covered = np.abs(result.stiffness - recording.stiffness) < 2 * result.stderr["stiffness"]
     assert covered.mean() == pytest.approx(0.55, rel=MEASURED)
