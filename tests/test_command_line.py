@@ -299,11 +299,11 @@ def test_an_interrupt_stops_at_once_and_leaves_no_half_written_file(tmp_path: Pa
         "-o",
         "r.csv",
     ]
-    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(2.5)
-    process.send_signal(signal.SIGINT)
-    started = time.perf_counter()
-    _, errors = process.communicate(timeout=20)
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        time.sleep(2.5)
+        process.send_signal(signal.SIGINT)
+        started = time.perf_counter()
+        _, errors = process.communicate()
     assert time.perf_counter() - started < 2
     assert process.returncode == 1
     assert "Aborted" in errors
