@@ -43,6 +43,8 @@ class Row:
     aim: float | None = None
     instructions: str | None = None
     """Vector instructions that are forced, or None for the fastest."""
+    threads: int = 1
+    """Threads that the faster side has."""
     slowest_over_fastest: bool = False
     """The ratio is that of the slowest work over the fastest, not of the first over the second."""
 
@@ -314,6 +316,7 @@ ROWS = [
         "one thread",
         _workers(_polynomials_by, "derivatives", "order", "sigma", "status"),
         most=_TWO,
+        threads=2,
     ),
     Row(
         "two-workers-least-squares",
@@ -321,6 +324,7 @@ ROWS = [
         "one thread",
         _workers(_least_squares_by, "params", "stderr", "condition", "status"),
         most=_TWO,
+        threads=2,
     ),
     Row(
         "two-workers-identify",
@@ -328,6 +332,7 @@ ROWS = [
         "one thread",
         _workers(_identification_by, "inertia", "damping", "stiffness", "condition", "status"),
         most=_TWO,
+        threads=2,
     ),
     Row(
         "outputs",
