@@ -8,6 +8,7 @@ READY := $(VENV)/.ready
 BUILT := $(VENV)/.built
 BENCH := .venv-bench
 BENCH_BUILT := $(BENCH)/.built
+ACCURACY := .venv-accuracy
 export CARGO_TERM_COLOR ?= auto
 
 .PHONY: help
@@ -57,6 +58,10 @@ format: $(READY)  ## format all sources
 	$(BIN)/ruff format
 	$(BIN)/ruff check --fix
 
+.PHONY: accuracy
+accuracy: $(ACCURACY)/.built  ## measure accuracy against truth, bound and other libraries, into benches/accuracy.md; hours: ARGUMENTS=--help
+	PYTHONPATH=benches $(ACCURACY)/bin/python -m accuracy $(ARGUMENTS)
+
 .PHONY: wheel
 wheel: $(READY)  ## build the wheel that users install, in dist/
 	$(BIN)/maturin build --release --locked --out dist
@@ -71,7 +76,7 @@ record-instructions: $(READY)  ## write down the instructions that a window cost
 
 .PHONY: clean
 clean:  ## remove everything that was made
-	rm -rf $(VENV) $(BENCH) target dist tvident-demo
+	rm -rf $(VENV) $(BENCH) $(ACCURACY) target dist tvident-demo
 
 $(READY): requirements-development.txt
 	$(PYTHON) -m venv $(VENV)
@@ -92,4 +97,13 @@ $(BENCH_BUILT): $(BENCH)/.ready $(RUST) pyproject.toml $(wildcard python/tvident
 	rm -rf target/bench-wheel
 	$(BENCH)/bin/maturin build --release --locked --quiet --out target/bench-wheel
 	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bench-wheel/*.whl
+	@touch $@
+
+$(ACCURACY)/.ready: requirements-accuracy.txt
+	$(PYTHON) -m venv $(ACCURACY)
+	$(ACCURACY)/bin/python -m pip install --quiet --disable-pip-version-check --requirement requirements-accuracy.txt
+	@touch $@
+
+$(ACCURACY)/.built: $(ACCURACY)/.ready $(RUST) pyproject.toml
+	VIRTUAL_ENV=$(abspath $(ACCURACY)) $(ACCURACY)/bin/maturin develop --profile checked --locked --quiet
 	@touch $@

@@ -1,0 +1,64 @@
+"""What nothing chosen by hand costs: the time of the automatic preset over that of the paper's, on an hour at 1 kHz."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+import tvident
+from accuracy import report
+from accuracy.cases import Case
+
+HEADING = "Cost of the automatic preset"
+_NOISES = (1e-6, 1e-2, 1e-1)
+
+
+def measure(seconds: float, repeats: int) -> list[str]:
+    """Time both presets in turns and return the section of the report."""
+    rows, refusal = [], ""
+    for noise in _NOISES:
+        case = Case(angle_noise=noise, duration=seconds)
+        recording = case.record(0)
+        try:
+            ratios, paper, chosen = _ratios(recording, repeats)
+        except (TypeError, ValueError, NotImplementedError) as error:
+            refusal = str(error)
+            continue
+        low, middle, high = np.percentile(ratios, [0, 50, 100])
+        rows.append([case.angle_label, f"{paper:.2f} s", f"{middle:.1f} ({low:.1f} … {high:.1f})", chosen])
+    samples = round(seconds * 1000)
+    return [
+        report.stamp(["ours"], f"{samples} samples, one thread, {repeats} repeats in turns after one to warm up"),
+        "",
+        *report.table(["angle noise", "paper", "automatic over paper: median (range)", "form, window chosen"], rows),
+        "",
+        *([f"* Not available: automatic: {refusal}."] if refusal else []),
+    ]
+
+
+def _ratios(recording: tvident.Recording, repeats: int) -> tuple[list[float], float, str]:
+    """Return the ratios of time, the median time of the paper's preset in s, and what was chosen."""
+    chosen = _identify(recording, "auto").settings
+    _identify(recording, "paper")
+    papers, ratios = [], []
+    for _ in range(repeats):
+        times = {}
+        for preset in ("paper", "auto"):
+            start = time.perf_counter()
+            _identify(recording, preset)
+            times[preset] = time.perf_counter() - start
+        papers.append(times["paper"])
+        ratios.append(times["auto"] / times["paper"])
+    return ratios, float(np.median(papers)), f"{chosen.get('form', 'strong')}, {chosen['window_length']}"
+
+
+def _identify(recording: tvident.Recording, preset: str) -> tvident.Identification:
+    options: dict[str, str] = {"preset": preset}
+    return tvident.identify(
+        recording.angle,
+        recording.torque,
+        sample_rate=recording.sample_rate,
+        workers=1,
+        **options,  # type: ignore[arg-type]
+    )
