@@ -22,7 +22,7 @@ def derivatives(angle: Array, half: int, delta: float, orders: npt.NDArray[np.ui
 
 def scaled(A: Array) -> Array:
     """Give every column the same norm."""
-    return A / np.maximum(np.linalg.norm(A, axis=0), np.finfo(np.float64).tiny)
+    return np.asarray(A / np.maximum(np.linalg.norm(A, axis=0), np.finfo(np.float64).tiny))
 
 
 def windowed(A: Array, torque: Array, equations: int) -> list[Solution | None]:
