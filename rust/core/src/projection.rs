@@ -289,7 +289,9 @@ fn span(basis: &Basis) -> usize {
         (length * steps as f64 * values.iter().map(|q| q * q).sum::<f64>()).sqrt()
     };
     let allowed = GROWTH * (length / GROWTH_LENGTH).max(1.0).powf(0.2);
-    let longest = LONGEST_SPAN.max(basis.length() / 4);
+    // Every window reached holds the sample at the start's centre: where that is a glitch and all samples are counted from it, none
+    // suffers but those that hold it.
+    let longest = LONGEST_SPAN.max(basis.length() / 4).min(basis.length());
     // The largest reach within bounds, by halving.
     let (mut reach, mut too_far) = (0, longest / 2 + 1);
     while reach + 1 < too_far {
