@@ -17,7 +17,7 @@ HIGHEST_ORDER = 15
 """No polynomial order above this is offered."""
 
 _SHORTEST_WINDOW = 5
-_BLOCK = 1 << 20
+_BLOCK = 1 << 17
 """Samples that NumPy works on at a time."""
 
 
