@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::local_polynomials::{Estimates, LocalPolynomials};
 use crate::motion::Motion;
 use crate::output::{Elements, split_off};
-use crate::parallel::{self, Piece, Watch};
+use crate::parallel::{self, GoOn, Piece, Watch};
 use crate::rolling::{Equations, Regressions, RollingLeastSquares};
 use crate::samples::{Samples, is_usable};
 use crate::shared_parameters::{SharedParameters, Summary};
@@ -88,6 +88,7 @@ impl Chunk {
     /// Differentiates the angle at some samples and builds their rows.
     fn fill(&mut self, plan: &LocalPolynomials, motion: &Motion<'_>, samples: Range<usize>) -> Result<(), Error> {
         self.first = samples.start;
+        motion.take_back(&mut self.derivatives, &mut self.columns);
         for derivative in &mut self.derivatives {
             derivative.resize(samples.len(), 0.0);
         }
@@ -137,7 +138,8 @@ pub fn identify_windowed(
     let scratch = || (Chunk::new(derivatives, least_squares.columns()), least_squares.scratch());
     let failed = Mutex::new(None);
     let work = |(motion, samples, mut part): (&Motion<'_>, Range<usize>, Identified<'_>),
-                (chunk, scratch): &mut (Chunk, crate::rolling::Scratch)| {
+                (chunk, scratch): &mut (Chunk, crate::rolling::Scratch),
+                go_on: &GoOn<'_>| {
         let needed = least_squares.rows_needed(samples.clone(), motion.angle.len());
         if let Err(error) = chunk.fill(derivatives, motion, needed) {
             *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
@@ -150,10 +152,10 @@ pub fn identify_windowed(
             columns: columns.iter().map(|column| column as &dyn Samples).collect(),
             rows: equations(derivatives, total),
         };
-        least_squares.solve(&equations, samples.clone(), &mut part.regressions, scratch);
+        least_squares.solve_while(&equations, samples.clone(), &mut part.regressions, scratch, go_on);
         finish(chunk, samples, &mut part);
     };
-    parallel::run(pieces, workers, scratch, work, watch)?;
+    parallel::run_long(pieces, workers, scratch, work, watch)?;
     failed.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
 }
 

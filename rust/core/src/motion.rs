@@ -63,7 +63,6 @@ impl Motion<'_> {
         let Some((side, unknowns)) = columns.split_last_mut() else { return };
         side.resize(count, 0.0);
         self.torque.read(first, side);
-        known.resize(count, 0.0);
         for (coefficient, factor) in self.coefficients.iter().zip([&*acceleration, velocity, angle]) {
             match *coefficient {
                 Coefficient::Unknown => {}
@@ -73,6 +72,7 @@ impl Motion<'_> {
                     }
                 }
                 Coefficient::Record(record) => {
+                    known.resize(count, 0.0);
                     record.read(first, known);
                     for ((side, factor), known) in side.iter_mut().zip(factor).zip(&*known) {
                         *side -= known * factor;
@@ -98,9 +98,21 @@ impl Motion<'_> {
                 Term::Record(record) => record.read(first, column),
             }
         }
+        self.exchange(derivatives, coefficients);
+    }
+
+    /// Gives derivatives that became columns their places back, so that there is memory for each only once.
+    pub(crate) fn take_back(&self, derivatives: &mut [Vec<f64>; 3], columns: &mut [Vec<f64>]) {
+        if derivatives.iter().any(Vec::is_empty) {
+            self.exchange(derivatives, columns);
+        }
+    }
+
+    /// Lets the derivatives that are multiplied by unknowns change places with their columns.
+    fn exchange(&self, [angle, velocity, acceleration]: &mut [Vec<f64>; 3], columns: &mut [Vec<f64>]) {
         let factors = self.coefficients.iter().zip([acceleration, velocity, angle]);
         let unknown = factors.filter(|(coefficient, _)| matches!(coefficient, Coefficient::Unknown));
-        unknown.zip(coefficients).for_each(|((_, factor), column)| std::mem::swap(factor, column));
+        unknown.zip(columns).for_each(|((_, factor), column)| std::mem::swap(factor, column));
     }
 }
 

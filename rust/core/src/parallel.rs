@@ -3,6 +3,7 @@
 //! The calling thread never joins the pool: it watches, so that it can show progress and be interrupted. The pool belongs to this
 //! process; a process that was forked makes its own, since threads do not survive a fork.
 
+use std::cell::{Cell, RefCell};
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
@@ -33,12 +34,26 @@ pub(crate) struct Piece<P> {
     pub(crate) content: P,
 }
 
+/// Asked now and then by long pieces of work: whether to go on. What a piece leaves undone after a no is thrown away.
+pub(crate) type GoOn<'a> = dyn Fn() -> bool + 'a;
+
 /// Does every piece once, each thread with its own scratch. With one worker, or one piece, no other thread is bothered.
 pub(crate) fn run<P: Send, S>(
     pieces: Vec<Piece<P>>,
     workers: NonZeroUsize,
     scratch: impl Fn() -> S + Sync,
     work: impl Fn(P, &mut S) + Sync,
+    watch: &mut Watch<'_>,
+) -> Result<(), Error> {
+    run_long(pieces, workers, scratch, |piece, scratch, _| work(piece, scratch), watch)
+}
+
+/// The same for pieces that may take longer than 50 ms and therefore ask whether to go on.
+pub(crate) fn run_long<P: Send, S>(
+    pieces: Vec<Piece<P>>,
+    workers: NonZeroUsize,
+    scratch: impl Fn() -> S + Sync,
+    work: impl Fn(P, &mut S, &GoOn<'_>) + Sync,
     watch: &mut Watch<'_>,
 ) -> Result<(), Error> {
     let total = pieces.iter().map(|piece| piece.size).sum();
@@ -55,20 +70,24 @@ fn run_here<P, S>(
     pieces: Vec<Piece<P>>,
     total: usize,
     scratch: impl Fn() -> S,
-    work: impl Fn(P, &mut S),
+    work: impl Fn(P, &mut S, &GoOn<'_>),
     watch: &mut Watch<'_>,
 ) -> bool {
     let mut scratch = scratch();
-    let mut done = 0;
-    let mut last = Instant::now();
+    let watch = RefCell::new(watch);
+    let (done, last, going) = (Cell::new(0), Cell::new(Instant::now()), Cell::new(true));
+    let go_on = || {
+        if going.get() && last.get().elapsed() >= WATCH {
+            going.set((*watch.borrow_mut())(done.get(), total));
+            last.set(Instant::now());
+        }
+        going.get()
+    };
     for Piece { size, content } in pieces {
-        work(content, &mut scratch);
-        done += size;
-        if last.elapsed() >= WATCH {
-            if !watch(done, total) {
-                return false;
-            }
-            last = Instant::now();
+        work(content, &mut scratch, &go_on);
+        done.set(done.get() + size);
+        if !go_on() {
+            return false;
         }
     }
     true
@@ -79,21 +98,22 @@ fn run_in_pool<P: Send, S>(
     total: usize,
     workers: usize,
     scratch: &(impl Fn() -> S + Sync),
-    work: &(impl Fn(P, &mut S) + Sync),
+    work: &(impl Fn(P, &mut S, &GoOn<'_>) + Sync),
     watch: &mut Watch<'_>,
 ) -> Result<bool, Error> {
     let queue = Mutex::new(pieces.into_iter());
     let done = AtomicUsize::new(0);
     let cancelled = AtomicBool::new(false);
     let active = Active { count: Mutex::new(workers), none_left: Condvar::new() };
+    let go_on = || !cancelled.load(Ordering::Relaxed);
     pool(workers)?.in_place_scope(|scope| {
         for _ in 0..workers {
             scope.spawn(|_| {
                 let _leaving = Leaving(&active);
                 let mut scratch = scratch();
-                while !cancelled.load(Ordering::Relaxed) {
+                while go_on() {
                     let Some(piece) = queue.lock().unwrap_or_else(PoisonError::into_inner).next() else { break };
-                    work(piece.content, &mut scratch);
+                    work(piece.content, &mut scratch, &go_on);
                     done.fetch_add(piece.size, Ordering::Relaxed);
                 }
             });

@@ -13,7 +13,7 @@ use std::ops::Range;
 use crate::aligned::Aligned;
 use crate::error::Error;
 use crate::output::{Elements, Outputs, split_off};
-use crate::parallel::{self, Piece, Watch};
+use crate::parallel::{self, GoOn, Piece, Watch};
 use crate::samples::{Samples, all_usable, is_usable};
 use crate::simd::{Instructions, Kernel, Lanes, MOST_LANES, dispatch};
 use crate::status::Status;
@@ -26,6 +26,9 @@ use crate::write::Write;
 
 /// Suffix factors kept at a time. Longer windows keep one in so many and build the others again.
 const SEGMENT: usize = 2048;
+
+/// Rows of every lane between two questions whether to go on: with 16 regressors some 10 ms.
+const ASK: usize = 256;
 
 /// Rows in a piece of work, about.
 const PIECE: usize = 1 << 14;
@@ -171,10 +174,10 @@ impl RollingLeastSquares {
             let part = regressions.split_off_before(piece.end);
             pieces.push(Piece { size: piece.len(), content: (piece, part) });
         }
-        let work = |(rows, mut part): (Range<usize>, Regressions<'_>), scratch: &mut Scratch| {
-            self.solve(equations, rows, &mut part, scratch);
+        let work = |(rows, mut part): (Range<usize>, Regressions<'_>), scratch: &mut Scratch, go_on: &GoOn<'_>| {
+            self.solve_while(equations, rows, &mut part, scratch, go_on);
         };
-        parallel::run(pieces, workers, || self.scratch(), work, watch)
+        parallel::run_long(pieces, workers, || self.scratch(), work, watch)
     }
 
     /// Solves the windows around some rows.
@@ -185,22 +188,42 @@ impl RollingLeastSquares {
         regressions: &mut Regressions<'_>,
         scratch: &mut Scratch,
     ) {
+        self.solve_while(equations, rows, regressions, scratch, &|| true);
+    }
+
+    /// The same, given up where `go_on` says no: it is asked every few hundred rows of every lane.
+    pub(crate) fn solve_while(
+        &self,
+        equations: &Equations<'_>,
+        rows: Range<usize>,
+        regressions: &mut Regressions<'_>,
+        scratch: &mut Scratch,
+        go_on: &GoOn<'_>,
+    ) {
         let mut outputs = Slots::of(self).outputs(regressions);
         let mut window = self.first_row(rows.start);
         let end = self.first_row(rows.end);
-        while window < end {
+        while window < end && go_on() {
             let first = window - window % self.window;
             let next = end.min(first + self.stride());
             let run = Run { plan: self, base: first, windows: window..next, rows: equations.rows.clone() };
             let outputs = &mut outputs;
             match (self.regressors, self.sides) {
-                (1, 1) => dispatch(self.instructions, Work { run, shape: Few::<1>, equations, scratch, outputs }),
-                (2, 1) => dispatch(self.instructions, Work { run, shape: Few::<2>, equations, scratch, outputs }),
-                (3, 1) => dispatch(self.instructions, Work { run, shape: Few::<3>, equations, scratch, outputs }),
-                (4, 1) => dispatch(self.instructions, Work { run, shape: Few::<4>, equations, scratch, outputs }),
+                (1, 1) => {
+                    dispatch(self.instructions, Work { run, shape: Few::<1>, equations, scratch, outputs, go_on });
+                }
+                (2, 1) => {
+                    dispatch(self.instructions, Work { run, shape: Few::<2>, equations, scratch, outputs, go_on });
+                }
+                (3, 1) => {
+                    dispatch(self.instructions, Work { run, shape: Few::<3>, equations, scratch, outputs, go_on });
+                }
+                (4, 1) => {
+                    dispatch(self.instructions, Work { run, shape: Few::<4>, equations, scratch, outputs, go_on });
+                }
                 (regressors, sides) => {
                     let shape = Many { regressors, sides };
-                    dispatch(self.instructions, Work { run, shape, equations, scratch, outputs });
+                    dispatch(self.instructions, Work { run, shape, equations, scratch, outputs, go_on });
                 }
             }
             window = next;
@@ -373,6 +396,7 @@ struct Work<'a, 'b, 'c, H: Shape> {
     equations: &'a Equations<'a>,
     scratch: &'b mut Scratch,
     outputs: &'b mut Outputs<'c>,
+    go_on: &'b GoOn<'b>,
 }
 
 impl<H: Shape> Kernel for Work<'_, '_, '_, H> {
@@ -389,6 +413,9 @@ impl<H: Shape> Kernel for Work<'_, '_, '_, H> {
         for segment in (1..segments).rev() {
             let rows = segment * SEGMENT..window.min((segment + 1) * SEGMENT);
             for offset in rows.rev() {
+                if offset % ASK == 0 && !(self.go_on)() {
+                    return;
+                }
                 self.append(simd, &mut suffix, offset, 0, &mut row);
             }
             store(simd, self.shape, &mut self.scratch.checkpoints[(segment - 1) * size..], &suffix);
@@ -403,12 +430,18 @@ impl<H: Shape> Kernel for Work<'_, '_, '_, H> {
                 load(simd, self.shape, &self.scratch.checkpoints[segment * size..], &mut suffix);
             }
             for offset in rows.clone().rev() {
+                if offset % ASK == 0 && !(self.go_on)() {
+                    return;
+                }
                 self.append(simd, &mut suffix, offset, 0, &mut row);
                 store(simd, self.shape, &mut self.scratch.suffixes[(offset - rows.start) * size..], &suffix);
             }
             // Merging waits for the step before, solving for nothing: apart, each keeps the processor busy.
             let mut first = rows.start;
             while first < rows.end {
+                if first % ASK == 0 && !(self.go_on)() {
+                    return;
+                }
                 let some = first..rows.end.min(first - first % places + places);
                 for offset in some.clone() {
                     let place = (offset - rows.start) * size;
