@@ -23,7 +23,7 @@ pub struct Basis {
     degrees: usize,
     /// `b_0 = 0, b_1, …, b_degrees` of the recurrence.
     recurrence: Vec<DoubleDouble>,
-    /// `b_j` and `1/b_{j+1}` in working precision.
+    /// `b_j / b_{j+1}` and `1 / b_{j+1}` in working precision.
     steps: Vec<(f64, f64)>,
     /// `q_j` at the positions that are not negative, position by position.
     values: Vec<f64>,
@@ -55,7 +55,8 @@ impl Basis {
     pub fn new(length: usize, degrees: usize) -> Self {
         assert!((1..=length).contains(&degrees), "{degrees} polynomials are not independent on {length} samples");
         let recurrence = recurrence(length, degrees);
-        let steps = recurrence.windows(2).map(|b| (b[0].to_f64(), (DoubleDouble::ONE / b[1]).to_f64())).collect();
+        let steps =
+            recurrence.windows(2).map(|b| ((b[0] / b[1]).to_f64(), (DoubleDouble::ONE / b[1]).to_f64())).collect();
         let mut basis = Self { length, degrees, recurrence, steps, values: Vec::new() };
         let rows = length - length / 2;
         let mut values = Vec::with_capacity(rows * degrees);
@@ -143,8 +144,9 @@ impl Basis {
         let (x, d) = (self.position(index), derivative as f64);
         // The derivative of q_j and of the one before it, while `values` still holds the lower derivative from q_j on.
         let (mut last, mut current) = (0.0, 0.0);
-        for (value, &(b, inverse)) in values.iter_mut().zip(&self.steps) {
-            let next = (x * current + d * *value - b * last) * inverse;
+        for (value, &(ratio, inverse)) in values.iter_mut().zip(&self.steps) {
+            // Only one product and one sum wait for the degree before.
+            let next = (d * inverse * *value - ratio * last) + x * inverse * current;
             *value = current;
             (last, current) = (current, next);
         }

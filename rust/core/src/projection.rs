@@ -23,7 +23,7 @@ use crate::strips::{Cursor, Strips};
 /// window of [`GROWTH_LENGTH`] samples. The residual sums over more errors in longer windows, so that more is allowed there.
 ///
 /// Keeps the coefficients good to 2e-12 of the window's norm, and the residual to 1e-6 of itself where noise is 1e-6 of the signal.
-const GROWTH: f64 = 35_000.0;
+const GROWTH: f64 = 40_000.0;
 const GROWTH_LENGTH: f64 = 51.0;
 
 /// No span is longer than this, or than a quarter of the window where that is more: what a run needs should stay near the processor.
@@ -127,7 +127,7 @@ impl<const D: usize> Projection<D> {
         self.length
     }
 
-    /// Windows reached from one start: a power of two, or a multiple of 16.
+    /// Windows reached from one start: a power of two, or a multiple of 8.
     pub(crate) fn span(&self) -> usize {
         self.span
     }
@@ -288,7 +288,7 @@ fn span(basis: &Basis) -> usize {
         let values = basis.evaluate(last + steps as f64, 0);
         (length * steps as f64 * values.iter().map(|q| q * q).sum::<f64>()).sqrt()
     };
-    let allowed = GROWTH * (length / GROWTH_LENGTH).max(1.0).powf(0.2);
+    let allowed = GROWTH * (length / GROWTH_LENGTH).max(1.0).powf(0.3);
     // Every window reached holds the sample at the start's centre: where that is a glitch and all samples are counted from it, none
     // suffers but those that hold it.
     let longest = LONGEST_SPAN.max(basis.length() / 4).min(basis.length());
@@ -306,7 +306,7 @@ fn span(basis: &Basis) -> usize {
     match 2 * reach {
         0 => 1,
         span @ 1..16 => 1 << span.ilog2(),
-        span => span - span % 16,
+        span => span - span % 8,
     }
 }
 
@@ -399,7 +399,7 @@ mod tests {
             for degrees in [1, 4, 16.min(length)] {
                 let projection = Projection::<16>::new(&Basis::new(length, degrees));
                 let (span, block) = (projection.span(), projection.block());
-                assert!(span.is_power_of_two() || span % 16 == 0, "span {span} at length {length}");
+                assert!(span.is_power_of_two() || span % 8 == 0, "span {span} at length {length}");
                 assert!(block % span == 0 && block % SHORTEST_BLOCK == 0, "block {block} at length {length}");
             }
         }
