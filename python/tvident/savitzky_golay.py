@@ -126,7 +126,11 @@ def _padded(samples: npt.NDArray[np.float64], length: int, mode: str, cval: floa
     near = samples
     if count > 4 * length:
         near = np.concatenate([samples[..., : 2 * length], samples[..., -2 * length :]], axis=-1)
-    near = np.pad(near, widths, "constant", constant_values=cval) if mode == "constant" else np.pad(near, widths, _PADDING[mode])
+    near = (
+        np.pad(near, widths, "constant", constant_values=cval)
+        if mode == "constant"
+        else np.pad(near, widths, _PADDING[mode])
+    )
     if count <= 4 * length:
         return near
     padded = np.empty((*samples.shape[:-1], before + count + after))
