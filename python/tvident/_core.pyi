@@ -24,9 +24,11 @@ class LocalPolynomials:
         order: int | None,
         max_order: int,
         criterion: str,
+        selection: str,
         derivatives: list[int],
         delta: float,
         noise: bool,
+        quantisation: float,
     ) -> LocalPolynomials: ...
     @property
     def orders(self) -> int: ...
@@ -39,9 +41,10 @@ class LocalPolynomials:
         workers: int | None = None,
         progress: Callable[[int, int], object] | None = None,
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint8], npt.NDArray[np.uint16], npt.NDArray[np.float64]]: ...
+    def errors(
+        self, samples: npt.NDArray[np.number], *, step: int = 1, workers: int | None = None
+    ) -> npt.NDArray[np.float64]: ...
     def scores(self, samples: npt.NDArray[np.number], sample: int) -> npt.NDArray[np.float64]: ...
-    def gains(self) -> npt.NDArray[np.float64]: ...
-    def end_errors(self, samples: npt.NDArray[np.number], last: bool) -> npt.NDArray[np.float64]: ...
 
 @final
 class Motions:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 import tvident
 from tvident import recordings, table
 from tvident.arguments import NanPolicy
-from tvident.derivatives import Criterion
+from tvident.derivatives import Criterion, Selection
 from tvident.identification import Preset
 from tvident.rig import Excitation, Pattern
 from tvident.status import describe
@@ -202,6 +202,9 @@ def _remark(values: npt.NDArray[Any]) -> str:
 @click.option("--max-order", type=int, default=15, show_default=True, help="Highest candidate order.")
 @click.option("--order", type=int, help="Fixes the order.")
 @_CRITERION
+@click.option(
+    "--selection", type=click.Choice(get_args(Selection)), help="Whose criterion: the window's, or its neighbours' too."
+)
 @click.option("--max-deriv", type=int, default=2, show_default=True, help="Highest derivative.")
 @_RUN
 def derivatives(

@@ -70,3 +70,23 @@ def fit_window(samples: npt.ArrayLike, delta: float, highest: int, max_deriv: in
     derivatives[0] += level
     residuals = y - derivatives[0]
     return Window(derivatives, gains, np.sum(residuals**2, axis=1))
+
+
+def pooled_scores(windows: list[Window], reach: int) -> Array:
+    """Give the criterion of every order summed over each window's neighbours, as far as there are any."""
+    scores = np.array([window.scores() for window in windows])
+    return np.array([scores[max(0, i - reach) : i + reach + 1].sum(axis=0) for i in range(len(windows))])
+
+
+def akaike_average(window: Window) -> tuple[Array, Array, Array]:
+    """Give Akaike's weights, the weighted average of all orders at the centre, and its standard error."""
+    half = window.gains.shape[2] // 2
+    scores = window.scores()
+    weights = np.exp(-(scores - scores.min()) / 2)
+    weights /= weights.sum()
+    estimates, gains = window.derivatives[:, :, half], window.gains[:, :, half]
+    average = estimates @ weights
+    freedom = window.gains.shape[2] - np.arange(weights.size) - 1
+    sigma = np.sqrt(window.rss / np.maximum(freedom, 1))
+    errors = np.sqrt((sigma * gains) ** 2 + (estimates - average[:, None]) ** 2) @ weights
+    return weights, average, errors

@@ -6,7 +6,7 @@ use tvident::identification::HARDLY_TOLD_APART;
 use tvident::rolling::HALF_OF_THE_DIGITS;
 use tvident::{
     Coefficient, Criterion, Elements, Equations, Error, Estimates, Identified, Instructions, LocalPolynomials, Motion,
-    Options, Order, Regressions, RollingLeastSquares, Samples, identify_windowed,
+    Options, Order, Regressions, RollingLeastSquares, Samples, Selection, identify_windowed,
 };
 
 /// Runs on a record of one or two lengths and returns the number of windows.
@@ -71,9 +71,11 @@ fn polynomials(window_length: usize, order: Order, derivatives: &[usize], length
     let plan = LocalPolynomials::new(Options {
         window_length,
         order,
+        selection: Selection::Window,
         derivatives: derivatives.to_vec(),
         delta: 1e-3,
         noise: choice,
+        quantisation: 0.0,
         instructions: Instructions::current(),
     })?;
     let windows = lengths * WINDOWS.next_multiple_of(plan.stride());
@@ -147,9 +149,11 @@ fn identify(lengths: usize) -> Result<usize, Error> {
     let derivatives = LocalPolynomials::new(Options {
         window_length: 201,
         order: CHOICE,
+        selection: Selection::Window,
         derivatives: vec![0, 1, 2],
         delta: 1e-3,
         noise: true,
+        quantisation: 0.0,
         instructions,
     })?;
     let pairs = vec![(0, 1), (0, 2), (1, 2)];

@@ -68,6 +68,8 @@ pub(crate) struct Tables {
     /// A whole number that says all about an order, and what is added where the residual is rounding.
     pub(crate) code: [f64; TABLE],
     pub(crate) exact: f64,
+    /// No residual is taken to be smaller.
+    pub(crate) floor: f64,
 }
 
 /// Bits of a score that the order takes.
@@ -83,6 +85,7 @@ impl Tables {
             variance: [f64::NAN; TABLE],
             code: [0.0; TABLE],
             exact: 0.0,
+            floor: 0.0,
         }
     }
 }
@@ -102,7 +105,7 @@ pub(crate) struct Choice<S: Lanes> {
 #[inline(always)]
 pub(crate) fn choose<S: Lanes, const D: usize>(simd: S, tables: &Tables, state: &State<S, D>) -> Choice<S> {
     let zero = simd.splat_f64s(0.0);
-    let floor = simd.max_f64s(simd.mul_f64s(state.energy, simd.splat_f64s(ROUNDING)), zero);
+    let floor = simd.max_f64s(simd.mul_f64s(state.energy, simd.splat_f64s(ROUNDING)), simd.splat_f64s(tables.floor));
     let mut residual = state.residual;
     let mut best = simd.splat_f64s(f64::MAX);
     unroll!(rev N < D, {

@@ -9,12 +9,15 @@
 //! ```
 //!
 //! Orders below the derivative's are left out where the window's own order is not one of them: zero with an error of zero is no estimate.
+//!
+//! Where several orders share in a window (see [`crate::selection`]), each of them is `top` in its turn, and what comes of it is averaged.
 
 use std::ops::Range;
 
 use crate::basis::{Basis, MOST_DEGREES};
 use crate::local_polynomials::{Estimates, Options, Order};
 use crate::samples::Samples;
+use crate::selection::Wanted;
 use crate::status::Status;
 use crate::window::Window;
 
@@ -33,6 +36,8 @@ pub(crate) struct Ends {
     order: Order,
     derivatives: Vec<usize>,
     delta: f64,
+    /// No residual is taken to be smaller.
+    floor: f64,
 }
 
 /// A derivative at one position and its standard error.
@@ -44,57 +49,49 @@ pub(crate) struct Estimate {
 
 impl Ends {
     pub(crate) fn new(options: &Options) -> Self {
-        Self { order: options.order, derivatives: options.derivatives.clone(), delta: options.delta }
+        let (order, floor) = (options.order, options.quantisation_floor());
+        Self { order, derivatives: options.derivatives.clone(), delta: options.delta, floor }
     }
 
-    /// Writes the estimates of the given samples, all of them at one end of the record.
+    /// Writes what is wanted of the given samples, all of them at one end of the record. `orders` are those that share in the window
+    /// there and their shares, where it does not choose for itself.
+    #[allow(clippy::too_many_arguments, reason = "which samples of which record, and where they go")]
     pub(crate) fn estimate(
         &self,
         basis: &Basis,
         record: &dyn Samples,
         end: End,
+        orders: Option<Vec<(usize, f64)>>,
         samples: Range<usize>,
+        wanted: Wanted,
         estimates: &mut Estimates<'_>,
     ) {
-        let (first, fit) = self.fit(basis, record, end);
+        let (first, fit) = self.fit(basis, record, end, orders);
         for element in estimates.elements.of(samples) {
             let sample = estimates.elements.sample(element);
-            let mut status = Status::EDGE;
             if let Some(fit) = &fit {
                 self.evaluate(basis, fit, sample - first, |slot, estimate| {
-                    estimates.derivatives[slot][element] = estimate.value;
+                    estimates.derivatives[slot][element] = match wanted {
+                        Wanted::Derivatives => estimate.value,
+                        Wanted::Errors => estimate.error,
+                    };
                 });
-                status |= fit.status;
+                estimates.diagnose(element, fit.order, Status::EDGE | fit.status, fit.sigma);
             } else {
-                estimates.derivatives.iter_mut().for_each(|derivative| derivative[element] = f64::NAN);
-                status |= Status::INVALID;
-            }
-            let (order, sigma) = fit.as_ref().map_or((0, f64::NAN), |fit| (fit.order, fit.sigma));
-            put(estimates.order, element, u8::try_from(order).unwrap_or(u8::MAX));
-            put(estimates.sigma, element, sigma);
-            put(estimates.status, element, status.bits());
-        }
-    }
-
-    /// Standard errors at an end: one row a derivative, in the order of the samples.
-    pub(crate) fn errors(&self, basis: &Basis, record: &dyn Samples, end: End) -> Vec<Vec<f64>> {
-        let (_, fit) = self.fit(basis, record, end);
-        let length = basis.length();
-        let places = match end {
-            End::First => 0..length / 2,
-            End::Last => length - length / 2..length,
-        };
-        let mut errors = vec![vec![f64::NAN; places.len()]; self.derivatives.len()];
-        if let Some(fit) = fit {
-            for (column, place) in places.enumerate() {
-                self.evaluate(basis, &fit, place, |slot, estimate| errors[slot][column] = estimate.error);
+                estimates.invalidate(element);
+                estimates.diagnose(element, 0, Status::EDGE | Status::INVALID, f64::NAN);
             }
         }
-        errors
     }
 
     /// The window at an end and its first sample.
-    fn fit(&self, basis: &Basis, record: &dyn Samples, end: End) -> (usize, Option<Fit>) {
+    fn fit(
+        &self,
+        basis: &Basis,
+        record: &dyn Samples,
+        end: End,
+        orders: Option<Vec<(usize, f64)>>,
+    ) -> (usize, Option<Fit>) {
         let length = basis.length();
         let first = match end {
             End::First => 0,
@@ -102,7 +99,8 @@ impl Ends {
         };
         let mut samples = vec![0.0; length];
         record.read(first, &mut samples);
-        (first, Window::project(basis, &samples).map(|window| Fit::new(window, self.order, length)))
+        let window = Window::project(basis, &samples, self.floor);
+        (first, window.map(|window| Fit::new(window, self.order, orders, length)))
     }
 
     /// Gives every derivative at sample `place` of the window to `give`, with its place among those asked for.
@@ -134,19 +132,33 @@ impl Ends {
 /// A window at an end, its order and noise.
 struct Fit {
     window: Window,
+    /// The orders that share in the window, their shares and noise.
+    tops: Vec<Top>,
     order: usize,
     sigma: f64,
     status: Status,
     chosen: bool,
 }
 
+/// An order that the window is fitted with.
+struct Top {
+    order: usize,
+    share: f64,
+    variance: f64,
+}
+
 impl Fit {
-    fn new(window: Window, order: Order, length: usize) -> Self {
+    fn new(window: Window, order: Order, shares: Option<Vec<(usize, f64)>>, length: usize) -> Self {
         let chosen = matches!(order, Order::Chosen { .. });
-        let order = window.order(order, length);
-        let residual = window.residuals[order];
-        let freedom = length - order - 1;
-        let sigma = if freedom == 0 { f64::NAN } else { (residual.max(window.floor) / freedom as f64).sqrt() };
+        let shares = shares.unwrap_or_else(|| vec![(window.order(order, length), 1.0)]);
+        let variance = |order: usize| {
+            let freedom = length - order - 1;
+            if freedom == 0 { f64::NAN } else { window.residuals[order].max(window.floor) / freedom as f64 }
+        };
+        let tops: Vec<Top> =
+            shares.into_iter().map(|(order, share)| Top { order, share, variance: variance(order) }).collect();
+        let largest = tops.iter().reduce(|best, top| if top.share > best.share { top } else { best });
+        let order = largest.map_or(0, |top| top.order);
         let mut status = Status::GOOD;
         if chosen && window.residuals.len() > 1 {
             if order == 0 {
@@ -156,10 +168,11 @@ impl Fit {
                 status |= Status::HIGHEST_ORDER;
             }
         }
-        if residual <= window.floor {
+        if window.residuals[order] <= window.floor {
             status |= Status::EXACT;
         }
-        Self { window, order, sigma, status, chosen }
+        let sigma = tops.iter().map(|top| top.share * top.variance).sum::<f64>().sqrt();
+        Self { window, tops, order, sigma, status, chosen }
     }
 
     /// The sum `Σ c_j q_j` up to the best order for it, with its standard error. Orders below `lowest` are not looked at.
@@ -167,19 +180,31 @@ impl Fit {
         // Value and gain of every order.
         let mut sums = [(0.0, 0.0); MOST_DEGREES];
         let (mut value, mut gain) = (0.0, 0.0);
-        for ((sum, c), q) in sums[..=self.order].iter_mut().zip(&self.window.coefficients).zip(polynomials) {
+        for ((sum, c), q) in sums.iter_mut().zip(&self.window.coefficients).zip(polynomials) {
             value += c * q;
             gain += q * q;
             *sum = (value, gain);
         }
-        let (top_value, top_gain) = (value, gain);
-        let top = Estimate { value: top_value, error: self.sigma * top_gain.sqrt() };
-        let variance = self.sigma * self.sigma;
-        if !self.chosen || variance.is_nan() {
-            return top;
+        if let [top] = self.tops.as_slice() {
+            return self.best_below(top, &sums, lowest);
         }
-        let mut best = (variance * top_gain, self.order);
-        for (order, &(value, gain)) in sums[..self.order].iter().enumerate().skip(lowest).rev() {
+        let estimates: Vec<Estimate> = self.tops.iter().map(|top| self.best_below(top, &sums, lowest)).collect();
+        let shared = |number: &dyn Fn(&Estimate) -> f64| -> f64 {
+            self.tops.iter().zip(&estimates).map(|(top, estimate)| top.share * number(estimate)).sum()
+        };
+        let value = shared(&|estimate| estimate.value);
+        Estimate { value, error: shared(&|estimate| estimate.error.hypot(estimate.value - value)) }
+    }
+
+    /// The best of the orders up to one that fits the window.
+    fn best_below(&self, top: &Top, sums: &[(f64, f64); MOST_DEGREES], lowest: usize) -> Estimate {
+        let (order, variance) = (top.order, top.variance);
+        let (top_value, top_gain) = sums[order];
+        if !self.chosen || variance.is_nan() {
+            return Estimate { value: top_value, error: (variance * top_gain).sqrt() };
+        }
+        let mut best = (variance * top_gain, order);
+        for (order, &(value, gain)) in sums[..order].iter().enumerate().skip(lowest).rev() {
             let bias = ((value - top_value).powi(2) - variance * (top_gain - gain)).max(0.0);
             let error = bias + variance * gain;
             if error <= best.0 {
@@ -187,12 +212,6 @@ impl Fit {
             }
         }
         let (value, gain) = sums[best.1];
-        Estimate { value, error: self.sigma * gain.sqrt() }
-    }
-}
-
-fn put<T>(values: &mut [T], element: usize, value: T) {
-    if let Some(place) = values.get_mut(element) {
-        *place = value;
+        Estimate { value, error: (variance * gain).sqrt() }
     }
 }

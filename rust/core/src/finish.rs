@@ -41,6 +41,17 @@ impl Functional {
         Self { weights, odd: derivative % 2 == 1, constant: f64::from(u8::from(derivative == 0)) }
     }
 
+    /// What was taken off the window's samples before they were projected.
+    fn level() -> Self {
+        Self { weights: [0.0; MOST_DEGREES], odd: false, constant: 1.0 }
+    }
+
+    /// The coefficient of one degree.
+    fn coefficient(degree: usize) -> Self {
+        let weights = std::array::from_fn(|j| f64::from(u8::from(j == degree)));
+        Self { weights, odd: degree % 2 == 1, constant: 0.0 }
+    }
+
     /// Its value's standard deviation over that of the noise, for every order.
     pub(crate) fn gains(&self, orders: usize) -> Vec<f64> {
         let mut sum = 0.0;
@@ -85,7 +96,15 @@ impl Finish {
             tables.code[order] = code(u8::try_from(order).unwrap_or(u8::MAX), status);
         }
         tables.exact = code(0, Status::EXACT);
+        tables.floor = options.quantisation_floor();
         Self { functionals: options.derivatives.iter().map(functional).collect(), tables, fixed_order }
+    }
+
+    /// Gives, instead of derivatives, what was taken off the window's samples and then the coefficients of some degrees.
+    pub(crate) fn bare(mut self, degrees: &[usize]) -> Self {
+        self.functionals = vec![Functional::level()];
+        self.functionals.extend(degrees.iter().copied().map(Functional::coefficient));
+        self
     }
 
     pub(crate) fn functionals(&self) -> &[Functional] {

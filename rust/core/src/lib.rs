@@ -3,6 +3,7 @@
 
 mod aligned;
 pub mod basis;
+mod coefficients;
 pub mod criterion;
 mod double_double;
 mod ends;
@@ -13,9 +14,11 @@ pub mod local_polynomials;
 pub mod motion;
 pub mod output;
 pub mod parallel;
+mod pool;
 mod projection;
 pub mod rolling;
 pub mod samples;
+pub mod selection;
 pub mod shared_parameters;
 mod simd;
 pub mod status;
@@ -38,6 +41,7 @@ pub use motion::{Coefficient, Motion, Term};
 pub use output::Elements;
 pub use rolling::{Equations, Regressions, RollingLeastSquares};
 pub use samples::Samples;
+pub use selection::Selection;
 pub use shared_parameters::SharedParameters;
 pub use simd::Instructions;
 pub use status::Status;

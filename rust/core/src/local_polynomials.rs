@@ -11,11 +11,14 @@ use crate::basis::Basis;
 use crate::criterion::Criterion;
 use crate::ends::{End, Ends};
 use crate::error::Error;
+use crate::finish::Finish;
 use crate::output::{Elements, split_off};
 use crate::parallel::{self, Piece, Watch};
 use crate::samples::Samples;
+use crate::selection::{self, Selection, Selector, Wanted};
 use crate::simd::Instructions;
-use crate::walk::{Engine, Walk};
+use crate::status::Status;
+use crate::walk::{Walk, engine};
 use crate::window::Window;
 
 /// The highest polynomial order that is offered.
@@ -45,14 +48,25 @@ pub struct Options {
     pub window_length: usize,
     /// How the order comes about.
     pub order: Order,
+    /// What chooses the order of a window, where it is chosen.
+    pub selection: Selection,
     /// Which derivatives are wanted; 0 is the value.
     pub derivatives: Vec<usize>,
     /// Sample period in seconds.
     pub delta: f64,
     /// Whether the noise is wanted too, where the order is fixed. It is always known where the order is chosen.
     pub noise: bool,
+    /// Step of the samples' quantisation, or zero: its noise is the least that a residual is taken to hold.
+    pub quantisation: f64,
     /// Instructions to use.
     pub instructions: Instructions,
+}
+
+impl Options {
+    /// The residual sum of squares of a window that holds nothing but quantisation: `M q²/12`.
+    pub(crate) fn quantisation_floor(&self) -> f64 {
+        self.window_length as f64 * self.quantisation * self.quantisation / 12.0
+    }
 }
 
 /// Where estimates are written. An empty slice stands for what is not wanted.
@@ -71,6 +85,19 @@ pub struct Estimates<'a> {
 }
 
 impl Estimates<'_> {
+    /// Writes what is known of a window beside its derivatives.
+    pub(crate) fn diagnose(&mut self, element: usize, order: usize, status: Status, sigma: f64) {
+        put(self.order, element, u8::try_from(order).unwrap_or(u8::MAX));
+        put(self.status, element, status.bits());
+        put(self.sigma, element, sigma);
+    }
+
+    /// Makes an element NaN.
+    pub(crate) fn invalidate(&mut self, element: usize) {
+        self.derivatives.iter_mut().for_each(|derivative| derivative[element] = f64::NAN);
+        self.diagnose(element, 0, Status::INVALID, f64::NAN);
+    }
+
     /// Cuts off what belongs to the samples before `sample`.
     fn split_off_before(&mut self, sample: usize) -> Self {
         let (elements, count) = (self.elements, self.elements.of(0..sample).len());
@@ -85,6 +112,13 @@ impl Estimates<'_> {
     }
 }
 
+/// Writes a value that may not be wanted.
+fn put<T>(values: &mut [T], element: usize, value: T) {
+    if let Some(place) = values.get_mut(element) {
+        *place = value;
+    }
+}
+
 /// The plan for windows of one length.
 #[derive(Debug)]
 pub struct LocalPolynomials {
@@ -92,11 +126,18 @@ pub struct LocalPolynomials {
     basis: Basis,
     ends: Ends,
     engine: Box<dyn Walk>,
+    selector: Option<Selector>,
 }
 
 /// What one thread needs to work: made once, used for any number of pieces.
 #[derive(Debug)]
-pub struct Scratch(crate::walk::Scratch);
+pub struct Scratch {
+    walk: crate::walk::Scratch,
+    selection: Option<selection::Scratch>,
+}
+
+/// A piece of work: some samples of a record, and where what is known of them goes.
+type Part<'a, 'b> = (&'a dyn Samples, Range<usize>, Estimates<'b>);
 
 impl LocalPolynomials {
     /// Prepares the tables.
@@ -132,18 +173,9 @@ impl LocalPolynomials {
         }
         let basis = Basis::new(window_length, degrees);
         let residual = options.noise || matches!(options.order, Order::Chosen { .. });
-        let engine: Box<dyn Walk> = match (residual, degrees) {
-            (true, ..=8) => Box::new(Engine::<8, true>::new(&options, &basis)),
-            (true, _) => Box::new(Engine::<16, true>::new(&options, &basis)),
-            (false, ..=4) => Box::new(Engine::<4, false>::new(&options, &basis)),
-            (false, ..=6) => Box::new(Engine::<6, false>::new(&options, &basis)),
-            (false, ..=8) => Box::new(Engine::<8, false>::new(&options, &basis)),
-            (false, ..=12) => Box::new(Engine::<12, false>::new(&options, &basis)),
-            (false, ..=16) => Box::new(Engine::<16, false>::new(&options, &basis)),
-            (false, _) => Box::new(Engine::<20, false>::new(&options, &basis)),
-        };
-        let ends = Ends::new(&options);
-        Ok(Self { options, basis, ends, engine })
+        let engine = engine(&basis, Finish::new(&options, &basis), residual, options.instructions);
+        let (ends, selector) = (Ends::new(&options), Selector::new(&options, &basis));
+        Ok(Self { options, basis, ends, engine, selector })
     }
 
     /// What was asked for.
@@ -167,7 +199,7 @@ impl LocalPolynomials {
     /// Memory for one thread.
     #[must_use]
     pub fn scratch(&self) -> Scratch {
-        Scratch(self.engine.scratch())
+        Scratch { walk: self.engine.scratch(), selection: self.selector.as_ref().map(Selector::scratch) }
     }
 
     /// Windows that are worked on side by side: a record may be cut anywhere, but multiples of this waste nothing.
@@ -191,21 +223,7 @@ impl LocalPolynomials {
         estimates: &mut Estimates<'_>,
         scratch: &mut Scratch,
     ) -> Result<(), Error> {
-        self.windows(record.len())?;
-        let half = self.options.window_length / 2;
-        let interior = samples.start.max(half)..samples.end.min(record.len() - half);
-        if samples.start < half {
-            let wanted = samples.start..samples.end.min(half);
-            self.ends.estimate(&self.basis, record, End::First, wanted, estimates);
-        }
-        if !interior.is_empty() {
-            self.estimate_centred(record, interior, estimates, scratch)?;
-        }
-        if samples.end > record.len() - half {
-            let wanted = samples.start.max(record.len() - half)..samples.end;
-            self.ends.estimate(&self.basis, record, End::Last, wanted, estimates);
-        }
-        Ok(())
+        self.everywhere(record, samples, Wanted::Derivatives, estimates, scratch)
     }
 
     /// The same for samples whose full window lies in the record: those from [`LocalPolynomials::before_centre`] on, as many as the
@@ -225,8 +243,67 @@ impl LocalPolynomials {
     ) -> Result<(), Error> {
         let (windows, before) = (self.windows(record.len())?, self.before_centre());
         assert!(before <= samples.start && samples.end <= before + windows, "every window must lie in the record");
-        self.engine.walk(record, samples.start - before..samples.end - before, estimates, &mut scratch.0);
+        self.centred(record, samples, Wanted::Derivatives, estimates, scratch);
         Ok(())
+    }
+
+    fn everywhere(
+        &self,
+        record: &dyn Samples,
+        samples: Range<usize>,
+        wanted: Wanted,
+        estimates: &mut Estimates<'_>,
+        scratch: &mut Scratch,
+    ) -> Result<(), Error> {
+        let (windows, half) = (self.windows(record.len())?, self.options.window_length / 2);
+        let (start, end) = (half, record.len() - half);
+        if samples.start < start {
+            let orders = self.orders_at(record, 0, scratch);
+            let edge = samples.start..samples.end.min(start);
+            self.ends.estimate(&self.basis, record, End::First, orders, edge, wanted, estimates);
+        }
+        let interior = samples.start.max(start)..samples.end.min(end);
+        if !interior.is_empty() {
+            self.centred(record, interior, wanted, estimates, scratch);
+        }
+        if samples.end > end {
+            let orders = self.orders_at(record, windows - 1, scratch);
+            let edge = samples.start.max(end)..samples.end;
+            self.ends.estimate(&self.basis, record, End::Last, orders, edge, wanted, estimates);
+        }
+        Ok(())
+    }
+
+    fn centred(
+        &self,
+        record: &dyn Samples,
+        samples: Range<usize>,
+        wanted: Wanted,
+        estimates: &mut Estimates<'_>,
+        scratch: &mut Scratch,
+    ) {
+        let before = self.before_centre();
+        let windows = samples.start - before..samples.end - before;
+        if let (Some(selector), Some(scratch)) = (&self.selector, &mut scratch.selection) {
+            selector.estimate(record, windows, wanted, estimates, scratch);
+            return;
+        }
+        self.engine.walk(record, windows, estimates, &mut scratch.walk);
+        if wanted == Wanted::Errors {
+            let elements = estimates.elements.of(samples);
+            for (functional, values) in self.engine.functionals().iter().zip(&mut estimates.derivatives) {
+                let gains = functional.gains(self.orders());
+                for element in elements.clone() {
+                    values[element] = gains[usize::from(estimates.order[element])] * estimates.sigma[element];
+                }
+            }
+        }
+    }
+
+    /// The orders that share in a window, where it does not choose for itself.
+    fn orders_at(&self, record: &dyn Samples, window: usize, scratch: &mut Scratch) -> Option<Vec<(usize, f64)>> {
+        let (selector, scratch) = (self.selector.as_ref()?, scratch.selection.as_mut()?);
+        Some(selector.orders(record, window, scratch))
     }
 
     /// Estimates at all samples of several records, in parallel. Every element of the outputs must belong to a sample.
@@ -242,7 +319,45 @@ impl LocalPolynomials {
         workers: NonZeroUsize,
         watch: &mut Watch<'_>,
     ) -> Result<(), Error> {
-        let piece = PIECE.next_multiple_of(self.stride());
+        let work = |(record, samples, mut estimates): Part<'_, '_>, scratch: &mut Scratch| {
+            let outcome = if ends {
+                self.estimate(record, samples, &mut estimates, scratch)
+            } else {
+                self.estimate_centred(record, samples, &mut estimates, scratch)
+            };
+            debug_assert_eq!(outcome, Ok(()), "the lengths of all records were checked");
+        };
+        parallel::run(self.pieces(records, ends)?, workers, || self.scratch(), work, watch)
+    }
+
+    /// Standard errors in the place of derivatives, at all samples of several records, in parallel.
+    ///
+    /// They are the noise times the gain of the order chosen; where orders were averaged, `Σ w_n √(σ_n² g_n² + (d_n - d)²)`. The plan must
+    /// know the noise, and all outputs must be wanted.
+    ///
+    /// # Errors
+    /// As [`LocalPolynomials::run`].
+    pub fn errors(
+        &self,
+        records: Vec<(&dyn Samples, Estimates<'_>)>,
+        workers: NonZeroUsize,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Error> {
+        let work = |(record, samples, mut estimates): Part<'_, '_>, scratch: &mut Scratch| {
+            let outcome = self.everywhere(record, samples, Wanted::Errors, &mut estimates, scratch);
+            debug_assert_eq!(outcome, Ok(()), "the lengths of all records were checked");
+        };
+        parallel::run(self.pieces(records, true)?, workers, || self.scratch(), work, watch)
+    }
+
+    /// Cuts records into pieces of work.
+    fn pieces<'a, 'b>(
+        &self,
+        records: Vec<(&'a dyn Samples, Estimates<'b>)>,
+        ends: bool,
+    ) -> Result<Vec<Piece<Part<'a, 'b>>>, Error> {
+        let least = self.selector.as_ref().map_or(0, Selector::least_piece);
+        let piece = PIECE.max(least).next_multiple_of(self.stride());
         let mut pieces = Vec::new();
         for (record, mut estimates) in records {
             let (windows, before) = (self.windows(record.len())?, self.before_centre());
@@ -256,16 +371,7 @@ impl LocalPolynomials {
                 first = end;
             }
         }
-        let work = |(record, samples, mut estimates): (&dyn Samples, Range<usize>, Estimates<'_>),
-                    scratch: &mut Scratch| {
-            let outcome = if ends {
-                self.estimate(record, samples, &mut estimates, scratch)
-            } else {
-                self.estimate_centred(record, samples, &mut estimates, scratch)
-            };
-            debug_assert_eq!(outcome, Ok(()), "the lengths of all records were checked");
-        };
-        parallel::run(pieces, workers, || self.scratch(), work, watch)
+        Ok(pieces)
     }
 
     /// The criterion of every order in the window around a sample, equation (8); infinite for an order that is no candidate. Near an
@@ -282,30 +388,13 @@ impl LocalPolynomials {
         };
         let mut samples = vec![0.0; self.options.window_length];
         record.read(window, &mut samples);
-        let Some(window) = Window::project(&self.basis, &samples) else {
+        let Some(window) = Window::project(&self.basis, &samples, self.options.quantisation_floor()) else {
             return Ok(vec![f64::NAN; self.orders()]);
         };
         let score = |(order, residual): (usize, &f64)| {
             criterion.score(residual.max(window.floor), order, self.options.window_length)
         };
         Ok(window.residuals.iter().enumerate().map(score).collect())
-    }
-
-    /// By what the noise standard deviation is multiplied to give the standard error of a derivative at the centre, by order: element
-    /// `d · orders + n` belongs to the `d`-th derivative asked for and order `n`.
-    #[must_use]
-    pub fn gains(&self) -> Vec<f64> {
-        self.engine.functionals().iter().flat_map(|functional| functional.gains(self.orders())).collect()
-    }
-
-    /// Standard errors of every derivative near one end, where orders and gains differ from sample to sample: one row a derivative,
-    /// in the order of the samples.
-    ///
-    /// # Errors
-    /// If the record is shorter than the window.
-    pub fn end_errors(&self, record: &dyn Samples, end: End) -> Result<Vec<Vec<f64>>, Error> {
-        self.windows(record.len())?;
-        Ok(self.ends.errors(&self.basis, record, end))
     }
 
     /// Number of full windows in a record.

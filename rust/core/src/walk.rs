@@ -11,7 +11,7 @@ use std::ops::Range;
 use crate::aligned::Aligned;
 use crate::basis::Basis;
 use crate::finish::{Finish, Functional};
-use crate::local_polynomials::{Estimates, Options};
+use crate::local_polynomials::Estimates;
 use crate::output::Outputs;
 use crate::projection::Projection;
 use crate::samples::Samples;
@@ -32,6 +32,20 @@ pub(crate) trait Walk: Debug + Send + Sync {
     fn scratch(&self) -> Scratch;
     fn functionals(&self) -> &[Functional];
     fn walk(&self, record: &dyn Samples, windows: Range<usize>, estimates: &mut Estimates<'_>, scratch: &mut Scratch);
+}
+
+/// The engine with the smallest kernels that hold a basis, which follow the residual or do not.
+pub(crate) fn engine(basis: &Basis, finish: Finish, residual: bool, instructions: Instructions) -> Box<dyn Walk> {
+    match (residual, basis.degrees()) {
+        (true, ..=8) => Box::new(Engine::<8, true>::new(basis, finish, instructions)),
+        (true, _) => Box::new(Engine::<16, true>::new(basis, finish, instructions)),
+        (false, ..=4) => Box::new(Engine::<4, false>::new(basis, finish, instructions)),
+        (false, ..=6) => Box::new(Engine::<6, false>::new(basis, finish, instructions)),
+        (false, ..=8) => Box::new(Engine::<8, false>::new(basis, finish, instructions)),
+        (false, ..=12) => Box::new(Engine::<12, false>::new(basis, finish, instructions)),
+        (false, ..=16) => Box::new(Engine::<16, false>::new(basis, finish, instructions)),
+        (false, _) => Box::new(Engine::<20, false>::new(basis, finish, instructions)),
+    }
 }
 
 /// Plan of the walk with kernels of `D` degrees, which follow the residual or do not.
@@ -58,12 +72,8 @@ pub(crate) struct Scratch {
 }
 
 impl<const D: usize, const RESIDUAL: bool> Engine<D, RESIDUAL> {
-    pub(crate) fn new(options: &Options, basis: &Basis) -> Self {
-        Self {
-            projection: Projection::new(basis),
-            finish: Finish::new(options, basis),
-            instructions: options.instructions,
-        }
+    pub(crate) fn new(basis: &Basis, finish: Finish, instructions: Instructions) -> Self {
+        Self { projection: Projection::new(basis), finish, instructions }
     }
 
     /// Samples of a window before the one it is said to be around: its centre, or the last one before that.

@@ -15,13 +15,13 @@ pub(crate) struct Window {
     pub(crate) coefficients: Vec<f64>,
     /// Residual sum of squares of every order.
     pub(crate) residuals: Vec<f64>,
-    /// Where residuals meet rounding.
+    /// Where residuals meet rounding or quantisation.
     pub(crate) floor: f64,
 }
 
 impl Window {
-    /// Projects a window, or gives nothing where a sample cannot be used.
-    pub(crate) fn project(basis: &Basis, samples: &[f64]) -> Option<Self> {
+    /// Projects a window, or gives nothing where a sample cannot be used. No residual is taken to be below `floor`.
+    pub(crate) fn project(basis: &Basis, samples: &[f64], floor: f64) -> Option<Self> {
         if !samples.iter().all(|&value| is_usable(value)) {
             return None;
         }
@@ -57,7 +57,7 @@ impl Window {
         for order in (0..degrees - 1).rev() {
             residuals[order] = residuals[order + 1] + coefficients[order + 1].powi(2);
         }
-        Some(Self { reference, coefficients, residuals, floor: ROUNDING * energy })
+        Some(Self { reference, coefficients, residuals, floor: floor.max(ROUNDING * energy) })
     }
 
     /// The order that the window takes: fixed, or the one that minimises the criterion, the lowest of several.

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use tvident::rolling::HALF_OF_THE_DIGITS;
 use tvident::{
     Criterion, Elements, Equations, Estimates, Instructions, LocalPolynomials, Options, Order, Regressions,
-    RollingLeastSquares, Samples,
+    RollingLeastSquares, Samples, Selection,
 };
 
 /// Outputs of one kind each, element for element.
@@ -162,7 +162,17 @@ fn options(length: usize, order: Order, derivatives: Vec<usize>, noise: bool, in
         chosen @ Order::Chosen { .. } => chosen,
     };
     let noise = noise || matches!(order, Order::Chosen { .. });
-    Options { window_length: length, order, derivatives, delta: 1e-3, noise, instructions }
+    let selection = Selection::Window;
+    Options {
+        window_length: length,
+        order,
+        selection,
+        derivatives,
+        delta: 1e-3,
+        noise,
+        quantisation: 0.0,
+        instructions,
+    }
 }
 
 fn cuts() -> impl Strategy<Value = Vec<usize>> {

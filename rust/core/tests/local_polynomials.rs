@@ -1,7 +1,9 @@
 //! Properties of the walk: it agrees with every window projected on its own, however the record is cut and whatever the instructions.
 
 use proptest::prelude::*;
-use tvident::{Basis, Criterion, Elements, Estimates, Instructions, LocalPolynomials, Options, Order, Status};
+use tvident::{
+    Basis, Criterion, Elements, Estimates, Instructions, LocalPolynomials, Options, Order, Selection, Status,
+};
 
 /// Everything a plan estimates, for all samples of a record.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,9 +18,11 @@ fn chosen(window_length: usize, highest: usize) -> Options {
     Options {
         window_length,
         order: Order::Chosen { criterion: Criterion::Aicc, highest },
+        selection: Selection::Window,
         derivatives: vec![0, 1, 2],
         delta: 1.0,
         noise: true,
+        quantisation: 0.0,
         instructions: Instructions::current(),
     }
 }

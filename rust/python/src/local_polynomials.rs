@@ -2,11 +2,13 @@
 
 use std::num::NonZeroUsize;
 
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use tvident::parallel::workers as threads;
-use tvident::{Criterion, Elements, End, Estimates, Instructions, LocalPolynomials as Plan, Options, Order, Samples};
+use tvident::parallel::{Watch, workers as threads};
+use tvident::{
+    Criterion, Elements, Error, Estimates, Instructions, LocalPolynomials as Plan, Options, Order, Samples, Selection,
+};
 
 use crate::records::records;
 use crate::watch::{exception, watched};
@@ -31,15 +33,17 @@ impl LocalPolynomials {
 #[pymethods]
 impl LocalPolynomials {
     #[new]
-    #[pyo3(signature = (window_length, order, max_order, criterion, derivatives, delta, noise))]
+    #[pyo3(signature = (window_length, order, max_order, criterion, selection, derivatives, delta, noise, quantisation))]
     fn new(
         window_length: usize,
         order: Option<usize>,
         max_order: usize,
         criterion: &str,
+        selection: &str,
         derivatives: Vec<usize>,
         delta: f64,
         noise: bool,
+        quantisation: f64,
     ) -> PyResult<Self> {
         let criterion = match criterion {
             "aicc" => Criterion::Aicc,
@@ -48,9 +52,16 @@ impl LocalPolynomials {
             "bic" => Criterion::Bic,
             _ => return Err(PyValueError::new_err(format!("no criterion is called {criterion:?}"))),
         };
+        let selection = match selection {
+            "window" => Selection::Window,
+            "pooled" => Selection::Pooled,
+            "average" => Selection::Average,
+            _ => return Err(PyValueError::new_err(format!("no selection is called {selection:?}"))),
+        };
         let order = order.map_or(Order::Chosen { criterion, highest: max_order }, Order::Fixed);
+        let instructions = Instructions::current();
         let options =
-            Options { window_length, order, derivatives, delta, noise, instructions: Instructions::current() };
+            Options { window_length, order, selection, derivatives, delta, noise, quantisation, instructions };
         Ok(Self { plan: Plan::new(options).map_err(|error| exception(&error))? })
     }
 
@@ -69,6 +80,43 @@ impl LocalPolynomials {
         step: usize,
         workers: Option<NonZeroUsize>,
         progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Outputs<'py>> {
+        let plan = &self.plan;
+        self.outputs(samples, ends, step, progress, |work, watch| plan.run(work, ends, threads(workers), watch))
+    }
+
+    /// Standard errors of the derivatives, one row each, along the last axis.
+    #[pyo3(signature = (samples, *, step=1, workers=None))]
+    fn errors<'py>(
+        &self,
+        samples: &Bound<'py, PyUntypedArray>,
+        step: usize,
+        workers: Option<NonZeroUsize>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let plan = &self.plan;
+        let outputs =
+            self.outputs(samples, true, step, None, |work, watch| plan.errors(work, threads(workers), watch))?;
+        Ok(outputs.0)
+    }
+
+    /// The criterion of every order in the window around a sample of a record.
+    fn scores<'py>(&self, samples: &Bound<'py, PyUntypedArray>, sample: usize) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let records = records(samples)?;
+        let record = records.first().ok_or_else(|| PyValueError::new_err("there is no record"))?;
+        let scores = self.plan.scores(record, sample).map_err(|error| exception(&error))?;
+        Ok(scores.into_pyarray(samples.py()))
+    }
+}
+
+impl LocalPolynomials {
+    /// Makes the arrays and has them filled.
+    fn outputs<'py>(
+        &self,
+        samples: &Bound<'py, PyUntypedArray>,
+        ends: bool,
+        step: usize,
+        progress: Option<&Bound<'py, PyAny>>,
+        fill: impl FnOnce(Vec<(&dyn Samples, Estimates<'_>)>, &mut Watch<'_>) -> Result<(), Error> + Send,
     ) -> PyResult<Outputs<'py>> {
         let py = samples.py();
         let options = self.plan.options();
@@ -110,32 +158,8 @@ impl LocalPolynomials {
                 };
                 work.push((record, estimates));
             }
-            let plan = &self.plan;
-            watched(py, progress, |watch| plan.run(work, ends, threads(workers), watch))?;
+            watched(py, progress, |watch| fill(work, watch))?;
         }
         Ok((derivatives, order, status, sigma))
-    }
-
-    /// The criterion of every order in the window around a sample of a record.
-    fn scores<'py>(&self, samples: &Bound<'py, PyUntypedArray>, sample: usize) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let records = records(samples)?;
-        let record = records.first().ok_or_else(|| PyValueError::new_err("there is no record"))?;
-        let scores = self.plan.scores(record, sample).map_err(|error| exception(&error))?;
-        Ok(scores.into_pyarray(samples.py()))
-    }
-
-    /// Standard error over noise at the centre of a window: one row a derivative, one column an order.
-    fn gains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let shape = [self.plan.options().derivatives.len(), self.plan.orders()];
-        self.plan.gains().into_pyarray(py).reshape(shape)
-    }
-
-    /// Standard errors at the first or last samples of a record: one row a derivative.
-    fn end_errors<'py>(&self, samples: &Bound<'py, PyUntypedArray>, last: bool) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let records = records(samples)?;
-        let record = records.first().ok_or_else(|| PyValueError::new_err("there is no record"))?;
-        let end = if last { End::Last } else { End::First };
-        let errors = self.plan.end_errors(record, end).map_err(|error| exception(&error))?;
-        PyArray2::from_vec2(samples.py(), &errors).map_err(Into::into)
     }
 }
