@@ -12,6 +12,8 @@ __all__ = [
     "identify_constant",
     "identify_windowed",
     "instructions",
+    "noise",
+    "quantisation_step",
     "rolling_least_squares",
     "status_flags",
 ]
@@ -89,6 +91,8 @@ def identify_constant(
     npt.NDArray[np.uint16],
     npt.NDArray[np.uint8],
 ]: ...
+def noise(samples: npt.NDArray[np.number], quantisation: float | None = None) -> tuple[list[float], list[float]]: ...
+def quantisation_step(samples: npt.NDArray[np.number]) -> float: ...
 def rolling_least_squares(
     regressors: npt.NDArray[np.number],
     sides: npt.NDArray[np.number],

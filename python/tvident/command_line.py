@@ -205,6 +205,7 @@ def _remark(values: npt.NDArray[Any]) -> str:
 @click.option(
     "--selection", type=click.Choice(get_args(Selection)), help="Whose criterion: the window's, or its neighbours' too."
 )
+@click.option("--quantisation", type=float, help="Step that the channel was rounded to; looked for if not given.")
 @click.option("--max-deriv", type=int, default=2, show_default=True, help="Highest derivative.")
 @_RUN
 def derivatives(

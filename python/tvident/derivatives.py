@@ -65,6 +65,13 @@ def plan(
     )
 
 
+def quantisation_step(samples: npt.NDArray[Any], given: float | None) -> float:
+    """Return the step to which samples were rounded: what was given, or what is found in them; 0 for none."""
+    if given is None:
+        return _core.quantisation_step(samples)
+    return 0.0 if given == 0 else arguments.positive_number("quantisation", given)
+
+
 class LocalPolynomialFit:
     r"""What :func:`fit_local_polynomials` found.
 
@@ -203,6 +210,7 @@ def fit_local_polynomials(
     axis: int = -1,
     step: int = 1,
     nan_policy: arguments.NanPolicy = "propagate",
+    quantisation: float | None = None,
     workers: int | None = None,
     progress: arguments.Progress = None,
 ) -> LocalPolynomialFit:
@@ -246,6 +254,9 @@ def fit_local_polynomials(
         Every how many samples an estimate is wanted: the same numbers as ``[::step]`` of all of them.
     nan_policy : {"propagate", "raise"}, optional
         Windows that hold a value that is not a finite number are NaN, and no others; or raise.
+    quantisation : float, optional
+        Step to which `y` was rounded, in its unit: an encoder's count, a converter's last bit. By default it is looked for in the
+        samples: the step that all differences of neighbours are multiples of, the smallest one of all records. 0 means none.
     workers : int, optional
         Threads; by default ``TVIDENT_WORKERS`` or all processors that this process may use. The numbers do not depend on it.
     progress : bool or callable, optional
@@ -267,6 +278,9 @@ def fit_local_polynomials(
 
     Notes
     -----
+    No residual is taken to be smaller than what rounding to a step ``q`` leaves on average, :math:`RSS_n \ge M q^2/12`, nor than the
+    rounding of the arithmetic. So a resting encoder has order 0, and its status says EXACT.
+
     The first and last ``N`` samples are evaluated off the centre of the first and last full window, where noise is amplified more. Each
     derivative takes there the order with the least estimated squared bias plus variance, at most ``order``; the status says EDGE.
 
@@ -313,6 +327,7 @@ def fit_local_polynomials(
         derivatives=tuple(range(arguments.whole_number("max_deriv", max_deriv, least=0) + 1)),
         delta=period,
         noise=True,
+        quantisation=quantisation_step(samples, quantisation),
     )
     every = arguments.whole_number("step", step, least=1)
     threads = arguments.worker_count(workers)

@@ -25,6 +25,14 @@ pub enum Error {
         /// Length of the record, samples.
         samples: usize,
     },
+    /// A record that holds less than what is to be learnt of it needs.
+    #[error("a record must hold at least {least} samples for its noise to be known; got {samples}; record more")]
+    RecordTooShort {
+        /// Length of the record, samples.
+        samples: usize,
+        /// The shortest allowed, samples.
+        least: usize,
+    },
     /// A polynomial order beyond what double precision supports.
     #[error(
         "{name} must be at most {most}; got {order}; polynomials of a higher order do more harm than good: shorten the window"

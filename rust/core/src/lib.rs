@@ -12,6 +12,7 @@ mod finish;
 pub mod identification;
 pub mod local_polynomials;
 pub mod motion;
+pub mod noise;
 pub mod output;
 pub mod parallel;
 mod pool;

@@ -8,6 +8,7 @@
 
 mod identification;
 mod local_polynomials;
+mod noise;
 mod records;
 mod rolling;
 mod watch;
@@ -25,6 +26,8 @@ mod _core {
     use crate::identification::{Motions, identify_constant, identify_windowed};
     #[pymodule_export]
     use crate::local_polynomials::LocalPolynomials;
+    #[pymodule_export]
+    use crate::noise::{noise, quantisation_step};
     #[pymodule_export]
     use crate::rolling::rolling_least_squares;
 

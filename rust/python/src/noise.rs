@@ -1,0 +1,35 @@
+//! The noise and the quantisation of channels.
+
+use numpy::PyUntypedArray;
+use pyo3::prelude::*;
+use tvident::noise::{noise as core_noise, quantisation_step as core_step};
+use tvident::{Error, Instructions};
+
+use crate::records::records;
+use crate::watch::watched;
+
+/// Noise and quantisation step of every record along the last axis: two lists in the order of the leading axes. The step is looked for
+/// where it is not given.
+#[pyfunction]
+#[pyo3(signature = (samples, quantisation=None))]
+pub(crate) fn noise(samples: &Bound<'_, PyUntypedArray>, quantisation: Option<f64>) -> PyResult<(Vec<f64>, Vec<f64>)> {
+    let records = records(samples)?;
+    let instructions = Instructions::current();
+    let (mut sigmas, mut steps) = (Vec::new(), Vec::new());
+    watched(samples.py(), None, |_| {
+        for record in &records {
+            let found = core_noise(record, quantisation, instructions)?;
+            sigmas.push(found.sigma);
+            steps.push(found.quantisation);
+        }
+        Ok::<(), Error>(())
+    })?;
+    Ok((sigmas, steps))
+}
+
+/// The smallest quantisation step of the records along the last axis, zero where one of them has none.
+#[pyfunction]
+pub(crate) fn quantisation_step(samples: &Bound<'_, PyUntypedArray>) -> PyResult<f64> {
+    let steps = records(samples)?.into_iter().map(|record| core_step(&record));
+    Ok(steps.reduce(f64::min).unwrap_or(0.0))
+}
