@@ -8,6 +8,7 @@ __all__ = [
     "LocalPolynomials",
     "Motions",
     "available_instructions",
+    "estimate_automatically",
     "force_instructions",
     "identify_constant",
     "identify_windowed",
@@ -58,6 +59,24 @@ class Motions:
         terms: list[npt.NDArray[np.number] | str],
     ) -> Motions: ...
 
+def estimate_automatically(
+    samples: npt.NDArray[np.number],
+    derivatives: list[int],
+    highest: int,
+    fixed: bool,
+    delta: float,
+    quantisation: float | None,
+    *,
+    workers: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> tuple[
+    npt.NDArray[np.float64],
+    npt.NDArray[np.float64],
+    npt.NDArray[np.uint8],
+    npt.NDArray[np.uint16],
+    list[list[tuple[int, int]]],
+    list[tuple[float, float]],
+]: ...
 def identify_windowed(
     plan: LocalPolynomials,
     motions: Motions,

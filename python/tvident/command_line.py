@@ -197,7 +197,9 @@ def _remark(values: npt.NDArray[Any]) -> str:
 @main.command(epilog="Example: tvident derivatives rig.csv --channel angle --time time -o derivatives.csv")
 @click.argument("file", type=click.Path())
 @click.option("--channel", required=True, metavar="NAME", help="Channel to differentiate.")
-@click.option("--window-length", default="201", show_default=True, help="Samples, odd, or a duration such as '0.2 s'.")
+@click.option(
+    "--window-length", default="201", show_default=True, help="Samples, odd, a duration such as '0.2 s', or auto."
+)
 @_TIME
 @click.option("--max-order", type=int, default=15, show_default=True, help="Highest candidate order.")
 @click.option("--order", type=int, help="Fixes the order.")
@@ -245,7 +247,8 @@ def derivatives(
     columns |= {"sigma": fit.sigma, "order": fit.order, "status": fit.status}
     counts = np.bincount(fit.order.ravel())
     orders = ", ".join(f"{order}: {count / fit.order.size:.0%}" for order, count in enumerate(counts) if count)
-    words = [f"{samples.size} samples, windows of {window_length}; orders {orders}", "", *describe(fit.status)]
+    windows = ", ".join(str(length) for length in np.atleast_1d(fit.window_length))
+    words = [f"{samples.size} samples, windows of {windows}; orders {orders}", "", *describe(fit.status)]
     _give(columns, {"time": "s"}, "\n".join(words), output)
     if plot is not None:
         _save_figure(_figures().plot_derivatives(columns["time"], fit, channel), Path(plot))

@@ -45,6 +45,16 @@ pub enum Error {
         /// The highest allowed.
         most: usize,
     },
+    /// A polynomial that has no such derivative.
+    #[error(
+        "the order must be at least that of the derivative; got order {order} for derivative {derivative}; raise the order or ask for less"
+    )]
+    OrderTooLow {
+        /// What was asked for.
+        order: usize,
+        /// The derivative.
+        derivative: usize,
+    },
     /// A polynomial of this order is not determined by a window of this length.
     #[error(
         "order must be less than window_length; got order {order} for a window of {window_length} samples; \

@@ -2,10 +2,14 @@
 //! differentiation of noisy recordings with a polynomial order chosen in every window.
 
 mod aligned;
+pub mod automatic;
+mod bank;
 pub mod basis;
+mod blocks;
 mod coefficients;
 pub mod criterion;
 mod double_double;
+mod eigen;
 mod ends;
 pub mod error;
 mod finish;
@@ -17,14 +21,17 @@ pub mod output;
 pub mod parallel;
 mod pool;
 mod projection;
+mod refinement;
 pub mod rolling;
 pub mod samples;
 pub mod selection;
 pub mod shared_parameters;
+mod shrinkage;
 mod simd;
 pub mod status;
 mod stretch;
 mod strips;
+mod survey;
 mod sweep;
 mod tile;
 mod triangle;
@@ -32,6 +39,7 @@ mod walk;
 mod window;
 mod write;
 
+pub use automatic::{AutomaticEstimates, AutomaticOptions, Chosen, estimate_automatically};
 pub use basis::Basis;
 pub use criterion::Criterion;
 pub use ends::End;

@@ -6,6 +6,7 @@
     reason = "what Python passes arrives by value, and keyword arguments are many"
 )]
 
+mod automatic;
 mod identification;
 mod local_polynomials;
 mod noise;
@@ -22,6 +23,8 @@ mod _core {
     use pyo3::prelude::*;
     use tvident::{Instructions, Status};
 
+    #[pymodule_export]
+    use crate::automatic::estimate_automatically;
     #[pymodule_export]
     use crate::identification::{Motions, identify_constant, identify_windowed};
     #[pymodule_export]

@@ -1,0 +1,224 @@
+//! Which window and order suit a record as a whole.
+//!
+//! The mean squared error of a candidate `c` is `b_c² + σ² g_c`, and its bias is only known by comparison with an estimate `r` of less bias:
+//!
+//! ```text
+//! risk_c = ⟨(d_c - d_r)²⟩ + 2 σ² ⟨k_c, k_r⟩ = b_c² + σ² g_c + what is the same for all c,   if b_r ≪ b_c,
+//! ```
+//!
+//! with `k` the weights of the samples: this is `Σ_f P|H_c - (iω)^d|² + σ²‖k_c‖²` with the spectrum `P` of what was recorded, summed in
+//! time. What is compared with must have less bias and yet no more noise than can be averaged out, so it climbs: it begins with the
+//! shortest window and its highest order; of the candidates that it can judge, those with at least a hundredth of its variance, the best is found, and the next
+//! to compare with is the window `√2` times shorter of the same order; until nothing changes. Since the least of many estimates
+//! of a risk is too small, the variance counts 1.3 times. At the end the window is found to 2 %.
+//!
+//! Long records are looked at in sixteen stretches.
+
+use std::ops::Range;
+
+use crate::bank::{Bank, Target, product};
+use crate::error::Error;
+use crate::samples::Samples;
+
+/// Half-width of the shortest window.
+pub(crate) const SHORTEST: usize = 4;
+
+/// Half-width of the longest that is looked at.
+const LONGEST: usize = 10_000;
+
+/// A record of more samples is looked at in stretches.
+const WHOLE: usize = 1 << 16;
+const STRETCHES: usize = 16;
+
+/// Places at which candidates are compared, at most, and at least.
+const MOST_PLACES: usize = 1 << 14;
+const FEWEST_PLACES: usize = 16;
+
+/// The reference judges candidates of at least its variance over this.
+const JUDGED: f64 = 100.0;
+
+/// What the variance counts, since the least of many risks is taken.
+pub(crate) const OPTIMISM: f64 = 1.3;
+
+/// The steps, in halvings and doublings, with which the best window is refined.
+const REFINEMENTS: [f64; 4] = [0.25, 0.125, 0.0625, 0.031_25];
+
+/// Called now and then; an error ends the work.
+pub(crate) type LookUp<'a> = dyn FnMut() -> Result<(), Error> + 'a;
+
+/// Where candidates are compared.
+pub(crate) struct Survey<'a> {
+    record: &'a dyn Samples,
+    stretches: Vec<Range<usize>>,
+    step: usize,
+}
+
+/// The candidates of one window at all places, a row each; NaN where there is none.
+#[derive(Debug)]
+struct Surveyed {
+    bank: Bank,
+    rows: Vec<Vec<f64>>,
+}
+
+/// A window and an order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Pair {
+    pub(crate) half: usize,
+    pub(crate) order: usize,
+}
+
+impl<'a> Survey<'a> {
+    pub(crate) fn new(record: &'a dyn Samples) -> Self {
+        let samples = record.len();
+        let (count, length) = if samples <= WHOLE { (1, samples) } else { (STRETCHES, WHOLE / STRETCHES) };
+        let first = |index: usize| (samples - length) * index / (count - 1).max(1);
+        let stretches = (0..count).map(|index| first(index)..first(index) + length).collect();
+        Self { record, stretches, step: (count * length).div_ceil(MOST_PLACES) }
+    }
+
+    /// The pair of least risk, or nothing where no window holds only what can be used. `look_up` is called now and then.
+    ///
+    /// # Errors
+    /// Those of `look_up`, at once.
+    pub(crate) fn best(&self, target: &Target, variance: f64, look_up: &mut LookUp<'_>) -> Result<Option<Pair>, Error> {
+        let mut ladder = Vec::new();
+        for half in ladder_of_windows(self.record.len()) {
+            if let Some(bank) = Bank::new(half, target) {
+                ladder.push(self.look(bank));
+            }
+            look_up()?;
+        }
+        let Some((pair, (window, candidate))) = climb(&ladder, variance) else { return Ok(None) };
+        let reference = ladder.swap_remove(window);
+        drop(ladder);
+        self.refine(target, variance, pair, (&reference, candidate), look_up).map(Some)
+    }
+
+    /// Finds the window, and the order, between those of the ladder.
+    fn refine(
+        &self,
+        target: &Target,
+        variance: f64,
+        mut pair: Pair,
+        (reference, candidate): (&Surveyed, usize),
+        look_up: &mut LookUp<'_>,
+    ) -> Result<Pair, Error> {
+        let best_of = |half: usize| {
+            let looked = self.look(Bank::new(half, target)?);
+            let risks = risks(reference, candidate, &looked, variance);
+            let best = risks.into_iter().zip(&looked.bank.orders).min_by(|a, b| a.0.total_cmp(&b.0));
+            best.map(|(risk, &order)| (risk, Pair { half, order }))
+        };
+        let mut least = best_of(pair.half).map_or(f64::INFINITY, |(risk, found)| {
+            pair = found;
+            risk
+        });
+        for step in REFINEMENTS {
+            let centre = pair.half as f64;
+            for half in [rounded(centre * (-step).exp2()), rounded(centre * step.exp2())] {
+                if half == pair.half || half < SHORTEST || 2 * half >= self.record.len() / 2 {
+                    continue;
+                }
+                if let Some((risk, found)) = best_of(half)
+                    && risk < least
+                {
+                    (least, pair) = (risk, found);
+                }
+                look_up()?;
+            }
+        }
+        Ok(pair)
+    }
+
+    fn look(&self, bank: Bank) -> Surveyed {
+        let mut scratch = bank.scratch();
+        let mut rows = vec![Vec::new(); bank.orders.len()];
+        for stretch in &self.stretches {
+            let places = stretch.len().div_ceil(self.step);
+            let centres = bank.centres(self.record.len());
+            // The places of this stretch that are centres.
+            let place = |sample: usize| sample.saturating_sub(stretch.start).div_ceil(self.step).min(places);
+            let wanted = place(centres.start)..place(centres.end).max(place(centres.start));
+            let before = rows[0].len();
+            for row in &mut rows {
+                row.resize(before + places, f64::NAN);
+            }
+            if wanted.is_empty() {
+                continue;
+            }
+            let first = stretch.start + wanted.start * self.step;
+            let end = centres.end.min(stretch.end);
+            let estimates = bank.estimates(self.record, first..end, self.step, &mut scratch);
+            for (row, estimates) in rows.iter_mut().zip(estimates) {
+                row[before + wanted.start..before + wanted.end].copy_from_slice(estimates);
+            }
+        }
+        Surveyed { bank, rows }
+    }
+}
+
+/// Climbs to the best pair of a ladder. Returns it and the place of what it was compared with.
+fn climb(ladder: &[Surveyed], variance: f64) -> Option<(Pair, (usize, usize))> {
+    let mut reference = (0, ladder.first()?.bank.orders.len() - 1);
+    let mut seen = Vec::new();
+    let mut best = None;
+    while !seen.contains(&reference) {
+        seen.push(reference);
+        let least_gain = ladder.get(reference.0)?.bank.gains[reference.1] / JUDGED;
+        let risks = ladder.iter().enumerate().flat_map(|(window, looked)| {
+            let risks = risks(&ladder[reference.0], reference.1, looked, variance);
+            risks.into_iter().enumerate().map(move |(candidate, risk)| (risk, window, candidate))
+        });
+        let judged = risks.filter(|&(_, window, candidate)| ladder[window].bank.gains[candidate] >= least_gain);
+        let (_, window, candidate) = judged.filter(|(risk, ..)| risk.is_finite()).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let order = ladder[window].bank.orders[candidate];
+        best = Some(Pair { half: ladder[window].bank.half, order });
+        reference = shorter(ladder, window, order)?;
+    }
+    best.map(|best| (best, reference))
+}
+
+/// The risk of every candidate of a window, by comparison with a reference; infinite where they cannot be compared.
+fn risks(reference: &Surveyed, candidate: usize, looked: &Surveyed, variance: f64) -> Vec<f64> {
+    let kernel = reference.bank.kernel(candidate);
+    let compare = &reference.rows[candidate];
+    let risk = |(candidate, row): (usize, &Vec<f64>)| {
+        let (mut sum, mut count) = (0.0, 0_usize);
+        for (a, b) in row.iter().zip(compare) {
+            let difference = a - b;
+            if !difference.is_nan() {
+                sum += difference * difference;
+                count += 1;
+            }
+        }
+        if count < FEWEST_PLACES {
+            return f64::INFINITY;
+        }
+        let shared = product(&looked.bank.kernel(candidate), &kernel, looked.bank.half);
+        sum / count as f64 + variance * (2.0 * shared + (OPTIMISM - 1.0) * looked.bank.gains[candidate])
+    };
+    looked.rows.iter().enumerate().map(risk).collect()
+}
+
+/// The window nearest to one √2 times shorter, and the candidate of an order in it.
+fn shorter(ladder: &[Surveyed], window: usize, order: usize) -> Option<(usize, usize)> {
+    let wanted = ladder[window].bank.half as f64 / std::f64::consts::SQRT_2;
+    let candidates = ladder.iter().enumerate().filter_map(|(place, looked)| {
+        let candidate = looked.bank.orders.iter().position(|&one| one == order)?;
+        Some(((looked.bank.half as f64 / wanted).ln().abs(), (place, candidate)))
+    });
+    candidates.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, found)| found)
+}
+
+/// Half-widths from the shortest on, each √2 times the last, of windows that are at most half the record.
+fn ladder_of_windows(samples: usize) -> impl Iterator<Item = usize> {
+    let half = |index: i32| rounded(SHORTEST as f64 * (0.5 * f64::from(index)).exp2());
+    (0..).map(half).take_while(move |&half| 2 * half < samples / 2 && half <= LONGEST)
+}
+
+/// The whole number nearest to one that is neither negative nor large.
+pub(crate) fn rounded(number: f64) -> usize {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "as the name says")]
+    let whole = number.round() as usize;
+    whole
+}

@@ -1,0 +1,89 @@
+//! Derivatives with window and order chosen.
+
+use std::num::NonZeroUsize;
+
+use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use tvident::noise::noise;
+use tvident::parallel::{Watch, workers as threads};
+use tvident::{AutomaticEstimates, AutomaticOptions, Error, Instructions, estimate_automatically as core_estimate};
+
+use crate::records::records;
+use crate::watch::watched;
+
+/// Derivatives and standard errors, one row each; orders and status of the last derivative and of all; then, by derivative and record, windows
+/// and orders chosen (0 where there is none), and by record noise and quantisation.
+type Outputs<'py> = (
+    Bound<'py, PyArrayDyn<f64>>,
+    Bound<'py, PyArrayDyn<f64>>,
+    Bound<'py, PyArrayDyn<u8>>,
+    Bound<'py, PyArrayDyn<u16>>,
+    Vec<Vec<(usize, usize)>>,
+    Vec<(f64, f64)>,
+);
+
+/// Estimates derivatives along the last axis. The quantisation is looked for where it is not given.
+#[pyfunction]
+#[pyo3(signature = (samples, derivatives, highest, fixed, delta, quantisation, *, workers=None, progress=None))]
+pub(crate) fn estimate_automatically<'py>(
+    samples: &Bound<'py, PyUntypedArray>,
+    derivatives: Vec<usize>,
+    highest: usize,
+    fixed: bool,
+    delta: f64,
+    quantisation: Option<f64>,
+    workers: Option<NonZeroUsize>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Outputs<'py>> {
+    let py = samples.py();
+    let records = records(samples)?;
+    let count = samples.shape().last().copied().unwrap_or(0);
+    let mut shape = samples.shape().to_vec();
+    let order = PyArrayDyn::<u8>::zeros(py, shape.clone(), false);
+    let status = PyArrayDyn::<u16>::zeros(py, shape.clone(), false);
+    shape.insert(0, derivatives.len());
+    let values = PyArrayDyn::<f64>::zeros(py, shape.clone(), false);
+    let errors = PyArrayDyn::<f64>::zeros(py, shape, false);
+    let (mut chosen, mut noises) = (vec![Vec::new(); derivatives.len()], Vec::new());
+    {
+        let (mut values, mut errors) = (values.readwrite(), errors.readwrite());
+        let (mut order, mut status) = (order.readwrite(), status.readwrite());
+        let (values, errors) = (values.as_slice_mut()?, errors.as_slice_mut()?);
+        let (order, status) = (order.as_slice_mut()?, status.as_slice_mut()?);
+        let instructions = Instructions::current();
+        let units = derivatives.len() * records.len();
+        watched(py, progress, |watch| {
+            let mut flags = vec![0; count];
+            for (index, record) in records.iter().enumerate() {
+                let found = noise(record, quantisation, instructions)?;
+                noises.push((found.sigma, found.quantisation));
+                for (row, &derivative) in derivatives.iter().enumerate() {
+                    let sigma = found.sigma;
+                    let options = AutomaticOptions { derivative, highest, fixed, delta, sigma, instructions };
+                    let place = (row * records.len() + index) * count;
+                    let own = index * count..(index + 1) * count;
+                    let mut estimates = AutomaticEstimates {
+                        values: &mut values[place..place + count],
+                        errors: &mut errors[place..place + count],
+                        order: &mut order[own.clone()],
+                        status: &mut flags,
+                    };
+                    let done = index * derivatives.len() + row;
+                    let mut watch = part_of(watch, done, units);
+                    let pair = core_estimate(record, &options, &mut estimates, threads(workers), &mut watch)?;
+                    chosen[row].push(pair.map_or((0, 0), |pair| (pair.window_length, pair.order)));
+                    for (status, flags) in status[own].iter_mut().zip(&flags) {
+                        *status |= flags;
+                    }
+                }
+            }
+            Ok::<(), Error>(())
+        })?;
+    }
+    Ok((values, errors, order, status, chosen, noises))
+}
+
+/// The watch of one of several equal parts of the work.
+fn part_of<'a>(watch: &'a mut Watch<'_>, done: usize, parts: usize) -> impl FnMut(usize, usize) -> bool + 'a {
+    move |now, total| watch(done * total + now, parts * total)
+}
