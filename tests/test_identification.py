@@ -258,7 +258,7 @@ def test_the_sample_period_may_come_from_times() -> None:
         ({"equations": 3}, ValueError, "equations must be at least 4"),
         ({"equations": 2000}, ValueError, "equations must be less than or equal to the length of the record; got 2000"),
         ({"max_order": 20}, ValueError, "max_order must be at most 15; got 20"),
-        ({"inertia": "varying"}, ValueError, "inertia must be .* got 'varying'"),
+        ({"inertia": "wobbly"}, ValueError, "inertia must be .* got 'wobbly'"),
         ({"inertia": np.nan}, ValueError, "inertia must be finite; got nan"),
         (
             {"stiffness": np.ones(5)},

@@ -1,5 +1,5 @@
-from collections.abc import Callable
-from typing import final
+from collections.abc import Callable, Sequence
+from typing import Any, final
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,8 @@ __all__ = [
     "estimate_automatically",
     "force_instructions",
     "identify_constant",
+    "identify_strong",
+    "identify_weak",
     "identify_windowed",
     "instructions",
     "noise",
@@ -112,6 +114,40 @@ def identify_constant(
 ]: ...
 def noise(samples: npt.NDArray[np.number], quantisation: float | None = None) -> tuple[list[float], list[float]]: ...
 def quantisation_step(samples: npt.NDArray[np.number]) -> float: ...
+def identify_strong(
+    plan: LocalPolynomials,
+    motions: Motions,
+    record: int,
+    kinds: Sequence[str],
+    *,
+    equations: int,
+    linear: bool = False,
+    filter_torque: bool = False,
+    lag: float = 0.0,
+    mask: npt.NDArray[np.bool_] | None = None,
+    step: int = 1,
+    workers: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> dict[str, Any]: ...
+def identify_weak(
+    motions: Motions,
+    record: int,
+    kinds: Sequence[str],
+    *,
+    delta: float,
+    half_width: int | None = None,
+    exponent: int | None = None,
+    equations: int | None = None,
+    average: bool = True,
+    linear: bool = True,
+    noise: tuple[float | None, float | None] = ...,
+    lag: float = 0.0,
+    mask: npt.NDArray[np.bool_] | None = None,
+    step: int = 1,
+    not_missing: Sequence[str] | None = None,
+    workers: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> dict[str, Any]: ...
 def rolling_least_squares(
     regressors: npt.NDArray[np.number],
     sides: npt.NDArray[np.number],

@@ -89,6 +89,16 @@ def positive_number(name: str, value: object) -> float:
     return number
 
 
+def finite_number(name: str, value: object) -> float:
+    """Return a finite number."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        raise TypeError(f"{name} must be a number; got {value!r}; pass a float")
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError(f"{name} must be finite; got {number}; pass a number")
+    return number
+
+
 def one_of(name: str, value: object, choices: tuple[str, ...]) -> str:
     """Return one of several words."""
     if value not in choices:
@@ -172,6 +182,21 @@ def check_window(name: str, length: int, samples: int, *, least: int = 1) -> Non
             f"{name} must be less than or equal to the length of the record; got {length} samples for a record of {samples}; "
             f"use at most {samples} samples or a longer record"
         )
+
+
+def mask(name: str, values: npt.ArrayLike | None, shape: tuple[int, ...]) -> npt.NDArray[np.bool_] | None:
+    """Return a mask of the given shape, or nothing."""
+    if values is None:
+        return None
+    array = np.asarray(values)
+    if array.dtype != np.bool_:
+        raise TypeError(f"{name} must hold True and False; got {array.dtype}; write {name} = {name} != 0")
+    try:
+        return np.broadcast_to(array, shape)
+    except ValueError:
+        raise ValueError(
+            f"{name} must have one value for every sample; got shape {array.shape} for an angle of shape {shape}; check its length"
+        ) from None
 
 
 def worker_count(workers: int | None) -> int | None:

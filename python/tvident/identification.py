@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import combinations
-from typing import Any, Literal, TypeAlias, get_args
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _core, arguments
+from tvident.collected import Collected
 from tvident.derivatives import Criterion, plan
 from tvident.progress import reporter
+from tvident.reasons import reasons
 from tvident.result import Identification
-from tvident.status import Status
+from tvident.settings import Averaging, Form, Preset, Variation, resolve
 from tvident.terms import COEFFICIENTS, Kind, Parameter, Term, TermName, Unknown, all_terms, parameter
 
-Preset: TypeAlias = Literal["paper"]
-
-_PRESETS: dict[str, dict[str, Any]] = {
-    "paper": {"window_length": 201, "max_order": 15, "criterion": "aicc", "equations": 200, "kind": "windowed"},
-}
 _SHORTEST_WINDOW = 5
+_SHORTEST_TEST_FUNCTION = 9
+_WINDOW_OF_TERMS = 51
+"""Samples of the polynomials that terms of one's own get angle and velocity from in weak form."""
 
 
 def identify(
@@ -35,21 +35,33 @@ def identify(
     window_length: int | str | None = None,
     max_order: int | None = None,
     criterion: Criterion | None = None,
+    selection: Averaging | None = None,
+    form: Form | None = None,
+    exponent: int | str | None = None,
     equations: int | str | None = None,
+    variation: Variation | None = None,
     inertia: Parameter | None = None,
     damping: Parameter | None = None,
     stiffness: Parameter | None = None,
-    terms: Sequence[TermName | Term | tuple[TermName | Term, Kind]] = (),
+    terms: Sequence[TermName | Term | tuple[TermName | Term, Kind]] | None = None,
+    filter_torque: bool | None = None,
+    lag: float | None = None,
+    mask: npt.ArrayLike | None = None,
     step: int = 1,
     nan_policy: arguments.NanPolicy = "propagate",
+    settings: Mapping[str, Any] | None = None,
     workers: int | None = None,
     progress: arguments.Progress = None,
 ) -> Identification:
     r"""Identify I(t), C(t) and K(t) in I θ̈ + C θ̇ + K θ = T from a recorded angle and torque.
 
-    In a window around every sample the angle is fitted by polynomials of every order, Akaike's criterion chooses one (equations (2), (8)
-    and (9) of the paper) and gives θ̇ and θ̈. In another window of 200 such equations the unknowns are solved for by least squares
-    ((3) and (4)).
+    In strong form, the paper's, the angle is fitted by polynomials of every order in a window around every sample, Akaike's criterion
+    chooses one (equations (2), (8) and (9) of the paper) and gives θ̇ and θ̈; in another window of 200 such equations the unknowns are
+    solved for by least squares ((3) and (4)).
+
+    In weak form the equation is multiplied by a test function φ = (1 - x²)^p that vanishes with its slope at both ends of a window and
+    integrated by parts: I⟨φ″θ⟩ - C⟨φ′θ⟩ + K⟨φθ⟩ = ⟨φT⟩. No derivative is ever estimated, what the angle's noise does to the equations
+    is taken off, and whatever is not given is chosen from the record: ``summary()`` says what and why.
 
     Parameters
     ----------
@@ -63,27 +75,48 @@ def identify(
         Sample period in seconds.
     t : array_like, shape (n,)
         Time of every sample in seconds, uniform to a thousandth of the sample period.
-    preset : {"paper"}, optional
-        What is used where nothing is given: the paper's method.
+    preset : {"paper", "auto"}, optional
+        What is used where nothing is given. ``"paper"``: the paper's method. ``"auto"``: weak form, everything chosen from the record,
+        inertia and damping constant unless it says otherwise, an offset of the torque.
     window_length : int or str, optional
-        Samples in the window of the polynomials, odd, or a duration such as ``"0.2 s"``; 201 in the paper.
+        Samples of the window of the polynomials, or of the test function in weak form: odd, a duration such as ``"0.2 s"``, or
+        ``"auto"`` in weak form; 201 in the paper.
     max_order : int, optional
-        Highest candidate order; 15 in the paper.
+        Highest candidate order of the strong form; 15 in the paper.
     criterion : {"aicc", "aicc-textbook", "aic", "bic"}, optional
-        What chooses the order, as in :func:`tvident.fit_local_polynomials`.
+        What chooses the order in strong form, as in :func:`tvident.fit_local_polynomials`.
+    selection : {"window", "average"}, optional
+        In weak form: ``"window"`` takes what is windowed from one window of `equations` around each sample; ``"average"`` averages
+        windows of many lengths before, around and after it by how well each predicts nearby, so that jumps are followed.
+    form : {"strong", "weak", "auto"}, optional
+        The paper's equations, or those of the test function.
+    exponent : int or str, optional
+        Exponent p of the test function, 3 to 20, or ``"auto"``; 8 with the paper's preset.
     equations : int or str, optional
-        Equations that are solved together around a sample, or a duration; 200 in the paper.
-    inertia, damping, stiffness : {"windowed", "constant"}, float or array_like, optional
-        ``"windowed"``: unknown, one value for every sample. ``"constant"``: unknown, one value for the record. A number or an array of the
-        angle's shape: known; 0 leaves it out.
+        Samples whose equations are solved together, a duration, or ``"auto"`` in weak form: the length of windows that predicts best
+        what they have not seen; 200 in the paper.
+    variation : {"constant", "linear"}, optional
+        How what is windowed may change within a window.
+    inertia, damping, stiffness : {"windowed", "constant", "auto", "varying"}, float or array_like, optional
+        ``"windowed"``: unknown, one value for every sample. ``"constant"``: unknown, one value for the record. ``"auto"``: constant unless
+        the record says otherwise (windowed, for stiffness). ``"varying"``: changes more slowly than what is windowed (weak form). A
+        number or an array of the angle's shape: known; 0 leaves it out.
     terms : sequence, optional
         What else stands on the left-hand side, with an unknown factor: ``"offset"``, ``"coulomb"`` (the sign of the velocity), ``"cubic"``
         (the cube of the angle) or a :class:`Term` of one's own; or a pair of one of these and its kind. Without a kind a term is
         windowed where all unknown parameters are, and constant otherwise.
+    filter_torque : bool, optional
+        In strong form: smooth the torque with polynomials of the orders chosen for the angle.
+    lag : float, optional
+        Seconds by which the torque was recorded late; fractions of a sample count.
+    mask : array_like of bool, shape (n,) or the angle's, optional
+        True where a sample may be the centre of an equation.
     step : int, optional
         Every how many samples a result is wanted.
     nan_policy : {"propagate", "raise"}, optional
         Windows that hold a value that is not a finite number are NaN, and no others; or raise.
+    settings : mapping, optional
+        Settings of an earlier result: what it chose is used again. What is given beside them wins.
     workers : int, optional
         Threads; by default ``TVIDENT_WORKERS`` or all processors that this process may use. The numbers do not depend on it.
     progress : bool or callable, optional
@@ -106,10 +139,13 @@ def identify(
     Within 0.2 s inertia and stiffness are nearly collinear unless several frequencies are excited: under a single sine they cannot be
     told apart at all. ``condition`` says so, and ``stderr`` by how much.
 
-    Standard errors take the equations for independent: see :class:`Identification`.
+    Standard errors of the strong form take the equations for independent: see :class:`Identification`. Those of the weak form follow
+    from the known covariance of its overlapping rows, times the mean squared error of predicting rows that were not seen, over the
+    noise's.
 
-    The cost is some 60 ns a sample and thread, whatever the windows. Memory is that of the results, but for terms of one's own, which
-    need the derivatives of the whole record.
+    In strong form, where all unknowns are of one kind, the cost is some 60 ns a sample and thread, whatever the windows, and memory is
+    that of the results, but for terms of one's own, which need the derivatives of the whole record. In weak form and where kinds are
+    mixed it is some 1 to 10 µs a sample, and the equations of the whole record are kept.
 
     References
     ----------
@@ -137,156 +173,248 @@ def identify(
     if sample_rate is None and delta is None and t is None:
         raise TypeError("identify needs the sample period; got none; give sample_rate=, delta= or t=")
     period = arguments.sample_period(samples, delta=delta, sample_rate=sample_rate, t=t)
-    chosen = _PRESETS[arguments.one_of("preset", preset, get_args(Preset))]
-    given = {"window_length": window_length, "max_order": max_order, "criterion": criterion, "equations": equations}
-    settings: dict[str, Any] = chosen | {name: value for name, value in given.items() if value is not None}
-
-    length = arguments.window_length("window_length", settings["window_length"], period, odd=True)
-    arguments.check_window("window_length", length, samples, least=_SHORTEST_WINDOW)
-    rows = arguments.window_length("equations", settings["equations"], period, odd=False)
+    given = {
+        "window_length": window_length,
+        "max_order": max_order,
+        "criterion": criterion,
+        "selection": selection,
+        "form": form,
+        "exponent": exponent,
+        "equations": equations,
+        "variation": variation,
+        "inertia": inertia,
+        "damping": damping,
+        "stiffness": stiffness,
+        "terms": terms,
+        "filter_torque": filter_torque,
+        "lag": lag,
+    }
+    used = resolve(preset, given, settings)
     for name, array in (("angle", angles), ("torque", torques)):
         arguments.check_nan(name, array, nan_policy)
     start = 0.0 if t is None else float(np.asarray(t)[0])
-    time = start + np.arange(samples, dtype=np.float64) * period
-
-    parameters = {
-        name: parameter(name, settings["kind"] if value is None else value, angles.shape)
-        for name, value in zip(COEFFICIENTS, (inertia, damping, stiffness), strict=True)
-    }
-    kinds: dict[str, Kind] = {name: value for name, value in parameters.items() if isinstance(value, str)}
-    default: Kind = "windowed" if all(kind == "windowed" for kind in kinds.values()) else "constant"
-    extra = all_terms(terms, default)
-    unknowns = [Unknown(name, kind) for name, kind in kinds.items()] + extra
-    kind = _only_kind(unknowns)
-
-    core_plan = plan(
-        length,
-        order=None,
-        max_order=arguments.whole_number("max_order", settings["max_order"], least=0),
-        criterion=arguments.one_of("criterion", settings["criterion"], get_args(Criterion)),
-        derivatives=(0, 1, 2),
-        delta=period,
-        noise=True,
+    task = _Task(
+        angles=angles,
+        torques=torques,
+        time=start + np.arange(samples, dtype=np.float64) * period,
+        period=period,
+        settings=used,
+        mask=arguments.mask("mask", mask, angles.shape),
+        step=arguments.whole_number("step", step, least=1),
+        workers=arguments.worker_count(workers),
+        parameters={name: parameter(name, used[name], angles.shape) for name in COEFFICIENTS},
     )
-    every = arguments.whole_number("step", step, least=1)
-    threads = arguments.worker_count(workers)
-    motions = _core.Motions(
-        angles,
-        torques,
-        [None if isinstance(value, str) else value for value in parameters.values()],
-        _columns(extra, core_plan, angles, time, threads),
-    )
-    found = _Found(angles.shape[:-1], [unknown.name for unknown in unknowns])
-    with reporter(progress, "identification") as report:
-        if kind == "windowed":
-            arguments.check_window("equations", rows, samples, least=len(unknowns) + 1)
-            found.windowed(core_plan, motions, rows, step=every, workers=threads, progress=report)
-        else:
-            found.constant(core_plan, motions, step=every, workers=threads, progress=report)
-    found.add_known({name: value for name, value in parameters.items() if not isinstance(value, str)}, every)
-    return Identification(
-        time=time[::every],
-        values=found.values,
-        errors=found.errors,
-        covariances=found.covariances,
-        constants=found.constants,
-        terms=[unknown.name for unknown in extra],
-        condition=found.condition,
-        residual_std=found.residual_std,
-        order=found.order,
-        status=found.status,
-        settings={
-            "preset": preset,
-            "sample_rate": 1 / period,
-            "window_length": length,
-            "order": None,
-            "max_order": settings["max_order"],
-            "criterion": settings["criterion"],
-            "equations": rows,
-            "kinds": {name: kinds.get(name, "known") for name in COEFFICIENTS}
-            | {unknown.name: unknown.kind for unknown in extra},
-            "step": every,
-        },
-    )
+    return task.weak(progress) if used["form"] == "weak" else task.strong(progress)
 
 
-def _only_kind(unknowns: list[Unknown]) -> Kind:
-    """Return the kind that all unknowns have."""
-    if not unknowns:
-        raise ValueError("at least one parameter must be unknown; all are given; use 'windowed' or 'constant' for one")
-    kinds = {unknown.kind for unknown in unknowns}
-    if len(kinds) > 1:
-        listed = ", ".join(f"{unknown.name} {unknown.kind}" for unknown in unknowns)
-        raise ValueError(f"all unknowns must be of one kind; got {listed}; make all of them 'windowed' or 'constant'")
-    return kinds.pop()
+@dataclass
+class _Task:
+    """One call: what is to be identified from what, and how."""
 
+    angles: npt.NDArray[np.number]
+    torques: npt.NDArray[np.number]
+    time: npt.NDArray[np.float64]
+    period: float
+    settings: dict[str, Any]
+    mask: npt.NDArray[np.bool_] | None
+    step: int
+    workers: int | None
+    parameters: dict[str, Kind | float | npt.NDArray[np.number]]
 
-def _columns(
-    extra: list[Unknown],
-    core_plan: _core.LocalPolynomials,
-    angles: npt.NDArray[np.number],
-    time: npt.NDArray[np.float64],
-    workers: int | None,
-) -> list[npt.NDArray[np.number] | str]:
-    """Return what the core needs of every further term: its name, or its value at every sample."""
-    if all(unknown.own is None for unknown in extra):
-        return [unknown.name for unknown in extra]
-    (angle, velocity, _), *_ = core_plan.estimate(angles, workers=workers)
-    return [unknown.own.values(time, angle, velocity) if unknown.own else unknown.name for unknown in extra]
+    def __post_init__(self) -> None:
+        kinds: dict[str, Kind] = {name: value for name, value in self.parameters.items() if isinstance(value, str)}
+        default: Kind = "windowed" if all(kind == "windowed" for kind in kinds.values()) else "constant"
+        self.extra = all_terms(self.settings["terms"], default)
+        self.unknowns = [Unknown(name, kind) for name, kind in kinds.items()] + self.extra
+        if not self.unknowns:
+            raise ValueError(
+                "at least one parameter must be unknown; all are given; use 'windowed' or 'constant' for one"
+            )
 
+    def strong(self, progress: arguments.Progress) -> Identification:
+        """Identify in strong form."""
+        samples, used = self.time.size, self.settings
+        length = arguments.window_length("window_length", used["window_length"], self.period, odd=True)
+        arguments.check_window("window_length", length, samples, least=_SHORTEST_WINDOW)
+        rows = arguments.window_length("equations", used["equations"], self.period, odd=False)
+        core_plan = self._plan(length)
+        self.unknowns = [Unknown(one.name, _in_strong_form(one), one.own) for one in self.unknowns]
+        kinds = {unknown.kind for unknown in self.unknowns}
+        found = Collected(self.angles.shape[:-1], [unknown.name for unknown in self.unknowns])
+        options: dict[str, Any] = {"step": self.step, "workers": self.workers}
+        if "windowed" in kinds:
+            arguments.check_window("equations", rows, samples, least=len(self.unknowns) + 1)
+        motions = self._motions(core_plan)
+        plain = not used["filter_torque"] and used["lag"] == 0 and self.mask is None
+        with reporter(progress, "identification") as report:
+            options["progress"] = report
+            if plain and kinds == {"windowed"} and used["variation"] == "constant":
+                found.windowed(core_plan, motions, rows, **options)
+            elif plain and kinds == {"constant"}:
+                found.constant(core_plan, motions, **options)
+            else:
+                options |= {"filter_torque": used["filter_torque"], "lag": used["lag"] / self.period}
+                options |= {"linear": used["variation"] == "linear", "equations": rows}
+                words = [unknown.kind for unknown in self.unknowns]
+                each = [
+                    _core.identify_strong(core_plan, motions, record, words, mask=self._mask(record), **options)
+                    for record in range(self._records)
+                ]
+                found.records(each, self._numbers)
+        chosen = {"window_length": length, "exponent": None, "equations": rows}
+        return self._result(found, chosen, [])
 
-class _Found:
-    """Results of a batch of records, put back into the batch's shape."""
+    def weak(self, progress: arguments.Progress) -> Identification:
+        """Identify in weak form."""
+        samples, used = self.time.size, self.settings
+        length = None
+        if used["window_length"] != "auto":
+            length = arguments.window_length("window_length", used["window_length"], self.period, odd=True)
+            arguments.check_window("window_length", length, samples, least=_SHORTEST_TEST_FUNCTION)
+        rows = None
+        if used["equations"] != "auto":
+            rows = arguments.window_length("equations", used["equations"], self.period, odd=False)
+            arguments.check_window("equations", rows, samples, least=len(self.unknowns) + 1)
+        exponent = None if used["exponent"] == "auto" else arguments.whole_number("exponent", used["exponent"])
+        average = used["selection"] != "window"
+        kinds = self._weak_kinds(average=average)
+        own = any(unknown.own is not None for unknown in self.extra)
+        core_plan = self._plan(min(_WINDOW_OF_TERMS, (samples - 1) // 2 * 2 + 1)) if own else None
+        motions = self._motions(core_plan)
+        present = [unknown.name for unknown in self.extra] + ([] if used["lag"] == 0 else ["lag"])
+        if not isinstance(self.parameters["stiffness"], str):
+            # A cubic spring beside a known one is not a question that anybody asked.
+            present.append("cubic")
+        found = Collected(self.angles.shape[:-1], [unknown.name for unknown in self.unknowns])
+        with reporter(progress, "identification") as report:
+            each = [
+                _core.identify_weak(
+                    motions,
+                    record,
+                    kinds,
+                    delta=self.period,
+                    half_width=None if length is None else length // 2,
+                    exponent=exponent,
+                    equations=rows,
+                    average=average,
+                    linear=used["variation"] == "linear",
+                    lag=used["lag"] / self.period,
+                    mask=self._mask(record),
+                    step=self.step,
+                    not_missing=present,
+                    workers=self.workers,
+                    progress=report,
+                )
+                for record in range(self._records)
+            ]
+        found.records(each, self._numbers)
+        names = dict(zip(self._numbers, (unknown.name for unknown in self.unknowns), strict=True))
+        decided = {"test_function": length is None or exponent is None, "equations": rows is None}
+        words = reasons(each[0], names, decided) if len(each) == 1 else []
+        chosen: dict[str, Any] = {
+            "window_length": [2 * one["half_width"] + 1 for one in each],
+            "exponent": [one["exponent"] for one in each],
+            "equations": [one["equations"] for one in each],
+        }
+        if len(each) == 1:
+            chosen = {name: value[0] for name, value in chosen.items()}
+            slow = {names[number] for number in each[0]["changing"]} & set(COEFFICIENTS)
+            self.unknowns = [Unknown(one.name, _in_the_end(one, slow), one.own) for one in self.unknowns]
+        return self._result(found, chosen, words)
 
-    def __init__(self, batch: tuple[int, ...], names: list[str]) -> None:
-        self._batch = batch
-        self._names = names
-        self.values: dict[str, npt.NDArray[np.float64]] = {}
-        self.errors: dict[str, npt.NDArray[np.float64]] = {}
-        self.covariances: dict[frozenset[str], npt.NDArray[np.float64]] = {}
-        self.constants: dict[str, tuple[Any, Any]] = {}
+    @property
+    def _records(self) -> int:
+        return int(np.prod(self.angles.shape[:-1], dtype=int))
 
-    def _shaped(self, array: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        return array.reshape(*self._batch, array.shape[-1])
+    @property
+    def _numbers(self) -> list[int]:
+        """What the core calls the unknowns: coefficients by their place, then the terms."""
+        unknown = [place for place, name in enumerate(COEFFICIENTS) if isinstance(self.parameters[name], str)]
+        return unknown + [len(COEFFICIENTS) + place for place in range(len(self.extra))]
 
-    def windowed(self, core_plan: _core.LocalPolynomials, motions: _core.Motions, rows: int, **options: Any) -> None:
-        pairs = list(combinations(range(sum(name in COEFFICIENTS for name in self._names)), 2))
-        parameters, errors, covariances, deviation, condition, status, order = _core.identify_windowed(
-            core_plan, motions, rows, pairs, **options
+    def _weak_kinds(self, *, average: bool) -> list[str]:
+        """Return the kinds by the words of the core."""
+        words: list[str] = []
+        several = any(one.kind == "windowed" for one in self.unknowns if one.name not in {"inertia", "damping"})
+        for one in self.unknowns:
+            kind: str = one.kind
+            if kind == "auto":
+                kind = "windowed" if one.name == "stiffness" else "auto"
+            if average and several and kind == "windowed" and one.name in {"inertia", "damping"}:
+                # In windows short enough for the stiffness they cannot be told from it.
+                kind = "varying"
+            if kind == "varying" and (not average or not several):
+                kind = "windowed"
+            words.append(kind)
+        return words
+
+    def _plan(self, length: int) -> _core.LocalPolynomials:
+        return plan(
+            length,
+            order=None,
+            max_order=arguments.whole_number("max_order", self.settings["max_order"], least=0),
+            criterion=self.settings["criterion"],
+            derivatives=(0, 1, 2),
+            delta=self.period,
+            noise=True,
         )
-        for index, name in enumerate(self._names):
-            self.values[name] = self._shaped(parameters[:, index])
-            self.errors[name] = self._shaped(errors[:, index])
-        for index, (one, other) in enumerate(pairs):
-            pair = frozenset((self._names[one], self._names[other]))
-            self.covariances[pair] = self._shaped(covariances[:, index])
-        self.residual_std, self.condition = self._shaped(deviation), self._shaped(condition)
-        self.status, self.order = self._shaped(status), self._shaped(order)
 
-    def constant(self, core_plan: _core.LocalPolynomials, motions: _core.Motions, **options: Any) -> None:
-        values, covariance, deviation, condition, status, order = _core.identify_constant(core_plan, motions, **options)
-        self.status, self.order = self._shaped(status), self._shaped(order)
-        errors = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    def _motions(self, core_plan: _core.LocalPolynomials | None) -> _core.Motions:
+        columns: list[npt.NDArray[np.number] | str] = [unknown.name for unknown in self.extra]
+        if core_plan is not None and any(unknown.own is not None for unknown in self.extra):
+            (angle, velocity, _), *_ = core_plan.estimate(self.angles, workers=self.workers)
+            columns = [
+                unknown.own.values(self.time, angle, velocity) if unknown.own else unknown.name
+                for unknown in self.extra
+            ]
+        known = [None if isinstance(value, str) else value for value in self.parameters.values()]
+        return _core.Motions(self.angles, self.torques, known, columns)
 
-        def spread(array: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-            """Repeat one value a record for every sample."""
-            return np.broadcast_to(array.reshape(*self._batch, 1), self.status.shape)
+    def _mask(self, record: int) -> npt.NDArray[np.bool_] | None:
+        if self.mask is None:
+            return None
+        return np.ascontiguousarray(self.mask.reshape(-1, self.time.size)[record])
 
-        for index, name in enumerate(self._names):
-            self.values[name], self.errors[name] = spread(values[:, index]), spread(errors[:, index])
-            value, error = values[:, index].reshape(self._batch), errors[:, index].reshape(self._batch)
-            self.constants[name] = (value, error) if self._batch else (float(value), float(error))
-        for one, other in combinations([name for name in self._names if name in COEFFICIENTS], 2):
-            entry = covariance[:, self._names.index(one), self._names.index(other)]
-            self.covariances[frozenset((one, other))] = spread(entry)
-        self.residual_std, self.condition = spread(deviation), spread(condition)
-        undetermined = np.isinf(self.condition)
-        flags = np.uint16(Status.INVALID | Status.RANK_DEFICIENT)
-        self.status = np.where(undetermined, self.status | flags, self.status)
+    def _result(self, found: Collected, chosen: Mapping[str, Any], words: list[str]) -> Identification:
+        known = {name: value for name, value in self.parameters.items() if not isinstance(value, str)}
+        found.add_known(known, self.step)
+        kinds: dict[str, str] = dict.fromkeys(COEFFICIENTS, "known")
+        kinds |= {unknown.name: unknown.kind for unknown in self.unknowns}
+        used = self.settings
+        same = ("preset", "form", "max_order", "criterion", "selection", "variation", "filter_torque", "lag")
+        return Identification(
+            time=self.time[:: self.step],
+            values=found.values,
+            errors=found.errors,
+            covariances=found.covariances,
+            constants=found.constants,
+            terms=[unknown.name for unknown in self.extra],
+            condition=found.condition,
+            residual_std=found.residual_std,
+            order=found.order,
+            status=found.status,
+            settings={
+                **{name: used[name] for name in same},
+                "sample_rate": 1 / self.period,
+                "order": None,
+                **chosen,
+                "kinds": kinds,
+                "known": {name: value if isinstance(value, float) else None for name, value in known.items()},
+                "step": self.step,
+                "reasons": tuple(words),
+            },
+        )
 
-    def add_known(self, known: dict[str, float | npt.NDArray[np.number]], step: int) -> None:
-        """Add what was known beforehand, without error."""
-        for name, value in known.items():
-            every = value if isinstance(value, float) else value[..., ::step]
-            self.values[name] = np.broadcast_to(np.asarray(every, dtype=np.float64), self.status.shape)
-            self.errors[name] = np.broadcast_to(np.float64(0), self.status.shape)
+
+def _in_strong_form(unknown: Unknown) -> Kind:
+    """Return the kind of an unknown where nothing tests it."""
+    if unknown.kind in {"windowed", "constant"}:
+        return unknown.kind
+    return "windowed" if unknown.name == "stiffness" or unknown.kind == "varying" else "constant"
+
+
+def _in_the_end(unknown: Unknown, changing: set[str]) -> Kind:
+    """Return the kind that an unknown turned out to be of."""
+    if unknown.kind == "auto" and unknown.name != "stiffness":
+        return "varying" if unknown.name in changing else "constant"
+    return "windowed" if unknown.kind == "auto" else unknown.kind

@@ -247,12 +247,20 @@ class Identification:
         """
         s = self.settings
         n, seconds = self.time.size, float(self.time[-1] - self.time[0]) if self.time.size else 0.0
-        order = s["max_order"] if s["order"] is None else s["order"]
-        lines = [
-            f"{n} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz, preset {s['preset']}",
-            f"windows of {s['window_length']} samples, orders up to {order} by {s['criterion']}, {s['equations']} equations",
-            "",
-        ]
+        lines = [f"{n} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz, preset {s['preset']}"]
+        if s["form"] == "strong":
+            order = s["max_order"] if s["order"] is None else s["order"]
+            equations = f"{s['equations']} equations"
+            lines.append(
+                f"windows of {s['window_length']} samples, orders up to {order} by {s['criterion']}, {equations}"
+            )
+        else:
+            lines.append(
+                f"weak form: test functions of {s['window_length']} samples, exponent {s['exponent']}; "
+                f"windows of {s['equations']} samples"
+            )
+        lines += [f"  {reason}" for reason in s["reasons"]]
+        lines.append("")
         rows = [("parameter", "kind", "median", "5 %", "95 %", "std. error", "unit")]
         values = {"inertia": self.inertia, "damping": self.damping, "stiffness": self.stiffness, **self.terms}
         for name, value in values.items():
@@ -261,7 +269,7 @@ class Identification:
             numbers = np.percentile(finite, [50, 5, 95]) if finite.size else [np.nan] * 3
             error = error[np.isfinite(error)]
             shown = [f"{number:.5g}" for number in numbers] + [f"{np.median(error):.2g}" if error.size else "nan"]
-            if kind != "windowed":
+            if kind not in {"windowed", "varying"}:
                 shown[1] = shown[2] = ""
             rows.append((name, kind, *shown, UNITS.get(name, "")))
         lines += table.aligned(rows)

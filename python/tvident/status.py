@@ -30,6 +30,9 @@ class Status(enum.IntFlag):
     EDGE = 2
     """Near an end of the record: evaluated off the centre of its window, or with fewer equations. Errors are larger there."""
 
+    GAP = 4
+    """Samples are missing or masked out here: the number is taken from what lies around. Look at its standard error."""
+
     LOWEST_ORDER = 8
     """The lowest candidate order was chosen. The signal hardly changes within the window: a longer window would be less noisy."""
 
@@ -45,6 +48,26 @@ class Status(enum.IntFlag):
     ILL_CONDITIONED = 128
     """The equations hardly tell the parameters apart. Look at the condition number, and at the standard errors before any value."""
 
+    NOISE_MODEL = 256
+    """Equations are predicted much worse than the noise of the channels explains: it is coloured, the torque is late, or a term is
+    missing. Standard errors are taken from the residuals. Look at what the summary suspects."""
+
+    COLOURED = 512
+    """What is left of the torque is correlated over more than a test function. Look for a term that is missing, or a slow disturbance."""
+
+    KIND_CONTRADICTED = 1024
+    """A parameter that was taken to be constant differs between the parts of the record. Let it be ``"auto"`` or ``"varying"``."""
+
+    WINDOW_LIMIT = 2048
+    """The best test function or length of windows is the first or last that was tried. The record may change faster than it can be
+    followed, or be too short: look at the settings."""
+
+    LAG_SUSPECTED = 4096
+    """The torque seems to have been recorded late. Give ``lag=`` as the summary suggests."""
+
+    TERM_SUSPECTED = 8192
+    """Friction, an offset or a hardening spring seems to be missing. Add the term that the summary names."""
+
     @property
     def advice(self) -> str:
         """What the flags mean and what to do, in words."""
@@ -54,6 +77,7 @@ class Status(enum.IntFlag):
 _ADVICE = {
     Status.INVALID: "no number: values are missing in the window, too few equations near an end, or see the other flags",
     Status.EDGE: "near an end of the record: errors are larger there",
+    Status.GAP: "samples are missing or masked out here: the number is taken from what lies around",
     Status.LOWEST_ORDER: (
         "the lowest order was chosen: the signal hardly changes within the window, a longer one would be less noisy"
     ),
@@ -62,6 +86,19 @@ _ADVICE = {
     ),
     Status.EXACT: "the residual is rounding or quantisation: there was no noise to weigh orders against",
     Status.RANK_DEFICIENT: "the equations do not determine the parameters: excite the system, or leave a parameter out",
+    Status.NOISE_MODEL: (
+        "the noise of the channels does not explain what is left: coloured noise, a lag, or a term that is missing; "
+        "errors are taken from the residuals"
+    ),
+    Status.COLOURED: "what is left is correlated for longer than a test function: a term is missing, or a slow disturbance acts",
+    Status.KIND_CONTRADICTED: (
+        "what was taken to be constant differs between parts of the record: let it be 'auto' or 'varying'"
+    ),
+    Status.WINDOW_LIMIT: (
+        "the best test function or window is the first or last that was tried: too fast a change, or too short a record"
+    ),
+    Status.LAG_SUSPECTED: "the torque seems to come late: give lag= as the summary suggests",
+    Status.TERM_SUSPECTED: "a term seems to be missing: add the one that the summary names",
     Status.ILL_CONDITIONED: "the equations hardly tell the parameters apart: look at the standard errors first",
 }
 

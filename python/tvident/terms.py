@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tvident import arguments
 
-Kind: TypeAlias = Literal["windowed", "constant"]
+Kind: TypeAlias = Literal["windowed", "constant", "auto", "varying"]
 Parameter: TypeAlias = Kind | float | npt.ArrayLike
 TermName: TypeAlias = Literal["offset", "coulomb", "cubic"]
 
@@ -81,9 +81,10 @@ def parameter(name: str, value: object, shape: tuple[int, ...]) -> Kind | float 
         kinds = get_args(Kind)
         if value not in kinds:
             raise ValueError(
-                f"{name} must be 'windowed', 'constant', a number or an array; got {value!r}; use one of these"
+                f"{name} must be 'windowed', 'constant', 'auto', 'varying', a number or an array; got {value!r}; use one of these"
             )
-        return "constant" if value == "constant" else "windowed"
+        kind: Kind = next(kind for kind in kinds if kind == value)
+        return kind
     array = np.asarray(value)
     if array.ndim == 0 and array.dtype.kind in "iuf":
         number = float(array)
@@ -107,7 +108,7 @@ def all_terms(terms: Sequence[object], default: Kind) -> list[Unknown]:
     found: list[Unknown] = []
     for given in terms:
         term, kind = given if isinstance(given, tuple) and len(given) == 2 else (given, default)  # noqa: PLR2004 - a pair
-        arguments.one_of("the kind of a term", kind, get_args(Kind))
+        arguments.one_of("the kind of a term", kind, ("windowed", "constant"))
         own = term if isinstance(term, Term) else None
         name = arguments.one_of("a term", term, get_args(TermName)) if own is None else own.name
         if any(name == other.name for other in found) or name in COEFFICIENTS:

@@ -85,6 +85,29 @@ pub enum Error {
         /// How many regressors there are.
         regressors: usize,
     },
+    /// An exponent that makes no test function.
+    #[error(
+        "exponent must be between {least} and {most}; got {exponent}; with less the test function's second derivative jumps at its ends"
+    )]
+    Exponent {
+        /// What was asked for.
+        exponent: usize,
+        /// The lowest allowed.
+        least: usize,
+        /// The highest allowed.
+        most: usize,
+    },
+    /// A record that holds too few samples to choose anything by.
+    #[error(
+        "the record must be long enough for windows of several test functions; got {samples} samples; record longer"
+    )]
+    RecordTooShortForWindows {
+        /// Length of the record, samples.
+        samples: usize,
+    },
+    /// Equations that do not determine what is constant.
+    #[error("the record must determine what is constant; it does not; excite the system, or leave a parameter out")]
+    NotDetermined,
     /// The work was cancelled by whoever watched it.
     #[error("the work was cancelled")]
     Cancelled,

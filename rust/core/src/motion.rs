@@ -117,6 +117,6 @@ impl Motion<'_> {
 }
 
 /// The sign of a number; zero has none.
-fn sign(value: f64) -> f64 {
+pub(crate) fn sign(value: f64) -> f64 {
     if value == 0.0 { 0.0 } else { value.signum() }
 }

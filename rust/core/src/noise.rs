@@ -18,6 +18,7 @@ use crate::coefficients::{Coefficients, Projected};
 use crate::error::Error;
 use crate::samples::{Samples, is_usable};
 use crate::simd::Instructions;
+use crate::spectrum::power;
 
 /// Half-widths of the windows that the noise is read from.
 const HALVES: [usize; 3] = [12, 20, 35];
@@ -44,6 +45,12 @@ const PRECISIONS: [f64; 2] = [8.0 * f32::EPSILON as f64, 8.0 * f64::EPSILON];
 
 /// A step must be so many times as large as rounding.
 const ABOVE_ROUNDING: f64 = 64.0;
+
+/// Bands of frequencies that are searched for one without signal, samples of a segment whose spectrum is taken, and how many segments a
+/// record must hold.
+const BANDS: usize = 16;
+const SEGMENT: usize = 512;
+const FEWEST_SEGMENTS: usize = 8;
 
 /// What a channel's noise is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,6 +79,28 @@ pub fn noise(record: &dyn Samples, quantisation: Option<f64>, instructions: Inst
     let least = (quantisation * quantisation / 12.0).max((f64::EPSILON * largest(record)).powi(2));
     let sigma = if variance.is_nan() { f64::NAN } else { variance.max(least).sqrt() };
     Ok(Noise { sigma, quantisation })
+}
+
+/// The variance of a channel's noise for whoever weighs equations by it: as [`noise`] finds it, but no more than the power in the quietest
+/// band of frequencies, which bounds it where a signal with only a few samples a cycle reaches even the shortest windows. Zero for a
+/// record that is too short to tell.
+pub(crate) fn channel_variance(record: &dyn Samples, quantisation: Option<f64>, instructions: Instructions) -> f64 {
+    let Ok(found) = noise(record, quantisation, instructions) else { return 0.0 };
+    if found.sigma.is_nan() {
+        return 0.0;
+    }
+    let least = found.quantisation * found.quantisation / 12.0;
+    (found.sigma * found.sigma).min(quietest_band(record)).max(least)
+}
+
+/// The mean power in the quietest band of frequencies; infinite for a record that is too short.
+fn quietest_band(record: &dyn Samples) -> f64 {
+    if record.len() < FEWEST_SEGMENTS * SEGMENT {
+        return f64::INFINITY;
+    }
+    let power = power(record, SEGMENT);
+    let bands = power[1..].chunks_exact(SEGMENT / 2 / BANDS);
+    bands.map(|band| band.iter().sum::<f64>() / band.len() as f64).fold(f64::INFINITY, f64::min)
 }
 
 /// The mean of the squared highest coefficients of windows of one half-width.

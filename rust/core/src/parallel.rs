@@ -66,6 +66,25 @@ pub(crate) fn run_long<P: Send, S>(
     if finished && watch(total, total) { Ok(()) } else { Err(Error::Cancelled) }
 }
 
+/// Does every piece once and returns what each gave, in their order.
+pub(crate) fn map<P: Send, S, R: Send>(
+    pieces: Vec<Piece<P>>,
+    workers: NonZeroUsize,
+    scratch: impl Fn() -> S + Sync,
+    work: impl Fn(P, &mut S) -> R + Sync,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<R>, Error> {
+    let results: Vec<Mutex<Option<R>>> = pieces.iter().map(|_| Mutex::new(None)).collect();
+    let numbered = pieces.into_iter().enumerate();
+    let pieces = numbered.map(|(number, Piece { size, content })| Piece { size, content: (number, content) }).collect();
+    let store = |(number, content): (usize, P), scratch: &mut S| {
+        let result = work(content, scratch);
+        *results[number].lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
+    };
+    run(pieces, workers, scratch, store, watch)?;
+    Ok(results.into_iter().filter_map(|result| result.into_inner().unwrap_or_else(PoisonError::into_inner)).collect())
+}
+
 fn run_here<P, S>(
     pieces: Vec<Piece<P>>,
     total: usize,

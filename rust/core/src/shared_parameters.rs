@@ -40,6 +40,47 @@ impl Summary {
         Self { rows: kept.len(), factor: triangle(rows.as_ref()) }
     }
 
+    /// Summarises rows given entry by entry.
+    pub(crate) fn from_rows(rows: usize, columns: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
+        Self { rows, factor: triangle(Mat::from_fn(rows, columns, entry).as_ref()) }
+    }
+
+    /// Solves with each column scaled by the square root of a number: the values, the inverse of the normal matrix row by row and the
+    /// condition number of the scaled columns. Nothing where they do not determine the values.
+    pub(crate) fn solution(&self, squared: &[f64]) -> Option<(Vec<f64>, Vec<f64>, f64)> {
+        let p = self.factor.ncols() - 1;
+        if self.factor.nrows() < p || squared.iter().any(|norm| *norm <= 0.0) {
+            return None;
+        }
+        let scaled = Mat::from_fn(p, p, |i, j| self.factor[(i, j)] / squared[j].sqrt());
+        let mut inverse = Mat::<f64>::identity(p, p);
+        faer::linalg::triangular_solve::solve_upper_triangular_in_place(
+            scaled.as_ref(),
+            inverse.as_mut(),
+            faer::Par::Seq,
+        );
+        let condition = (p as f64).sqrt() * inverse.norm_l2();
+        if condition.is_nan() || condition * f64::EPSILON * self.rows as f64 >= 1.0 {
+            return None;
+        }
+        let value = |i: usize| (i..p).map(|j| inverse[(i, j)] * self.factor[(j, p)]).sum::<f64>() / squared[i].sqrt();
+        let gram = &inverse * inverse.transpose();
+        let entry = |i: usize, j: usize| gram[(i, j)] / (squared[i] * squared[j]).sqrt();
+        let normal = (0..p * p).map(|index| entry(index / p, index % p)).collect();
+        Some(((0..p).map(value).collect(), normal, condition))
+    }
+
+    /// The direction in which columns, each scaled by the square root of a number, are smallest: the last right singular vector.
+    pub(crate) fn weakest(&self, squared: &[f64]) -> Vec<f64> {
+        let p = self.factor.ncols() - 1;
+        let scaled = Mat::from_fn(self.factor.nrows().min(p), p, |i, j| {
+            if squared[j] > 0.0 { self.factor[(i, j)] / squared[j].sqrt() } else { 0.0 }
+        });
+        let normal = scaled.transpose() * &scaled;
+        let Ok(decomposed) = normal.self_adjoint_eigen(faer::Side::Lower) else { return vec![0.0; p] };
+        (0..p).map(|i| decomposed.U()[(i, 0)]).collect()
+    }
+
     /// Adds the rows that another summary stands for.
     pub(crate) fn add(&mut self, other: &Self) {
         let (above, below) = (self.factor.nrows(), other.factor.nrows());

@@ -14,6 +14,8 @@ impl Status {
     pub const INVALID: Self = Self(1);
     /// Near an end of the record: evaluated off the centre of its window, or with fewer equations.
     pub const EDGE: Self = Self(1 << 1);
+    /// Samples are missing or masked out here: the number is taken from what lies around.
+    pub const GAP: Self = Self(1 << 2);
     /// The lowest candidate order was chosen; the paper advises a longer window.
     pub const LOWEST_ORDER: Self = Self(1 << 3);
     /// The highest candidate order was chosen; the paper advises a shorter window or a higher `max_order`.
@@ -25,15 +27,35 @@ impl Status {
     /// The equations hardly tell the parameters apart.
     pub const ILL_CONDITIONED: Self = Self(1 << 7);
 
+    /// Rows are predicted much worse than the noise of the channels explains: errors are taken from what is left instead.
+    pub const NOISE_MODEL: Self = Self(1 << 8);
+    /// What is left is correlated over more than a test function.
+    pub const COLOURED: Self = Self(1 << 9);
+    /// What was taken to be constant differs between the parts of the record.
+    pub const KIND_CONTRADICTED: Self = Self(1 << 10);
+    /// The best length of a window or test function is the first or last that was tried.
+    pub const WINDOW_LIMIT: Self = Self(1 << 11);
+    /// The torque seems to come late.
+    pub const LAG_SUSPECTED: Self = Self(1 << 12);
+    /// A term that was left out seems to act: friction, an offset or a hardening spring.
+    pub const TERM_SUSPECTED: Self = Self(1 << 13);
+
     /// Every flag that exists, with its name.
-    pub const NAMED: [(&'static str, Self); 7] = [
+    pub const NAMED: [(&'static str, Self); 14] = [
         ("INVALID", Self::INVALID),
         ("EDGE", Self::EDGE),
+        ("GAP", Self::GAP),
         ("LOWEST_ORDER", Self::LOWEST_ORDER),
         ("HIGHEST_ORDER", Self::HIGHEST_ORDER),
         ("EXACT", Self::EXACT),
         ("RANK_DEFICIENT", Self::RANK_DEFICIENT),
         ("ILL_CONDITIONED", Self::ILL_CONDITIONED),
+        ("NOISE_MODEL", Self::NOISE_MODEL),
+        ("COLOURED", Self::COLOURED),
+        ("KIND_CONTRADICTED", Self::KIND_CONTRADICTED),
+        ("WINDOW_LIMIT", Self::WINDOW_LIMIT),
+        ("LAG_SUSPECTED", Self::LAG_SUSPECTED),
+        ("TERM_SUSPECTED", Self::TERM_SUSPECTED),
     ];
 
     /// The flags as a number, as they are stored in arrays.

@@ -99,7 +99,7 @@ impl Motions {
 
 impl Motions {
     /// The equation of motion of one record.
-    fn motion(&self, record: usize) -> PyResult<Motion<'_>> {
+    pub(crate) fn motion(&self, record: usize) -> PyResult<Motion<'_>> {
         let [inertia, damping, stiffness] = &self.coefficients;
         Ok(Motion {
             angle: one(&self.angles, record)?,

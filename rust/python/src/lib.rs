@@ -12,7 +12,9 @@ mod local_polynomials;
 mod noise;
 mod records;
 mod rolling;
+mod strong_identification;
 mod watch;
+mod weak_identification;
 
 use pyo3::prelude::*;
 
@@ -33,6 +35,10 @@ mod _core {
     use crate::noise::{noise, quantisation_step};
     #[pymodule_export]
     use crate::rolling::rolling_least_squares;
+    #[pymodule_export]
+    use crate::strong_identification::identify_strong;
+    #[pymodule_export]
+    use crate::weak_identification::identify_weak;
 
     /// Every flag of a status: name and bits.
     #[pyfunction]

@@ -1,0 +1,340 @@
+//! What changes, at every row: windows of many lengths before, around and after it, averaged by how well each predicts nearby.
+//!
+//! A window predicts the rows that it has not seen. The weight of one at a row is `exp(-½ (n e + n₀ ē))`, where `e` is its mean squared
+//! error around the row over the noise's variance, `n` the number of independent rows in that mean, and `ē` and `n₀` the same over the
+//! record. So a jump is followed from both sides, and where nothing happens long windows rule.
+
+use std::ops::Range;
+
+use crate::error::Error;
+use crate::model::{Predictor, without_constants};
+use crate::parallel::Piece;
+use crate::pooling::Expected;
+use crate::run::Run;
+use crate::scale::{Cells, Scale};
+use crate::simd::Instructions;
+use crate::windows::Problem;
+
+/// The largest squared error, over the noise's, that a single row counts with.
+const MOST: f64 = 16.0;
+/// Independent rows that the errors over the record count as, at least, and per length of the best window.
+const RECORD: [f64; 2] = [16.0, 5.0];
+/// Rows in a piece of work.
+const PIECE: usize = 8192;
+/// Cells of at least so many rows are solved once for all pieces.
+const COARSE: usize = 8;
+/// A window that predicts so much worse over the record than the best one weighs nothing anywhere.
+const HOPELESS: f64 = 40.0;
+
+/// What changes, at every row.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Averages {
+    /// Windowed unknowns, by row; NaN where no window says anything.
+    pub(crate) values: Vec<Vec<f64>>,
+    /// What they grow by in a second.
+    pub(crate) slopes: Vec<Vec<f64>>,
+    /// Their standard errors for given constants.
+    pub(crate) errors: Vec<Vec<f64>>,
+    /// How they change with each constant: unknown by unknown, constant by constant.
+    pub(crate) sensitivities: Vec<Vec<f64>>,
+}
+
+impl Averages {
+    fn new(windowed: usize, constants: usize, rows: usize) -> Self {
+        let columns = |count: usize| vec![vec![f64::NAN; rows]; count];
+        Self {
+            values: columns(windowed),
+            slopes: columns(windowed),
+            errors: columns(windowed),
+            sensitivities: columns(windowed * constants),
+        }
+    }
+
+    fn columns(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
+        self.values.iter_mut().chain(&mut self.slopes).chain(&mut self.errors).chain(&mut self.sensitivities)
+    }
+}
+
+/// Which windows of a scale: before a row, around it, after it.
+const SIDES: usize = 3;
+
+/// A scale and what is known of it beforehand.
+struct Candidate {
+    scale: Scale,
+    /// All cells, where they are few.
+    cells: Option<Cells>,
+    /// Mean squared error over the record, by side; infinite where it takes no part.
+    record: [f64; SIDES],
+}
+
+/// Averages windows of several lengths at every row, for given constants. `best` is the length of the windows that predict best, in
+/// rows.
+pub(crate) fn average(
+    problem: &Problem<'_>,
+    scales: &[Scale],
+    constants: &[f64],
+    expected: Expected,
+    best: usize,
+    instructions: Instructions,
+    run: &mut Run<'_, '_>,
+) -> Result<Averages, Error> {
+    let rows = problem.rows();
+    let reach = scales.first().map_or(1, |scale| scale.reach);
+    let side = without_constants(problem, constants);
+    let mut candidates = Vec::new();
+    for &scale in scales {
+        let all = scale.side_cells(rows);
+        let cells = if scale.step >= COARSE { Some(scale.solve(problem, &all, instructions, run)?) } else { None };
+        candidates.push(Candidate { scale, cells, record: [f64::INFINITY; SIDES] });
+    }
+    let view = View { problem, side: &side, constants, variance: expected.variance, reach, instructions };
+    let middle = rows / 5..(4 * rows / 5).max(rows / 5 + 1).min(rows);
+    let pieces: Vec<_> = pieces(rows).into_iter().map(|rows| Piece { size: rows.len(), content: rows }).collect();
+    let sums = run.map(
+        pieces,
+        || (),
+        |rows: Range<usize>, (): &mut ()| {
+            let counted = rows.start.max(middle.start)..rows.end.min(middle.end);
+            candidates.iter().map(|candidate| view.sums(candidate, counted.clone())).collect::<Vec<_>>()
+        },
+    )?;
+    for (index, candidate) in candidates.iter_mut().enumerate() {
+        for which in 0..SIDES {
+            let (sum, count) = sums
+                .iter()
+                .map(|sums| sums[index][which])
+                .fold((0.0, 0.0), |all, part| (all.0 + part.0, all.1 + part.1));
+            if count > 0.0 {
+                candidate.record[which] = sum / count;
+            }
+        }
+    }
+    let record = RECORD[0].max(RECORD[1] * best as f64 / expected.redundancy);
+    let least = candidates.iter().flat_map(|candidate| candidate.record).fold(f64::INFINITY, f64::min);
+    let hopeless = least + HOPELESS / record;
+
+    let mut averages = Averages::new(problem.layout.windowed, problem.layout.constant, rows);
+    let mut work = Vec::new();
+    {
+        let mut parts: Vec<_> = averages.columns().map(|column| column.chunks_mut(PIECE)).collect();
+        for rows in self::pieces(rows) {
+            let columns: Vec<&mut [f64]> = parts.iter_mut().filter_map(Iterator::next).collect();
+            work.push(Piece { size: rows.len(), content: (rows, columns) });
+        }
+    }
+    let nearby = view.nearby(expected);
+    run.map(
+        work,
+        || (),
+        |(rows, mut columns): (Range<usize>, Vec<&mut [f64]>), (): &mut ()| {
+            view.average(&candidates, rows, nearby, record, hopeless, &mut columns);
+        },
+    )?;
+    Ok(averages)
+}
+
+fn pieces(rows: usize) -> Vec<Range<usize>> {
+    (0..rows).step_by(PIECE).map(|first| first..rows.min(first + PIECE)).collect()
+}
+
+/// Rows around a row that its errors are averaged over, to either side, and how many independent ones that makes.
+#[derive(Clone, Copy)]
+struct Nearby {
+    rows: usize,
+    independent: f64,
+}
+
+struct View<'a, 'b> {
+    problem: &'a Problem<'b>,
+    side: &'a [f64],
+    constants: &'a [f64],
+    variance: f64,
+    /// Rows that a test function reaches to either side.
+    reach: usize,
+    instructions: Instructions,
+}
+
+/// The windows of one scale around some rows, ready to predict.
+struct Around<'a> {
+    scale: Scale,
+    sides: Predictor<'a>,
+    hollow: Predictor<'a>,
+    full: Predictor<'a>,
+}
+
+/// One window as seen from a row: what predicts the row, what is believed there, and how much later the row is than either's centre.
+struct Seen<'a, 'b> {
+    predictor: &'b Predictor<'a>,
+    believed: &'b Predictor<'a>,
+    place: usize,
+    believed_place: usize,
+    later: f64,
+}
+
+impl<'a> Around<'a> {
+    fn new(scale: Scale, cells: &'a Cells, constants: &[f64]) -> Self {
+        let of = |solved| Predictor::new(solved, constants);
+        Self { scale, sides: of(&cells.sides), hollow: of(&cells.hollow), full: of(&cells.full) }
+    }
+
+    fn seen(&self, row: usize, which: usize, period: f64) -> Option<Seen<'a, '_>> {
+        let cell = self.scale.cell(row);
+        let later = |centre: f64| (row as f64 - centre) * period;
+        if which == 1 {
+            let (place, believed_place) = (self.hollow.place(cell)?, self.full.place(cell)?);
+            let later = later(self.scale.centres(cell)[1]);
+            return Some(Seen { predictor: &self.hollow, believed: &self.full, place, believed_place, later });
+        }
+        if !self.scale.stands_alone() {
+            return None;
+        }
+        let cell = if which == 0 { cell } else { self.scale.after(cell) };
+        let place = self.sides.place(cell)?;
+        let later = later(self.scale.centres(cell)[0]);
+        Some(Seen { predictor: &self.sides, believed: &self.sides, place, believed_place: place, later })
+    }
+}
+
+impl View<'_, '_> {
+    fn nearby(&self, expected: Expected) -> Nearby {
+        let rows = self.reach;
+        Nearby { rows, independent: (2 * rows + 1) as f64 / expected.redundancy }
+    }
+
+    /// The cells of a candidate around some rows.
+    fn cells(&self, candidate: &Candidate, rows: &Range<usize>) -> Cells {
+        let scale = candidate.scale;
+        let all = scale.side_cells(self.problem.rows());
+        let wanted = scale.cell(rows.start).max(all.start)..(scale.cell(rows.end.max(1) - 1) + 1).min(all.end);
+        let wanted = wanted.start..wanted.end.max(wanted.start);
+        scale.solve_here(self.problem, &wanted, self.instructions)
+    }
+
+    /// Squared error of a row, over the noise's variance.
+    fn error(&self, seen: &Seen<'_, '_>, row: usize) -> f64 {
+        let error = self.side[row] - seen.predictor.predict(self.problem, seen.place, row, seen.later);
+        (error * error / self.variance).min(MOST)
+    }
+
+    /// Sums of squared errors and their number, by side.
+    fn sums(&self, candidate: &Candidate, rows: Range<usize>) -> [(f64, f64); SIDES] {
+        let mut sums = [(0.0, 0.0); SIDES];
+        if rows.is_empty() {
+            return sums;
+        }
+        let here;
+        let cells = match &candidate.cells {
+            Some(cells) => cells,
+            None => {
+                here = self.cells(candidate, &rows);
+                &here
+            }
+        };
+        let around = Around::new(candidate.scale, cells, self.constants);
+        for row in rows.filter(|&row| self.problem.usable[row]) {
+            for (which, (sum, count)) in sums.iter_mut().enumerate() {
+                if let Some(seen) = around.seen(row, which, self.problem.period) {
+                    *sum += self.error(&seen, row);
+                    *count += 1.0;
+                }
+            }
+        }
+        sums
+    }
+
+    /// Averages all candidates at some rows.
+    fn average(
+        &self,
+        candidates: &[Candidate],
+        rows: Range<usize>,
+        nearby: Nearby,
+        record: f64,
+        hopeless: f64,
+        columns: &mut [&mut [f64]],
+    ) {
+        let (windowed, constants) = (self.problem.layout.windowed, self.problem.layout.constant);
+        let total = self.problem.rows();
+        let wide = rows.start.saturating_sub(nearby.rows)..(rows.end + nearby.rows).min(total);
+        let width = rows.len();
+        let numbers = 3 * windowed + windowed * constants;
+        // By row: sums of weights and of weighted numbers, and the least exponent so far, which all are relative to.
+        let mut weights = vec![0.0; width];
+        let mut least = vec![f64::INFINITY; width];
+        let mut sums = vec![0.0; width * numbers];
+        let mut numbers_here = vec![0.0; numbers];
+        // Where no window with hope reaches, near an end or a gap, the others serve.
+        for hope in [true, false] {
+            let wanted: Vec<bool> = weights.iter().map(|&weight| hope || weight == 0.0).collect();
+            if !wanted.contains(&true) {
+                break;
+            }
+            let chosen = |candidate: &&Candidate| candidate.record.iter().any(|&error| (error <= hopeless) == hope);
+            for candidate in candidates.iter().filter(chosen) {
+                let here;
+                let cells = match &candidate.cells {
+                    Some(cells) => cells,
+                    None => {
+                        here = self.cells(candidate, &wide);
+                        &here
+                    }
+                };
+                let around = Around::new(candidate.scale, cells, self.constants);
+                for which in (0..SIDES).filter(|&which| (candidate.record[which] <= hopeless) == hope) {
+                    // Running sums of the errors, so that every mean costs two differences; they restart with every piece.
+                    let mut errors = vec![[0.0, 0.0]; wide.len() + 1];
+                    for (place, row) in wide.clone().enumerate() {
+                        let mut next = errors[place];
+                        if self.problem.usable[row]
+                            && let Some(seen) = around.seen(row, which, self.problem.period)
+                        {
+                            next = [next[0] + self.error(&seen, row), next[1] + 1.0];
+                        }
+                        errors[place + 1] = next;
+                    }
+                    for (place, row) in rows.clone().enumerate().filter(|(place, _)| wanted[*place]) {
+                        let Some(seen) = around.seen(row, which, self.problem.period) else { continue };
+                        let first = row.saturating_sub(nearby.rows).max(wide.start) - wide.start;
+                        let last = (row + nearby.rows + 1).min(wide.end) - wide.start;
+                        let (sum, count) = (errors[last][0] - errors[first][0], errors[last][1] - errors[first][1]);
+                        if count == 0.0 {
+                            continue;
+                        }
+                        let exponent =
+                            0.5 * (nearby.independent * sum / count + record * candidate.record[which].min(MOST));
+                        self.believe(&seen, &mut numbers_here);
+                        let sums = &mut sums[place * numbers..(place + 1) * numbers];
+                        if exponent < least[place] {
+                            let shrink = (exponent - least[place]).exp();
+                            weights[place] *= shrink;
+                            sums.iter_mut().for_each(|sum| *sum *= shrink);
+                            least[place] = exponent;
+                        }
+                        let weight = (least[place] - exponent).exp();
+                        weights[place] += weight;
+                        sums.iter_mut().zip(&numbers_here).for_each(|(sum, number)| *sum += weight * number);
+                    }
+                }
+            }
+        }
+        for (place, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+            for (number, column) in columns.iter_mut().enumerate() {
+                column[place] = sums[place * numbers + number] / weight;
+            }
+        }
+    }
+
+    /// What a window says at a row: values, slopes, standard errors and sensitivities.
+    fn believe(&self, seen: &Seen<'_, '_>, numbers: &mut [f64]) {
+        let (windowed, constants) = (self.problem.layout.windowed, self.problem.layout.constant);
+        let (believed, place, later) = (seen.believed, seen.believed_place, seen.later);
+        for unknown in 0..windowed {
+            numbers[unknown] = believed.value(place, unknown, later);
+            numbers[windowed + unknown] = believed.value(place, unknown, 1.0) - believed.value(place, unknown, 0.0);
+            numbers[2 * windowed + unknown] = believed.variance(place, unknown, later).max(0.0).sqrt();
+            for constant in 0..constants {
+                numbers[3 * windowed + unknown * constants + constant] =
+                    believed.sensitivity(place, unknown, constant, later);
+            }
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! Rows of the equation of motion of one record, whatever form they were made in.
+
+/// One regressor in every row.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Regressor {
+    /// For a factor that is constant around the row.
+    pub(crate) value: Vec<f64>,
+    /// For a factor that grows by one a second and is zero at the row's centre.
+    pub(crate) companion: Vec<f64>,
+    /// The kernels that the angle's noise enters by, of both; empty where it does not or nothing is known of it.
+    pub(crate) noise: [Vec<f64>; 2],
+}
+
+/// All rows of a record. Those that are no equations are zero in every column.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Rows {
+    /// Inertia, damping, stiffness and terms, known or not.
+    pub(crate) regressors: Vec<Regressor>,
+    /// The torque, with what is known taken off.
+    pub(crate) side: Vec<f64>,
+    /// The kernel that the angle's noise enters the right-hand side by; empty where it does not.
+    pub(crate) side_noise: Vec<f64>,
+    pub(crate) usable: Vec<bool>,
+    /// Seconds from one row to the next.
+    pub(crate) period: f64,
+}
+
+impl Rows {
+    /// Number of rows.
+    pub(crate) fn len(&self) -> usize {
+        self.side.len()
+    }
+}

@@ -1,0 +1,222 @@
+//! Which unknowns of the equation of motion belong to every window and which are the same over the record, and what windows of one
+//! length say of both.
+
+use crate::equations::{Regressor, Rows};
+use crate::error::Error;
+use crate::factor::{Layout, RowNoise};
+use crate::pooling::{Expected, Pooled, is_determined, local, pool};
+use crate::row_covariance::RowCovariance;
+use crate::run::Run;
+use crate::scale::{Cells, Scale};
+use crate::simd::Instructions;
+use crate::windows::{Problem, Shape, Solved, solve_windows};
+
+/// Blocks that a record without windowed unknowns is cut into.
+const BLOCKS: usize = 64;
+
+/// Windows that begin within the length of one.
+const DENSITY: usize = 8;
+
+/// Regressors of the rows by what is known of their factors.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Model {
+    pub(crate) windowed: Vec<usize>,
+    pub(crate) constant: Vec<usize>,
+    /// Whether windowed factors may grow linearly within a window.
+    pub(crate) linear: bool,
+}
+
+impl Model {
+    pub(crate) fn layout(&self) -> Layout {
+        Layout { windowed: self.windowed.len(), linear: self.linear, constant: self.constant.len() }
+    }
+
+    /// The least-squares problem of some rows, with a right-hand side. `noise` is the variance of the angle's.
+    pub(crate) fn problem<'a>(
+        &self,
+        rows: &'a Rows,
+        side: &'a [f64],
+        noise: f64,
+        covariance: Option<&RowCovariance>,
+    ) -> Problem<'a> {
+        let of = |regressors: &[usize], pick: fn(&Regressor) -> &Vec<f64>| -> Vec<&'a [f64]> {
+            regressors.iter().map(|&index| pick(&rows.regressors[index]).as_slice()).collect()
+        };
+        let values = of(&self.windowed, |regressor| &regressor.value);
+        let companions = of(&self.windowed, |regressor| &regressor.companion);
+        let mut kernels = of(&self.windowed, |regressor| &regressor.noise[0]);
+        kernels.extend(of(&self.windowed, |regressor| &regressor.noise[1]));
+        kernels.extend(of(&self.constant, |regressor| &regressor.noise[0]));
+        kernels.push(&rows.side_noise);
+        let period = rows.period;
+        Problem {
+            layout: self.layout(),
+            correlated: covariance.map(|covariance| covariance.correlated(&values, &companions, period)),
+            windowed: values,
+            companions,
+            constants: of(&self.constant, |regressor| &regressor.value),
+            side,
+            usable: &rows.usable,
+            period,
+            noise: RowNoise::new(&kernels, noise),
+        }
+    }
+}
+
+/// What windows of one length, or the whole record, say of a model.
+#[derive(Clone, Debug)]
+pub(crate) struct Fit {
+    /// Nothing where the windows' length was given, or no unknown belongs to a window.
+    pub(crate) scale: Option<Scale>,
+    /// Windows on one side and on both; nothing without a scale.
+    pub(crate) cells: Option<Cells>,
+    /// The windows that all unknowns are taken from.
+    pub(crate) full: Solved,
+    pub(crate) pooled: Pooled,
+    /// Rows from one window to the next, and rows of a window.
+    pub(crate) step: usize,
+    pub(crate) span: usize,
+}
+
+impl Fit {
+    /// Solves a problem in windows of one length, or in one piece; nothing where the constants are not determined.
+    pub(crate) fn new(
+        problem: &Problem<'_>,
+        scale: Option<Scale>,
+        expected: Expected,
+        instructions: Instructions,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Option<Self>, Error> {
+        let Some(scale) = scale else {
+            let step = problem.rows().div_ceil(BLOCKS).max(1);
+            return Ok(Self::in_windows(problem, step, BLOCKS, expected, instructions));
+        };
+        let cells = scale.solve(problem, &scale.full_cells(problem.rows()), instructions, run)?;
+        let full = cells.full.clone();
+        let pooled = pool(&full, 0..full.len(), expected, instructions);
+        let (scale, step, span) = (Some(scale), scale.step, scale.span());
+        Ok(pooled.map(|pooled| Self { scale, cells: Some(cells), full, pooled, step, span }))
+    }
+
+    /// Solves a problem in windows of so many rows, or in one piece if that is all of them.
+    pub(crate) fn in_rows(
+        problem: &Problem<'_>,
+        window: usize,
+        expected: Expected,
+        instructions: Instructions,
+    ) -> Option<Self> {
+        let step = (window / DENSITY).max(1);
+        Self::in_windows(problem, step, window / step, expected, instructions)
+    }
+
+    fn in_windows(
+        problem: &Problem<'_>,
+        step: usize,
+        blocks: usize,
+        expected: Expected,
+        instructions: Instructions,
+    ) -> Option<Self> {
+        let span = blocks * step;
+        let windows = problem.rows().saturating_sub(span) / step + 1;
+        let shapes = [Shape::of(0..blocks, step)];
+        let full = solve_windows(problem, step, &(0..windows.cast_signed()), &shapes, instructions).swap_remove(0);
+        let pooled = pool(&full, 0..full.len(), expected, instructions)?;
+        Some(Self { scale: None, cells: None, full, pooled, step, span })
+    }
+
+    /// The middle of a window, in rows.
+    pub(crate) fn centre(&self, window: usize) -> f64 {
+        let first = (self.full.first + window.cast_signed()) * self.step.cast_signed();
+        first as f64 + (self.span as f64 - 1.0) / 2.0
+    }
+
+    /// The median over all windows of what they say of a windowed unknown.
+    pub(crate) fn median(&self, unknown: usize) -> f64 {
+        let windows = (0..self.full.len()).filter(|&window| is_determined(&self.full, window));
+        let mut values: Vec<f64> = windows
+            .map(|window| local(&self.full, window, &self.pooled.values, unknown))
+            .filter(|v| v.is_finite())
+            .collect();
+        if values.is_empty() {
+            return 0.0;
+        }
+        let middle = values.len() / 2;
+        *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+}
+
+/// What windows say of their own unknowns, for given constants, ready to predict rows.
+#[derive(Clone, Debug)]
+pub(crate) struct Predictor<'a> {
+    solved: &'a Solved,
+    /// By unknown, by window.
+    values: Vec<Vec<f64>>,
+    usable: Vec<bool>,
+}
+
+impl<'a> Predictor<'a> {
+    pub(crate) fn new(solved: &'a Solved, constants: &[f64]) -> Self {
+        let unknowns = solved.fields.layout.local();
+        let values = (0..unknowns)
+            .map(|unknown| (0..solved.len()).map(|window| local(solved, window, constants, unknown)).collect())
+            .collect();
+        let usable = (0..solved.len()).map(|window| is_determined(solved, window)).collect();
+        Self { solved, values, usable }
+    }
+
+    /// Where a window is, if it is there and determined.
+    pub(crate) fn place(&self, window: isize) -> Option<usize> {
+        self.solved.place(window).filter(|&place| self.usable[place])
+    }
+
+    /// A windowed unknown at a time, in seconds after the window's centre.
+    pub(crate) fn value(&self, place: usize, windowed: usize, later: f64) -> f64 {
+        let layout = self.solved.fields.layout;
+        let slope = if layout.linear { self.values[layout.windowed + windowed][place] } else { 0.0 };
+        self.values[windowed][place] + later * slope
+    }
+
+    /// Its variance there.
+    pub(crate) fn variance(&self, place: usize, windowed: usize, later: f64) -> f64 {
+        let (fields, layout) = (self.solved.fields, self.solved.fields.layout);
+        let entry = |i, j| self.solved.field(fields.covariance(i, j))[place];
+        let mut variance = entry(windowed, windowed);
+        if layout.linear {
+            let slope = layout.windowed + windowed;
+            variance += 2.0 * later * entry(windowed, slope) + later * later * entry(slope, slope);
+        }
+        variance
+    }
+
+    /// How it changes with a constant.
+    pub(crate) fn sensitivity(&self, place: usize, windowed: usize, constant: usize, later: f64) -> f64 {
+        let (fields, layout) = (self.solved.fields, self.solved.fields.layout);
+        let mut value = self.solved.field(fields.solution(windowed, constant))[place];
+        if layout.linear {
+            value += later * self.solved.field(fields.solution(layout.windowed + windowed, constant))[place];
+        }
+        -value
+    }
+
+    /// What the windowed unknowns add to a row's right-hand side.
+    pub(crate) fn predict(&self, problem: &Problem<'_>, place: usize, row: usize, later: f64) -> f64 {
+        let layout = problem.layout;
+        let mut sum = 0.0;
+        for windowed in 0..layout.windowed {
+            sum += self.value(place, windowed, later) * problem.windowed[windowed][row];
+            if layout.linear {
+                sum += self.values[layout.windowed + windowed][place] * problem.companions[windowed][row];
+            }
+        }
+        sum
+    }
+}
+
+/// What is left of a right-hand side once the constants are taken off.
+pub(crate) fn without_constants(problem: &Problem<'_>, constants: &[f64]) -> Vec<f64> {
+    let mut side = problem.side.to_vec();
+    for (column, value) in problem.constants.iter().zip(constants) {
+        side.iter_mut().zip(*column).for_each(|(side, factor)| *side -= value * factor);
+    }
+    side
+}

@@ -1,0 +1,140 @@
+//! Eight numbers worked on side by side, for small dense algebra on eight problems at once.
+//!
+//! Plain arithmetic on arrays of a fixed length becomes vector instructions of whatever width the kernel around it is compiled for (see
+//! [`crate::simd::dispatch`]). Nothing is fused or reordered, so every width gives the same bits.
+
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// Problems side by side.
+pub(crate) const WIDTH: usize = 8;
+
+/// One number of each problem.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(64))]
+pub(crate) struct Packet(pub(crate) [f64; WIDTH]);
+
+impl Packet {
+    pub(crate) const ZERO: Self = Self([0.0; WIDTH]);
+    pub(crate) const ONE: Self = Self([1.0; WIDTH]);
+
+    #[inline(always)]
+    pub(crate) fn splat(value: f64) -> Self {
+        Self([value; WIDTH])
+    }
+
+    #[inline(always)]
+    pub(crate) fn load(from: &[f64]) -> Self {
+        let mut values = [0.0; WIDTH];
+        values.copy_from_slice(&from[..WIDTH]);
+        Self(values)
+    }
+
+    #[inline(always)]
+    pub(crate) fn store(self, to: &mut [f64]) {
+        to[..WIDTH].copy_from_slice(&self.0);
+    }
+
+    #[inline(always)]
+    pub(crate) fn sqrt(self) -> Self {
+        self.map(f64::sqrt)
+    }
+
+    #[inline(always)]
+    pub(crate) fn min(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    pub(crate) fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+
+    /// One over it, or zero where it is zero.
+    #[inline(always)]
+    pub(crate) fn inverse_or_zero(self) -> Self {
+        self.map(|a| if a == 0.0 { 0.0 } else { 1.0 / a })
+    }
+
+    /// Its magnitude with the sign of another number.
+    #[inline(always)]
+    pub(crate) fn with_sign_of(self, sign: Self) -> Self {
+        self.zip(sign, f64::copysign)
+    }
+
+    #[inline(always)]
+    fn map(self, f: impl Fn(f64) -> f64) -> Self {
+        let mut result = self;
+        for value in &mut result.0 {
+            *value = f(*value);
+        }
+        result
+    }
+
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        let mut result = self;
+        for (value, other) in result.0.iter_mut().zip(other.0) {
+            *value = f(*value, other);
+        }
+        result
+    }
+}
+
+impl Add for Packet {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+}
+
+impl Sub for Packet {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip(other, |a, b| a - b)
+    }
+}
+
+impl Mul for Packet {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip(other, |a, b| a * b)
+    }
+}
+
+impl Div for Packet {
+    type Output = Self;
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.zip(other, |a, b| a / b)
+    }
+}
+
+impl Neg for Packet {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        self.map(|a| -a)
+    }
+}
+
+impl AddAssign for Packet {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl SubAssign for Packet {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}

@@ -1,0 +1,272 @@
+//! Constant unknowns from all windows together.
+//!
+//! Once a window's own unknowns are eliminated, what is left of its rows speaks of the constant ones only (Speckman 1988): a few rows,
+//! stacked over all windows and decomposed again. A window over a jump fits badly and counts less (Huber's rule on its misfit).
+
+use std::ops::Range;
+
+use crate::factor::{Fields, Layout, absorb};
+use crate::packet::{Packet, WIDTH};
+use crate::row_covariance::RowCovariance;
+use crate::shared_parameters::Summary;
+use crate::simd::{Instructions, Kernel, Lanes, dispatch};
+use crate::windows::{Problem, Solved};
+
+/// Windows whose misfit exceeds the median by more than so many standard deviations count less.
+const TOLERATED: f64 = 4.0;
+
+/// Rounds of weighting.
+const ROUNDS: usize = 3;
+
+/// What all windows together say of the constant unknowns.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Pooled {
+    pub(crate) values: Vec<f64>,
+    /// The inverse of the normal matrix, row by row.
+    pub(crate) inverse: Vec<f64>,
+    /// Condition number of what the windows left of the columns, each scaled to its norm before.
+    pub(crate) condition: f64,
+    /// Weight of every window.
+    pub(crate) weights: Vec<f64>,
+}
+
+/// What a row's noise is expected to leave.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Expected {
+    /// Variance of a row, and the part of it that is the torque's.
+    pub(crate) variance: f64,
+    pub(crate) torque: f64,
+    /// Rows that stand for one independent row.
+    pub(crate) redundancy: f64,
+}
+
+impl Expected {
+    pub(crate) fn new(covariance: &RowCovariance, torque: f64) -> Self {
+        Self { variance: covariance.variance(), torque, redundancy: covariance.redundancy() }
+    }
+}
+
+/// Solves for the constant unknowns from some windows; nothing where they are not determined.
+pub(crate) fn pool(
+    full: &Solved,
+    windows: Range<usize>,
+    expected: Expected,
+    instructions: Instructions,
+) -> Option<Pooled> {
+    let fields = full.fields;
+    let mut weights = vec![1.0; windows.len()];
+    let mut pooled = solve(full, &windows, &weights, instructions)?;
+    if fields.layout.local() == 0 {
+        return Some(Pooled { weights, ..pooled });
+    }
+    for _ in 0..ROUNDS {
+        let misfits: Vec<f64> = windows.clone().map(|window| misfit(full, window, &pooled.values, expected)).collect();
+        let mut sorted: Vec<f64> = misfits.iter().copied().filter(|misfit| misfit.is_finite()).collect();
+        if sorted.is_empty() {
+            break;
+        }
+        let middle = sorted.len() / 2;
+        let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
+        for ((window, weight), misfit) in windows.clone().zip(&mut weights).zip(&misfits) {
+            let independent = (full.field(fields.count())[window] / expected.redundancy - 2.0).max(1.0);
+            let most = median.max(1.0) * (1.0 + TOLERATED * (2.0 / independent).sqrt());
+            *weight = if *misfit > most { (most / misfit).powi(2) } else { 1.0 };
+        }
+        pooled = solve(full, &windows, &weights, instructions)?;
+    }
+    Some(Pooled { weights, ..pooled })
+}
+
+/// The residual sum of squares of every window over what its noise should leave.
+pub(crate) fn misfits(full: &Solved, values: &[f64], expected: Expected) -> Vec<f64> {
+    (0..full.len()).map(|window| misfit(full, window, values, expected)).collect()
+}
+
+/// A window's residual sum of squares over what its noise should leave.
+fn misfit(full: &Solved, window: usize, values: &[f64], expected: Expected) -> f64 {
+    let fields = full.fields;
+    let count = full.field(fields.count())[window];
+    let noise = count * expected.variance;
+    let left = (noise - full.field(fields.freedom())[window]).max(0.3 * noise);
+    (residual(full, window, values) + count * (expected.variance - expected.torque)) / left
+}
+
+/// A window's residual sum of squares for given constants, the angle's noise taken off.
+pub(crate) fn residual(full: &Solved, window: usize, values: &[f64]) -> f64 {
+    let fields = full.fields;
+    let constants = fields.layout.constant;
+    let mut sum = full.field(fields.left(constants, constants))[window];
+    for row in 0..constants {
+        let mut error = full.field(fields.left(row, constants))[window];
+        for column in row..constants {
+            error -= full.field(fields.left(row, column))[window] * values[column];
+        }
+        sum += error * error;
+    }
+    sum
+}
+
+/// How much each constant takes part in the combination that all windows together determine worst, its column scaled to its norm.
+pub(crate) fn weakest(full: &Solved, weights: &[f64]) -> Vec<f64> {
+    let constants = full.fields.layout.constant;
+    if constants == 0 {
+        return Vec::new();
+    }
+    let (total, norms) = Stack { full, windows: &(0..full.len()), weights }.run(pulp::Scalar::new());
+    total.weakest(&norms)
+}
+
+fn solve(full: &Solved, windows: &Range<usize>, weights: &[f64], instructions: Instructions) -> Option<Pooled> {
+    let fields = full.fields;
+    let constants = fields.layout.constant;
+    if constants == 0 {
+        return Some(Pooled { condition: 1.0, ..Pooled::default() });
+    }
+    let (total, norms) = dispatch(instructions, Stack { full, windows, weights });
+    let (values, inverse, condition) = total.solution(&norms)?;
+    Some(Pooled { values, inverse, condition, weights: Vec::new() })
+}
+
+/// Stacks what windows left for the constants and decomposes it, eight windows at a time.
+struct Stack<'a> {
+    full: &'a Solved,
+    windows: &'a Range<usize>,
+    weights: &'a [f64],
+}
+
+impl Kernel for Stack<'_> {
+    /// The factor, and the squared norms of the columns before anything was eliminated.
+    type Output = (Summary, Vec<f64>);
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _simd: S) -> (Summary, Vec<f64>) {
+        let fields = self.full.fields;
+        let constants = fields.layout.constant;
+        let layout = Layout { windowed: 0, linear: false, constant: constants };
+        let columns = layout.columns();
+        let mut factor = vec![Packet::ZERO; layout.size()];
+        let mut rows = vec![Packet::ZERO; columns * columns];
+        let mut norms = vec![0.0; constants];
+        let enough = fields.layout.regressors() as f64;
+        for first in self.windows.clone().step_by(WIDTH) {
+            let weight: [f64; WIDTH] = std::array::from_fn(|lane| {
+                let window = first + lane;
+                let counts = self.windows.contains(&window) && self.full.field(fields.count())[window] > enough;
+                if counts { self.weights[window - self.windows.start] } else { 0.0 }
+            });
+            let root = Packet(weight).sqrt();
+            let of = |field: usize| {
+                let values = self.full.field(field);
+                Packet(std::array::from_fn(|lane| values.get(first + lane).copied().unwrap_or(0.0)))
+            };
+            for row in 0..constants {
+                for column in row..columns {
+                    rows[row * columns + column] = root * of(fields.left(row, column));
+                }
+                let squared = Packet(weight) * of(fields.norm(row));
+                norms[row] += squared.0.iter().sum::<f64>();
+            }
+            absorb(layout, &mut factor, &mut rows, constants, true);
+        }
+        let entry = |row: usize, column: usize| {
+            let (lane, row) = (row / columns, row % columns);
+            if column < row { 0.0 } else { factor[layout.entry(row, column)].0[lane] }
+        };
+        (Summary::from_rows(WIDTH * columns, columns, entry), norms)
+    }
+}
+
+/// How every row moves the constants: the rows of `X̃`, one column a constant, so that they are `N⁻¹ X̃ᵀ b`.
+///
+/// `step` and `span` are the rows from one window to the next and the rows of a window, `centres` where each is solved.
+pub(crate) fn influence(
+    problem: &Problem<'_>,
+    full: &Solved,
+    windows: Range<usize>,
+    weights: &[f64],
+    step: usize,
+    span: usize,
+    centre: impl Fn(usize) -> f64,
+) -> Vec<Vec<f64>> {
+    let layout = problem.layout;
+    let (fields, q) = (full.fields, layout.windowed);
+    let (rows, blocks) = (problem.rows(), span / step);
+    let first_block = full.first + windows.start.cast_signed();
+    let mut columns = vec![vec![0.0; rows]; layout.constant];
+    for (constant, column) in columns.iter_mut().enumerate() {
+        // Sums over windows from the first on: weights, then by regressor the part at the window's centre, its rate, and the rate times
+        // the centre. The windows over a block are a stretch of them.
+        let width = 1 + 3 * q;
+        let mut sums = vec![0.0; (windows.len() + 1) * width];
+        for (place, window) in windows.clone().enumerate() {
+            let weight = weights[place];
+            let (before, after) = sums[place * width..(place + 2) * width].split_at_mut(width);
+            after.copy_from_slice(before);
+            after[0] += weight;
+            for regressor in 0..q {
+                let value = weight * full.field(fields.solution(regressor, constant))[window];
+                let rate = match layout.linear {
+                    true => weight * full.field(fields.solution(q + regressor, constant))[window],
+                    false => 0.0,
+                };
+                let parts = [value, rate, rate * centre(window)];
+                after[1 + 3 * regressor..][..3].iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
+            }
+        }
+        let mut taken = vec![0.0; width];
+        for block in 0..windows.len() + blocks - 1 {
+            let covering = block.saturating_sub(blocks - 1)..(block + 1).min(windows.len());
+            let first = (first_block + block.cast_signed()) * step.cast_signed();
+            let Ok(first) = usize::try_from(first) else { continue };
+            for (index, taken) in taken.iter_mut().enumerate() {
+                *taken = sums[covering.end * width + index] - sums[covering.start * width + index];
+            }
+            for row in first..(first + step).min(rows) {
+                let mut value = taken[0] * problem.constants[constant][row];
+                for (regressor, part) in taken[1..].chunks_exact(3).enumerate() {
+                    let at_row = part[0] + problem.period * (row as f64 * part[1] - part[2]);
+                    value -= at_row * problem.windowed[regressor][row];
+                    if layout.linear {
+                        value -= part[1] * problem.companions[regressor][row];
+                    }
+                }
+                column[row] = value;
+            }
+        }
+    }
+    columns
+}
+
+/// Covariance of the constants, row by row: `N⁻¹ X̃ᵀ Γ X̃ N⁻¹`.
+pub(crate) fn sandwich(influence: &[Vec<f64>], inverse: &[f64], covariance: &RowCovariance) -> Vec<f64> {
+    let size = influence.len();
+    let mut middle = vec![0.0; size * size];
+    for (j, column) in influence.iter().enumerate() {
+        let noisy = covariance.times(column);
+        for (i, other) in influence.iter().enumerate() {
+            middle[i * size + j] = other.iter().zip(&noisy).map(|(a, b)| a * b).sum();
+        }
+    }
+    let product = |a: &[f64], b: &[f64]| -> Vec<f64> {
+        let entry = |i: usize, j: usize| (0..size).map(|k| a[i * size + k] * b[k * size + j]).sum();
+        (0..size * size).map(|index| entry(index / size, index % size)).collect()
+    };
+    let result = product(&product(inverse, &middle), inverse);
+    (0..size * size).map(|index| f64::midpoint(result[index], result[index % size * size + index / size])).collect()
+}
+
+/// What a window says of its own unknown at its centre, and per second, for given constants.
+pub(crate) fn local(full: &Solved, window: usize, values: &[f64], local: usize) -> f64 {
+    let fields = full.fields;
+    let mut value = full.field(fields.solution(local, fields.layout.constant))[window];
+    for (constant, factor) in values.iter().enumerate() {
+        value -= full.field(fields.solution(local, constant))[window] * factor;
+    }
+    value
+}
+
+/// Whether a window has more rows than unknowns.
+pub(crate) fn is_determined(solved: &Solved, window: usize) -> bool {
+    let Fields { layout } = solved.fields;
+    solved.field(solved.fields.count())[window] > (layout.regressors() + 1) as f64
+}

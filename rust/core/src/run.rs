@@ -1,0 +1,45 @@
+//! The stages of one long call: who works on them, and who watches.
+
+use std::num::NonZeroUsize;
+
+use crate::error::Error;
+use crate::parallel::{self, Piece, Watch};
+
+/// Workers and watch of a call that goes through a number of stages.
+pub(crate) struct Run<'a, 'b> {
+    pub(crate) workers: NonZeroUsize,
+    watch: &'a mut Watch<'b>,
+    /// What the watch is told at the end.
+    total: usize,
+    /// Stages done, and about how many there will be.
+    done: usize,
+    stages: usize,
+}
+
+impl<'a, 'b> Run<'a, 'b> {
+    pub(crate) fn new(workers: NonZeroUsize, total: usize, stages: usize, watch: &'a mut Watch<'b>) -> Self {
+        Self { workers, watch, total, done: 0, stages }
+    }
+
+    /// Does every piece once and returns what each gave, in their order.
+    pub(crate) fn map<P: Send, S, R: Send>(
+        &mut self,
+        pieces: Vec<Piece<P>>,
+        scratch: impl Fn() -> S + Sync,
+        work: impl Fn(P, &mut S) -> R + Sync,
+    ) -> Result<Vec<R>, Error> {
+        let workers = self.workers;
+        self.stage(|watch| parallel::map(pieces, workers, scratch, work, watch))
+    }
+
+    /// Does one stage, of which the watch sees its share of the whole.
+    pub(crate) fn stage<R>(&mut self, work: impl FnOnce(&mut Watch<'_>) -> Result<R, Error>) -> Result<R, Error> {
+        let (total, stages, done) = (self.total, self.stages, self.done);
+        let watch = &mut *self.watch;
+        let share = |part: f64| (total as f64 * ((done as f64 + part) / stages as f64).min(1.0)).floor();
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between zero and the total")]
+        let result = work(&mut |now, all| watch(share(now as f64 / all.max(1) as f64) as usize, total));
+        self.done += 1;
+        result
+    }
+}

@@ -1,0 +1,121 @@
+//! Power spectra: a Fourier transform of a power of two, and the averaged spectrum of a record.
+
+use std::f64::consts::PI;
+
+use crate::samples::{Samples, is_usable};
+
+/// Segments that are averaged at most, spread over the record.
+const MOST_SEGMENTS: usize = 256;
+
+/// The discrete Fourier transform of a real sequence of a length that is a power of two: frequencies from zero to half the sample rate,
+/// real and imaginary parts.
+pub(crate) fn transform(samples: &[f64]) -> Vec<[f64; 2]> {
+    let length = samples.len();
+    assert!(length.is_power_of_two(), "the length {length} is no power of two");
+    let bits = length.trailing_zeros();
+    let mut values: Vec<[f64; 2]> = (0..length)
+        .map(|i| [samples[if bits == 0 { 0 } else { i.reverse_bits() >> (usize::BITS - bits) }], 0.0])
+        .collect();
+    let turns: Vec<[f64; 2]> = (0..length / 2)
+        .map(|k| {
+            let (sine, cosine) = (-2.0 * PI * k as f64 / length as f64).sin_cos();
+            [cosine, sine]
+        })
+        .collect();
+    let mut half = 1;
+    while half < length {
+        let stride = length / (2 * half);
+        for pair in values.chunks_exact_mut(2 * half) {
+            let (low, high) = pair.split_at_mut(half);
+            for (k, (a, b)) in low.iter_mut().zip(high).enumerate() {
+                let [cosine, sine] = turns[k * stride];
+                let turned = [cosine * b[0] - sine * b[1], cosine * b[1] + sine * b[0]];
+                *b = [a[0] - turned[0], a[1] - turned[1]];
+                *a = [a[0] + turned[0], a[1] + turned[1]];
+            }
+        }
+        half *= 2;
+    }
+    values.truncate(length / 2 + 1);
+    values
+}
+
+/// The frequency response of a kernel that is centred on its middle sample, padded to a power of two.
+pub(crate) fn response(kernel: &[f64], length: usize) -> Vec<[f64; 2]> {
+    let half = kernel.len() / 2;
+    let mut padded = vec![0.0; length];
+    for (k, &value) in kernel.iter().enumerate() {
+        // A dot product reads forwards in time, so the response is that of the kernel turned round.
+        padded[(length + half - k) % length] += value;
+    }
+    transform(&padded)
+}
+
+/// The power of a record by frequency, so that its mean over all frequencies, both signs, is the mean square: of segments of `length`
+/// samples, a power of two, that overlap by half and fade in and out. Segments with a sample that cannot be used are left out.
+///
+/// Only the changes are of interest, so the mean of each segment is taken off.
+pub(crate) fn power(record: &dyn Samples, length: usize) -> Vec<f64> {
+    let fade: Vec<f64> = (0..length).map(|k| (PI * (k as f64 + 0.5) / length as f64).sin().powi(2)).collect();
+    let energy: f64 = fade.iter().map(|value| value * value).sum();
+    let mut sum = vec![0.0; length / 2 + 1];
+    let mut count = 0.0_f64;
+    let mut samples = vec![0.0; length];
+    let last = record.len().saturating_sub(length);
+    let every = (length / 2).max(last / MOST_SEGMENTS).max(1);
+    for first in (0..=last).step_by(every).take_while(|_| record.len() >= length) {
+        record.read(first, &mut samples);
+        if !samples.iter().all(|&value| is_usable(value)) {
+            continue;
+        }
+        let mean = samples.iter().sum::<f64>() / length as f64;
+        samples.iter_mut().zip(&fade).for_each(|(value, fade)| *value = (*value - mean) * fade);
+        for (sum, [real, imaginary]) in sum.iter_mut().zip(transform(&samples)) {
+            *sum += (real * real + imaginary * imaginary) / energy;
+        }
+        count += 1.0;
+    }
+    sum.iter_mut().for_each(|value| *value /= count.max(1.0));
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_transform_is_the_sum_it_is_defined_by() {
+        for length in [1, 2, 8, 64] {
+            let samples: Vec<f64> = (0..length).map(|i| (i as f64 * 1.7).sin() + 0.1 * i as f64).collect();
+            for (k, [real, imaginary]) in transform(&samples).into_iter().enumerate() {
+                let angle = |i: usize| -2.0 * PI * (k * i) as f64 / length as f64;
+                let expected = [
+                    samples.iter().enumerate().map(|(i, value)| value * angle(i).cos()).sum::<f64>(),
+                    samples.iter().enumerate().map(|(i, value)| value * angle(i).sin()).sum::<f64>(),
+                ];
+                assert!((real - expected[0]).abs() < 1e-11 && (imaginary - expected[1]).abs() < 1e-11);
+            }
+        }
+    }
+
+    #[test]
+    fn a_sine_has_its_power_at_its_frequency() {
+        let samples: Vec<f64> = (0..4096).map(|i| 3.0 + 2.0 * (2.0 * PI * 0.125 * i as f64).sin()).collect();
+        let spectrum = power(&samples.as_slice(), 512);
+        let total = 2.0 * spectrum[1..256].iter().sum::<f64>() / 512.0;
+        assert!((total - 2.0).abs() < 1e-6, "{total}");
+        assert!(2.0 * spectrum[62..=66].iter().sum::<f64>() / 512.0 > 1.999);
+    }
+
+    #[test]
+    fn a_response_tells_what_a_kernel_makes_of_a_sine() {
+        let kernel: Vec<f64> = (-3..=3).map(|k| f64::from(k * k + k)).collect();
+        let found = response(&kernel, 32)[5];
+        let omega = 2.0 * PI * 5.0 / 32.0;
+        let expected = kernel.iter().enumerate().fold([0.0, 0.0], |[real, imaginary], (k, value)| {
+            let angle = omega * (k as f64 - 3.0);
+            [real + value * angle.cos(), imaginary + value * angle.sin()]
+        });
+        assert!((found[0] - expected[0]).abs() < 1e-12 && (found[1] - expected[1]).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,85 @@
+//! What may have been left out of the equation of motion: friction, an offset, a hardening spring, a lag of the torque.
+//!
+//! Each is added to the constants on its own and judged by its standard error (a score test, near enough).
+
+use crate::equations::Rows;
+use crate::error::Error;
+use crate::factor::Layout;
+use crate::model::{Fit, Model};
+use crate::pooling::{Expected, influence, sandwich};
+use crate::row_covariance::RowCovariance;
+use crate::run::Run;
+use crate::simd::Instructions;
+
+/// A term is suspected where its factor exceeds its standard error so many times.
+const CONSPICUOUS: f64 = 5.0;
+
+/// Something that may have been left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Missing {
+    /// A constant torque.
+    Offset,
+    /// Dry friction.
+    Coulomb,
+    /// A hardening or softening spring.
+    Cubic,
+    /// The torque comes late.
+    Lag,
+}
+
+/// What was left out and its factor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Suspect {
+    /// What it is.
+    pub missing: Missing,
+    /// Its factor: N·m, N·m, N·m/rad³, or samples.
+    pub value: f64,
+    /// Its standard error.
+    pub error: f64,
+}
+
+impl Suspect {
+    /// Whether it is more than chance.
+    #[must_use]
+    pub fn is_conspicuous(&self) -> bool {
+        self.value.abs() > CONSPICUOUS * self.error
+    }
+}
+
+/// What a fit was made with.
+pub(crate) struct Judged<'a> {
+    pub(crate) rows: &'a Rows,
+    pub(crate) model: &'a Model,
+    pub(crate) side: &'a [f64],
+    /// Variance of the angle's noise.
+    pub(crate) noise: f64,
+    pub(crate) fit: &'a Fit,
+    pub(crate) covariance: &'a RowCovariance,
+    pub(crate) expected: Expected,
+    /// What variances are multiplied by.
+    pub(crate) inflation: f64,
+    pub(crate) instructions: Instructions,
+}
+
+impl Judged<'_> {
+    /// Adds one regressor to the constants and returns its factor with its standard error; nothing where it is not determined.
+    pub(crate) fn factor(&self, regressor: usize, run: &mut Run<'_, '_>) -> Result<Option<(f64, f64)>, Error> {
+        let mut model = self.model.clone();
+        model.constant.push(regressor);
+        let problem = model.problem(self.rows, self.side, self.noise, Some(self.covariance));
+        let fit = match self.fit.scale {
+            None if self.fit.full.fields.layout.local() > 0 => {
+                Fit::in_rows(&problem, self.fit.span, self.expected, self.instructions)
+            }
+            scale => Fit::new(&problem, scale, self.expected, self.instructions, run)?,
+        };
+        let Some(fit) = fit else { return Ok(None) };
+        let windows = 0..fit.full.len();
+        let Layout { constant, .. } = problem.layout;
+        let centre = |window| fit.centre(window);
+        let columns = influence(&problem, &fit.full, windows, &fit.pooled.weights, fit.step, fit.span, centre);
+        let variances = sandwich(&columns, &fit.pooled.inverse, self.covariance);
+        let variance = self.inflation * variances[constant * constant - 1];
+        Ok(Some((fit.pooled.values[constant - 1], variance.sqrt())))
+    }
+}

@@ -1,0 +1,346 @@
+//! Identification of one record in weak form: what is constant from all windows together, what changes from windows around every row.
+
+use std::num::NonZeroUsize;
+
+use crate::constancy::Test;
+use crate::criterion::Criterion;
+use crate::error::Error;
+use crate::local_polynomials::{Estimates, LocalPolynomials, Options, Order};
+use crate::model::{Fit, Model};
+use crate::motion::{Coefficient, Motion, Term, sign};
+use crate::noise::channel_variance;
+use crate::output::Elements;
+use crate::parallel::Watch;
+use crate::pooling::Expected;
+use crate::row_covariance::RowCovariance;
+use crate::run::Run;
+use crate::samples::Samples;
+use crate::scale::Scale;
+use crate::selection::Selection;
+use crate::simd::Instructions;
+use crate::spectrum::power;
+use crate::suspects::{Missing, Suspect};
+use crate::test_function::TestFunction;
+use crate::test_function_choice::{Candidates, Evidence, half_widths, spectrum_length};
+use crate::weak_form::{Record, TermSamples, WeakRows};
+use crate::weak_results::SampleResults;
+
+/// Half-widths of the test function that windows span while it is chosen.
+const PILOT_WINDOW: usize = 4;
+/// Rounds of choosing the test function and estimating what the choice depends on.
+const ROUNDS: usize = 6;
+/// Stages of a call, about: only for showing progress.
+const STAGES: usize = 60;
+/// A cross-validation error beyond which the rows hold more than the noise of the channels explains.
+pub const NOISE_MODEL_FAILS: f64 = 4.0;
+
+/// How an unknown comes about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// One value in every window.
+    Windowed,
+    /// One value over the record.
+    Constant,
+    /// Constant unless the record says otherwise.
+    Tested,
+    /// Changes more slowly than what is windowed.
+    Varying,
+}
+
+/// How to identify.
+#[derive(Clone, Debug)]
+pub struct WeakOptions {
+    /// Seconds from one sample to the next.
+    pub delta: f64,
+    /// Samples on either side of a test function's centre; chosen from the spectra where not given.
+    pub half_width: Option<usize>,
+    /// Exponent of the test function; chosen likewise.
+    pub exponent: Option<usize>,
+    /// Samples that a window spans; chosen by cross-validation.
+    pub equations: Option<usize>,
+    /// Whether windows of many lengths, before, around and after a sample are averaged, instead of one of the given length.
+    pub average: bool,
+    /// Whether what is windowed may grow linearly within a window.
+    pub linear: bool,
+    /// How each unknown comes about: unknown coefficients in the order inertia, damping, stiffness, then terms.
+    pub kinds: Vec<Kind>,
+    /// Variances of the noise of angle and torque; estimated where not given.
+    pub noise: [Option<f64>; 2],
+    /// By how many samples the torque comes late.
+    pub lag: f64,
+    /// Every how many samples numbers are wanted.
+    pub step: usize,
+    /// Whether to look for what may have been left out, and for what not to look.
+    pub diagnose: bool,
+    /// What cannot be missing because it is there.
+    pub not_missing: Vec<Missing>,
+    /// Vector instructions.
+    pub instructions: Instructions,
+}
+
+/// A parameter that is constant over the record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Constant {
+    /// Which unknown: 0 inertia, 1 damping, 2 stiffness, then terms.
+    pub unknown: usize,
+    /// Its value.
+    pub value: f64,
+    /// Its standard error.
+    pub error: f64,
+    /// Whether it is the same in all parts of the record.
+    pub test: Option<Test>,
+}
+
+/// What was found in one record.
+#[derive(Clone, Debug)]
+pub struct WeakIdentified {
+    /// The test function.
+    pub function: TestFunction,
+    /// Variances of the noise of angle and torque.
+    pub noise: [f64; 2],
+    /// Samples spanned by the windows that windowed unknowns are eliminated in: those that predict best where none were given.
+    pub equations: usize,
+    /// Lengths of windows that were tried, in samples, and how well each predicts.
+    pub lengths: Vec<(usize, f64)>,
+    /// Mean squared error of predicting a row from others, over the noise's.
+    pub prediction_error: f64,
+    /// Samples that coefficients which change slowly are taken from.
+    pub pooling: Option<f64>,
+    /// What turned out to be constant.
+    pub constants: Vec<Constant>,
+    /// The covariance of the constants, row by row.
+    pub covariance: Vec<f64>,
+    /// Condition number of the equations for the constants; infinite where they are not determined.
+    pub condition: f64,
+    /// How much each constant takes part in the combination that is determined worst, its column scaled to a norm of one.
+    pub weakest: Vec<f64>,
+    /// What may have been left out.
+    pub suspects: Vec<Suspect>,
+    /// Unknowns that change, in the order of the values at the samples.
+    pub changing: Vec<usize>,
+    /// Pairs of unknowns whose covariances are at the samples.
+    pub pairs: Vec<(usize, usize)>,
+    /// Samples before which what changes jumps.
+    pub jumps: Vec<usize>,
+    /// Numbers at the samples.
+    pub results: SampleResults,
+}
+
+/// Rows with the test function that was chosen.
+pub(crate) struct Chosen {
+    pub(crate) weak: WeakRows,
+    /// Inertia, damping and stiffness, about.
+    pub(crate) parameters: [f64; 3],
+    /// Whether the narrowest or widest was chosen of all that were tried.
+    pub(crate) at_end: bool,
+}
+
+/// One record under work.
+pub(crate) struct Session<'a, 'b, 'c> {
+    pub(crate) record: &'a Record<'a>,
+    pub(crate) options: &'a WeakOptions,
+    pub(crate) noise: [f64; 2],
+    pub(crate) run: Run<'b, 'c>,
+}
+
+/// Identifies one record in weak form.
+///
+/// # Errors
+/// If the record is too short, its rows do not determine what is constant, or the watch cancels.
+pub fn identify_weak(
+    motion: &Motion<'_>,
+    mask: Option<&[bool]>,
+    options: &WeakOptions,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<WeakIdentified, Error> {
+    let samples = motion.angle.len();
+    let mut angle = Vec::new();
+    if motion.terms.iter().any(|term| matches!(term, Term::Coulomb | Term::Cubic)) {
+        angle.resize(samples, 0.0);
+        motion.angle.read(0, &mut angle);
+    }
+    let velocity = match motion.terms.iter().any(|term| matches!(term, Term::Coulomb)) {
+        true => velocity(motion.angle, options, workers, watch)?,
+        false => Vec::new(),
+    };
+    let cubed: Vec<f64> = angle.iter().map(|angle| angle * angle * angle).collect();
+    let direction: Vec<f64> = velocity.iter().map(|&velocity| sign(velocity)).collect();
+    let (cubed, direction) = (cubed.as_slice(), direction.as_slice());
+    let terms = motion.terms.iter().map(|term| match *term {
+        Term::Offset => TermSamples::One,
+        Term::Coulomb => TermSamples::Given(&direction),
+        Term::Cubic => TermSamples::Given(&cubed),
+        Term::Record(record) => TermSamples::Given(record),
+    });
+    let record = Record {
+        angle: motion.angle,
+        torque: motion.torque,
+        coefficients: motion.coefficients,
+        terms: terms.collect(),
+        lag: options.lag,
+        mask,
+    };
+    identify(&record, options, workers, watch)
+}
+
+/// The velocity at every sample, from local polynomials an eighth of a typical cycle to either side.
+fn velocity(
+    angle: &dyn Samples,
+    options: &WeakOptions,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<f64>, Error> {
+    let samples = angle.len();
+    let evidence = Evidence {
+        power: power(angle, spectrum_length(samples, 200)),
+        samples,
+        noise: [channel_variance(angle, None, options.instructions), 0.0],
+        delta: options.delta,
+        unknown: [true; 3],
+    };
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a few samples")]
+    let half = (evidence.period() / 8.0).clamp(8.0, 100.0) as usize;
+    let plan = LocalPolynomials::new(Options {
+        window_length: (2 * half + 1).min((samples.max(1) - 1) / 2 * 2 + 1),
+        order: Order::Chosen { criterion: Criterion::Aicc, highest: 15 },
+        derivatives: vec![1],
+        delta: options.delta,
+        noise: false,
+        selection: Selection::Window,
+        quantisation: 0.0,
+        instructions: options.instructions,
+    })?;
+    let mut velocity = vec![0.0; samples];
+    let estimates = Estimates {
+        elements: Elements { first: 0, step: 1 },
+        derivatives: vec![&mut velocity],
+        order: &mut [],
+        status: &mut [],
+        sigma: &mut [],
+    };
+    plan.run(vec![(angle, estimates)], true, workers, watch)?;
+    Ok(velocity)
+}
+
+/// Identifies one record.
+fn identify(
+    record: &Record<'_>,
+    options: &WeakOptions,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<WeakIdentified, Error> {
+    let samples = record.angle.len();
+    let level = |given: Option<f64>, channel| given.unwrap_or_else(|| channel_variance(channel, None, options.instructions));
+    let noise = [level(options.noise[0], record.angle), level(options.noise[1], record.torque)];
+    let mut session = Session { record, options, noise, run: Run::new(workers, samples, STAGES, watch) };
+    let model = session.model();
+    let chosen = session.choose_test_function(&model)?;
+    let decided = session.decide(&chosen, &model)?;
+    session.report(chosen, decided)
+}
+
+impl Session<'_, '_, '_> {
+    /// Regressors of the unknowns: coefficients that are not known, then terms.
+    pub(crate) fn unknowns(&self) -> Vec<usize> {
+        let coefficients = self.record.coefficients.iter().enumerate();
+        let unknown = coefficients.filter(|(_, one)| matches!(one, Coefficient::Unknown)).map(|(index, _)| index);
+        unknown.chain((0..self.record.terms.len()).map(|term| 3 + term)).collect()
+    }
+
+    pub(crate) fn model(&self) -> Model {
+        let unknowns = self.unknowns();
+        let of = |windowed: bool| {
+            let kinds = unknowns.iter().zip(&self.options.kinds);
+            kinds.filter(|(_, kind)| (**kind == Kind::Windowed) == windowed).map(|(index, _)| *index).collect()
+        };
+        Model { windowed: of(true), constant: of(false), linear: self.options.linear }
+    }
+
+    /// Inertia, damping and stiffness as far as a fit knows them.
+    pub(crate) fn parameters(&self, model: &Model, fit: &Fit) -> [f64; 3] {
+        std::array::from_fn(|index| match self.record.coefficients[index] {
+            Coefficient::Number(number) => number,
+            Coefficient::Record(_) => 0.0,
+            Coefficient::Unknown => {
+                let constant = model.constant.iter().position(|&one| one == index);
+                let windowed = model.windowed.iter().position(|&one| one == index);
+                let value = constant.map(|place| fit.pooled.values[place]);
+                let value = value.or(windowed.map(|place| fit.median(place))).unwrap_or(0.0);
+                if index == 1 { value.max(0.0) } else { value }
+            }
+        })
+    }
+
+    /// The rows' covariance as the noise of both channels makes it, and what windows are expected to leave.
+    pub(crate) fn covariance(&self, weak: &WeakRows, parameters: [f64; 3]) -> (RowCovariance, Expected) {
+        let known = RowCovariance::known(&weak.kernels, &weak.torque, parameters, self.noise, weak.stride);
+        let torque = RowCovariance::known(&weak.kernels, &weak.torque, [0.0; 3], self.noise, weak.stride).variance();
+        let expected = Expected::new(&known, torque);
+        (known, expected)
+    }
+
+    /// A first estimate, in windows of a few test functions.
+    fn pilot(&mut self, weak: &WeakRows, model: &Model) -> Result<[f64; 3], Error> {
+        let problem = model.problem(&weak.rows, &weak.rows.side, self.noise[0], None);
+        let scales = Scale::all(weak.rows.len(), weak.reach());
+        let wanted = PILOT_WINDOW * weak.function.half_width() / weak.stride;
+        let scale = match model.windowed.is_empty() {
+            true => None,
+            false => Some(scales[Scale::nearest(&scales, wanted).ok_or(self.too_short())?]),
+        };
+        let any = Expected { variance: 1.0, torque: 0.0, redundancy: 1.0 };
+        let fit = Fit::new(&problem, scale, any, self.options.instructions, &mut self.run)?;
+        Ok(fit.map_or([0.0; 3], |fit| self.parameters(model, &fit)))
+    }
+
+    pub(crate) fn too_short(&self) -> Error {
+        Error::RecordTooShortForWindows { samples: self.record.angle.len() }
+    }
+
+    fn rows(&mut self, function: TestFunction) -> Result<WeakRows, Error> {
+        let (record, delta, workers) = (self.record, self.options.delta, self.run.workers);
+        self.run.stage(|watch| WeakRows::build(record, function, delta, workers, watch))
+    }
+
+    /// Chooses half-width and exponent where they are not given, and estimates the coefficients on the way.
+    fn choose_test_function(&mut self, model: &Model) -> Result<Chosen, Error> {
+        let (samples, delta) = (self.record.angle.len(), self.options.delta);
+        let (width, exponent) = (self.options.half_width, self.options.exponent);
+        if let (Some(width), Some(exponent)) = (width, exponent) {
+            let weak = self.rows(TestFunction::new(width, exponent, delta)?)?;
+            let parameters = self.pilot(&weak, model)?;
+            return Ok(Chosen { weak, parameters, at_end: false });
+        }
+        let widest = samples / 32;
+        let evidence = |length: usize| Evidence {
+            power: power(self.record.angle, length),
+            samples,
+            noise: self.noise,
+            delta,
+            unknown: std::array::from_fn(|index| matches!(self.record.coefficients[index], Coefficient::Unknown)),
+        };
+        let typical = evidence(spectrum_length(samples, 200)).period().min(widest as f64);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the record's length")]
+        let typical = (typical.round() as usize).max(1);
+        let widths = width.map_or_else(|| half_widths((4 * typical).min(widest)), |width| vec![width]);
+        let widest = *widths.last().ok_or(self.too_short())?;
+        let candidates = Candidates::new(evidence(spectrum_length(samples, widest)), &widths, exponent);
+        let mut current = TestFunction::new(width.unwrap_or(typical.max(4)), exponent.unwrap_or(9), delta)?;
+        let mut seen = Vec::new();
+        loop {
+            let weak = self.rows(current)?;
+            let parameters = self.pilot(&weak, model)?;
+            match candidates.best(parameters) {
+                Some(best) if best != current && !seen.contains(&best) && seen.len() < ROUNDS => {
+                    seen.push(current);
+                    current = best;
+                }
+                _ => {
+                    let end = [widths.first(), widths.last()].contains(&Some(&current.half_width()));
+                    return Ok(Chosen { weak, parameters, at_end: width.is_none() && end });
+                }
+            }
+        }
+    }
+}

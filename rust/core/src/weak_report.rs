@@ -1,0 +1,457 @@
+//! What is said of a record once it is decided what changes: values at every sample, their errors, and what looks wrong.
+
+use crate::averaging::average;
+use crate::constancy::NO_CHANCE;
+use crate::error::Error;
+use crate::every_window::every_window;
+use crate::identification::HARDLY_TOLD_APART;
+use crate::model::{Fit, Predictor, without_constants};
+use crate::pooling::{Expected, influence, sandwich, weakest};
+use crate::row_covariance::RowCovariance;
+use crate::status::Status;
+use crate::suspects::{Judged, Missing, Suspect};
+use crate::weak_decision::{Decided, rows_of};
+use crate::weak_form::{Record, TermSamples, WeakRows};
+use crate::weak_identification::{Chosen, Constant, NOISE_MODEL_FAILS, Session, WeakIdentified};
+use crate::weak_results::{RowResults, SampleResults};
+use crate::windows::Problem;
+
+/// A correlation of the residuals beyond the reach of a test function that no white noise shows, at least.
+const COLOURED: f64 = 0.15;
+
+/// How errors are made.
+struct Errors {
+    covariance: RowCovariance,
+    expected: Expected,
+    /// What variances are multiplied by.
+    inflation: f64,
+    /// What is wrong with the noise.
+    status: Status,
+}
+
+/// What changes, at rows from `first` on, whatever it was taken from.
+struct Tracks {
+    first: isize,
+    values: Vec<Vec<f64>>,
+    slopes: Vec<Vec<f64>>,
+    /// Covariances for given constants, the lower half row by row.
+    covariances: Vec<Vec<f64>>,
+    sensitivities: Vec<Vec<f64>>,
+    condition: Vec<f64>,
+    status: Vec<u16>,
+}
+
+impl Session<'_, '_, '_> {
+    pub(crate) fn report(&mut self, chosen: Chosen, decided: Decided) -> Result<WeakIdentified, Error> {
+        let Chosen { mut weak, at_end, .. } = chosen;
+        let stride = weak.stride;
+        let ordered = decided.ordered();
+        let mut found = WeakIdentified {
+            function: weak.function,
+            noise: self.noise,
+            equations: 0,
+            lengths: decided.lengths.clone(),
+            prediction_error: decided.error,
+            pooling: decided.found.as_ref().map(|found| 2.0 * found.reach * stride as f64),
+            constants: Vec::new(),
+            covariance: Vec::new(),
+            condition: f64::INFINITY,
+            weakest: Vec::new(),
+            suspects: Vec::new(),
+            changing: decided.model.windowed.iter().chain(&decided.slow).copied().collect(),
+            pairs: Vec::new(),
+            jumps: Vec::new(),
+            results: SampleResults::default(),
+        };
+        let Some(fit) = &decided.fit else { return Ok(self.undetermined(found, &decided)) };
+        let given = self.options.equations.filter(|_| !self.options.average);
+        found.equations = given.unwrap_or(fit.span * stride).min(self.record.angle.len());
+        let errors = self.errors(&weak, &decided, fit);
+        let problem = ordered.problem(&weak.rows, decided.side(&weak.rows), self.noise[0], Some(&errors.covariance));
+        let all = self.refit(&problem, fit, errors.expected)?;
+        let Some(all) = all else { return Ok(self.undetermined(found, &decided)) };
+        found.condition = all.pooled.condition;
+        found.weakest = weakest(&all.full, &all.pooled.weights);
+        let windows = 0..all.full.len();
+        let centre = |window| all.centre(window);
+        let columns = influence(&problem, &all.full, windows, &all.pooled.weights, all.step, all.span, centre);
+        found.covariance = sandwich(&columns, &all.pooled.inverse, &errors.covariance);
+        found.covariance.iter_mut().for_each(|entry| *entry *= errors.inflation);
+
+        let slow = decided.slow.len();
+        let count = ordered.constant.len();
+        let mut values = vec![0.0; slow];
+        values.extend(&fit.pooled.values);
+        for (place, &unknown) in decided.model.constant.iter().enumerate() {
+            let test = decided.tests.iter().find(|(one, _)| *one == unknown).map(|(_, test)| test.clone());
+            let variance = found.covariance[(place + slow) * (count + 1)];
+            found.constants.push(Constant { unknown, value: values[place + slow], error: variance.sqrt(), test });
+        }
+        let mut status = errors.status;
+        let contradicted = |one: &Constant| one.test.as_ref().is_some_and(|test| test.probability < NO_CHANCE);
+        if found.constants.iter().any(contradicted) {
+            status |= Status::KIND_CONTRADICTED;
+        }
+        if at_end || decided.scales.first().is_some_and(|first| Some(*first) == fit.scale) && decided.scales.len() > 1 {
+            status |= Status::WINDOW_LIMIT;
+        }
+        if found.condition > HARDLY_TOLD_APART {
+            status |= Status::ILL_CONDITIONED;
+        }
+        let tracks = self.tracks(&problem, &weak, &decided, fit, &values, errors.expected)?;
+        let results = self.rows_results(&weak, &problem, &decided, &all, &errors, &tracks, &found, &values);
+        let (results, pairs) = results;
+        found.pairs = pairs;
+        let side = decided.side(&weak.rows).to_vec();
+        found.suspects = self.suspects(&mut weak, &decided, fit, &side, &errors)?;
+        for suspect in found.suspects.iter().filter(|suspect| suspect.is_conspicuous()) {
+            status |= if suspect.missing == Missing::Lag { Status::LAG_SUSPECTED } else { Status::TERM_SUSPECTED };
+        }
+        found.results = results.at_samples(self.record.angle.len(), self.options.step);
+        found.results.status.iter_mut().for_each(|one| *one |= status.bits());
+        Ok(found)
+    }
+
+    /// Nothing but a status.
+    fn undetermined(&self, mut found: WeakIdentified, decided: &Decided) -> WeakIdentified {
+        let elements = self.record.angle.len().div_ceil(self.options.step);
+        let nothing = || vec![f64::NAN; elements];
+        for &unknown in &decided.model.constant {
+            found.constants.push(Constant { unknown, value: f64::NAN, error: f64::NAN, test: None });
+        }
+        found.results = SampleResults {
+            values: found.changing.iter().map(|_| nothing()).collect(),
+            errors: found.changing.iter().map(|_| nothing()).collect(),
+            covariances: Vec::new(),
+            deviation: nothing(),
+            condition: vec![f64::INFINITY; elements],
+            status: vec![(Status::INVALID | Status::RANK_DEFICIENT).bits(); elements],
+        };
+        found
+    }
+
+    /// Solves another problem in the windows of a fit.
+    fn refit(&mut self, problem: &Problem<'_>, fit: &Fit, expected: Expected) -> Result<Option<Fit>, Error> {
+        let instructions = self.options.instructions;
+        if fit.scale.is_none() && problem.layout.local() > 0 {
+            return Ok(Fit::in_rows(problem, fit.span, expected, instructions));
+        }
+        Fit::new(problem, fit.scale, expected, instructions, &mut self.run)
+    }
+
+    /// The covariance that errors are made from: that of the channels' noise, or where it fails to explain the residuals, theirs.
+    fn errors(&self, weak: &WeakRows, decided: &Decided, fit: &Fit) -> Errors {
+        let mut errors = Errors {
+            covariance: decided.covariance.clone(),
+            expected: decided.expected,
+            inflation: decided.error.max(1.0),
+            status: Status::GOOD,
+        };
+        let rows = &weak.rows;
+        let problem = decided.model.problem(rows, decided.side(rows), self.noise[0], None);
+        let residuals = residuals(&problem, fit);
+        let reach = 2 * weak.reach();
+        let shown = RowCovariance::of_residuals(&residuals, &rows.usable, 2 * reach);
+        if shown.is_coloured(reach, COLOURED, rows.usable.iter().filter(|usable| **usable).count()) {
+            errors.status |= Status::COLOURED;
+        }
+        let whole = decided.model.windowed.is_empty();
+        let error = if whole { shown.variance() / errors.expected.variance } else { decided.error };
+        if whole {
+            errors.inflation = error.max(1.0);
+        }
+        if error > NOISE_MODEL_FAILS {
+            errors.status |= Status::NOISE_MODEL;
+            errors.inflation = 1.0;
+            errors.expected = Expected::new(&shown, shown.variance());
+            errors.covariance = shown;
+        }
+        errors
+    }
+
+    /// What changes, at every row.
+    fn tracks(
+        &mut self,
+        problem: &Problem<'_>,
+        weak: &WeakRows,
+        decided: &Decided,
+        fit: &Fit,
+        constants: &[f64],
+        expected: Expected,
+    ) -> Result<Tracks, Error> {
+        let rows = &weak.rows;
+        let instructions = self.options.instructions;
+        let windowed = problem.layout.windowed;
+        if windowed == 0 {
+            let nothing = || Vec::new();
+            return Ok(Tracks {
+                first: 0,
+                values: nothing(),
+                slopes: nothing(),
+                covariances: nothing(),
+                sensitivities: nothing(),
+                condition: vec![1.0; rows.len()],
+                status: vec![0; rows.len()],
+            });
+        }
+        if !self.options.average {
+            // Rows that would lie before and after the record have windows too, as long as half of them is there.
+            let beyond = weak.first.div_ceil(weak.stride).cast_signed();
+            let range = -beyond..rows.len().cast_signed() + beyond + 1;
+            let (ill, run) = (HARDLY_TOLD_APART, &mut self.run);
+            let window = self.options.equations.map_or(fit.span, |samples| rows_of(samples, weak.stride));
+            let found = every_window(problem, window, range.clone(), constants, ill, instructions, run)?;
+            let slopes = found.values.iter().map(|column| vec![0.0; column.len()]).collect();
+            return Ok(Tracks {
+                first: range.start,
+                values: found.values,
+                slopes,
+                covariances: found.covariances,
+                sensitivities: found.sensitivities,
+                condition: found.condition,
+                status: found.status,
+            });
+        }
+        let averages = average(problem, &decided.scales, constants, expected, fit.span, instructions, &mut self.run)?;
+        let names = fit.full.fields;
+        let condition = fit.full.field(names.condition());
+        let status = (0..rows.len()).map(|row| {
+            let mut status = if rows.usable[row] { Status::GOOD } else { Status::GAP };
+            if averages.values.iter().any(|column| column[row].is_nan()) {
+                status |= Status::INVALID;
+            }
+            if condition[nearest(fit, row)] > HARDLY_TOLD_APART {
+                status |= Status::ILL_CONDITIONED;
+            }
+            status.bits()
+        });
+        let status = status.collect();
+        let mut covariances = Vec::new();
+        for unknown in 0..windowed {
+            for other in 0..=unknown {
+                let squared =
+                    averages.errors[unknown].iter().map(|error| if other == unknown { error * error } else { 0.0 });
+                covariances.push(squared.collect());
+            }
+        }
+        Ok(Tracks {
+            first: 0,
+            covariances,
+            slopes: averages
+                .slopes
+                .iter()
+                .map(|column| column.iter().map(|slope| slope * rows.period).collect())
+                .collect(),
+            values: averages.values,
+            sensitivities: averages.sensitivities,
+            condition: (0..rows.len()).map(|row| condition[nearest(fit, row)]).collect(),
+            status,
+        })
+    }
+
+    /// Puts together what changes and its errors.
+    #[allow(clippy::too_many_arguments, reason = "all that was found")]
+    fn rows_results(
+        &self,
+        weak: &WeakRows,
+        problem: &Problem<'_>,
+        decided: &Decided,
+        all: &Fit,
+        errors: &Errors,
+        tracks: &Tracks,
+        found: &WeakIdentified,
+        constants: &[f64],
+    ) -> (RowResults, Vec<(usize, usize)>) {
+        let count = problem.layout.constant;
+        let (windowed, slow) = (problem.layout.windowed, decided.slow.len());
+        let length = tracks.status.len();
+        let row_of = |place: usize| (tracks.first + place.cast_signed()) as f64;
+        // A slow coefficient is taken from a part of the record only, so its error is larger.
+        let share = |constant: usize, place: usize| match &decided.found {
+            Some(found) if constant < slow => {
+                let whole = all.pooled.inverse[constant * (count + 1)];
+                (found.varying.variance(constant, row_of(place)) / whole).sqrt()
+            }
+            _ => 1.0,
+        };
+        let between = |one: usize, other: usize, place: usize| {
+            share(one, place) * share(other, place) * found.covariance[one * count + other]
+        };
+        let sensitive =
+            |unknown: usize, constant: usize, place: usize| tracks.sensitivities[unknown * count + constant][place];
+        let covariance = |one: usize, other: usize, place: usize| -> f64 {
+            match (one.checked_sub(windowed), other.checked_sub(windowed)) {
+                (Some(one), Some(other)) => between(one, other, place),
+                (Some(constant), None) => {
+                    (0..count).map(|k| sensitive(other, k, place) * between(k, constant, place)).sum()
+                }
+                (None, Some(constant)) => {
+                    (0..count).map(|k| sensitive(one, k, place) * between(k, constant, place)).sum()
+                }
+                (None, None) => {
+                    let own = tracks.covariances[crate::factor::symmetric(one, other)][place] * errors.inflation;
+                    let passed_on: f64 = (0..count)
+                        .flat_map(|i| (0..count).map(move |j| (i, j)))
+                        .map(|(i, j)| sensitive(one, i, place) * sensitive(other, j, place) * between(i, j, place))
+                        .sum();
+                    own + passed_on
+                }
+            }
+        };
+        let names: Vec<usize> =
+            decided.model.windowed.iter().chain(&decided.slow).chain(&decided.model.constant).copied().collect();
+        let changing = windowed + slow;
+        let mut results = RowResults {
+            first: weak.first as f64 + tracks.first as f64 * weak.stride as f64,
+            stride: weak.stride as f64,
+            values: tracks.values.clone(),
+            slopes: tracks.slopes.clone(),
+            condition: tracks.condition.clone(),
+            status: tracks.status.clone(),
+            ..RowResults::default()
+        };
+        if let Some(found) = &decided.found {
+            for coefficient in 0..slow {
+                let at = |place: usize| found.varying.at(coefficient, row_of(place));
+                results.values.push((0..length).map(|place| at(place).0).collect());
+                results.slopes.push((0..length).map(|place| at(place).1).collect());
+            }
+        }
+        for one in 0..changing {
+            results.errors.push((0..length).map(|place| covariance(one, one, place).max(0.0).sqrt()).collect());
+        }
+        let mut pairs = Vec::new();
+        for one in 0..names.len() {
+            for other in 0..one {
+                if names[one] < 3 && names[other] < 3 {
+                    pairs.push((names[one], names[other]));
+                    results.covariances.push((0..length).map(|place| covariance(one, other, place)).collect());
+                }
+            }
+        }
+        results.deviation = deviation(problem, tracks, constants, all.span);
+        (results, pairs)
+    }
+
+    /// Looks for what may have been left out.
+    fn suspects(
+        &mut self,
+        weak: &mut WeakRows,
+        decided: &Decided,
+        fit: &Fit,
+        side: &[f64],
+        errors: &Errors,
+    ) -> Result<Vec<Suspect>, Error> {
+        if !self.options.diagnose {
+            return Ok(Vec::new());
+        }
+        let samples = self.record.angle.len();
+        let mut cubed = vec![0.0; samples];
+        self.record.angle.read(0, &mut cubed);
+        cubed.iter_mut().for_each(|angle| *angle = angle.powi(3));
+        let direction = direction(weak, samples);
+        let (cubed, direction) = (cubed.as_slice(), direction.as_slice());
+        let all = [
+            (Missing::Offset, TermSamples::One),
+            (Missing::Coulomb, TermSamples::Given(&direction)),
+            (Missing::Cubic, TermSamples::Given(&cubed)),
+            (Missing::Lag, TermSamples::TorqueRate),
+        ];
+        let terms: Vec<_> =
+            all.into_iter().filter(|(missing, _)| !self.options.not_missing.contains(missing)).collect();
+        let record = Record { terms: terms.iter().map(|(_, samples)| *samples).collect(), ..self.record.clone() };
+        let (function, delta, workers) = (weak.function, self.options.delta, self.run.workers);
+        let more = self.run.stage(|watch| WeakRows::build(&record, function, delta, workers, watch))?;
+        let first = weak.rows.regressors.len();
+        weak.rows.regressors.extend(more.rows.regressors.into_iter().skip(3));
+        let mut suspects = Vec::new();
+        for (place, (missing, _)) in terms.iter().enumerate() {
+            let judged = Judged {
+                rows: &weak.rows,
+                model: &decided.model,
+                side,
+                noise: self.noise[0],
+                fit,
+                covariance: &errors.covariance,
+                expected: errors.expected,
+                inflation: errors.inflation,
+                instructions: self.options.instructions,
+            };
+            if let Some((value, error)) = judged.factor(first + place, &mut self.run)? {
+                let unit = if *missing == Missing::Lag { -1.0 / self.options.delta } else { 1.0 };
+                suspects.push(Suspect { missing: *missing, value: unit * value, error: unit.abs() * error });
+            }
+        }
+        Ok(suspects)
+    }
+}
+
+/// The window whose middle is nearest to a row.
+fn nearest(fit: &Fit, row: usize) -> usize {
+    let place = (row as f64 - (fit.span as f64 - 1.0) / 2.0) / fit.step as f64;
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the windows")]
+    let place = place.round().clamp(0.0, fit.full.len() as f64 - 1.0) as usize;
+    place
+}
+
+/// What a fit leaves of every row.
+fn residuals(problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
+    let mut left = without_constants(problem, &fit.pooled.values);
+    if problem.layout.windowed > 0 {
+        let predictor = Predictor::new(&fit.full, &fit.pooled.values);
+        for (row, left) in left.iter_mut().enumerate().filter(|(row, _)| problem.usable[*row]) {
+            let place = nearest(fit, row);
+            let later = (row as f64 - fit.centre(place)) * problem.period;
+            *left -= predictor.predict(problem, place, row, later);
+        }
+    }
+    left
+}
+
+/// Standard deviation of what is left, over windows of so many rows.
+fn deviation(problem: &Problem<'_>, tracks: &Tracks, constants: &[f64], span: usize) -> Vec<f64> {
+    let left = without_constants(problem, constants);
+    let mut sums = vec![[0.0, 0.0]];
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (row, left) in left.iter().enumerate() {
+        let mut error = *left;
+        let place = (row.cast_signed() - tracks.first).unsigned_abs();
+        for unknown in 0..problem.layout.windowed {
+            error -= tracks.values[unknown][place] * problem.windowed[unknown][row];
+            if problem.layout.linear {
+                error -= tracks.slopes[unknown][place] / problem.period * problem.companions[unknown][row];
+            }
+        }
+        if problem.usable[row] && error.is_finite() {
+            sum += error * error;
+            count += 1.0;
+        }
+        sums.push([sum, count]);
+    }
+    let rows = left.len();
+    (0..tracks.status.len())
+        .map(|place| {
+            let row = (tracks.first + place.cast_signed()).max(0).unsigned_abs();
+            let (first, end) = (row.saturating_sub(span / 2).min(rows), (row + span.div_ceil(2)).min(rows));
+            let (sum, count) = (sums[end][0] - sums[first][0], sums[end][1] - sums[first][1]);
+            if count > 0.0 { (sum / count).max(0.0).sqrt() } else { f64::NAN }
+        })
+        .collect()
+}
+
+/// The sign of the velocity at every sample, as the rows see it.
+fn direction(weak: &WeakRows, samples: usize) -> Vec<f64> {
+    let velocity = &weak.rows.regressors[1].value;
+    let last = velocity.len() - 1;
+    let at = |sample: usize| {
+        let place = (sample as f64 - weak.first as f64) / weak.stride as f64;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the rows")]
+        let row = place.floor().clamp(0.0, last as f64) as usize;
+        let part = (place - row as f64).clamp(0.0, 1.0);
+        velocity[row] + part * (velocity[(row + 1).min(last)] - velocity[row])
+    };
+    (0..samples)
+        .map(|sample| at(sample))
+        .map(|velocity| if velocity == 0.0 { 0.0 } else { velocity.signum() })
+        .collect()
+}

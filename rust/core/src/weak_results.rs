@@ -1,0 +1,115 @@
+//! Results of weak rows, and what they say at every sample.
+
+use crate::status::Status;
+
+/// Numbers at every row.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct RowResults {
+    /// The sample of row 0; rows may begin before the record.
+    pub(crate) first: f64,
+    /// Samples from one row to the next.
+    pub(crate) stride: f64,
+    /// Windowed and slow unknowns, what they grow by from row to row, and their standard errors.
+    pub(crate) values: Vec<Vec<f64>>,
+    pub(crate) slopes: Vec<Vec<f64>>,
+    pub(crate) errors: Vec<Vec<f64>>,
+    /// Covariances of pairs.
+    pub(crate) covariances: Vec<Vec<f64>>,
+    pub(crate) deviation: Vec<f64>,
+    pub(crate) condition: Vec<f64>,
+    /// Bits of [`Status`].
+    pub(crate) status: Vec<u16>,
+    /// Samples before which the values jump, in order.
+    pub(crate) jumps: Vec<usize>,
+}
+
+/// Numbers at every so-manieth sample.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SampleResults {
+    /// Unknowns that change, in the order in which they are listed.
+    pub values: Vec<Vec<f64>>,
+    /// Their standard errors.
+    pub errors: Vec<Vec<f64>>,
+    /// Covariances of pairs of unknowns.
+    pub covariances: Vec<Vec<f64>>,
+    /// Standard deviation of what is left of the torque after multiplication with the test function.
+    pub deviation: Vec<f64>,
+    /// Condition number of the equations.
+    pub condition: Vec<f64>,
+    /// Bits of [`Status`].
+    pub status: Vec<u16>,
+}
+
+impl RowResults {
+    /// What the rows say at every `step`-th of so many samples: interpolated between them, carried on beyond the first and last.
+    pub(crate) fn at_samples(&self, samples: usize, step: usize) -> SampleResults {
+        let rows = self.status.len();
+        let mut places = Vec::with_capacity(samples.div_ceil(step));
+        for sample in (0..samples).step_by(step) {
+            places.push(self.place(sample, rows));
+        }
+        let between = |column: &Vec<f64>| places.iter().map(|place| place.between(column)).collect();
+        let along = |(column, slopes): (&Vec<f64>, &Vec<f64>)| {
+            places.iter().map(|place| place.between(column) + place.beyond * slopes[place.nearest]).collect()
+        };
+        let status = places.iter().map(|place| {
+            let edge = if place.beyond == 0.0 { 0 } else { Status::EDGE.bits() };
+            self.status[place.nearest] | edge
+        });
+        SampleResults {
+            values: self.values.iter().zip(&self.slopes).map(along).collect(),
+            errors: self.errors.iter().map(between).collect(),
+            covariances: self.covariances.iter().map(between).collect(),
+            deviation: between(&self.deviation),
+            condition: between(&self.condition),
+            status: status.collect(),
+        }
+    }
+
+    fn place(&self, sample: usize, rows: usize) -> Place {
+        let exact = (sample as f64 - self.first) / self.stride;
+        let inside = exact.clamp(0.0, rows as f64 - 1.0);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the rows")]
+        let row = inside.floor() as usize;
+        let next = (row + 1).min(rows - 1);
+        let part = inside - row as f64;
+        let mut place = Place { row, next, part, beyond: exact - inside, nearest: if part < 0.5 { row } else { next } };
+        let usable = |row: usize| self.status[row] & Status::INVALID.bits() == 0;
+        if usable(row) != usable(next) && part != 0.0 {
+            // The number beside a gap is better than none.
+            let only = if usable(row) { row } else { next };
+            place = Place { row: only, next: only, part: 0.0, beyond: exact - only as f64, nearest: only };
+        }
+        // A jump between two rows: the one on the sample's side of it is carried on.
+        let jump = self.jumps.partition_point(|&jump| jump <= sample);
+        let at = |row: usize| self.first + row as f64 * self.stride;
+        let before = jump.checked_sub(1).is_some_and(|index| self.jumps[index] as f64 > at(row));
+        let after = self.jumps.get(jump).is_some_and(|&jump| jump as f64 <= at(next));
+        match (before, after) {
+            (true, false) => Place { row: next, next, part: 0.0, beyond: exact - next as f64, nearest: next },
+            (false, true) => Place { row, next: row, part: 0.0, beyond: exact - row as f64, nearest: row },
+            _ => place,
+        }
+    }
+}
+
+/// Where a sample lies among rows.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    row: usize,
+    next: usize,
+    /// How far from the one to the other.
+    part: f64,
+    /// Rows by which it lies outside of them.
+    beyond: f64,
+    nearest: usize,
+}
+
+impl Place {
+    fn between(&self, column: &[f64]) -> f64 {
+        if self.part == 0.0 {
+            return column[self.row];
+        }
+        column[self.row] + self.part * (column[self.next] - column[self.row])
+    }
+}

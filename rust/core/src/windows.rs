@@ -1,0 +1,300 @@
+//! Windows of rows of one record: summaries by doubling, and what solving them gives.
+//!
+//! Rows are grouped into blocks of `step`, and a window is a whole number of consecutive blocks. Summaries of `1, 2, 4, …` blocks from every
+//! block on are merged from each other, and any window from those of its length's binary digits. Eight neighbouring windows are
+//! worked on side by side. A window's numbers depend only on the rows in it, so every way of cutting gives the same bits.
+
+use std::ops::Range;
+
+use crate::factor::{Fields, Layout, RowNoise, Scratch, absorb, count, merge, recentre, solve, symmetric};
+use crate::packet::{Packet, WIDTH};
+use crate::simd::{Instructions, Kernel, Lanes, dispatch};
+
+/// Rows absorbed at a time.
+const BATCH: usize = 8;
+
+/// Rows of a record. Those that are no equations are zero in every column.
+#[derive(Clone, Debug)]
+pub(crate) struct Problem<'a> {
+    pub(crate) layout: Layout,
+    /// Windowed regressors, and their companions where the layout is linear.
+    pub(crate) windowed: Vec<&'a [f64]>,
+    pub(crate) companions: Vec<&'a [f64]>,
+    pub(crate) constants: Vec<&'a [f64]>,
+    pub(crate) side: &'a [f64],
+    pub(crate) usable: &'a [bool],
+    /// Seconds from one row to the next.
+    pub(crate) period: f64,
+    /// What the angle's noise does in a row.
+    pub(crate) noise: RowNoise,
+    /// What the covariance of the rows makes of the windowed regressors; without it errors are those of ordinary least squares.
+    pub(crate) correlated: Option<Correlated>,
+}
+
+/// Windowed regressors and their companions, multiplied by the covariance of the rows.
+#[derive(Clone, Debug)]
+pub(crate) struct Correlated {
+    /// Variance of a row's noise.
+    pub(crate) variance: f64,
+    pub(crate) windowed: Vec<Vec<f64>>,
+    pub(crate) companions: Vec<Vec<f64>>,
+}
+
+impl Problem<'_> {
+    /// Number of rows.
+    pub(crate) fn rows(&self) -> usize {
+        self.side.len()
+    }
+}
+
+/// Numbers of consecutive windows, field by field.
+#[derive(Clone, Debug)]
+pub(crate) struct Solved {
+    pub(crate) fields: Fields,
+    /// The number of the first window; it may begin before the record.
+    pub(crate) first: isize,
+    count: usize,
+    padded: usize,
+    values: Vec<f64>,
+}
+
+impl Solved {
+    pub(crate) fn new(layout: Layout, first: isize, count: usize) -> Self {
+        let (fields, padded) = (Fields { layout }, count.next_multiple_of(WIDTH));
+        Self { fields, first, count, padded, values: vec![0.0; fields.size() * padded] }
+    }
+
+    /// Number of windows.
+    pub(crate) fn len(&self) -> usize {
+        self.count
+    }
+
+    /// A field of every window.
+    pub(crate) fn field(&self, field: usize) -> &[f64] {
+        &self.values[field * self.padded..][..self.count]
+    }
+
+    /// Where a window is in the fields, if it is there.
+    pub(crate) fn place(&self, window: isize) -> Option<usize> {
+        usize::try_from(window - self.first).ok().filter(|&place| place < self.count)
+    }
+
+    /// Puts windows that follow these after them.
+    pub(crate) fn join(parts: &[Self]) -> Self {
+        let mut all = Self::new(parts[0].fields.layout, parts[0].first, parts.iter().map(Self::len).sum());
+        for field in 0..all.fields.size() {
+            let mut place = field * all.padded;
+            for part in parts {
+                all.values[place..place + part.count].copy_from_slice(part.field(field));
+                place += part.count;
+            }
+        }
+        all
+    }
+
+    /// Writes eight windows.
+    pub(crate) fn put(&mut self, place: usize, fields: &[Packet]) {
+        for (field, value) in fields.iter().enumerate() {
+            value.store(&mut self.values[field * self.padded + place..]);
+        }
+    }
+}
+
+/// Summaries of consecutive windows of one length.
+struct Table {
+    size: usize,
+    padded: usize,
+    values: Vec<f64>,
+}
+
+impl Table {
+    fn new(size: usize, count: usize) -> Self {
+        // A packet may begin at any window, so the last may reach beyond.
+        let padded = count.next_multiple_of(WIDTH) + WIDTH;
+        Self { size, padded, values: vec![0.0; size * padded] }
+    }
+
+    #[inline(always)]
+    fn load(&self, place: usize, summary: &mut [Packet]) {
+        for (entry, value) in summary[..self.size].iter_mut().enumerate() {
+            *value = Packet::load(&self.values[entry * self.padded + place..]);
+        }
+    }
+
+    #[inline(always)]
+    fn store(&mut self, place: usize, summary: &[Packet]) {
+        for (entry, value) in summary[..self.size].iter().enumerate() {
+            value.store(&mut self.values[entry * self.padded + place..]);
+        }
+    }
+}
+
+/// A window of blocks relative to the block it is counted from: parts that are merged, and where it is solved.
+#[derive(Clone, Debug)]
+pub(crate) struct Shape {
+    /// Blocks of every part.
+    pub(crate) parts: Vec<Range<usize>>,
+    /// Time at which it is solved, in rows from the first row of block 0.
+    pub(crate) centre: f64,
+}
+
+impl Shape {
+    /// Consecutive blocks of `step` rows.
+    pub(crate) fn of(blocks: Range<usize>, step: usize) -> Self {
+        let centre = ((blocks.start + blocks.end) * step - 1) as f64 / 2.0;
+        Self { parts: vec![blocks], centre }
+    }
+
+    /// The block after the last.
+    fn end(&self) -> usize {
+        self.parts.iter().map(|part| part.end).max().unwrap_or(0)
+    }
+
+    /// Parts whose numbers of blocks are powers of two: where they begin and the logarithm.
+    fn pieces(&self) -> Vec<(usize, usize)> {
+        let mut pieces = Vec::new();
+        for part in &self.parts {
+            let mut first = part.start;
+            while first < part.end {
+                let level = (part.end - first).ilog2() as usize;
+                pieces.push((first, level));
+                first += 1 << level;
+            }
+        }
+        pieces
+    }
+}
+
+/// Solves windows of several shapes from every block of some on. Block `b` holds the rows `b · step …`, which need not exist.
+pub(crate) fn solve_windows(
+    problem: &Problem<'_>,
+    step: usize,
+    blocks: &Range<isize>,
+    shapes: &[Shape],
+    instructions: Instructions,
+) -> Vec<Solved> {
+    dispatch(instructions, Work { problem, step, blocks, shapes })
+}
+
+struct Work<'a, 'b> {
+    problem: &'a Problem<'b>,
+    step: usize,
+    blocks: &'a Range<isize>,
+    shapes: &'a [Shape],
+}
+
+impl Kernel for Work<'_, '_> {
+    type Output = Vec<Solved>;
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _simd: S) -> Vec<Solved> {
+        let Self { problem, step, blocks, shapes } = self;
+        let layout = problem.layout;
+        let windows = blocks.len();
+        let mut results: Vec<_> = shapes.iter().map(|_| Solved::new(layout, blocks.start, windows)).collect();
+        if windows == 0 {
+            return results;
+        }
+        let reach = shapes.iter().map(Shape::end).max().unwrap_or(0);
+        let pieces: Vec<_> = shapes.iter().map(Shape::pieces).collect();
+        let levels = pieces.iter().flatten().map(|&(_, level)| level).max().unwrap_or(0);
+        let block_period = step as f64 * problem.period;
+
+        let mut rows = vec![Packet::ZERO; layout.columns().max(BATCH) * layout.columns()];
+        let mut summary = vec![Packet::ZERO; layout.size()];
+        let mut other = summary.clone();
+        let count = windows + reach.max(1) - 1;
+        let mut tables = vec![Table::new(layout.size(), count)];
+        for place in (0..count).step_by(WIDTH) {
+            summarise(problem, step, blocks.start + place.cast_signed(), &mut summary, &mut rows);
+            tables[0].store(place, &summary);
+        }
+        for level in 0..levels {
+            let half = 1 << level;
+            let count = count + 1 - 2 * half;
+            let mut table = Table::new(layout.size(), count);
+            for place in (0..count).step_by(WIDTH) {
+                tables[level].load(place, &mut summary);
+                tables[level].load(place + half, &mut other);
+                merge(layout, &mut summary, &other, half as f64 * block_period, &mut rows);
+                table.store(place, &summary);
+            }
+            tables.push(table);
+        }
+        let mut scratch = Scratch::new(layout);
+        let mut fields = vec![Packet::ZERO; Fields { layout }.size()];
+        let variance = problem.correlated.as_ref().map(|correlated| correlated.variance);
+        for ((shape, pieces), result) in shapes.iter().zip(&pieces).zip(&mut results) {
+            for place in (0..windows).step_by(WIDTH) {
+                let mut begin = 0;
+                for (number, &(first, level)) in pieces.iter().enumerate() {
+                    if number == 0 {
+                        tables[level].load(place + first, &mut summary);
+                        begin = first;
+                    } else {
+                        tables[level].load(place + first, &mut other);
+                        merge(layout, &mut summary, &other, (first - begin) as f64 * block_period, &mut rows);
+                    }
+                }
+                let later = shape.centre * problem.period - begin as f64 * block_period;
+                recentre(layout, &mut summary, later, &mut other);
+                solve(layout, &summary, &problem.noise, variance, &mut scratch, &mut fields);
+                result.put(place, &fields);
+            }
+        }
+        results
+    }
+}
+
+/// Summarises eight neighbouring blocks.
+#[inline(always)]
+fn summarise(problem: &Problem<'_>, step: usize, block: isize, summary: &mut [Packet], rows: &mut [Packet]) {
+    let layout = problem.layout;
+    let (columns, q) = (layout.columns(), layout.windowed);
+    summary.fill(Packet::ZERO);
+    let total = problem.rows();
+    let place = |lane: usize, offset: usize| {
+        let row = (block + lane.cast_signed()) * step.cast_signed() + offset.cast_signed();
+        usize::try_from(row).ok().filter(|&row| row < total)
+    };
+    for first in (0..step).step_by(BATCH) {
+        let batch = BATCH.min(step - first);
+        for offset in 0..batch {
+            let time = (first + offset) as f64 * problem.period;
+            let places: [Option<usize>; WIDTH] = std::array::from_fn(|lane| place(lane, first + offset));
+            let gather = |column: &[f64]| Packet(places.map(|place| place.map_or(0.0, |place| column[place])));
+            let row = &mut rows[offset * columns..(offset + 1) * columns];
+            for (value, column) in row.iter_mut().zip(&problem.windowed) {
+                *value = gather(column);
+            }
+            if layout.linear {
+                for (i, column) in problem.companions.iter().enumerate() {
+                    row[q + i] = gather(column) + Packet::splat(time) * row[i];
+                }
+            }
+            for (i, column) in problem.constants.iter().enumerate() {
+                row[layout.local() + i] = gather(column);
+            }
+            row[columns - 1] = gather(problem.side);
+            let usable =
+                Packet(places.map(|place| place.map_or(0.0, |place| f64::from(u8::from(problem.usable[place])))));
+            count(layout, summary, usable, time);
+            if let Some(correlated) = &problem.correlated {
+                for i in 0..layout.local() {
+                    let noisy = match i.checked_sub(q) {
+                        None => gather(&correlated.windowed[i]),
+                        Some(i) => {
+                            gather(&correlated.companions[i]) + Packet::splat(time) * gather(&correlated.windowed[i])
+                        }
+                    };
+                    // Both halves of a product that the window's ends make unsymmetric.
+                    for j in 0..layout.local() {
+                        let half = Packet::splat(if i == j { 1.0 } else { 0.5 });
+                        summary[layout.noise() + symmetric(i, j)] += half * noisy * row[j];
+                    }
+                }
+            }
+        }
+        absorb(layout, summary, rows, batch, false);
+    }
+}

@@ -1,0 +1,47 @@
+"""The weak form written slowly in NumPy: rows of a test function, and constants from windows one by one."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from numpy.polynomial import Polynomial
+
+Array = npt.NDArray[np.float64]
+
+
+def kernels(half: int, exponent: int, delta: float, shift: float = 0.0) -> Array:
+    """Give φ″, -φ′ and φ at the samples, scaled so that φ, where it is not shifted, sums to one."""
+    phi = Polynomial([1, 0, -1]) ** exponent
+    x = (np.arange(-half, half + 1) - shift) / half
+    inside = np.abs(x) <= 1
+    total = phi(np.arange(-half, half + 1) / half).sum()
+    second = half * delta
+    rows = [phi.deriv(2)(x) / second**2, -phi.deriv(1)(x) / second, phi(x)]
+    return np.array(rows) * inside / total
+
+
+def rows(angle: Array, torque: Array, half: int, exponent: int, delta: float, lag: float = 0.0) -> tuple[Array, Array]:
+    """Give the regressors of inertia, damping and stiffness and the right-hand side, NaN where a window does not fit."""
+    stride = max(1, half // 8)
+    kernel = kernels(half, exponent, delta)
+    whole = int(np.rint(lag))
+    late = kernels(half, exponent, delta, lag - whole)[2]
+    centres = range(half, angle.size - half, stride)
+    A, b = np.full((len(centres), 3), np.nan), np.full(len(centres), np.nan)
+    for row, centre in enumerate(centres):
+        A[row] = kernel @ angle[centre - half : centre + half + 1]
+        first = centre - half + whole
+        if first >= 0 and first + 2 * half + 1 <= torque.size:
+            b[row] = late @ torque[first : first + 2 * half + 1]
+    return A, b
+
+
+def profile(windowed: Array, constant: Array, b: Array, window: int, step: int) -> Array:
+    """Give the constants that are best for all windows of rows together, each window with unknowns of its own."""
+    normal, side = 0.0, 0.0
+    for first in range(0, b.size - window + 1, step):
+        rows_of = slice(first, first + window)
+        Q, _ = np.linalg.qr(windowed[rows_of])
+        left = constant[rows_of] - Q @ (Q.T @ constant[rows_of])
+        normal, side = normal + left.T @ left, side + left.T @ b[rows_of]
+    return np.asarray(np.linalg.solve(normal, side))

@@ -1,0 +1,229 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import tvident
+from reference.weak_form import profile, rows
+from tvident import Status
+
+Array = npt.NDArray[np.float64]
+
+EXACT = 1e-9
+"""Promised error of inertia, damping and stiffness without noise, for half-widths from 80 samples and exponents from 8."""
+CONSTANT: dict[str, Any] = {"inertia": "constant", "damping": "constant", "stiffness": "constant"}
+SYSTEM = {"inertia": 0.0123, "damping": 0.00825, "stiffness": 13.0}
+
+
+def multisine(n: int, seed: int = 0, delta: float = 1e-3) -> tuple[Array, Array]:
+    """Give angle and torque of a constant system that moves with 24 frequencies, at any time as it should be."""
+    generator = np.random.default_rng(seed)
+    t = np.arange(n) * delta
+    angle, torque = np.zeros(n), np.zeros(n)
+    for frequency in np.linspace(0.5, 12, 24):
+        omega, phase = 2 * np.pi * frequency, generator.uniform(0, 2 * np.pi)
+        angle += np.sin(omega * t + phase) / (1 + frequency)
+        torque += (SYSTEM["stiffness"] - SYSTEM["inertia"] * omega**2) * np.sin(omega * t + phase) / (1 + frequency)
+        torque += SYSTEM["damping"] * omega * np.cos(omega * t + phase) / (1 + frequency)
+    return angle, torque
+
+
+def errors(result: tvident.Identification) -> list[float]:
+    """Give the relative errors of the constants."""
+    return [abs(result.constants[name][0] / SYSTEM[name] - 1) for name in result.constants if name in SYSTEM]
+
+
+@pytest.mark.parametrize("half", [80, 113, 226, 320])
+@pytest.mark.parametrize("exponent", [8, 9, 12])
+def test_without_noise_the_parameters_are_exact(half: int, exponent: int) -> None:
+    angle, torque = multisine(20_000)
+    call: dict[str, Any] = {"sample_rate": 1000, "form": "weak", "window_length": 2 * half + 1, "exponent": exponent}
+    assert max(errors(tvident.identify(angle, torque, **call, **CONSTANT))) < EXACT
+    # An offset of the angle that the spring bears.
+    leaning = tvident.identify(angle + 1e3, torque + SYSTEM["stiffness"] * 1e3, **call, **CONSTANT)
+    assert max(errors(leaning)) < EXACT
+    windowed = tvident.identify(angle, torque, **call, inertia="constant", damping="constant", equations=3000)
+    assert max(errors(windowed)) < EXACT
+    valid = windowed.status & Status.INVALID == 0
+    np.testing.assert_allclose(windowed.stiffness[valid], SYSTEM["stiffness"], rtol=1e-7)
+
+
+def test_ten_million_samples_with_a_drift_lose_no_digits() -> None:
+    angle, torque = multisine(8000)
+    n = 10_000_000
+    angle, torque = np.tile(angle, n // 8000), np.tile(torque, n // 8000)
+    drift = np.linspace(0, 100, n)
+    found = tvident.identify(
+        angle + drift, torque + SYSTEM["stiffness"] * drift, sample_rate=1000, form="weak", step=100_000, **CONSTANT
+    )
+    # A drift has a velocity too.
+    expected = SYSTEM["stiffness"]
+    assert abs(found.constants["stiffness"][0] / expected - 1) < 1e-6
+    assert abs(found.constants["inertia"][0] / SYSTEM["inertia"] - 1) < 1e-4
+
+
+@settings(max_examples=15)
+@given(
+    seed=st.integers(0, 2**32),
+    half=st.integers(5, 60),
+    exponent=st.integers(3, 12),
+    lag=st.sampled_from([0.0, 3.0, -0.4, 1.7]),
+)
+def test_constants_are_least_squares_of_the_rows(seed: int, half: int, exponent: int, lag: float) -> None:
+    generator = np.random.default_rng(seed)
+    angle, torque = multisine(2000, seed)
+    torque = torque + 0.3 * generator.standard_normal(2000)
+    found = tvident.identify(
+        angle,
+        torque,
+        sample_rate=1000,
+        form="weak",
+        window_length=2 * half + 1,
+        exponent=exponent,
+        lag=lag * 1e-3,
+        **CONSTANT,
+    )
+    A, b = rows(angle, torque, half, exponent, 1e-3, lag)
+    usable = np.isfinite(b)
+    expected = np.linalg.lstsq(A[usable], b[usable])[0]
+    # The angle is a sum of sines, so what is taken for its noise is rounding, and nothing is corrected for.
+    for value, (name, (constant, _)) in zip(expected, found.constants.items(), strict=True):
+        assert constant == pytest.approx(value, rel=1e-6), name
+
+
+@pytest.mark.parametrize("variation", ["constant", "linear"])
+def test_constants_beside_what_is_windowed_are_best_for_all_windows_together(variation: str) -> None:
+    half, exponent, window = 40, 8, 64
+    generator = np.random.default_rng(1)
+    angle, torque = multisine(6000)
+    torque = torque + 0.05 * generator.standard_normal(6000)
+    found = tvident.identify(
+        angle,
+        torque,
+        sample_rate=1000,
+        form="weak",
+        window_length=2 * half + 1,
+        equations=window * 5,
+        variation=variation,  # type: ignore[arg-type]
+        inertia="constant",
+        damping="constant",
+    )
+    A, b = rows(angle, torque, half, exponent, 1e-3)
+    columns = [A[:, 2]]
+    if variation == "linear":
+        # ⟨φ τ θ⟩ around each row's centre, and the row's own time.
+        kernel = np.arange(-half, half + 1) * 1e-3 * (1 - (np.arange(-half, half + 1) / half) ** 2) ** exponent
+        kernel /= ((1 - (np.arange(-half, half + 1) / half) ** 2) ** exponent).sum()
+        centres = np.arange(half, angle.size - half, 5)
+        companion = np.array([kernel @ angle[c - half : c + half + 1] for c in centres])
+        columns.append(companion + centres * 1e-3 * A[:, 2])
+    expected = profile(np.stack(columns, axis=1), A[:, :2], b, window, 8)
+    assert found.constants["inertia"][0] == pytest.approx(expected[0], rel=1e-7)
+    assert found.constants["damping"][0] == pytest.approx(expected[1], rel=1e-6)
+
+
+def test_known_coefficients_that_change_are_integrated_by_parts_too() -> None:
+    n = 20_000
+    t = np.arange(n) / 1000
+    generator = np.random.default_rng(2)
+    angle, velocity, acceleration = np.zeros(n), np.zeros(n), np.zeros(n)
+    for frequency in generator.uniform(1, 10, 12):
+        omega, phase = 2 * np.pi * frequency, generator.uniform(0, 6)
+        angle += np.sin(omega * t + phase)
+        velocity += omega * np.cos(omega * t + phase)
+        acceleration -= omega**2 * np.sin(omega * t + phase)
+    inertia = 0.01 * (1 + 0.3 * np.sin(2 * np.pi * 0.4 * t))
+    damping = 0.1 * (1 + 0.5 * np.cos(2 * np.pi * 0.3 * t))
+    stiffness = 15 + 3 * np.sin(2 * np.pi * 0.5 * t)
+    torque = inertia * acceleration + damping * velocity + stiffness * angle
+    everything = {"inertia": inertia, "damping": damping, "stiffness": stiffness}
+    for unknown, true in (("inertia", 1.0), ("damping", 1.0), ("stiffness", 1.0)):
+        known: dict[str, Any] = {name: value for name, value in everything.items() if name != unknown}
+        extra = {"inertia": acceleration, "damping": velocity, "stiffness": angle}[unknown]
+        result = tvident.identify(
+            angle,
+            torque + extra,
+            sample_rate=1000,
+            form="weak",
+            window_length=161,
+            equations=400,
+            variation="linear",
+            **known,
+        )
+        valid = result.status & (Status.INVALID | Status.EDGE) == 0
+        found = getattr(result, unknown)[valid]
+        # A coefficient that bends within a window of 0.4 s is followed by a line.
+        np.testing.assert_allclose(found, everything[unknown][valid] + true, rtol=0.02)
+
+
+def test_missing_and_masked_samples_cost_their_own_rows_only() -> None:
+    angle, torque = multisine(6000)
+    noisy = torque + 0.05 * np.random.default_rng(3).standard_normal(6000)
+    call: dict[str, Any] = {"sample_rate": 1000, "form": "weak", "window_length": 161, "exponent": 8, **CONSTANT}
+    angle[3000], noisy[1000] = np.nan, np.inf
+    found = tvident.identify(angle, noisy, **call)
+    centres = np.arange(80, 6000 - 80, 10)
+    hit = (np.abs(centres - 3000) <= 80) | (np.abs(centres - 1000) <= 80)
+    A, b = rows(np.nan_to_num(angle), np.nan_to_num(noisy, posinf=0.0), 80, 8, 1e-3)
+    expected = np.linalg.lstsq(A[~hit], b[~hit])[0]
+    for value, (name, (constant, _)) in zip(expected, found.constants.items(), strict=True):
+        assert constant == pytest.approx(value, rel=1e-6), name
+    mask = np.abs(np.arange(6000) - 4000) > 300
+    masked = tvident.identify(angle, noisy, mask=mask, **call)
+    hit |= np.abs(centres - 4000) <= 300
+    expected = np.linalg.lstsq(A[~hit], b[~hit])[0]
+    assert masked.constants["stiffness"][0] == pytest.approx(expected[2], rel=1e-6)
+
+
+def test_a_window_of_rows_around_every_sample_shrinks_towards_the_ends() -> None:
+    angle, torque = multisine(4000)
+    torque = torque + 0.01 * np.random.default_rng(4).standard_normal(4000)
+    result = tvident.identify(angle, torque, sample_rate=1000, form="weak", window_length=81, equations=400)
+    middle = result.status[600:-600]
+    assert (middle & (Status.EDGE | Status.INVALID) == 0).all()
+    assert result.status[0] & Status.EDGE
+    assert (np.isnan(result.stiffness) == (result.status & Status.INVALID != 0)).all()
+    assert np.nanmedian(result.stiffness) == pytest.approx(13.0, rel=1e-2)
+
+
+@pytest.mark.parametrize("workers", [2, 5])
+def test_the_numbers_do_not_depend_on_the_number_of_workers(workers: int) -> None:
+    recording = tvident.simulate_torsional_rig(60.0, angle_noise=1e-2)
+    for call in ({"preset": "auto"}, {"form": "weak", "inertia": "constant"}):
+        one, many = (
+            tvident.identify(recording.angle, recording.torque, sample_rate=1000, workers=count, **call)  # type: ignore[arg-type]
+            for count in (1, workers)
+        )
+        assert one.constants == many.constants
+        for name, values in one.columns().items():
+            np.testing.assert_array_equal(values, many.columns()[name], err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        ({"exponent": 2}, ValueError, "exponent must be between 3 and 20; got 2"),
+        ({"exponent": 8.5}, TypeError, "exponent must be a whole number; got 8.5"),
+        ({"window_length": 7}, ValueError, "window_length must be at least 9 samples; got 7"),
+        ({"form": "feeble"}, ValueError, "form must be .* got 'feeble'"),
+        ({"selection": "best"}, ValueError, "selection must be .* got 'best'"),
+        ({"variation": "cubic"}, ValueError, "variation must be .* got 'cubic'"),
+        ({"mask": np.ones(5, bool)}, ValueError, r"mask must have one value for every sample; got shape \(5,\)"),
+        ({"mask": np.ones(1000)}, TypeError, "mask must hold True and False; got float64"),
+        ({"settings": {"form": "weak"}}, TypeError, "settings must be those of an earlier result"),
+        ({"filter_torque": 1}, TypeError, "filter_torque must be True or False; got 1"),
+        ({"lag": np.inf}, ValueError, "lag must be finite; got inf"),
+    ],
+)
+def test_misuse_says_the_rule_the_value_and_the_cure(
+    call: dict[str, Any], error: type[Exception], message: str
+) -> None:
+    angle, torque = multisine(1000)
+    good: dict[str, Any] = {"sample_rate": 1000, "form": "weak"}
+    with pytest.raises(error, match=message):
+        tvident.identify(angle, torque, **(good | call))
