@@ -155,7 +155,7 @@ struct View<'a, 'b> {
 }
 
 /// The windows of one scale around some rows, ready to predict.
-struct Around<'a> {
+pub(crate) struct Around<'a> {
     scale: Scale,
     sides: Predictor<'a>,
     hollow: Predictor<'a>,
@@ -163,7 +163,7 @@ struct Around<'a> {
 }
 
 /// One window as seen from a row: what predicts the row, what is believed there, and how much later the row is than either's centre.
-struct Seen<'a, 'b> {
+pub(crate) struct Seen<'a, 'b> {
     predictor: &'b Predictor<'a>,
     believed: &'b Predictor<'a>,
     place: usize,
@@ -172,14 +172,15 @@ struct Seen<'a, 'b> {
 }
 
 impl<'a> Around<'a> {
-    fn new(scale: Scale, cells: &'a Cells, constants: &[f64]) -> Self {
+    pub(crate) fn new(scale: Scale, cells: &'a Cells, constants: &[f64]) -> Self {
         let of = |solved| Predictor::new(solved, constants);
         Self { scale, sides: of(&cells.sides), hollow: of(&cells.hollow), full: of(&cells.full) }
     }
 
-    fn seen(&self, row: usize, which: usize, period: f64) -> Option<Seen<'a, '_>> {
+    /// The window of one scale before (0), around (1) or after (2) a row, if there is one and no jump lies between.
+    pub(crate) fn seen(&self, problem: &Problem<'_>, row: usize, which: usize) -> Option<Seen<'a, '_>> {
         let cell = self.scale.cell(row);
-        let later = |centre: f64| (row as f64 - centre) * period;
+        let later = |centre: f64| (row as f64 - centre) * problem.period;
         if which == 1 {
             let (place, believed_place) = (self.hollow.place(cell)?, self.full.place(cell)?);
             let later = later(self.scale.centres(cell)[1]);
@@ -190,8 +191,37 @@ impl<'a> Around<'a> {
         }
         let cell = if which == 0 { cell } else { self.scale.after(cell) };
         let place = self.sides.place(cell)?;
+        let rows = self.scale.side_rows(cell);
+        let between = if which == 0 { rows.end - 1..row.cast_signed() } else { row.cast_signed()..rows.start };
+        if problem.jumps_within(&between) {
+            return None;
+        }
         let later = later(self.scale.centres(cell)[0]);
         Some(Seen { predictor: &self.sides, believed: &self.sides, place, believed_place: place, later })
+    }
+}
+
+impl Seen<'_, '_> {
+    /// What is believed of a windowed unknown at the row, per second and how uncertain it is.
+    pub(crate) fn value(&self, unknown: usize) -> f64 {
+        self.believed.value(self.believed_place, unknown, self.later)
+    }
+
+    pub(crate) fn slope(&self, unknown: usize) -> f64 {
+        self.believed.value(self.believed_place, unknown, 1.0) - self.believed.value(self.believed_place, unknown, 0.0)
+    }
+
+    pub(crate) fn variance(&self, unknown: usize) -> f64 {
+        self.believed.variance(self.believed_place, unknown, self.later)
+    }
+
+    fn sensitivity(&self, unknown: usize, constant: usize) -> f64 {
+        self.believed.sensitivity(self.believed_place, unknown, constant, self.later)
+    }
+
+    /// What the windowed unknowns add to the row's right-hand side, from windows that have not seen it.
+    pub(crate) fn predict(&self, problem: &Problem<'_>, row: usize) -> f64 {
+        self.predictor.predict(problem, self.place, row, self.later)
     }
 }
 
@@ -212,7 +242,7 @@ impl View<'_, '_> {
 
     /// Squared error of a row, over the noise's variance.
     fn error(&self, seen: &Seen<'_, '_>, row: usize) -> f64 {
-        let error = self.side[row] - seen.predictor.predict(self.problem, seen.place, row, seen.later);
+        let error = self.side[row] - seen.predict(self.problem, row);
         (error * error / self.variance).min(MOST)
     }
 
@@ -223,17 +253,16 @@ impl View<'_, '_> {
             return sums;
         }
         let here;
-        let cells = match &candidate.cells {
-            Some(cells) => cells,
-            None => {
-                here = self.cells(candidate, &rows);
-                &here
-            }
+        let cells = if let Some(cells) = &candidate.cells {
+            cells
+        } else {
+            here = self.cells(candidate, &rows);
+            &here
         };
         let around = Around::new(candidate.scale, cells, self.constants);
         for row in rows.filter(|&row| self.problem.usable[row]) {
             for (which, (sum, count)) in sums.iter_mut().enumerate() {
-                if let Some(seen) = around.seen(row, which, self.problem.period) {
+                if let Some(seen) = around.seen(self.problem, row, which) {
                     *sum += self.error(&seen, row);
                     *count += 1.0;
                 }
@@ -271,12 +300,11 @@ impl View<'_, '_> {
             let chosen = |candidate: &&Candidate| candidate.record.iter().any(|&error| (error <= hopeless) == hope);
             for candidate in candidates.iter().filter(chosen) {
                 let here;
-                let cells = match &candidate.cells {
-                    Some(cells) => cells,
-                    None => {
-                        here = self.cells(candidate, &wide);
-                        &here
-                    }
+                let cells = if let Some(cells) = &candidate.cells {
+                    cells
+                } else {
+                    here = self.cells(candidate, &wide);
+                    &here
                 };
                 let around = Around::new(candidate.scale, cells, self.constants);
                 for which in (0..SIDES).filter(|&which| (candidate.record[which] <= hopeless) == hope) {
@@ -285,14 +313,14 @@ impl View<'_, '_> {
                     for (place, row) in wide.clone().enumerate() {
                         let mut next = errors[place];
                         if self.problem.usable[row]
-                            && let Some(seen) = around.seen(row, which, self.problem.period)
+                            && let Some(seen) = around.seen(self.problem, row, which)
                         {
                             next = [next[0] + self.error(&seen, row), next[1] + 1.0];
                         }
                         errors[place + 1] = next;
                     }
                     for (place, row) in rows.clone().enumerate().filter(|(place, _)| wanted[*place]) {
-                        let Some(seen) = around.seen(row, which, self.problem.period) else { continue };
+                        let Some(seen) = around.seen(self.problem, row, which) else { continue };
                         let first = row.saturating_sub(nearby.rows).max(wide.start) - wide.start;
                         let last = (row + nearby.rows + 1).min(wide.end) - wide.start;
                         let (sum, count) = (errors[last][0] - errors[first][0], errors[last][1] - errors[first][1]);
@@ -306,7 +334,9 @@ impl View<'_, '_> {
                         if exponent < least[place] {
                             let shrink = (exponent - least[place]).exp();
                             weights[place] *= shrink;
-                            sums.iter_mut().for_each(|sum| *sum *= shrink);
+                            for sum in sums.iter_mut() {
+                                *sum *= shrink;
+                            }
                             least[place] = exponent;
                         }
                         let weight = (least[place] - exponent).exp();
@@ -326,14 +356,12 @@ impl View<'_, '_> {
     /// What a window says at a row: values, slopes, standard errors and sensitivities.
     fn believe(&self, seen: &Seen<'_, '_>, numbers: &mut [f64]) {
         let (windowed, constants) = (self.problem.layout.windowed, self.problem.layout.constant);
-        let (believed, place, later) = (seen.believed, seen.believed_place, seen.later);
         for unknown in 0..windowed {
-            numbers[unknown] = believed.value(place, unknown, later);
-            numbers[windowed + unknown] = believed.value(place, unknown, 1.0) - believed.value(place, unknown, 0.0);
-            numbers[2 * windowed + unknown] = believed.variance(place, unknown, later).max(0.0).sqrt();
+            numbers[unknown] = seen.value(unknown);
+            numbers[windowed + unknown] = seen.slope(unknown);
+            numbers[2 * windowed + unknown] = seen.variance(unknown).max(0.0).sqrt();
             for constant in 0..constants {
-                numbers[3 * windowed + unknown * constants + constant] =
-                    believed.sensitivity(place, unknown, constant, later);
+                numbers[3 * windowed + unknown * constants + constant] = seen.sensitivity(unknown, constant);
             }
         }
     }

@@ -21,6 +21,8 @@ pub(crate) struct Rows {
     /// The kernel that the angle's noise enters the right-hand side by; empty where it does not.
     pub(crate) side_noise: Vec<f64>,
     pub(crate) usable: Vec<bool>,
+    /// The first rows after jumps of what is windowed, in order.
+    pub(crate) jumps: Vec<usize>,
     /// Seconds from one row to the next.
     pub(crate) period: f64,
 }
@@ -29,5 +31,24 @@ impl Rows {
     /// Number of rows.
     pub(crate) fn len(&self) -> usize {
         self.side.len()
+    }
+
+    /// Makes rows no equations.
+    pub(crate) fn exclude(&mut self, rows: impl Iterator<Item = usize>) {
+        for row in rows {
+            self.usable[row] = false;
+            self.clear(row);
+        }
+    }
+
+    /// Makes every column zero in a row.
+    pub(crate) fn clear(&mut self, row: usize) {
+        self.side[row] = 0.0;
+        for Regressor { value, companion, .. } in &mut self.regressors {
+            value[row] = 0.0;
+            if let Some(value) = companion.get_mut(row) {
+                *value = 0.0;
+            }
+        }
     }
 }

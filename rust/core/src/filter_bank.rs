@@ -40,7 +40,7 @@ impl Default for Scratch {
 impl FilterBank {
     /// Kernels of one length, at least one.
     pub(crate) fn new(kernels: &[&[f64]], stride: usize) -> Self {
-        let length = kernels.first().map_or(0, |kernel| kernel.len());
+        let length = kernels.first().copied().map_or(0, <[f64]>::len);
         Self {
             kernels: Mat::from_fn(length, kernels.len(), |row, column| kernels[column][row]),
             sums: kernels.iter().map(|kernel| sum(kernel)).collect(),
@@ -99,7 +99,9 @@ impl FilterBank {
         // An offset would cost digits: a typical sample is taken off, and what the kernels make of it is added at the end.
         let last = present.max(1) - 1;
         let reference = middle([samples[0], samples[last / 2], samples[last]]);
-        samples.iter_mut().for_each(|value| *value -= reference);
+        for value in samples.iter_mut() {
+            *value -= reference;
+        }
         if products.shape() != (BLOCK, self.kernels()) {
             *products = Mat::zeros(BLOCK, self.kernels());
         }

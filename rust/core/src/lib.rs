@@ -22,6 +22,7 @@ mod factor;
 mod filter_bank;
 mod finish;
 pub mod identification;
+mod jumps;
 pub mod local_polynomials;
 mod model;
 pub mod motion;

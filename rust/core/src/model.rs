@@ -57,6 +57,7 @@ impl Model {
             constants: of(&self.constant, |regressor| &regressor.value),
             side,
             usable: &rows.usable,
+            jumps: &rows.jumps,
             period,
             noise: RowNoise::new(&kernels, noise),
         }

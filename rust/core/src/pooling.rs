@@ -54,14 +54,20 @@ pub(crate) fn pool(
     instructions: Instructions,
 ) -> Option<Pooled> {
     let fields = full.fields;
-    let mut weights = vec![1.0; windows.len()];
+    let mut weights: Vec<f64> =
+        windows.clone().map(|window| f64::from(u8::from(is_determined(full, window)))).collect();
     let mut pooled = solve(full, &windows, &weights, instructions)?;
     if fields.layout.local() == 0 {
         return Some(Pooled { weights, ..pooled });
     }
     for _ in 0..ROUNDS {
         let misfits: Vec<f64> = windows.clone().map(|window| misfit(full, window, &pooled.values, expected)).collect();
-        let mut sorted: Vec<f64> = misfits.iter().copied().filter(|misfit| misfit.is_finite()).collect();
+        let mut sorted: Vec<f64> = misfits
+            .iter()
+            .zip(&weights)
+            .filter(|(misfit, weight)| misfit.is_finite() && **weight > 0.0)
+            .map(|(misfit, _)| *misfit)
+            .collect();
         if sorted.is_empty() {
             break;
         }
@@ -70,7 +76,9 @@ pub(crate) fn pool(
         for ((window, weight), misfit) in windows.clone().zip(&mut weights).zip(&misfits) {
             let independent = (full.field(fields.count())[window] / expected.redundancy - 2.0).max(1.0);
             let most = median.max(1.0) * (1.0 + TOLERATED * (2.0 / independent).sqrt());
-            *weight = if *misfit > most { (most / misfit).powi(2) } else { 1.0 };
+            if *weight > 0.0 {
+                *weight = if *misfit > most { (most / misfit).powi(2) } else { 1.0 };
+            }
         }
         pooled = solve(full, &windows, &weights, instructions)?;
     }
@@ -98,8 +106,8 @@ pub(crate) fn residual(full: &Solved, window: usize, values: &[f64]) -> f64 {
     let mut sum = full.field(fields.left(constants, constants))[window];
     for row in 0..constants {
         let mut error = full.field(fields.left(row, constants))[window];
-        for column in row..constants {
-            error -= full.field(fields.left(row, column))[window] * values[column];
+        for (column, value) in values.iter().enumerate().take(constants).skip(row) {
+            error -= full.field(fields.left(row, column))[window] * value;
         }
         sum += error * error;
     }
@@ -205,9 +213,10 @@ pub(crate) fn influence(
             after[0] += weight;
             for regressor in 0..q {
                 let value = weight * full.field(fields.solution(regressor, constant))[window];
-                let rate = match layout.linear {
-                    true => weight * full.field(fields.solution(q + regressor, constant))[window],
-                    false => 0.0,
+                let rate = if layout.linear {
+                    weight * full.field(fields.solution(q + regressor, constant))[window]
+                } else {
+                    0.0
                 };
                 let parts = [value, rate, rate * centre(window)];
                 after[1 + 3 * regressor..][..3].iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
@@ -221,7 +230,8 @@ pub(crate) fn influence(
             for (index, taken) in taken.iter_mut().enumerate() {
                 *taken = sums[covering.end * width + index] - sums[covering.start * width + index];
             }
-            for row in first..(first + step).min(rows) {
+            let last = (first + step).min(rows);
+            for (row, influence) in column.iter_mut().enumerate().take(last).skip(first) {
                 let mut value = taken[0] * problem.constants[constant][row];
                 for (regressor, part) in taken[1..].chunks_exact(3).enumerate() {
                     let at_row = part[0] + problem.period * (row as f64 * part[1] - part[2]);
@@ -230,7 +240,7 @@ pub(crate) fn influence(
                         value -= part[1] * problem.companions[regressor][row];
                     }
                 }
-                column[row] = value;
+                *influence = value;
             }
         }
     }

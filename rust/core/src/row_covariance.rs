@@ -8,9 +8,9 @@ const CHANCE: f64 = 5.0;
 
 /// Covariance of rows by their distance.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RowCovariance {
+pub(crate) struct RowCovariance {
     /// By distance in rows, from the variance on.
-    pub lags: Vec<f64>,
+    pub(crate) lags: Vec<f64>,
 }
 
 impl RowCovariance {

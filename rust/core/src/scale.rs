@@ -25,7 +25,7 @@ const BLOCKS: [usize; 2] = [8, 12];
 const SHORT: [usize; 4] = [2, 3, 4, 6];
 
 /// The shortest window that may serve alone, in rows: two and a half half-widths.
-const SHORTEST_ALONE: usize = 20;
+pub(crate) const SHORTEST_ALONE: usize = 20;
 
 /// One length of windows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -105,6 +105,12 @@ impl Scale {
     /// The window on one side that comes after the rows of a cell, as the number of its own cell.
     pub(crate) fn after(self, cell: isize) -> isize {
         cell + (self.blocks + self.gap).cast_signed()
+    }
+
+    /// The rows of the window before a cell.
+    pub(crate) fn side_rows(self, cell: isize) -> Range<isize> {
+        let first = cell * self.step.cast_signed();
+        first..first + self.side().cast_signed()
     }
 
     /// Cells whose full windows lie within the rows.

@@ -75,7 +75,9 @@ pub(crate) fn power(record: &dyn Samples, length: usize) -> Vec<f64> {
         }
         count += 1.0;
     }
-    sum.iter_mut().for_each(|value| *value /= count.max(1.0));
+    for value in &mut sum {
+        *value /= count.max(1.0);
+    }
     sum
 }
 
@@ -85,10 +87,10 @@ mod tests {
 
     #[test]
     fn a_transform_is_the_sum_it_is_defined_by() {
-        for length in [1, 2, 8, 64] {
-            let samples: Vec<f64> = (0..length).map(|i| (i as f64 * 1.7).sin() + 0.1 * i as f64).collect();
+        for length in [1_u32, 2, 8, 64] {
+            let samples: Vec<f64> = (0..length).map(|i| (f64::from(i) * 1.7).sin() + 0.1 * f64::from(i)).collect();
             for (k, [real, imaginary]) in transform(&samples).into_iter().enumerate() {
-                let angle = |i: usize| -2.0 * PI * (k * i) as f64 / length as f64;
+                let angle = |i: usize| -2.0 * PI * (k * i) as f64 / f64::from(length);
                 let expected = [
                     samples.iter().enumerate().map(|(i, value)| value * angle(i).cos()).sum::<f64>(),
                     samples.iter().enumerate().map(|(i, value)| value * angle(i).sin()).sum::<f64>(),
@@ -100,7 +102,7 @@ mod tests {
 
     #[test]
     fn a_sine_has_its_power_at_its_frequency() {
-        let samples: Vec<f64> = (0..4096).map(|i| 3.0 + 2.0 * (2.0 * PI * 0.125 * i as f64).sin()).collect();
+        let samples: Vec<f64> = (0..4096).map(|i| 3.0 + 2.0 * (2.0 * PI * 0.125 * f64::from(i)).sin()).collect();
         let spectrum = power(&samples.as_slice(), 512);
         let total = 2.0 * spectrum[1..256].iter().sum::<f64>() / 512.0;
         assert!((total - 2.0).abs() < 1e-6, "{total}");

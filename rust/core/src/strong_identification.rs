@@ -322,7 +322,14 @@ fn rows(
     let companion = || if options.linear { vec![0.0; samples] } else { Vec::new() };
     let regressors =
         columns.into_iter().map(|value| Regressor { value, companion: companion(), noise: Default::default() });
-    Rows { regressors: regressors.collect(), side, side_noise: Vec::new(), usable, period: plan.options().delta }
+    Rows {
+        regressors: regressors.collect(),
+        side,
+        side_noise: Vec::new(),
+        usable,
+        jumps: Vec::new(),
+        period: plan.options().delta,
+    }
 }
 
 fn whole(record: &dyn Samples) -> Vec<f64> {

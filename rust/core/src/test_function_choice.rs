@@ -124,7 +124,9 @@ impl Tried {
             last.map_or(0, |last| last + 1)
         };
         let bins = responses.iter().map(|response| through(response)).max().unwrap_or(0);
-        responses.iter_mut().for_each(|response| response.truncate(bins));
+        for response in &mut responses {
+            response.truncate(bins);
+        }
         let dot = |i: usize, j: usize| kernels[i].iter().zip(&kernels[j]).map(|(a, b)| a * b).sum();
         let gram = std::array::from_fn(|i| std::array::from_fn(|j| dot(i, j)));
         Self { function, responses, gram }

@@ -70,6 +70,8 @@ pub(crate) struct Slow<'a> {
     pub(crate) fit: &'a Fit,
     /// Number of slow coefficients.
     pub(crate) coefficients: usize,
+    /// What their growth multiplies, by coefficient.
+    pub(crate) companions: Vec<&'a [f64]>,
     /// Slow coefficients so far, which were taken off the right-hand side.
     pub(crate) current: Option<&'a Varying>,
     /// Weight of every window.
@@ -86,14 +88,13 @@ impl Slow<'_> {
         let last = self.rows as f64 - 1.0;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "points of a record")]
         let points = (last / spacing).ceil() as usize + 1;
-        let solved = dispatch(instructions, Points { slow: self, reach, hole, spacing, points });
+        let solved = dispatch(instructions, Points { slow: self, reach, hole, spacing, count: points });
         let fields = solved.fields;
-        let constants = match fields.layout.constant {
-            0 => Vec::new(),
-            _ => {
-                let any = Expected { variance: 1.0, torque: 0.0, redundancy: 1.0 };
-                pool(&solved, 0..points, any, instructions)?.values
-            }
+        let constants = if fields.layout.constant == 0 {
+            Vec::new()
+        } else {
+            let any = Expected { variance: 1.0, torque: 0.0, redundancy: 1.0 };
+            pool(&solved, 0..points, any, instructions)?.values
         };
         let value = |coefficient: usize, point: usize| {
             is_determined(&solved, point).then(|| crate::pooling::local(&solved, point, &constants, coefficient))
@@ -101,17 +102,17 @@ impl Slow<'_> {
         let mut values = Vec::new();
         let mut variances = Vec::new();
         for coefficient in 0..self.coefficients {
-            values.push(fill((0..points).map(|point| value(coefficient * TERMS, point)).collect())?);
+            values.push(fill(&(0..points).map(|point| value(coefficient * TERMS, point)).collect::<Vec<_>>())?);
             let variance = solved.field(fields.covariance(coefficient * TERMS, coefficient * TERMS));
-            variances
-                .push(fill((0..points).map(|point| is_determined(&solved, point).then(|| variance[point])).collect())?);
+            let variance = (0..points).map(|point| is_determined(&solved, point).then(|| variance[point]));
+            variances.push(fill(&variance.collect::<Vec<_>>())?);
         }
         Some(Varying { first: 0.0, spacing, values, variances, constants })
     }
 }
 
 /// Fills gaps from the nearest number; nothing where there is none.
-fn fill(values: Vec<Option<f64>>) -> Option<Vec<f64>> {
+fn fill(values: &[Option<f64>]) -> Option<Vec<f64>> {
     let known: Vec<(usize, f64)> =
         values.iter().enumerate().filter_map(|(place, value)| value.map(|value| (place, value))).collect();
     let nearest = |place: usize| known.iter().min_by_key(|(other, _)| other.abs_diff(place)).map(|(_, value)| *value);
@@ -124,7 +125,7 @@ struct Points<'a, 'b> {
     reach: f64,
     hole: f64,
     spacing: f64,
-    points: usize,
+    count: usize,
 }
 
 impl Kernel for Points<'_, '_> {
@@ -132,7 +133,7 @@ impl Kernel for Points<'_, '_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, _simd: S) -> Solved {
-        let Self { slow, reach, hole, spacing, points } = self;
+        let Self { slow, reach, hole, spacing, count: points } = self;
         let full = &slow.fit.full;
         let from = full.fields;
         let (all, slow_ones) = (from.layout.constant, slow.coefficients);
@@ -216,18 +217,23 @@ pub(crate) struct Found {
     pub(crate) reach: f64,
 }
 
-/// Finds the first `coefficients` constants of a model as slow coefficients; nothing where they are not determined.
-pub(crate) fn find(
-    rows: &Rows,
-    model: &Model,
-    coefficients: usize,
-    noise: f64,
-    expected: Expected,
-    scales: &[Scale],
-    first: Scale,
-    instructions: Instructions,
-    run: &mut Run<'_, '_>,
-) -> Result<Option<Found>, Error> {
+/// Where slow coefficients are looked for.
+pub(crate) struct Search<'a> {
+    pub(crate) rows: &'a Rows,
+    /// The slow coefficients come first among its constants.
+    pub(crate) model: &'a Model,
+    pub(crate) coefficients: usize,
+    /// Variance of the angle's noise.
+    pub(crate) noise: f64,
+    pub(crate) expected: Expected,
+    /// Lengths of windows for what is windowed.
+    pub(crate) scales: &'a [Scale],
+    pub(crate) instructions: Instructions,
+}
+
+/// Finds slow coefficients; nothing where they are not determined. `first` is the length of windows to begin with.
+pub(crate) fn find(search: &Search<'_>, first: Scale, run: &mut Run<'_, '_>) -> Result<Option<Found>, Error> {
+    let &Search { rows, model, coefficients, noise, expected, scales, instructions } = search;
     let slow = &model.constant[..coefficients];
     let rest = Model { constant: model.constant[coefficients..].to_vec(), ..model.clone() };
     let mut scale = first;
@@ -239,7 +245,8 @@ pub(crate) fn find(
         let Some(fit) = Fit::new(&problem, Some(scale), expected, instructions, run)? else { return Ok(None) };
         let ones = vec![1.0; fit.full.len()];
         let weights = if current.is_some() { &fit.pooled.weights } else { &ones };
-        let equations = Slow { fit: &fit, coefficients, current, weights, rows: rows.len() };
+        let companions = slow.iter().map(|&one| rows.regressors[one].companion.as_slice()).collect();
+        let equations = Slow { fit: &fit, coefficients, companions, current, weights, rows: rows.len() };
         let hole = (scale.span() / 2 + scale.reach) as f64;
         let mut best: Option<(f64, Varying, f64)> = None;
         for reach in REACHES.map(|multiple| multiple * hole) {
@@ -248,7 +255,7 @@ pub(crate) fn find(
             }
             let Some(hollow) = equations.fit(reach, hole, instructions) else { continue };
             let Some(full) = equations.fit(reach, 0.0, instructions) else { continue };
-            let error = equations.error(&problem, rows, slow, &hollow, &full, scale, expected.variance);
+            let error = equations.error(&problem, &hollow, &full, scale, expected.variance);
             if best.as_ref().is_none_or(|best| error < best.0) {
                 best = Some((error, full, reach));
             }
@@ -266,7 +273,7 @@ pub(crate) fn find(
 }
 
 /// The right-hand side without slow coefficients.
-fn without(rows: &Rows, slow: &[usize], varying: &Varying) -> Vec<f64> {
+pub(crate) fn without(rows: &Rows, slow: &[usize], varying: &Varying) -> Vec<f64> {
     let mut side = rows.side.clone();
     for (coefficient, &regressor) in slow.iter().enumerate() {
         let regressor = &rows.regressors[regressor];
@@ -281,16 +288,7 @@ fn without(rows: &Rows, slow: &[usize], varying: &Varying) -> Vec<f64> {
 impl Slow<'_> {
     /// Mean squared error of predicting rows, over the noise's variance: slow coefficients from equations that the row had no part in,
     /// what is windowed from windows on both sides of it.
-    fn error(
-        &self,
-        problem: &Problem<'_>,
-        rows: &Rows,
-        slow: &[usize],
-        hollow: &Varying,
-        full: &Varying,
-        scale: Scale,
-        variance: f64,
-    ) -> f64 {
+    fn error(&self, problem: &Problem<'_>, hollow: &Varying, full: &Varying, scale: Scale, variance: f64) -> f64 {
         let Some(cells) = &self.fit.cells else { return f64::INFINITY };
         let solved = &cells.hollow;
         let (fields, layout) = (solved.fields, problem.layout);
@@ -301,14 +299,14 @@ impl Slow<'_> {
             let cell = scale.cell(row);
             let Some(place) = solved.place(cell).filter(|&place| is_determined(solved, place)) else { continue };
             let mut error = problem.side[row];
-            for coefficient in 0..self.coefficients {
+            for (coefficient, companion) in self.companions.iter().enumerate() {
                 let (mut value, mut slope) = (hollow.at(coefficient, row as f64).0, full.at(coefficient, row as f64).1);
                 if let Some(current) = self.current {
                     let (taken, rate) = current.at(coefficient, row as f64);
                     (value, slope) = (value - taken, slope - rate);
                 }
                 constants[coefficient] = value;
-                error -= slope / rows.period * rows.regressors[slow[coefficient]].companion[row];
+                error -= slope / problem.period * companion[row];
             }
             for (constant, column) in constants.iter().zip(&problem.constants) {
                 error -= constant * column[row];

@@ -1,18 +1,33 @@
 //! What a record says of its unknowns: over which length windows should reach, and what is constant.
 
+use crate::averaging::Around;
 use crate::constancy::{self, Test};
 use crate::cross_validation::{Validated, validate};
 use crate::equations::Rows;
 use crate::error::Error;
-use crate::model::{Fit, Model};
+use crate::jumps::{self, Jump, Search};
+use crate::model::{Fit, Model, without_constants};
 use crate::pooling::{Expected, misfits};
 use crate::row_covariance::RowCovariance;
+use crate::samples::Samples;
 use crate::scale::Scale;
 use crate::varying;
-use crate::weak_form::WeakRows;
+use crate::weak_form::{Ones, Record, TermSamples, WeakRows, Whole};
 use crate::weak_identification::{Chosen, Kind, Session};
 
+/// The mean squared error of predicting rows, over the noise's, from which on more is tried, and the part of it that must be left to be
+/// worth it.
+const BADLY: f64 = 1.5;
+const BETTER: f64 = 0.8;
+
+/// Rounds of looking for jumps and fitting again with windows that end there.
+const JUMP_ROUNDS: usize = 4;
+
+/// Lengths of windows, from the best one on, that jumps are looked for with.
+const JUMP_SCALES: usize = 5;
+
 /// What was decided, and the fit it rests on.
+#[derive(Clone)]
 pub(crate) struct Decided {
     /// What is windowed and what is constant.
     pub(crate) model: Model,
@@ -29,6 +44,10 @@ pub(crate) struct Decided {
     pub(crate) scales: Vec<Scale>,
     pub(crate) covariance: RowCovariance,
     pub(crate) expected: Expected,
+    /// Where what is windowed jumps.
+    pub(crate) jumps: Vec<Jump>,
+    /// All rows, also those over jumps; nothing without jumps.
+    pub(crate) whole: Option<Rows>,
 }
 
 /// How many rows lie in so many samples.
@@ -50,8 +69,35 @@ impl Decided {
 }
 
 impl Session<'_, '_, '_> {
+    /// Chooses the length of windows where it is not given, tests what is constant, and finds jumps of what is windowed.
+    pub(crate) fn decide(&mut self, chosen: &mut Chosen, model: &Model) -> Result<Decided, Error> {
+        let mut jumps = Vec::new();
+        let mut whole = None;
+        loop {
+            let mut decided = self.decide_kinds(chosen, model)?;
+            let found = match jumps.len() {
+                rounds if rounds < JUMP_ROUNDS => {
+                    self.find_jumps(&chosen.weak, &decided, jumps.last(), whole.as_ref())?
+                }
+                _ => jumps.last().cloned().unwrap_or_default(),
+            };
+            let samples = |jumps: &[Jump]| jumps.iter().map(|jump| jump.sample).collect::<Vec<_>>();
+            if samples(&found) == jumps.last().map_or_else(Vec::new, |known| samples(known)) {
+                (decided.jumps, decided.whole) = (found, whole);
+                return Ok(decided);
+            }
+            let weak = &mut chosen.weak;
+            let whole = whole.get_or_insert_with(|| weak.rows.clone());
+            weak.rows = whole.clone();
+            let (function, rows) = (&weak.kernels.values[2], weak.rows.len());
+            weak.rows.exclude(jumps::rows_over(&found, function, weak.first, weak.stride, rows));
+            weak.rows.jumps = found.iter().map(|jump| (jump.sample - weak.first).div_ceil(weak.stride)).collect();
+            jumps.push(found);
+        }
+    }
+
     /// Chooses the length of windows where it is not given, and tests what is constant.
-    pub(crate) fn decide(&mut self, chosen: &Chosen, model: &Model) -> Result<Decided, Error> {
+    fn decide_kinds(&mut self, chosen: &Chosen, model: &Model) -> Result<Decided, Error> {
         let rows = &chosen.weak.rows;
         let (covariance, expected) = self.covariance(&chosen.weak, chosen.parameters);
         let mut decided = Decided {
@@ -65,6 +111,8 @@ impl Session<'_, '_, '_> {
             scales: Vec::new(),
             covariance,
             expected,
+            jumps: Vec::new(),
+            whole: None,
         };
         if self.options.average {
             decided.scales = Scale::all(rows.len(), chosen.weak.reach());
@@ -78,31 +126,47 @@ impl Session<'_, '_, '_> {
             if !decided.slow.is_empty() {
                 self.set_free(rows, model, &mut decided)?;
             }
-            let Some(fit) = &decided.fit else { return Ok(decided) };
-            let side = decided.side(rows);
-            let problem = decided.model.problem(rows, side, self.noise[0], Some(&decided.covariance));
-            let (expected, inflation) = (decided.expected, decided.error.max(1.0));
-            let results =
-                constancy::test(&problem, fit, expected, &decided.covariance, inflation, self.options.instructions);
-            // Tests of what was set free before stand as they were.
-            decided.tests.retain(|(one, _)| decided.slow.contains(one));
-            let constants = decided.model.constant.iter().zip(results);
-            decided.tests.extend(constants.filter_map(|(&one, test)| test.map(|test| (one, test))));
-            // The most conspicuous first, then the others again.
-            let tested = self.of_kind(Kind::Tested);
-            let worst = decided
-                .tests
-                .iter()
-                .filter(|(one, test)| {
-                    tested.contains(one) && !decided.slow.contains(one) && test.probability < constancy::NO_CHANCE
-                })
-                .min_by(|a, b| a.1.probability.total_cmp(&b.1.probability))
-                .map(|(one, _)| *one);
-            match worst {
-                Some(one) if fit.scale.is_some() => decided.slow.push(one),
-                _ => return Ok(decided),
-            }
+            let Some(worst) = self.test(rows, &mut decided) else { break };
+            decided.slow.push(worst);
         }
+        self.set_others_free(rows, model, &mut decided)?;
+        Ok(decided)
+    }
+
+    /// Tests every constant. Returns the one that differs most between the parts of the record, if it may be set free.
+    fn test(&self, rows: &Rows, decided: &mut Decided) -> Option<usize> {
+        let fit = decided.fit.as_ref()?;
+        let problem = decided.model.problem(rows, decided.side(rows), self.noise[0], Some(&decided.covariance));
+        let (expected, inflation) = (decided.expected, decided.error.max(1.0));
+        let instructions = self.options.instructions;
+        let results = constancy::test(&problem, fit, expected, &decided.covariance, inflation, instructions);
+        // Tests of what was set free before stand as they were.
+        decided.tests.retain(|(one, _)| decided.slow.contains(one));
+        let constants = decided.model.constant.iter().zip(results);
+        decided.tests.extend(constants.filter_map(|(&one, test)| test.map(|test| (one, test))));
+        let tested = self.of_kind(Kind::Tested);
+        let conspicuous = decided.tests.iter().filter(|(one, test)| {
+            tested.contains(one) && !decided.slow.contains(one) && test.probability < constancy::NO_CHANCE
+        });
+        fit.scale?;
+        conspicuous.min_by(|a, b| a.1.probability.total_cmp(&b.1.probability)).map(|(one, _)| *one)
+    }
+
+    /// Sets all that was tested free where one of them changes and yet the rows are predicted badly: what changes beside what is held
+    /// constant needs windows so short that a test sees nothing.
+    fn set_others_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided) -> Result<(), Error> {
+        let others: Vec<usize> =
+            self.of_kind(Kind::Tested).into_iter().filter(|one| !decided.slow.contains(one)).collect();
+        if decided.slow.is_empty() || others.is_empty() || decided.error < BADLY {
+            return Ok(());
+        }
+        let mut free = decided.clone();
+        free.slow.extend(others);
+        self.set_free(rows, model, &mut free)?;
+        if free.fit.is_some() && free.error < BETTER * decided.error {
+            *decided = free;
+        }
+        Ok(())
     }
 
     /// Regressors of the unknowns of a kind.
@@ -149,6 +213,51 @@ impl Session<'_, '_, '_> {
         Ok(())
     }
 
+    /// Finds jumps of what is windowed beside those that are known. `whole` holds all rows where some are over jumps.
+    fn find_jumps(
+        &mut self,
+        weak: &WeakRows,
+        decided: &Decided,
+        known: Option<&Vec<Jump>>,
+        whole: Option<&Rows>,
+    ) -> Result<Vec<Jump>, Error> {
+        let known = known.map_or(&[][..], Vec::as_slice);
+        let signals = signals(self.record, &decided.model).filter(|_| self.options.average);
+        let (Some(signals), Some(fit)) = (signals, &decided.fit) else { return Ok(known.to_vec()) };
+        let signals: Vec<&dyn Samples> = signals.iter().map(|signal| &**signal).collect();
+        let (constants, noise) = (&fit.pooled.values, self.noise[0]);
+        let problem = decided.model.problem(&weak.rows, decided.side(&weak.rows), noise, Some(&decided.covariance));
+        let whole = whole.unwrap_or(&weak.rows);
+        let side = match &decided.found {
+            Some(found) => varying::without(whole, &decided.slow, &found.varying),
+            None => whole.side.clone(),
+        };
+        let whole = decided.model.problem(whole, &side, noise, None);
+        let best = decided.scales.iter().position(|scale| Some(*scale) == fit.scale).unwrap_or(0);
+        let scales = decided.scales[best..].iter().filter(|scale| scale.stands_alone()).take(JUMP_SCALES);
+        let mut solved = Vec::new();
+        for &scale in scales {
+            let cells = scale.side_cells(weak.rows.len());
+            solved.push((scale, scale.solve(&problem, &cells, self.options.instructions, &mut self.run)?));
+        }
+        let windows: Vec<Around<'_>> =
+            solved.iter().map(|(scale, cells)| Around::new(*scale, cells, constants)).collect();
+        let search = Search {
+            problem: &problem,
+            whole: &whole,
+            side: &without_constants(&whole, constants),
+            signals: &signals,
+            function: &weak.kernels.values[2],
+            first: weak.first,
+            stride: weak.stride,
+            expected: decided.expected,
+            constants,
+            scales: &decided.scales,
+            instructions: self.options.instructions,
+        };
+        Ok(search.find(&windows, known))
+    }
+
     /// Finds what changes slowly, and the other constants beside it.
     fn set_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided) -> Result<(), Error> {
         let instructions = self.options.instructions;
@@ -157,17 +266,16 @@ impl Session<'_, '_, '_> {
         decided.model = Model { constant: rest, ..model.clone() };
         let ordered = decided.ordered();
         let slow = decided.slow.len();
-        decided.found = varying::find(
+        let search = varying::Search {
             rows,
-            &ordered,
-            slow,
-            self.noise[0],
-            decided.expected,
-            &decided.scales,
-            first,
+            model: &ordered,
+            coefficients: slow,
+            noise: self.noise[0],
+            expected: decided.expected,
+            scales: &decided.scales,
             instructions,
-            &mut self.run,
-        )?;
+        };
+        decided.found = varying::find(&search, first, &mut self.run)?;
         decided.fit = None;
         if let Some(found) = &decided.found {
             let problem = decided.model.problem(rows, &found.side, self.noise[0], Some(&decided.covariance));
@@ -177,4 +285,22 @@ impl Session<'_, '_, '_> {
         }
         Ok(())
     }
+}
+
+/// What the windowed unknowns multiply, sample by sample; nothing where there are none or jumps of one would act through a derivative.
+fn signals<'a>(record: &'a Record<'_>, model: &Model) -> Option<Vec<Box<dyn Samples + 'a>>> {
+    if model.windowed.is_empty() {
+        return None;
+    }
+    let of = |&index: &usize| -> Option<Box<dyn Samples + 'a>> {
+        match index.checked_sub(2)? {
+            0 => Some(Box::new(Whole(record.angle))),
+            term => match record.terms[term - 1] {
+                TermSamples::One => Some(Box::new(Ones(record.angle.len()))),
+                TermSamples::Given(samples) => Some(Box::new(Whole(samples))),
+                TermSamples::TorqueRate => None,
+            },
+        }
+    };
+    model.windowed.iter().map(of).collect()
 }

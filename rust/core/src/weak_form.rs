@@ -242,8 +242,21 @@ fn mean(samples: &dyn Samples) -> f64 {
     sum / count.max(1.0)
 }
 
+/// One at every sample.
+pub(crate) struct Ones(pub(crate) usize);
+
+impl Samples for Ones {
+    fn len(&self) -> usize {
+        self.0
+    }
+
+    fn read(&self, _first: usize, into: &mut [f64]) {
+        into.fill(1.0);
+    }
+}
+
 /// A channel as it is.
-struct Whole<'a>(&'a dyn Samples);
+pub(crate) struct Whole<'a>(pub(crate) &'a dyn Samples);
 
 impl Samples for Whole<'_> {
     fn len(&self) -> usize {

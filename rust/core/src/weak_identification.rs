@@ -160,9 +160,10 @@ pub fn identify_weak(
         angle.resize(samples, 0.0);
         motion.angle.read(0, &mut angle);
     }
-    let velocity = match motion.terms.iter().any(|term| matches!(term, Term::Coulomb)) {
-        true => velocity(motion.angle, options, workers, watch)?,
-        false => Vec::new(),
+    let velocity = if motion.terms.iter().any(|term| matches!(term, Term::Coulomb)) {
+        velocity(motion.angle, options, workers, watch)?
+    } else {
+        Vec::new()
     };
     let cubed: Vec<f64> = angle.iter().map(|angle| angle * angle * angle).collect();
     let direction: Vec<f64> = velocity.iter().map(|&velocity| sign(velocity)).collect();
@@ -231,13 +232,14 @@ fn identify(
     watch: &mut Watch<'_>,
 ) -> Result<WeakIdentified, Error> {
     let samples = record.angle.len();
-    let level = |given: Option<f64>, channel| given.unwrap_or_else(|| channel_variance(channel, None, options.instructions));
+    let level =
+        |given: Option<f64>, channel| given.unwrap_or_else(|| channel_variance(channel, None, options.instructions));
     let noise = [level(options.noise[0], record.angle), level(options.noise[1], record.torque)];
     let mut session = Session { record, options, noise, run: Run::new(workers, samples, STAGES, watch) };
     let model = session.model();
-    let chosen = session.choose_test_function(&model)?;
-    let decided = session.decide(&chosen, &model)?;
-    session.report(chosen, decided)
+    let mut chosen = session.choose_test_function(&model)?;
+    let decided = session.decide(&mut chosen, &model)?;
+    session.report(chosen, &decided)
 }
 
 impl Session<'_, '_, '_> {
@@ -285,9 +287,10 @@ impl Session<'_, '_, '_> {
         let problem = model.problem(&weak.rows, &weak.rows.side, self.noise[0], None);
         let scales = Scale::all(weak.rows.len(), weak.reach());
         let wanted = PILOT_WINDOW * weak.function.half_width() / weak.stride;
-        let scale = match model.windowed.is_empty() {
-            true => None,
-            false => Some(scales[Scale::nearest(&scales, wanted).ok_or(self.too_short())?]),
+        let scale = if model.windowed.is_empty() {
+            None
+        } else {
+            Some(scales[Scale::nearest(&scales, wanted).ok_or(self.too_short())?])
         };
         let any = Expected { variance: 1.0, torque: 0.0, redundancy: 1.0 };
         let fit = Fit::new(&problem, scale, any, self.options.instructions, &mut self.run)?;

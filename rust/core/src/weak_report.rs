@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::every_window::every_window;
 use crate::identification::HARDLY_TOLD_APART;
 use crate::model::{Fit, Predictor, without_constants};
-use crate::pooling::{Expected, influence, sandwich, weakest};
+use crate::pooling::{Expected, influence, is_determined, sandwich, weakest};
 use crate::row_covariance::RowCovariance;
 use crate::status::Status;
 use crate::suspects::{Judged, Missing, Suspect};
@@ -42,7 +42,7 @@ struct Tracks {
 }
 
 impl Session<'_, '_, '_> {
-    pub(crate) fn report(&mut self, chosen: Chosen, decided: Decided) -> Result<WeakIdentified, Error> {
+    pub(crate) fn report(&mut self, chosen: Chosen, decided: &Decided) -> Result<WeakIdentified, Error> {
         let Chosen { mut weak, at_end, .. } = chosen;
         let stride = weak.stride;
         let ordered = decided.ordered();
@@ -60,16 +60,16 @@ impl Session<'_, '_, '_> {
             suspects: Vec::new(),
             changing: decided.model.windowed.iter().chain(&decided.slow).copied().collect(),
             pairs: Vec::new(),
-            jumps: Vec::new(),
+            jumps: decided.jumps.iter().map(|jump| jump.sample).collect(),
             results: SampleResults::default(),
         };
-        let Some(fit) = &decided.fit else { return Ok(self.undetermined(found, &decided)) };
+        let Some(fit) = &decided.fit else { return Ok(self.undetermined(found, decided)) };
         let given = self.options.equations.filter(|_| !self.options.average);
         found.equations = given.unwrap_or(fit.span * stride).min(self.record.angle.len());
-        let errors = self.errors(&weak, &decided, fit);
+        let errors = self.errors(&weak, decided, fit);
         let problem = ordered.problem(&weak.rows, decided.side(&weak.rows), self.noise[0], Some(&errors.covariance));
         let all = self.refit(&problem, fit, errors.expected)?;
-        let Some(all) = all else { return Ok(self.undetermined(found, &decided)) };
+        let Some(all) = all else { return Ok(self.undetermined(found, decided)) };
         found.condition = all.pooled.condition;
         found.weakest = weakest(&all.full, &all.pooled.weights);
         let windows = 0..all.full.len();
@@ -98,12 +98,12 @@ impl Session<'_, '_, '_> {
         if found.condition > HARDLY_TOLD_APART {
             status |= Status::ILL_CONDITIONED;
         }
-        let tracks = self.tracks(&problem, &weak, &decided, fit, &values, errors.expected)?;
-        let results = self.rows_results(&weak, &problem, &decided, &all, &errors, &tracks, &found, &values);
+        let tracks = self.tracks(&problem, &weak, decided, fit, &values, errors.expected)?;
+        let results = Self::rows_results(&weak, &problem, decided, &all, &errors, &tracks, &found, &values);
         let (results, pairs) = results;
         found.pairs = pairs;
         let side = decided.side(&weak.rows).to_vec();
-        found.suspects = self.suspects(&mut weak, &decided, fit, &side, &errors)?;
+        found.suspects = self.suspects(&mut weak, decided, fit, &side, &errors)?;
         for suspect in found.suspects.iter().filter(|suspect| suspect.is_conspicuous()) {
             status |= if suspect.missing == Missing::Lag { Status::LAG_SUSPECTED } else { Status::TERM_SUSPECTED };
         }
@@ -149,10 +149,10 @@ impl Session<'_, '_, '_> {
         };
         let rows = &weak.rows;
         let problem = decided.model.problem(rows, decided.side(rows), self.noise[0], None);
-        let residuals = residuals(&problem, fit);
+        let (residuals, usable) = residuals(&problem, fit);
         let reach = 2 * weak.reach();
-        let shown = RowCovariance::of_residuals(&residuals, &rows.usable, 2 * reach);
-        if shown.is_coloured(reach, COLOURED, rows.usable.iter().filter(|usable| **usable).count()) {
+        let shown = RowCovariance::of_residuals(&residuals, &usable, 2 * reach);
+        if shown.is_coloured(reach, COLOURED, usable.iter().filter(|usable| **usable).count()) {
             errors.status |= Status::COLOURED;
         }
         let whole = decided.model.windowed.is_empty();
@@ -215,8 +215,9 @@ impl Session<'_, '_, '_> {
         let averages = average(problem, &decided.scales, constants, expected, fit.span, instructions, &mut self.run)?;
         let names = fit.full.fields;
         let condition = fit.full.field(names.condition());
+        let usable = &decided.whole.as_ref().unwrap_or(rows).usable;
         let status = (0..rows.len()).map(|row| {
-            let mut status = if rows.usable[row] { Status::GOOD } else { Status::GAP };
+            let mut status = if usable[row] { Status::GOOD } else { Status::GAP };
             if averages.values.iter().any(|column| column[row].is_nan()) {
                 status |= Status::INVALID;
             }
@@ -252,7 +253,6 @@ impl Session<'_, '_, '_> {
     /// Puts together what changes and its errors.
     #[allow(clippy::too_many_arguments, reason = "all that was found")]
     fn rows_results(
-        &self,
         weak: &WeakRows,
         problem: &Problem<'_>,
         decided: &Decided,
@@ -308,6 +308,7 @@ impl Session<'_, '_, '_> {
             slopes: tracks.slopes.clone(),
             condition: tracks.condition.clone(),
             status: tracks.status.clone(),
+            jumps: decided.jumps.clone(),
             ..RowResults::default()
         };
         if let Some(found) = &decided.found {
@@ -348,7 +349,9 @@ impl Session<'_, '_, '_> {
         let samples = self.record.angle.len();
         let mut cubed = vec![0.0; samples];
         self.record.angle.read(0, &mut cubed);
-        cubed.iter_mut().for_each(|angle| *angle = angle.powi(3));
+        for angle in &mut cubed {
+            *angle = angle.powi(3);
+        }
         let direction = direction(weak, samples);
         let (cubed, direction) = (cubed.as_slice(), direction.as_slice());
         let all = [
@@ -364,6 +367,8 @@ impl Session<'_, '_, '_> {
         let more = self.run.stage(|watch| WeakRows::build(&record, function, delta, workers, watch))?;
         let first = weak.rows.regressors.len();
         weak.rows.regressors.extend(more.rows.regressors.into_iter().skip(3));
+        let unusable: Vec<usize> = (0..weak.rows.len()).filter(|&row| !weak.rows.usable[row]).collect();
+        weak.rows.exclude(unusable.into_iter());
         let mut suspects = Vec::new();
         for (place, (missing, _)) in terms.iter().enumerate() {
             let judged = Judged {
@@ -394,18 +399,23 @@ fn nearest(fit: &Fit, row: usize) -> usize {
     place
 }
 
-/// What a fit leaves of every row.
-fn residuals(problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
+/// What a fit leaves of every row, and where it says anything.
+fn residuals(problem: &Problem<'_>, fit: &Fit) -> (Vec<f64>, Vec<bool>) {
+    let mut usable = problem.usable.to_vec();
     let mut left = without_constants(problem, &fit.pooled.values);
     if problem.layout.windowed > 0 {
         let predictor = Predictor::new(&fit.full, &fit.pooled.values);
         for (row, left) in left.iter_mut().enumerate().filter(|(row, _)| problem.usable[*row]) {
             let place = nearest(fit, row);
+            if !is_determined(&fit.full, place) {
+                (*left, usable[row]) = (0.0, false);
+                continue;
+            }
             let later = (row as f64 - fit.centre(place)) * problem.period;
             *left -= predictor.predict(problem, place, row, later);
         }
     }
-    left
+    (left, usable)
 }
 
 /// Standard deviation of what is left, over windows of so many rows.
@@ -450,8 +460,5 @@ fn direction(weak: &WeakRows, samples: usize) -> Vec<f64> {
         let part = (place - row as f64).clamp(0.0, 1.0);
         velocity[row] + part * (velocity[(row + 1).min(last)] - velocity[row])
     };
-    (0..samples)
-        .map(|sample| at(sample))
-        .map(|velocity| if velocity == 0.0 { 0.0 } else { velocity.signum() })
-        .collect()
+    (0..samples).map(at).map(|velocity| if velocity == 0.0 { 0.0 } else { velocity.signum() }).collect()
 }

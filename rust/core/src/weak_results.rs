@@ -1,6 +1,10 @@
 //! Results of weak rows, and what they say at every sample.
 
+use crate::jumps::Jump;
 use crate::status::Status;
+
+/// A place of a jump that is less probable does not count.
+const UNLIKELY: f64 = 1e-3;
 
 /// Numbers at every row.
 #[derive(Clone, Debug, Default)]
@@ -19,8 +23,8 @@ pub(crate) struct RowResults {
     pub(crate) condition: Vec<f64>,
     /// Bits of [`Status`].
     pub(crate) status: Vec<u16>,
-    /// Samples before which the values jump, in order.
-    pub(crate) jumps: Vec<usize>,
+    /// Where the values jump, in order.
+    pub(crate) jumps: Vec<Jump>,
 }
 
 /// Numbers at every so-manieth sample.
@@ -56,13 +60,39 @@ impl RowResults {
             let edge = if place.beyond == 0.0 { 0 } else { Status::EDGE.bits() };
             self.status[place.nearest] | edge
         });
-        SampleResults {
+        let mut results = SampleResults {
             values: self.values.iter().zip(&self.slopes).map(along).collect(),
             errors: self.errors.iter().map(between).collect(),
             covariances: self.covariances.iter().map(between).collect(),
             deviation: between(&self.deviation),
             condition: between(&self.condition),
             status: status.collect(),
+        };
+        self.jumps.iter().for_each(|jump| self.blur(jump, samples, step, &mut results));
+        results
+    }
+
+    /// Where a jump may or may not have happened the values are the mean of both, and its spread is part of their errors.
+    fn blur(&self, jump: &Jump, samples: usize, step: usize, results: &mut SampleResults) {
+        let (rows, at) = (self.status.len(), |row: usize| self.first + row as f64 * self.stride);
+        let exact = (jump.sample as f64 - self.first) / self.stride;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the rows")]
+        let after = exact.ceil().clamp(1.0, rows as f64 - 1.0) as usize;
+        let end = samples.min(jump.first + jump.happened.len());
+        for sample in (jump.first.next_multiple_of(step)..end).step_by(step) {
+            let happened = jump.happened[sample - jump.first];
+            if !(UNLIKELY..=1.0 - UNLIKELY).contains(&happened) {
+                continue;
+            }
+            let place = sample / step;
+            for ((column, slopes), (values, errors)) in
+                self.values.iter().zip(&self.slopes).zip(results.values.iter_mut().zip(&mut results.errors))
+            {
+                let on = |row: usize| column[row] + (sample as f64 - at(row)) / self.stride * slopes[row];
+                let (left, right) = (on(after - 1), on(after));
+                values[place] = left + happened * (right - left);
+                errors[place] = errors[place].hypot((happened * (1.0 - happened)).sqrt() * (right - left));
+            }
         }
     }
 
@@ -81,10 +111,10 @@ impl RowResults {
             place = Place { row: only, next: only, part: 0.0, beyond: exact - only as f64, nearest: only };
         }
         // A jump between two rows: the one on the sample's side of it is carried on.
-        let jump = self.jumps.partition_point(|&jump| jump <= sample);
+        let jump = self.jumps.partition_point(|jump| jump.sample <= sample);
         let at = |row: usize| self.first + row as f64 * self.stride;
-        let before = jump.checked_sub(1).is_some_and(|index| self.jumps[index] as f64 > at(row));
-        let after = self.jumps.get(jump).is_some_and(|&jump| jump as f64 <= at(next));
+        let before = jump.checked_sub(1).is_some_and(|index| self.jumps[index].sample as f64 > at(row));
+        let after = self.jumps.get(jump).is_some_and(|jump| jump.sample as f64 <= at(next));
         match (before, after) {
             (true, false) => Place { row: next, next, part: 0.0, beyond: exact - next as f64, nearest: next },
             (false, true) => Place { row, next: row, part: 0.0, beyond: exact - row as f64, nearest: row },

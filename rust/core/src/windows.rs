@@ -23,6 +23,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) constants: Vec<&'a [f64]>,
     pub(crate) side: &'a [f64],
     pub(crate) usable: &'a [bool],
+    /// The first rows after jumps of what is windowed, in order. A window over a jump counts as one without rows.
+    pub(crate) jumps: &'a [usize],
     /// Seconds from one row to the next.
     pub(crate) period: f64,
     /// What the angle's noise does in a row.
@@ -44,6 +46,12 @@ impl Problem<'_> {
     /// Number of rows.
     pub(crate) fn rows(&self) -> usize {
         self.side.len()
+    }
+
+    /// Whether there is a jump after the first of some rows and not after the end of them.
+    pub(crate) fn jumps_within(&self, rows: &Range<isize>) -> bool {
+        let next = self.jumps.partition_point(|&jump| jump.cast_signed() <= rows.start);
+        self.jumps.get(next).is_some_and(|&jump| jump.cast_signed() <= rows.end)
     }
 }
 
@@ -90,6 +98,11 @@ impl Solved {
             }
         }
         all
+    }
+
+    /// Makes a window one without rows.
+    fn disregard(&mut self, place: usize) {
+        self.values[self.fields.count() * self.padded + place] = 0.0;
     }
 
     /// Writes eight windows.
@@ -173,7 +186,19 @@ pub(crate) fn solve_windows(
     shapes: &[Shape],
     instructions: Instructions,
 ) -> Vec<Solved> {
-    dispatch(instructions, Work { problem, step, blocks, shapes })
+    let mut solved = dispatch(instructions, Work { problem, step, blocks, shapes });
+    if !problem.jumps.is_empty() {
+        for (shape, solved) in shapes.iter().zip(&mut solved) {
+            let first = shape.parts.iter().map(|part| part.start).min().unwrap_or(0);
+            for (place, block) in blocks.clone().enumerate() {
+                let row = |offset: usize| (block + offset.cast_signed()) * step.cast_signed();
+                if problem.jumps_within(&(row(first)..row(shape.end()) - 1)) {
+                    solved.disregard(place);
+                }
+            }
+        }
+    }
+    solved
 }
 
 struct Work<'a, 'b> {

@@ -1,0 +1,290 @@
+//! Where a windowed coefficient jumps.
+//!
+//! A window over a jump says nothing of either side, so windows should end there. A jump is suspected at rows where the window before and
+//! the window after say different things. It is placed between two samples by the rows that reach over it: with `k₋` and `k₊` the lines
+//! on both sides, they are predicted by
+//!
+//! ```text
+//! Σ_{t<τ} φ(t - c) θ(t) k₋(t) + Σ_{t≥τ} φ(t - c) θ(t) k₊(t),
+//! ```
+//!
+//! and `τ` leaves the smallest sum of squares. It is believed where that is smaller than what the same windows leave when they predict
+//! the rows between them without a jump, by more than chance.
+
+use std::ops::Range;
+
+use crate::averaging::Around;
+use crate::pooling::Expected;
+use crate::samples::{Samples, is_usable};
+use crate::scale::{SHORTEST_ALONE, Scale};
+use crate::simd::Instructions;
+use crate::windows::Problem;
+
+/// Squared differences between the windows before and after a row, over their variance, from which on a jump is looked for.
+const SUSPECTED: f64 = 36.0;
+
+/// By how much a jump must lessen the sum of squares, over the noise of one independent row.
+const BELIEVED: f64 = 40.0;
+
+/// The most that a jump may leave of the sum of squares: a steep slope is no jump.
+const LEFT: f64 = 0.5;
+
+/// Rounds of placing a jump and taking the windows beside it again.
+const ROUNDS: usize = 4;
+
+/// The part of a test function that may reach over a jump unnoticed, and the probability that its place may be missed by.
+const UNNOTICED: f64 = 1e-4;
+const UNLIKELY: f64 = 1e-3;
+
+/// A jump of what is windowed.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Jump {
+    /// The first sample after it.
+    pub(crate) sample: usize,
+    /// The probability that it has happened at the samples from `first` on.
+    pub(crate) first: usize,
+    pub(crate) happened: Vec<f64>,
+}
+
+/// What jumps are looked for in.
+pub(crate) struct Search<'a> {
+    pub(crate) problem: &'a Problem<'a>,
+    /// All rows, also those over jumps that are known, and their right-hand side without constants.
+    pub(crate) whole: &'a Problem<'a>,
+    pub(crate) side: &'a [f64],
+    /// What the windowed coefficients multiply, sample by sample.
+    pub(crate) signals: &'a [&'a dyn Samples],
+    /// The test function at its samples.
+    pub(crate) function: &'a [f64],
+    /// Sample of the first row, and samples from one to the next.
+    pub(crate) first: usize,
+    pub(crate) stride: usize,
+    pub(crate) expected: Expected,
+    pub(crate) constants: &'a [f64],
+    /// All lengths of windows.
+    pub(crate) scales: &'a [Scale],
+    pub(crate) instructions: Instructions,
+}
+
+/// A line for every windowed coefficient: value at a row and growth per row.
+type Lines = Vec<[f64; 2]>;
+
+impl Search<'_> {
+    /// The jumps of the record, in order: those that are known placed again, and new ones.
+    pub(crate) fn find(&self, windows: &[Around<'_>], known: &[Jump]) -> Vec<Jump> {
+        let apart = self.apart();
+        let mut jumps: Vec<Jump> =
+            known.iter().map(|jump| self.again(windows, jump).unwrap_or_else(|| jump.clone())).collect();
+        let mut suspected = self.suspected(windows);
+        suspected.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut looked: Vec<usize> = Vec::new();
+        let samples = self.first * 2 + (self.problem.rows() - 1) * self.stride;
+        for (_, row, scale) in suspected {
+            if looked.iter().any(|other| other.abs_diff(row) <= apart / 2) {
+                continue;
+            }
+            looked.push(row);
+            let Some(jump) = self.place(&windows[scale], row) else { continue };
+            let room = apart * self.stride;
+            let alone = jumps.iter().all(|other| other.sample.abs_diff(jump.sample) >= room);
+            if alone && jump.sample >= room && jump.sample + room <= samples {
+                jumps.push(jump);
+            }
+        }
+        jumps.sort_by_key(|jump| jump.sample);
+        jumps
+    }
+
+    /// Places a known jump again with the longest windows beside it.
+    fn again(&self, windows: &[Around<'_>], jump: &Jump) -> Option<Jump> {
+        windows.iter().rev().find_map(|windows| self.placed(windows, jump.sample).map(|(placed, _)| placed))
+    }
+
+    /// Rows that jumps must be apart, so that a window that serves alone fits between them.
+    fn apart(&self) -> usize {
+        SHORTEST_ALONE + 4 * self.function.len() / 2 / self.stride
+    }
+
+    /// Rows where the windows before and after differ most, by how much, and the scale that says so.
+    fn suspected(&self, windows: &[Around<'_>]) -> Vec<(f64, usize, usize)> {
+        let mut found = Vec::new();
+        let rows = self.problem.rows();
+        for (scale, windows) in windows.iter().enumerate() {
+            let mut best: Option<(f64, usize)> = None;
+            for row in 0..rows {
+                let differs = self.differs(windows, row).unwrap_or(0.0);
+                if differs > SUSPECTED {
+                    if best.is_none_or(|best| differs > best.0) {
+                        best = Some((differs, row));
+                    }
+                } else if let Some((differs, row)) = best.take() {
+                    found.push((differs, row, scale));
+                }
+            }
+            found.extend(best.map(|(differs, row)| (differs, row, scale)));
+        }
+        found
+    }
+
+    /// The squared difference between what the windows before and after a row say of it, over its variance: that of the coefficient that
+    /// differs most.
+    fn differs(&self, windows: &Around<'_>, row: usize) -> Option<f64> {
+        let before = windows.seen(self.problem, row, 0)?;
+        let after = windows.seen(self.problem, row, 2)?;
+        let squared = (0..self.problem.layout.windowed).map(|unknown| {
+            let difference = after.value(unknown) - before.value(unknown);
+            difference * difference / (after.variance(unknown) + before.variance(unknown))
+        });
+        Some(squared.fold(0.0, f64::max))
+    }
+
+    /// Places a jump near a row, if there is one.
+    fn place(&self, windows: &Around<'_>, row: usize) -> Option<Jump> {
+        let (jump, (over, left)) = self.placed(windows, self.first + row * self.stride)?;
+        self.is_believed(&over, left).then_some(jump)
+    }
+
+    /// Places a jump near a sample. Returns it with the rows that it was judged by and the sum of squares that it leaves there.
+    fn placed(&self, windows: &Around<'_>, sample: usize) -> Option<(Jump, (Range<usize>, f64))> {
+        let rows = self.problem.rows();
+        let half = self.function.len() / 2;
+        let reach = half.div_ceil(self.stride);
+        let (mut tau, mut round) = (sample, 0);
+        loop {
+            // The first row after the jump.
+            let row = tau.saturating_sub(self.first).div_ceil(self.stride).clamp(1, rows - 1);
+            let sides = [self.lines(windows, row, 0)?, self.lines(windows, row - 1, 2)?];
+            let candidates = tau.saturating_sub(half)..tau + half + 1;
+            let over = row.saturating_sub(2 * reach)..(row + 2 * reach).min(rows);
+            let left = self.left(&sides, row, &over, &candidates)?;
+            let best = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]))?;
+            let next = candidates.start + best;
+            if next.abs_diff(tau) <= self.stride / 2 || round == ROUNDS {
+                let jump = self.jump(&left, best, candidates.start, over.len() as f64);
+                return Some((jump, (over, left[best])));
+            }
+            (tau, round) = (next, round + 1);
+        }
+    }
+
+    /// What the windows on one side say at a row.
+    fn lines(&self, windows: &Around<'_>, row: usize, which: usize) -> Option<Lines> {
+        let seen = windows.seen(self.problem, row, which)?;
+        let line = |unknown| [seen.value(unknown), seen.slope(unknown) * self.problem.period];
+        Some((0..self.problem.layout.windowed).map(line).collect())
+    }
+
+    /// The sums of squares that jumps before each candidate sample leave in some rows. The line before a jump counts from a row, that after it
+    /// from the row before.
+    fn left(
+        &self,
+        [before, after]: &[Lines; 2],
+        row: usize,
+        over: &Range<usize>,
+        candidates: &Range<usize>,
+    ) -> Option<Vec<f64>> {
+        let (length, half) = (self.function.len(), self.function.len() / 2);
+        let mut left = vec![0.0; candidates.len()];
+        let mut samples = vec![0.0; length];
+        let mut products = vec![[0.0, 0.0]; length];
+        let mut count = 0;
+        for one in over.clone().filter(|&one| self.whole.usable[one]) {
+            let begin = self.first + one * self.stride - half;
+            products.fill([0.0, 0.0]);
+            for (unknown, signal) in self.signals.iter().enumerate() {
+                signal.read(begin, &mut samples);
+                for (place, product) in products.iter_mut().enumerate() {
+                    let value = samples[place];
+                    if !is_usable(value) {
+                        return None;
+                    }
+                    let weight = self.function[place] * value;
+                    let later = (begin + place) as f64 - (self.first + row * self.stride) as f64;
+                    let later = later / self.stride as f64;
+                    product[0] += weight * (before[unknown][0] + later * before[unknown][1]);
+                    product[1] += weight * (after[unknown][0] + (later + 1.0) * after[unknown][1]);
+                }
+            }
+            let total: f64 = products.iter().map(|product| product[1]).sum();
+            let mut error = self.side[one] - total;
+            let mut place = 0;
+            for (candidate, left) in candidates.clone().zip(&mut left) {
+                while place < length && begin + place < candidate {
+                    error += products[place][1] - products[place][0];
+                    place += 1;
+                }
+                *left += error * error;
+            }
+            count += 1;
+        }
+        (count > 2).then_some(left)
+    }
+
+    /// Whether a jump is more than chance: windows of no length may predict the rows around it nearly as well without one.
+    fn is_believed(&self, over: &Range<usize>, left: f64) -> bool {
+        let rows: Vec<usize> = over.clone().filter(|&row| self.whole.usable[row]).collect();
+        let without =
+            self.scales.iter().filter_map(|scale| self.without(*scale, over, &rows)).fold(f64::INFINITY, f64::min);
+        let gain = (without - left) / self.noise(left, rows.len() as f64);
+        without.is_finite() && gain > BELIEVED && left < LEFT * without
+    }
+
+    /// The sum of squares that windows of one length leave in rows between them; nothing where they do not reach all of them.
+    fn without(&self, scale: Scale, over: &Range<usize>, rows: &[usize]) -> Option<f64> {
+        let all = scale.side_cells(self.problem.rows());
+        let cells = scale.cell(over.start).max(all.start)..(scale.cell(over.end) + 1).min(all.end);
+        if cells.is_empty() {
+            return None;
+        }
+        let cells = scale.solve_here(self.problem, &cells, self.instructions);
+        let windows = Around::new(scale, &cells, self.constants);
+        let error = |&row: &usize| {
+            let seen = windows.seen(self.problem, row, 1)?;
+            Some((self.side[row] - seen.predict(self.whole, row)).powi(2))
+        };
+        rows.iter().map(error).sum()
+    }
+
+    /// The variance of the sum of squares of rows that stand for one independent row, at least that of the noise.
+    fn noise(&self, left: f64, count: f64) -> f64 {
+        self.expected.redundancy * self.expected.variance.max(left / count)
+    }
+
+    /// A jump with the probability of every place of it.
+    fn jump(&self, left: &[f64], best: usize, first: usize, count: f64) -> Jump {
+        let noise = self.noise(left[best], count);
+        let weights: Vec<f64> = left.iter().map(|one| (-(one - left[best]) / (2.0 * noise)).exp()).collect();
+        let total: f64 = weights.iter().sum();
+        let happened = weights.iter().scan(0.0, |sum, weight| {
+            *sum += weight / total;
+            Some(*sum)
+        });
+        Jump { sample: first + best, first, happened: happened.collect() }
+    }
+}
+
+/// Rows whose test function reaches over a jump, wherever it may be.
+pub(crate) fn rows_over(
+    jumps: &[Jump],
+    function: &[f64],
+    first: usize,
+    stride: usize,
+    rows: usize,
+) -> impl Iterator<Item = usize> {
+    let mut beyond = 0.0;
+    let unnoticed = function.iter().take_while(|&&value| {
+        beyond += value;
+        beyond < UNNOTICED
+    });
+    let reach = function.len() / 2 - unnoticed.count();
+    let over: Vec<Range<usize>> = jumps
+        .iter()
+        .map(|jump| {
+            let place = |part: f64| jump.first + jump.happened.partition_point(|&happened| happened < part);
+            let (early, late) = (place(UNLIKELY).min(jump.sample), place(1.0 - UNLIKELY).max(jump.sample));
+            let row = |sample: usize| sample.saturating_sub(first).div_ceil(stride).min(rows);
+            row((early + 1).saturating_sub(reach))..row(late + reach)
+        })
+        .collect();
+    over.into_iter().flatten()
+}
