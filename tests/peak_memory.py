@@ -31,10 +31,10 @@ CALLS: dict[str, Callable[[Array, Array, int, int], object]] = {
         np.lib.stride_tricks.sliding_window_view(angle, 3), torque[:-2], window, step=STEP, workers=workers
     ),
     "identify, window": lambda angle, torque, window, workers: tvident.identify(
-        angle, torque, sample_rate=1000, window_length=window | 1, step=STEP, workers=workers
+        angle, torque, sample_rate=1000, preset="paper", window_length=window | 1, step=STEP, workers=workers
     ),
     "identify, equations": lambda angle, torque, window, workers: tvident.identify(
-        angle, torque, sample_rate=1000, equations=window, step=STEP, workers=workers
+        angle, torque, sample_rate=1000, preset="paper", equations=window, step=STEP, workers=workers
     ),
 }
 

@@ -57,7 +57,14 @@ def test_every_window_is_the_papers(
     call = given[known]
     names: list[Any] = sorted(extra)
     result = tvident.identify(
-        angle, torque, sample_rate=1000, window_length=2 * half + 1, equations=equations, terms=names, **call
+        angle,
+        torque,
+        sample_rate=1000,
+        preset="paper",
+        window_length=2 * half + 1,
+        equations=equations,
+        terms=names,
+        **call,
     )
     theta, velocity, acceleration = derivatives(angle, half, 1e-3, result.order)
     factors = {"inertia": acceleration, "damping": velocity, "stiffness": theta}
@@ -89,7 +96,7 @@ def test_every_window_is_the_papers(
 
 def test_natural_frequency_and_damping_ratio_come_with_their_errors() -> None:
     angle, torque = system(1, 800)
-    result = tvident.identify(angle, torque, sample_rate=1000, window_length=51, equations=100)
+    result = tvident.identify(angle, torque, sample_rate=1000, preset="paper", window_length=51, equations=100)
     theta, velocity, acceleration = derivatives(angle, 25, 1e-3, result.order)
     solutions = windowed(np.stack([acceleration, velocity, theta], axis=1), torque, 100)
     i = 400
@@ -114,7 +121,9 @@ def test_constant_parameters_are_one_least_squares_over_the_record(seed: int) ->
     angle, torque = system(seed, 700)
     angle[300] = np.nan  # costs its own windows, and no others
     call: dict[str, Any] = {"inertia": "constant", "damping": "constant", "stiffness": "constant"}
-    result = tvident.identify(angle, torque, sample_rate=1000, window_length=51, terms=["offset"], **call)
+    result = tvident.identify(
+        angle, torque, sample_rate=1000, preset="paper", window_length=51, terms=["offset"], **call
+    )
     theta, velocity, acceleration = derivatives(angle, 25, 1e-3, result.order)
     hit = np.abs(np.arange(700) - 300) <= 25
     A = np.stack([acceleration, velocity, theta, np.ones(700)], axis=1)
@@ -133,7 +142,7 @@ def test_constant_parameters_are_one_least_squares_over_the_record(seed: int) ->
 
 def test_a_term_of_ones_own_is_like_a_built_in_one() -> None:
     angle, torque = system(2, 600)
-    call: dict[str, Any] = {"sample_rate": 1000, "window_length": 51, "equations": 80}
+    call: dict[str, Any] = {"sample_rate": 1000, "preset": "paper", "window_length": 51, "equations": 80}
     expected = tvident.identify(angle, torque, terms=["cubic"], **call)
     own = tvident.Term("hardening", lambda _t, theta, _velocity: theta**3)
     found = tvident.identify(angle, torque, terms=[own], **call)
@@ -147,7 +156,13 @@ def test_a_batch_is_its_records_one_by_one() -> None:
     angle, torque = (np.array([pair[k] for pair in pairs]).reshape(2, 3, 500) for k in range(2))
     stiffness = np.linspace(10, 20, 500)
     for kind in ("windowed", "constant"):
-        call: dict[str, Any] = {"sample_rate": 1000, "window_length": 51, "equations": 80, "stiffness": stiffness}
+        call: dict[str, Any] = {
+            "sample_rate": 1000,
+            "preset": "paper",
+            "window_length": 51,
+            "equations": 80,
+            "stiffness": stiffness,
+        }
         call |= {"inertia": kind, "damping": kind, "terms": ["offset"]}
         result = tvident.identify(angle, torque, **call)
         assert result.inertia.shape == (2, 3, 500)
@@ -166,7 +181,7 @@ def test_a_batch_is_its_records_one_by_one() -> None:
 @pytest.mark.parametrize("step", [2, 7, 333])
 def test_a_step_gives_every_so_manieth_result(step: int) -> None:
     angle, torque = system(3, 900)
-    call: dict[str, Any] = {"sample_rate": 1000, "window_length": 51, "equations": 80}
+    call: dict[str, Any] = {"sample_rate": 1000, "preset": "paper", "window_length": 51, "equations": 80}
     full = tvident.identify(angle, torque, **call)
     found = tvident.identify(angle, torque, step=step, **call)
     np.testing.assert_array_equal(found.time, full.time[::step])
@@ -178,21 +193,21 @@ def test_a_step_gives_every_so_manieth_result(step: int) -> None:
 @settings(max_examples=settings().max_examples // 10)
 def test_the_numbers_do_not_depend_on_the_number_of_workers(workers: int, equations: int) -> None:
     angle, torque = system(4, 60_000)
-    one = tvident.identify(angle, torque, sample_rate=1000, equations=equations, workers=1)
-    many = tvident.identify(angle, torque, sample_rate=1000, equations=equations, workers=workers)
+    one = tvident.identify(angle, torque, sample_rate=1000, preset="paper", equations=equations, workers=1)
+    many = tvident.identify(angle, torque, sample_rate=1000, preset="paper", equations=equations, workers=workers)
     for name in ("inertia", "damping", "stiffness", "condition", "status"):
         np.testing.assert_array_equal(getattr(one, name), getattr(many, name))
     call: dict[str, Any] = {"inertia": "constant", "damping": "constant", "stiffness": "constant"}
-    one = tvident.identify(angle, torque, sample_rate=1000, workers=1, **call)
-    many = tvident.identify(angle, torque, sample_rate=1000, workers=workers, **call)
+    one = tvident.identify(angle, torque, sample_rate=1000, preset="paper", workers=1, **call)
+    many = tvident.identify(angle, torque, sample_rate=1000, preset="paper", workers=workers, **call)
     assert one.constants == many.constants
 
 
 def test_missing_values_cost_their_own_windows_only() -> None:
     angle, torque = system(5, 3000)
-    clean = tvident.identify(angle, torque, sample_rate=1000)
+    clean = tvident.identify(angle, torque, sample_rate=1000, preset="paper")
     angle[1000], torque[2500] = np.nan, np.inf
-    dirty = tvident.identify(angle, torque, sample_rate=1000)
+    dirty = tvident.identify(angle, torque, sample_rate=1000, preset="paper")
     i = np.arange(3000)
     hit = ((i > 1000 - 200) & (i <= 1000 + 200)) | ((i > 2500 - 100) & (i <= 2500 + 100))
     np.testing.assert_array_equal((dirty.status & Status.INVALID != 0)[200:-200], hit[200:-200])
@@ -200,12 +215,12 @@ def test_missing_values_cost_their_own_windows_only() -> None:
 
 
 def test_nothing_excited_is_flagged_and_nan() -> None:
-    result = tvident.identify(np.zeros(1000), np.zeros(1000), sample_rate=1000)
+    result = tvident.identify(np.zeros(1000), np.zeros(1000), sample_rate=1000, preset="paper")
     assert (result.status & Status.INVALID != 0).all()
     assert (result.status[200:-200] & Status.RANK_DEFICIENT != 0).all()
     assert np.isnan(result.inertia).all()
     call: dict[str, Any] = {"inertia": "constant", "damping": "constant", "stiffness": "constant"}
-    constant = tvident.identify(np.zeros(1000), np.zeros(1000), sample_rate=1000, **call)
+    constant = tvident.identify(np.zeros(1000), np.zeros(1000), sample_rate=1000, preset="paper", **call)
     assert (constant.status & Status.RANK_DEFICIENT != 0).all()
     assert np.isnan(constant.constants["inertia"][0])
 
@@ -213,16 +228,18 @@ def test_nothing_excited_is_flagged_and_nan() -> None:
 def test_a_single_sine_is_flagged_as_hardly_determined() -> None:
     t = np.arange(5000) / 1000
     angle = np.sin(2 * np.pi * 3 * t) + 1e-4 * np.random.default_rng(0).standard_normal(t.size)
-    result = tvident.identify(angle, 10 * angle, sample_rate=1000)
+    result = tvident.identify(angle, 10 * angle, sample_rate=1000, preset="paper")
     assert (result.status[200:-200] & Status.ILL_CONDITIONED != 0).mean() > 0.95
     recording = tvident.simulate_torsional_rig(duration=5.0)
-    multisine = tvident.identify(recording.angle, recording.torque, sample_rate=1000)
+    multisine = tvident.identify(recording.angle, recording.torque, sample_rate=1000, preset="paper")
     assert (multisine.status & Status.ILL_CONDITIONED != 0).mean() < 0.01
 
 
 def test_settings_and_words_say_what_was_done() -> None:
     angle, torque = system(6, 1000)
-    result = tvident.identify(angle, torque, sample_rate=1000, window_length="51 ms", terms=["offset"], damping=0.1)
+    result = tvident.identify(
+        angle, torque, sample_rate=1000, preset="paper", window_length="51 ms", terms=["offset"], damping=0.1
+    )
     assert result.settings["window_length"] == 51
     assert result.settings["kinds"] == {
         "inertia": "windowed",
@@ -239,8 +256,8 @@ def test_settings_and_words_say_what_was_done() -> None:
 def test_the_sample_period_may_come_from_times() -> None:
     angle, torque = system(7, 600)
     t = 12.5 + np.arange(600) / 1000
-    expected = tvident.identify(angle, torque, delta=1e-3)
-    found = tvident.identify(angle, torque, t=t)
+    expected = tvident.identify(angle, torque, delta=1e-3, preset="paper")
+    found = tvident.identify(angle, torque, t=t, preset="paper")
     np.testing.assert_allclose(found.stiffness, expected.stiffness, rtol=1e-6)
     np.testing.assert_allclose(found.time, t)
 
@@ -278,7 +295,7 @@ def test_misuse_says_the_rule_the_value_and_the_cure(
     call: dict[str, Any], error: type[Exception], message: str
 ) -> None:
     angle, torque = system(0, 1000)
-    good: dict[str, Any] = {"angle": angle, "torque": torque, "sample_rate": 1000}
+    good: dict[str, Any] = {"angle": angle, "torque": torque, "sample_rate": 1000, "preset": "paper"}
     call = good | call
     with pytest.raises(error, match=message):
         tvident.identify(call.pop("angle"), call.pop("torque"), **call)

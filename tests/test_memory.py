@@ -28,7 +28,7 @@ def test_a_result_goes_when_it_is_let_go(name: str) -> None:
     calls: dict[str, Callable[[], object]] = {
         "fit_local_polynomials": lambda: tvident.fit_local_polynomials(y, 51),
         "rolling_least_squares": lambda: tvident.rolling_least_squares(y, y + 1, 51),
-        "identify": lambda: tvident.identify(y, y + 1, sample_rate=1000),
+        "identify": lambda: tvident.identify(y, y + 1, sample_rate=1000, preset="paper"),
     }
     gc.disable()
     try:

@@ -87,12 +87,13 @@ WORKS: dict[str, Work] = {
         workers=workers,
     ),
     "identify": lambda y, window, workers: tvident.identify(
-        y, np.roll(y, 5), sample_rate=1000, window_length=window, equations=window + 3, workers=workers
+        y, np.roll(y, 5), sample_rate=1000, preset="paper", window_length=window, equations=window + 3, workers=workers
     ),
     "identify, further terms": lambda y, window, workers: tvident.identify(
         y,
         np.roll(y, 5),
         sample_rate=1000,
+        preset="paper",
         window_length=window,
         terms=["offset", "coulomb"],
         damping=0,
@@ -102,6 +103,7 @@ WORKS: dict[str, Work] = {
         y,
         np.roll(y, 5),
         sample_rate=1000,
+        preset="paper",
         window_length=window,
         inertia="constant",
         damping="constant",
@@ -229,7 +231,9 @@ def test_every_path_identifies_alike(seed: int, half: int, equations: int) -> No
     for path in _core.available_instructions():
         with instructions(path):
             found.append(
-                tvident.identify(angle, torque, sample_rate=1000, window_length=2 * half + 1, equations=equations)
+                tvident.identify(
+                    angle, torque, sample_rate=1000, preset="paper", window_length=2 * half + 1, equations=equations
+                )
             )
     first = found[0]
     for other in found[1:]:

@@ -136,7 +136,12 @@ def test_identification_of_a_record_that_holds_hardly_an_equation(more: int, wor
     half, equations = 10, 8
     n = 2 * half + 1 + more
     angle, torque = samples(0, n), samples(1, n)
-    call: dict[str, Any] = {"sample_rate": 1.0, "window_length": 2 * half + 1, "equations": equations}
+    call: dict[str, Any] = {
+        "sample_rate": 1.0,
+        "preset": "paper",
+        "window_length": 2 * half + 1,
+        "equations": equations,
+    }
     result = tvident.identify(angle, torque, workers=workers, **call)
     theta, velocity, acceleration = derivatives(angle, half, 1.0, result.order)
     expected = windowed(np.stack([acceleration, velocity, theta], axis=1), torque, equations)

@@ -42,7 +42,13 @@ def errors(result: tvident.Identification) -> list[float]:
 @pytest.mark.parametrize("exponent", [8, 9, 12])
 def test_without_noise_the_parameters_are_exact(half: int, exponent: int) -> None:
     angle, torque = multisine(20_000)
-    call: dict[str, Any] = {"sample_rate": 1000, "form": "weak", "window_length": 2 * half + 1, "exponent": exponent}
+    call: dict[str, Any] = {
+        "sample_rate": 1000,
+        "preset": "paper",
+        "form": "weak",
+        "window_length": 2 * half + 1,
+        "exponent": exponent,
+    }
     assert max(errors(tvident.identify(angle, torque, **call, **CONSTANT))) < EXACT
     # An offset of the angle that the spring bears.
     leaning = tvident.identify(angle + 1e3, torque + SYSTEM["stiffness"] * 1e3, **call, **CONSTANT)
@@ -59,7 +65,13 @@ def test_ten_million_samples_with_a_drift_lose_no_digits() -> None:
     angle, torque = np.tile(angle, n // 8000), np.tile(torque, n // 8000)
     drift = np.linspace(0, 100, n)
     found = tvident.identify(
-        angle + drift, torque + SYSTEM["stiffness"] * drift, sample_rate=1000, form="weak", step=100_000, **CONSTANT
+        angle + drift,
+        torque + SYSTEM["stiffness"] * drift,
+        sample_rate=1000,
+        preset="paper",
+        form="weak",
+        step=100_000,
+        **CONSTANT,
     )
     # A drift has a velocity too.
     expected = SYSTEM["stiffness"]
@@ -82,6 +94,7 @@ def test_constants_are_least_squares_of_the_rows(seed: int, half: int, exponent:
         angle,
         torque,
         sample_rate=1000,
+        preset="paper",
         form="weak",
         window_length=2 * half + 1,
         exponent=exponent,
@@ -106,6 +119,7 @@ def test_constants_beside_what_is_windowed_are_best_for_all_windows_together(var
         angle,
         torque,
         sample_rate=1000,
+        preset="paper",
         form="weak",
         window_length=2 * half + 1,
         equations=window * 5,
@@ -149,6 +163,7 @@ def test_known_coefficients_that_change_are_integrated_by_parts_too() -> None:
             angle,
             torque + extra,
             sample_rate=1000,
+            preset="paper",
             form="weak",
             window_length=161,
             equations=400,
@@ -164,7 +179,14 @@ def test_known_coefficients_that_change_are_integrated_by_parts_too() -> None:
 def test_missing_and_masked_samples_cost_their_own_rows_only() -> None:
     angle, torque = multisine(6000)
     noisy = torque + 0.05 * np.random.default_rng(3).standard_normal(6000)
-    call: dict[str, Any] = {"sample_rate": 1000, "form": "weak", "window_length": 161, "exponent": 8, **CONSTANT}
+    call: dict[str, Any] = {
+        "sample_rate": 1000,
+        "preset": "paper",
+        "form": "weak",
+        "window_length": 161,
+        "exponent": 8,
+        **CONSTANT,
+    }
     angle[3000], noisy[1000] = np.nan, np.inf
     found = tvident.identify(angle, noisy, **call)
     centres = np.arange(80, 6000 - 80, 10)
@@ -183,7 +205,9 @@ def test_missing_and_masked_samples_cost_their_own_rows_only() -> None:
 def test_a_window_of_rows_around_every_sample_shrinks_towards_the_ends() -> None:
     angle, torque = multisine(4000)
     torque = torque + 0.01 * np.random.default_rng(4).standard_normal(4000)
-    result = tvident.identify(angle, torque, sample_rate=1000, form="weak", window_length=81, equations=400)
+    result = tvident.identify(
+        angle, torque, sample_rate=1000, preset="paper", form="weak", window_length=81, equations=400
+    )
     middle = result.status[600:-600]
     assert (middle & (Status.EDGE | Status.INVALID) == 0).all()
     assert result.status[0] & Status.EDGE
@@ -194,7 +218,7 @@ def test_a_window_of_rows_around_every_sample_shrinks_towards_the_ends() -> None
 @pytest.mark.parametrize("workers", [2, 5])
 def test_the_numbers_do_not_depend_on_the_number_of_workers(workers: int) -> None:
     recording = tvident.simulate_torsional_rig(60.0, angle_noise=1e-2)
-    for call in ({"preset": "auto"}, {"form": "weak", "inertia": "constant"}):
+    for call in ({"preset": "auto"}, {"preset": "paper", "form": "weak", "inertia": "constant"}):
         one, many = (
             tvident.identify(recording.angle, recording.torque, sample_rate=1000, workers=count, **call)  # type: ignore[arg-type]
             for count in (1, workers)
@@ -224,6 +248,6 @@ def test_misuse_says_the_rule_the_value_and_the_cure(
     call: dict[str, Any], error: type[Exception], message: str
 ) -> None:
     angle, torque = multisine(1000)
-    good: dict[str, Any] = {"sample_rate": 1000, "form": "weak"}
+    good: dict[str, Any] = {"sample_rate": 1000, "preset": "paper", "form": "weak"}
     with pytest.raises(error, match=message):
         tvident.identify(angle, torque, **(good | call))

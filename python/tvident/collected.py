@@ -113,13 +113,13 @@ class Collected:
                 # Where only some records say that it changes there is no one number for all.
                 self._add_constant(name, values[:, 0], errors[:, 0])
         coefficients = [number for number, name in names.items() if name in COEFFICIENTS]
-        for one, other in combinations(coefficients, 2):
+        for first, second in combinations(coefficients, 2):
             pair = np.zeros((len(found), count))
             for place, record in enumerate(found):
                 for row, both in enumerate(record["pairs"]):
-                    if set(both) == {one, other}:
+                    if set(both) == {first, second}:
                         pair[place] = record["covariances"][row]
-            self.covariances[frozenset((names[one], names[other]))] = self._shaped(pair)
+            self.covariances[frozenset((names[first], names[second]))] = self._shaped(pair)
 
     def add_known(self, known: dict[str, float | npt.NDArray[np.number]], step: int) -> None:
         """Add what was known beforehand, without error."""

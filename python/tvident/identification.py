@@ -13,9 +13,9 @@ from tvident import _core, arguments
 from tvident.collected import Collected
 from tvident.derivatives import Criterion, plan
 from tvident.progress import reporter
-from tvident.reasons import reasons
+from tvident.reasons import Explained, Words
 from tvident.result import Identification
-from tvident.settings import Averaging, Form, Preset, Variation, resolve
+from tvident.settings import Form, Preset, Selection, Variation, resolve
 from tvident.terms import COEFFICIENTS, Kind, Parameter, Term, TermName, Unknown, all_terms, parameter
 
 _SHORTEST_WINDOW = 5
@@ -31,11 +31,11 @@ def identify(
     sample_rate: float | None = None,
     delta: float | None = None,
     t: npt.ArrayLike | None = None,
-    preset: Preset = "paper",
+    preset: Preset = "auto",
     window_length: int | str | None = None,
     max_order: int | None = None,
     criterion: Criterion | None = None,
-    selection: Averaging | None = None,
+    selection: Selection | None = None,
     form: Form | None = None,
     exponent: int | str | None = None,
     equations: int | str | None = None,
@@ -55,13 +55,13 @@ def identify(
 ) -> Identification:
     r"""Identify I(t), C(t) and K(t) in I θ̈ + C θ̇ + K θ = T from a recorded angle and torque.
 
+    In weak form, the default, the equation is multiplied by a test function φ = (1 - x²)^p that vanishes with its slope at both ends of
+    a window, and integrated by parts: I⟨φ″θ⟩ - C⟨φ′θ⟩ + K⟨φθ⟩ = ⟨φT⟩. No derivative is ever estimated, what the angle's noise does to
+    the equations is taken off, and whatever is not given is chosen from the record: ``summary()`` says what and why.
+
     In strong form, the paper's, the angle is fitted by polynomials of every order in a window around every sample, Akaike's criterion
     chooses one (equations (2), (8) and (9) of the paper) and gives θ̇ and θ̈; in another window of 200 such equations the unknowns are
     solved for by least squares ((3) and (4)).
-
-    In weak form the equation is multiplied by a test function φ = (1 - x²)^p that vanishes with its slope at both ends of a window and
-    integrated by parts: I⟨φ″θ⟩ - C⟨φ′θ⟩ + K⟨φθ⟩ = ⟨φT⟩. No derivative is ever estimated, what the angle's noise does to the equations
-    is taken off, and whatever is not given is chosen from the record: ``summary()`` says what and why.
 
     Parameters
     ----------
@@ -75,19 +75,22 @@ def identify(
         Sample period in seconds.
     t : array_like, shape (n,)
         Time of every sample in seconds, uniform to a thousandth of the sample period.
-    preset : {"paper", "auto"}, optional
-        What is used where nothing is given. ``"paper"``: the paper's method. ``"auto"``: weak form, everything chosen from the record,
-        inertia and damping constant unless it says otherwise, an offset of the torque.
+    preset : {"auto", "paper"}, optional
+        What is used where nothing is given. ``"auto"``: weak form, everything chosen from the record, inertia and damping constant
+        unless it says otherwise, an offset of the torque. ``"paper"``: the paper's method, windows of 201 samples and 200 equations.
     window_length : int or str, optional
-        Samples of the window of the polynomials, or of the test function in weak form: odd, a duration such as ``"0.2 s"``, or
+        Samples of the test function, or in strong form of the window of the polynomials: odd, a duration such as ``"0.2 s"``, or
         ``"auto"`` in weak form; 201 in the paper.
     max_order : int, optional
         Highest candidate order of the strong form; 15 in the paper.
     criterion : {"aicc", "aicc-textbook", "aic", "bic"}, optional
         What chooses the order in strong form, as in :func:`tvident.fit_local_polynomials`.
-    selection : {"window", "average"}, optional
-        In weak form: ``"window"`` takes what is windowed from one window of `equations` around each sample; ``"average"`` averages
-        windows of many lengths before, around and after it by how well each predicts nearby, so that jumps are followed.
+    selection : {"auto", "window", "pooled", "average"}, optional
+        In strong form, how orders are chosen, as in :func:`tvident.fit_local_polynomials`: each window's own (the paper), one for
+        neighbouring windows together (``"auto"``), or all of them averaged. In weak form, where what is windowed comes from:
+        ``"window"`` takes one window of `equations` around each sample; ``"average"`` (``"auto"``) averages windows of many lengths
+        before, around and after it by how well each predicts nearby, so that jumps are followed; giving `equations` means
+        ``"window"``.
     form : {"strong", "weak", "auto"}, optional
         The paper's equations, or those of the test function.
     exponent : int or str, optional
@@ -108,7 +111,7 @@ def identify(
     filter_torque : bool, optional
         In strong form: smooth the torque with polynomials of the orders chosen for the angle.
     lag : float, optional
-        Seconds by which the torque was recorded late; fractions of a sample count.
+        Seconds by which the torque was recorded late; a fraction of a sample period counts too.
     mask : array_like of bool, shape (n,) or the angle's, optional
         True where a sample may be the centre of an equation.
     step : int, optional
@@ -116,7 +119,8 @@ def identify(
     nan_policy : {"propagate", "raise"}, optional
         Windows that hold a value that is not a finite number are NaN, and no others; or raise.
     settings : mapping, optional
-        Settings of an earlier result: what it chose is used again. What is given beside them wins.
+        Settings of an earlier result: what it chose is used again. What is given beside them wins. `mask`, `step` and what was known
+        at every sample are not among them.
     workers : int, optional
         Threads; by default ``TVIDENT_WORKERS`` or all processors that this process may use. The numbers do not depend on it.
     progress : bool or callable, optional
@@ -130,7 +134,8 @@ def identify(
     Raises
     ------
     ValueError
-        If shapes differ, a window is even or does not fit, `t` is not uniform, kinds are mixed, nothing is unknown, or a name is unknown.
+        If shapes differ, a window is even or does not fit, `t` is not uniform, nothing is unknown, a name is unknown, or a setting
+        belongs to the other form.
     TypeError
         If an array is complex or holds no numbers, or there is no sample period.
 
@@ -161,6 +166,9 @@ def identify(
     >>> torque = 0.01 * acceleration + 0.05 * velocity + 15 * angle
     >>> result = tvident.identify(angle, torque, sample_rate=1000)
     >>> bool(abs(result.stiffness[2000] - 15) < 0.01)
+    True
+    >>> paper = tvident.identify(angle, torque, sample_rate=1000, preset="paper")
+    >>> bool(abs(paper.stiffness[2000] - 15) < 0.01)
     True
     """
     angles = arguments.real_array("angle", angle)
@@ -261,21 +269,17 @@ class _Task:
                     for record in range(self._records)
                 ]
                 found.records(each, self._numbers)
-        chosen = {"window_length": length, "exponent": None, "equations": rows}
-        return self._result(found, chosen, [])
+        chosen = {"chosen": (), "window_length": length, "exponent": None, "equations": rows}
+        return self._result(found, chosen, Words())
 
     def weak(self, progress: arguments.Progress) -> Identification:
         """Identify in weak form."""
         samples, used = self.time.size, self.settings
-        length = None
-        if used["window_length"] != "auto":
-            length = arguments.window_length("window_length", used["window_length"], self.period, odd=True)
-            arguments.check_window("window_length", length, samples, least=_SHORTEST_TEST_FUNCTION)
-        rows = None
-        if used["equations"] != "auto":
-            rows = arguments.window_length("equations", used["equations"], self.period, odd=False)
-            arguments.check_window("equations", rows, samples, least=len(self.unknowns) + 1)
-        exponent = None if used["exponent"] == "auto" else arguments.whole_number("exponent", used["exponent"])
+        lengths = [self._length(value) for value in self._each("window_length")]
+        equations = [self._equations(value) for value in self._each("equations")]
+        exponents = [
+            None if value == "auto" else arguments.whole_number("exponent", value) for value in self._each("exponent")
+        ]
         average = used["selection"] != "window"
         kinds = self._weak_kinds(average=average)
         own = any(unknown.own is not None for unknown in self.extra)
@@ -305,22 +309,59 @@ class _Task:
                     workers=self.workers,
                     progress=report,
                 )
-                for record in range(self._records)
+                for record, (length, exponent, rows) in enumerate(zip(lengths, exponents, equations, strict=True))
             ]
         found.records(each, self._numbers)
         names = dict(zip(self._numbers, (unknown.name for unknown in self.unknowns), strict=True))
-        decided = {"test_function": length is None or exponent is None, "equations": rows is None}
-        words = reasons(each[0], names, decided) if len(each) == 1 else []
+        tested = [one.name for one in self.unknowns if one.kind == "auto"]
+        asked = {"window_length": lengths, "exponent": exponents, "equations": equations}
+        automatic = tuple(name for name, values in asked.items() if None in values)
+        words = [Explained(one, names, automatic, tested, self.period).words() for one in each]
         chosen: dict[str, Any] = {
-            "window_length": [2 * one["half_width"] + 1 for one in each],
-            "exponent": [one["exponent"] for one in each],
-            "equations": [one["equations"] for one in each],
+            "chosen": automatic,
+            "window_length": tuple(2 * one["half_width"] + 1 for one in each),
+            "exponent": tuple(one["exponent"] for one in each),
+            "equations": tuple(one["equations"] for one in each),
         }
         if len(each) == 1:
-            chosen = {name: value[0] for name, value in chosen.items()}
+            chosen |= {name: chosen[name][0] for name in asked}
             slow = {names[number] for number in each[0]["changing"]} & set(COEFFICIENTS)
             self.unknowns = [Unknown(one.name, _in_the_end(one, slow), one.own) for one in self.unknowns]
-        return self._result(found, chosen, words)
+        else:
+            # What is constant in some records and changes in others stays to be tested in each.
+            self.unknowns = [
+                Unknown(one.name, "constant" if one.name in found.constants else one.kind, one.own)
+                for one in self.unknowns
+            ]
+        return self._result(found, chosen, words[0] if len(words) == 1 else _of_batch(words))
+
+    def _each(self, name: str) -> Sequence[Any]:
+        """Return a setting of every record: the same for all, or what an earlier call chose for each."""
+        value = self.settings[name]
+        if not isinstance(value, tuple | list):
+            return [value] * self._records
+        if len(value) != self._records:
+            raise ValueError(
+                f"{name} must be one number, or one for each of the {self._records} records; got {len(value)}; "
+                "give settings of a result with as many records"
+            )
+        return value
+
+    def _length(self, value: int | str) -> int | None:
+        """Return the samples of a test function, None for those that are to be chosen."""
+        if value == "auto":
+            return None
+        length = arguments.window_length("window_length", value, self.period, odd=True)
+        arguments.check_window("window_length", length, self.time.size, least=_SHORTEST_TEST_FUNCTION)
+        return length
+
+    def _equations(self, value: int | str) -> int | None:
+        """Return the samples of a window of equations, None for those that are to be chosen."""
+        if value == "auto":
+            return None
+        rows = arguments.window_length("equations", value, self.period, odd=False)
+        arguments.check_window("equations", rows, self.time.size, least=len(self.unknowns) + 1)
+        return rows
 
     @property
     def _records(self) -> int:
@@ -354,6 +395,7 @@ class _Task:
             order=None,
             max_order=arguments.whole_number("max_order", self.settings["max_order"], least=0),
             criterion=self.settings["criterion"],
+            selection=self.settings["selection"] if self.settings["form"] == "strong" else "window",
             derivatives=(0, 1, 2),
             delta=self.period,
             noise=True,
@@ -375,13 +417,14 @@ class _Task:
             return None
         return np.ascontiguousarray(self.mask.reshape(-1, self.time.size)[record])
 
-    def _result(self, found: Collected, chosen: Mapping[str, Any], words: list[str]) -> Identification:
+    def _result(self, found: Collected, chosen: Mapping[str, Any], words: Words) -> Identification:
         known = {name: value for name, value in self.parameters.items() if not isinstance(value, str)}
         found.add_known(known, self.step)
         kinds: dict[str, str] = dict.fromkeys(COEFFICIENTS, "known")
         kinds |= {unknown.name: unknown.kind for unknown in self.unknowns}
         used = self.settings
         same = ("preset", "form", "max_order", "criterion", "selection", "variation", "filter_torque", "lag")
+        terms = tuple((one.own or one.name, one.kind) for one in self.unknowns if one.name not in COEFFICIENTS)
         return Identification(
             time=self.time[:: self.step],
             values=found.values,
@@ -399,11 +442,18 @@ class _Task:
                 "order": None,
                 **chosen,
                 "kinds": kinds,
+                "terms": terms,
                 "known": {name: value if isinstance(value, float) else None for name, value in known.items()},
                 "step": self.step,
-                "reasons": tuple(words),
+                "reasons": words.reasons,
+                "advice": words.advice,
             },
         )
+
+
+def _of_batch(each: Sequence[Words]) -> Words:
+    """Return the advice of every record; reasons differ too much from one to the next."""
+    return Words((), tuple(f"record {record}: {line}" for record, words in enumerate(each) for line in words.advice))
 
 
 def _in_strong_form(unknown: Unknown) -> Kind:

@@ -1,33 +1,41 @@
-"""What the automatic choice decided and why, in words."""
+"""What the automatic choice decided and why, and what to do next, in words."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from tvident.result import UNITS
+from tvident.status import Status
+from tvident.terms import COEFFICIENTS
 
 _NO_CHANCE = 3e-4
 """Probability below which parts of a record differ by more than chance: that of the core."""
-_NOISE_MODEL_FAILS = 4.0
-"""Error of prediction, over the noise's, above which the noise of the channels does not explain it: that of the core."""
 _TAKES_PART = 0.3
 """A constant that has at least this share in the combination that is determined worst is named."""
-_HARDLY_TOLD_APART = 500.0
-"""Condition number that is worth a word: that of the core."""
 
-_MISSING = {
-    "offset": "a constant torque",
-    "coulomb": "dry friction",
-    "cubic": "a spring that hardens or softens",
-    "lag": "a torque that comes late",
+_SUSPECTED = {
+    "offset": "a constant torque of {amount} seems to act: give {terms}",
+    "coulomb": "dry friction of {amount} seems to act: give {terms}",
+    "cubic": "the spring seems to harden or soften, by {amount}: give {terms}",
+    "lag": "the torque seems to be recorded {amount} late: give lag={lag:.3g} (seconds), or align the channels",
 }
 
 
-def reasons(found: Mapping[str, Any], names: Mapping[int, str], chosen: Mapping[str, bool]) -> list[str]:
-    """Return sentences about one record.
+@dataclass(frozen=True)
+class Words:
+    """Sentences about one record: what was chosen and why, and what is worth doing about it."""
+
+    reasons: tuple[str, ...] = ()
+    advice: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Explained:
+    """One record as it was identified in weak form.
 
     Parameters
     ----------
@@ -35,73 +43,143 @@ def reasons(found: Mapping[str, Any], names: Mapping[int, str], chosen: Mapping[
         What the core returned.
     names : mapping of int to str
         What the core's unknowns are called.
-    chosen : mapping of str to bool
-        Which settings were chosen from the record: ``"test_function"``, ``"equations"``.
-
-    Returns
-    -------
-    list of str
+    chosen : collection of str
+        Settings that were chosen from the record.
+    tested : collection of str
+        Unknowns that the record was to decide upon.
+    period : float
+        Seconds from one sample to the next.
     """
-    angle, torque = np.sqrt(found["noise"])
-    words = [f"noise of the angle {angle:.2g} rad, of the torque {torque:.2g} N m"]
-    length, exponent = 2 * found["half_width"] + 1, found["exponent"]
-    if chosen["test_function"]:
-        words.append(
-            f"test function of {length} samples, exponent {exponent}: "
-            "the least error to be expected from the angle's spectrum and the noise"
-        )
-    else:
-        words.append(f"test function of {length} samples, exponent {exponent}")
-    words += _windows(found, chosen)
-    words += [_constancy(names[number], test) for number, _, _, test in found["constants"] if test is not None]
-    if found["pooling"] is not None:
-        slow = [names[number] for number in found["changing"] if names[number] in {"inertia", "damping"}]
-        words.append(
-            f"{' and '.join(slow)} followed by a quadratic in time over {found['pooling']:.0f} samples, which predicts best"
-        )
-    if found["jumps"]:
-        words.append(f"jumps at {len(found['jumps'])} samples: {_listed(found['jumps'])}")
-    return words + _warnings(found, names)
 
+    found: Mapping[str, Any]
+    names: Mapping[int, str]
+    chosen: Collection[str]
+    tested: Collection[str]
+    period: float
 
-def _windows(found: Mapping[str, Any], chosen: Mapping[str, bool]) -> list[str]:
-    if not found["lengths"]:
-        return []
-    error = found["prediction_error"]
-    if chosen["equations"]:
+    def words(self) -> Words:
+        """Return what there is to say."""
+        common = Status(int(np.bitwise_and.reduce(self.found["status"])))
+        if Status.RANK_DEFICIENT in common:
+            undetermined = (
+                "the equations do not determine the parameters: check that angle and torque are the right channels and move, "
+                "leave a term out, or give what is known"
+            )
+            return Words((self._noise(),), (undetermined,))
+        reasons = (self._noise(), self._test_function(), *self._windows(), *self._kinds())
+        advice = (*self._misfit(common), *self._suspects(), *self._contradictions(), *self._told_apart(common))
+        return Words(reasons, (*advice, *self._limits(common)))
+
+    def _noise(self) -> str:
+        angle, torque = np.sqrt(self.found["noise"])
+        return f"noise, taken to be white: {angle:.2g} rad in the angle, {torque:.2g} N m in the torque"
+
+    def _test_function(self) -> str:
+        words = f"test function of {2 * self.found['half_width'] + 1} samples, exponent {self.found['exponent']}"
+        if not {"window_length", "exponent"} & set(self.chosen):
+            return f"{words}: as given"
+        return f"{words}: with the angle's spectrum and this noise it should leave the smallest errors"
+
+    def _windows(self) -> list[str]:
+        if not self.found["lengths"]:
+            return []
+        words, error = f"windows of {self.found['equations']} samples", self.found["prediction_error"]
+        left = f"torque that they have not seen is predicted with {error:.2f} times the variance of the noise (1 is perfect)"
+        why = "best of all lengths" if "equations" in self.chosen else "as given"
         return [
-            f"windows of {found['equations']} samples predict what they have not seen best: "
-            f"{error:.2f} times the noise's variance; longer and shorter ones take part by how well they predict nearby"
+            f"{words}: {why}; {left}",
+            "longer, shorter and one-sided windows are averaged with them wherever they predict better",
         ]
-    return [f"windows of about {found['equations']} samples, as asked for: {error:.2f} times the noise's variance"]
 
+    def _kinds(self) -> list[str]:
+        words = [
+            f"{self.names[number]} constant: eight parts of the record differ no more than noise makes them (p = {test[0]:.2g})"
+            for number, _, _, test in self.found["constants"]
+            if test is not None and test[0] >= _NO_CHANCE
+        ]
+        if self.found["pooling"] is not None:
+            slow = [self.names[number] for number in self.found["changing"]]
+            slow = [name for name in slow if name in {"inertia", "damping"}]
+            why = "parts of the record differ by more than noise" if set(slow) <= set(self.tested) else "as given"
+            seconds = self.found["pooling"] * self.period
+            words.append(
+                f"{' and '.join(slow)} varying: {why}; followed by quadratics in time over {seconds:.3g} s, which predict best"
+            )
+        return words
 
-def _constancy(name: str, test: tuple[float, float]) -> str:
-    probability, spread = test
-    if probability < _NO_CHANCE:
-        return f"{name} differs between eight parts of the record by {spread:.1%} beyond noise (p = {probability:.1g})"
-    return f"{name} is the same in eight parts of the record (p = {probability:.2g})"
+    def _misfit(self, common: Status) -> list[str]:
+        words = []
+        if Status.NOISE_MODEL in common:
+            words.append(
+                f"torque is predicted with {self.found['prediction_error']:.1f} times the variance of the noise: is a term missing, was "
+                "the torque recorded late, or is the noise not white, since a channel was filtered or drifts? Standard errors are taken "
+                "from what is left over instead, and may be too small"
+            )
+        if Status.COLOURED in common:
+            words.append(
+                "what is left over is correlated for longer than a test function: look for a drift, a disturbance or a sudden change, "
+                "near which errors are larger than stated"
+            )
+        return words
 
+    def _suspects(self) -> list[str]:
+        found = [suspect for suspect in self.found["suspects"] if suspect[3]]
+        found.sort(key=lambda suspect: -abs(suspect[1]) / suspect[2])
+        words = []
+        for name, value, error, _ in found:
+            amount = f"{value:.3g} ± {error:.1g} {'samples' if name == 'lag' else UNITS[name]}"
+            terms = [one for one in self.names.values() if one not in COEFFICIENTS] + [name]
+            words.append(_SUSPECTED[name].format(amount=amount, terms=f"terms={terms}", lag=value * self.period))
+        if len(words) > 1:
+            words.append("begin with the first of these: the others may be gone then")
+        return words
 
-def _warnings(found: Mapping[str, Any], names: Mapping[int, str]) -> list[str]:
-    words = []
-    if found["prediction_error"] > _NOISE_MODEL_FAILS:
-        words.append(
-            f"the rows are predicted {found['prediction_error']:.1f} times worse than the noise explains: "
-            "coloured noise, a lag, or a term that is missing; errors are taken from the residuals"
+    def _contradictions(self) -> list[str]:
+        words = []
+        for number, _, _, test in self.found["constants"]:
+            if test is None or test[0] >= _NO_CHANCE:
+                continue
+            name = self.names[number]
+            if name in COEFFICIENTS:
+                kind = "windowed" if name == "stiffness" else "auto"
+                words.append(
+                    f"{name} was given as constant, but parts of the record differ by {test[1]:.0%}: give {name}={kind!r}, or cut "
+                    "the record"
+                )
+            else:
+                words.append(
+                    f"{name} was taken as constant, but differs between parts of the record: something drifts, or a term is missing"
+                )
+        return words
+
+    def _told_apart(self, common: Status) -> list[str]:
+        if Status.ILL_CONDITIONED not in common:
+            return []
+        constants = [self.names[number] for number, *_ in self.found["constants"]]
+        # What varies slowly comes first among the shares.
+        shares = self.found["weakest"][len(self.found["weakest"]) - len(constants) :]
+        parts = [name for name, part in zip(constants, shares, strict=True) if abs(part) > _TAKES_PART]
+        if len(parts) == 1 and "stiffness" in (self.names[number] for number in self.found["changing"]):
+            parts.append("stiffness")
+        told = " and ".join(parts) if len(parts) > 1 else "the parameters"
+        words = (
+            f"{told} are hardly told apart (condition {self.found['condition']:.0f}): under a single frequency they look alike; "
+            "excite two or more, or give one of them as known"
         )
-    for name, value, error, conspicuous in found["suspects"]:
-        if conspicuous:
-            unit = {"lag": "samples"}.get(name, UNITS.get(name, ""))
-            words.append(f"{_MISSING[name]} may be missing: {value:.3g} ± {error:.1g} {unit}")
-    constants = [names[number] for number, *_ in found["constants"]]
-    if found["condition"] > _HARDLY_TOLD_APART and len(constants) == len(found["weakest"]):
-        parts = [name for name, part in zip(constants, found["weakest"], strict=True) if abs(part) > _TAKES_PART]
-        told = "is hardly determined" if len(parts) == 1 else "are hardly told apart"
-        words.append(f"{' and '.join(parts)} {told}: excite the system at more frequencies, or give one of them")
-    return words
+        return [words]
 
-
-def _listed(numbers: Sequence[int], most: int = 6) -> str:
-    shown = ", ".join(str(number) for number in numbers[:most])
-    return shown if len(numbers) <= most else f"{shown} …"
+    def _limits(self, common: Status) -> list[str]:
+        if Status.WINDOW_LIMIT not in common:
+            return []
+        lengths = [length for length, _ in self.found["lengths"]]
+        if lengths and self.found["equations"] <= min(lengths):
+            words = (
+                f"windows of {self.found['equations']} samples are the shortest that were tried: what is windowed changes faster than it "
+                "can be followed; excite higher frequencies, or record with less noise"
+            )
+        else:
+            words = (
+                f"a test function of {2 * self.found['half_width'] + 1} samples is the narrowest or widest that was tried: record longer, "
+                "or at a rate of 20 samples a cycle or more"
+            )
+        return [words]

@@ -34,6 +34,18 @@ UNITS = {
 """Units of results for an angle in rad and a torque in N m."""
 
 
+_MOST_SENTENCES = 20
+"""A summary of many records shows the advice for some."""
+
+
+def _range(value: Any) -> str:
+    """Return one number, or those of several records."""
+    if not isinstance(value, tuple):
+        return str(value)
+    least, most = min(value, default=0), max(value, default=0)
+    return str(least) if least == most else f"{least} to {most}"
+
+
 class StandardErrors(Mapping[str, Array]):
     """Standard errors by name; those that need work are computed when asked for."""
 
@@ -126,18 +138,21 @@ class Identification:
     constants : dict of str to (value, stderr)
         Parameters that are constant over the record.
     stderr : mapping of str to ndarray, shape (\*, n)
-        Standard errors of all of these, ``"natural_frequency"`` and ``"damping_ratio"``. They are those of ordinary least squares, which
-        takes the equations as independent; derivatives from overlapping windows are not, so they are too small.
+        Standard errors of all of these, ``"natural_frequency"`` and ``"damping_ratio"`` (by the delta method, with all covariances). In
+        weak form they hold the correlation of overlapping equations and what windows cannot follow. In strong form they are those of
+        ordinary least squares, which takes the equations as independent; derivatives from overlapping windows are not, so they are
+        too small.
     condition : ndarray, shape (\*, n)
         Condition number of the equations, their columns scaled to the same norm: how hard the parameters are to tell apart.
     residual_std : ndarray, shape (\*, n)
         Standard deviation of what is left of the torque.
     order : ndarray of uint8, shape (\*, n)
-        Order of the polynomial around each sample.
+        Order of the polynomial around each sample; 0 in weak form, which has none.
     status : ndarray of uint16, shape (\*, n)
         Flags of :class:`tvident.Status`.
     settings : dict
-        What was used.
+        What was used, what was chosen, in words why (``"reasons"``) and what to do (``"advice"``). ``identify(…, settings=…)`` uses it
+        again.
 
     Examples
     --------
@@ -147,7 +162,7 @@ class Identification:
     >>> bool(abs(result.stiffness[1500] / rig.stiffness[1500] - 1) < 0.02)
     True
     >>> sorted(result.stderr)
-    ['damping', 'damping_ratio', 'inertia', 'natural_frequency', 'stiffness']
+    ['damping', 'damping_ratio', 'inertia', 'natural_frequency', 'offset', 'stiffness']
     """
 
     def __init__(
@@ -243,7 +258,8 @@ class Identification:
         Returns
         -------
         str
-            Median, range and median standard error of every parameter; then how often each flag of the status occurs.
+            Median, range and median standard error of every parameter; what was chosen and why; what to do about what looks wrong;
+            how often each flag of the status occurs.
         """
         s = self.settings
         n, seconds = self.time.size, float(self.time[-1] - self.time[0]) if self.time.size else 0.0
@@ -255,11 +271,10 @@ class Identification:
                 f"windows of {s['window_length']} samples, orders up to {order} by {s['criterion']}, {equations}"
             )
         else:
+            length, exponent, equations = (_range(s[name]) for name in ("window_length", "exponent", "equations"))
             lines.append(
-                f"weak form: test functions of {s['window_length']} samples, exponent {s['exponent']}; "
-                f"windows of {s['equations']} samples"
+                f"weak form: test functions of {length} samples, exponent {exponent}; windows of {equations} samples"
             )
-        lines += [f"  {reason}" for reason in s["reasons"]]
         lines.append("")
         rows = [("parameter", "kind", "median", "5 %", "95 %", "std. error", "unit")]
         values = {"inertia": self.inertia, "damping": self.damping, "stiffness": self.stiffness, **self.terms}
@@ -273,6 +288,11 @@ class Identification:
                 shown[1] = shown[2] = ""
             rows.append((name, kind, *shown, UNITS.get(name, "")))
         lines += table.aligned(rows)
+        for name, title in (("reasons", "what was chosen, and why"), ("advice", "what to do")):
+            if s[name]:
+                lines += ["", title, *(f"  {sentence}" for sentence in s[name][:_MOST_SENTENCES])]
+            if len(s[name]) > _MOST_SENTENCES:
+                lines.append(f"  and {len(s[name]) - _MOST_SENTENCES} more in settings[{name!r}]")
         lines += ["", *describe(self.status)]
         return "\n".join(lines)
 

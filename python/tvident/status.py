@@ -103,14 +103,33 @@ _ADVICE = {
 }
 
 
+_OF_THE_RECORD = (
+    Status.NOISE_MODEL,
+    Status.COLOURED,
+    Status.KIND_CONTRADICTED,
+    Status.WINDOW_LIMIT,
+    Status.LAG_SUSPECTED,
+    Status.TERM_SUSPECTED,
+)
+"""Flags that every sample of a record has, or none."""
+
+
 def describe(status: npt.NDArray[Any]) -> list[str]:
     """Return a line for every flag that occurs: how often, and what it means."""
     if not status.size:
         return ["no samples"]
-    good = float(np.mean(status == 0))
-    lines = [f"{good:6.1%}  good"]
-    for flag in Status:
-        share = float(np.mean(status & flag != 0))
-        if share > 0:
-            lines.append(f"{share:6.1%}  {flag.name}: {flag.advice}")
+    shares = {flag: float(np.mean(status & flag != 0)) for flag in Status}
+    everywhere = [flag for flag in _OF_THE_RECORD if shares[flag] == 1]
+    own = np.uint16(0xFFFF & ~sum(everywhere))
+    lines = [
+        f"{float(np.mean(status & own == 0)):6.1%}  good"
+        + (" but for what holds for the whole record" if everywhere else "")
+    ]
+    lines += [
+        f"{shares[flag]:6.1%}  {flag.name}: {flag.advice}"
+        for flag in Status
+        if shares[flag] > 0 and flag not in everywhere
+    ]
+    if everywhere:
+        lines.append(f"record  {', '.join(flag.name or '' for flag in everywhere)}: see what to do, or tvident.Status")
     return lines

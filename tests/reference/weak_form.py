@@ -17,7 +17,7 @@ def kernels(half: int, exponent: int, delta: float, shift: float = 0.0) -> Array
     total = phi(np.arange(-half, half + 1) / half).sum()
     second = half * delta
     rows = [phi.deriv(2)(x) / second**2, -phi.deriv(1)(x) / second, phi(x)]
-    return np.array(rows) * inside / total
+    return np.asarray(np.array(rows) * inside / total)
 
 
 def rows(angle: Array, torque: Array, half: int, exponent: int, delta: float, lag: float = 0.0) -> tuple[Array, Array]:
@@ -38,7 +38,8 @@ def rows(angle: Array, torque: Array, half: int, exponent: int, delta: float, la
 
 def profile(windowed: Array, constant: Array, b: Array, window: int, step: int) -> Array:
     """Give the constants that are best for all windows of rows together, each window with unknowns of its own."""
-    normal, side = 0.0, 0.0
+    unknowns = constant.shape[1]
+    normal, side = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
     for first in range(0, b.size - window + 1, step):
         rows_of = slice(first, first + window)
         Q, _ = np.linalg.qr(windowed[rows_of])
