@@ -42,7 +42,7 @@ def test_the_demo_prints_a_table_and_writes_pictures(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "stiffness  N m/rad" in done.stdout
     written = {path.name for path in (tmp_path / "tvident-demo").iterdir()}
-    pictures = {"recording.png", "window.png", "window-with-noise.png", "parameters.png"}
+    pictures = {"recording.png", "window.png", "window-with-noise.png", "parameters.png", "parameters-paper.png"}
     assert written == pictures | {"recording.csv", "result.csv"}
     for name in pictures:
         assert (tmp_path / "tvident-demo" / name).read_bytes().startswith(b"\x89PNG")
@@ -69,6 +69,7 @@ def test_results_are_the_librarys_with_names_and_units(recording: Path, tmp_path
     done = run(
         *("identify", recording, "--angle", "angle", "--torque", "torque", "--time", "time", "--equations", "0.3 s"),
         *("--window-length", 101, "--damping", 0, "--term", "offset", "-o", output, "--plot", picture),
+        *("--preset", "paper"),
     )
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
@@ -78,6 +79,7 @@ def test_results_are_the_librarys_with_names_and_units(recording: Path, tmp_path
         channels["angle [rad]"],
         channels["torque [N m]"],
         t=channels["time [s]"],
+        preset="paper",
         window_length=101,
         equations=300,
         damping=0,
@@ -151,6 +153,82 @@ def test_known_parameters_may_be_channels_and_kinds_may_be_given(recording: Path
     assert abs(float(inertia.split()[2]) / 0.0123 - 1) < 0.01
 
 
+def test_every_setting_has_an_option_and_may_be_kept_in_a_file(recording: Path, tmp_path: Path) -> None:
+    channels = recordings.read(recording)
+    angle, torque = channels["angle [rad]"], channels["torque [N m]"]
+    usable = (np.arange(angle.size) < 2000) | (np.arange(angle.size) > 2200)
+    np.save(tmp_path / "usable.npy", usable.astype(float))
+    common = ("identify", recording, "--angle", "angle", "--torque", "torque", "--sample-rate", 1000)
+    done = run(
+        *(
+            *common,
+            "--form",
+            "weak",
+            "--exponent",
+            8,
+            "--window-length",
+            161,
+            "--variation",
+            "constant",
+            "--lag",
+            0.0005,
+        ),
+        *(
+            "--equations",
+            900,
+            "--selection",
+            "window",
+            "--mask",
+            "usable.npy",
+            "--term",
+            "none",
+            "--inertia",
+            "varying",
+        ),
+        *("--settings-output", "chosen.json", "-o", "one.npz"),
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    expected = tvident.identify(
+        angle,
+        torque,
+        sample_rate=1000,
+        form="weak",
+        exponent=8,
+        window_length=161,
+        variation="constant",
+        lag=0.0005,
+        equations=900,
+        selection="window",
+        mask=usable,
+        terms=(),
+        inertia="varying",
+    )
+    found = recordings.read(tmp_path / "one.npz")
+    np.testing.assert_array_equal(found["stiffness [N m/rad]"], expected.stiffness)
+    assert "offset [N m]" not in found
+
+    again = run(*common, "--settings", "chosen.json", "--mask", "usable.npy", "-o", "two.npz", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    np.testing.assert_array_equal(recordings.read(tmp_path / "two.npz")["stiffness [N m/rad]"], expected.stiffness)
+
+    strong = ("--preset", "paper", "--filter-torque", "--selection", "pooled", "--max-order", 9, "--criterion", "bic")
+    done = run(*common, *strong, "-o", "three.npz", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    smoothed = tvident.identify(
+        angle,
+        torque,
+        sample_rate=1000,
+        preset="paper",
+        filter_torque=True,
+        selection="pooled",
+        max_order=9,
+        criterion="bic",
+    )
+    found = recordings.read(tmp_path / "three.npz")
+    np.testing.assert_array_equal(found["inertia [kg m^2]"], smoothed.inertia)
+
+
 GOOD = ("--angle", "angle", "--torque", "torque", "--sample-rate", "1000")
 
 
@@ -172,6 +250,10 @@ GOOD = ("--angle", "angle", "--torque", "torque", "--sample-rate", "1000")
         (("identify", "FILE", *GOOD, "--plot", "result.gif"), 2, "--plot must end in .png, .pdf or .svg"),
         (("identify", "FILE", *GOOD, "--preset", "magic"), 2, "'magic' is not"),
         (("identify", "FILE", *GOOD, "--no-such-option"), 2, "No such option"),
+        (("identify", "FILE", *GOOD, "--settings", "broken.npz"), 1, "broken.npz: holds no settings"),
+        (("identify", "FILE", *GOOD, "--settings", "few.npz", "--preset", "paper"), 2, "--settings hold a preset"),
+        (("identify", "FILE", *GOOD, "--settings-output", "no/such/s.json"), 1, "no/such: there is no such folder"),
+        (("identify", "FILE", *GOOD, "--filter-torque"), 2, "filter_torque belongs to the strong form; got True"),
         (("identify", *GOOD), 2, "channel 'angle' needs a FILE"),
         (("identify", "missing.csv", *GOOD), 1, "missing.csv: there is no such file"),
         (("identify", "FILE", *GOOD, "--time", "time"), 2, "only one of --sample-rate, --delta, --time; got"),
@@ -296,6 +378,8 @@ def test_an_interrupt_stops_at_once_and_leaves_no_half_written_file(tmp_path: Pa
         "t.npy",
         "--sample-rate",
         "1000",
+        "--preset",
+        "paper",
         "-o",
         "r.csv",
     ]

@@ -151,18 +151,23 @@ def _period_of_times(t: npt.ArrayLike, samples: int) -> float:
     return period
 
 
+def seconds(name: str, value: str) -> float:
+    """Return the seconds of a duration such as ``"0.2 s"``."""
+    match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*([a-zµ]+)\s*", value)
+    try:
+        duration = float(match[1]) * _SECONDS[match[2]] if match else math.nan
+    except (KeyError, ValueError):
+        duration = math.nan
+    if not (math.isfinite(duration) and duration > 0):
+        units = ", ".join(_SECONDS)
+        raise ValueError(f"{name} must be samples or a duration such as '0.2 s'; got {value!r}; units are {units}")
+    return duration
+
+
 def window_length(name: str, value: int | str, period: float, *, odd: bool) -> int:
     """Return a length in samples from a number of samples or a duration such as ``"0.2 s"``."""
     if isinstance(value, str):
-        match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*([a-zµ]+)\s*", value)
-        try:
-            duration = float(match[1]) * _SECONDS[match[2]] if match else math.nan
-        except (KeyError, ValueError):
-            duration = math.nan
-        if not (math.isfinite(duration) and duration > 0):
-            units = ", ".join(_SECONDS)
-            raise ValueError(f"{name} must be samples or a duration such as '0.2 s'; got {value!r}; units are {units}")
-        samples = duration / period
+        samples = seconds(name, value) / period
         return max(1, 2 * round((samples - 1) / 2) + 1) if odd else max(1, round(samples))
     length = whole_number(name, value, least=1)
     if odd and length % 2 == 0:

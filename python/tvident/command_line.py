@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import sys
 from collections.abc import Callable
 from importlib import import_module
@@ -17,9 +18,11 @@ import tvident
 from tvident import recordings, table
 from tvident.arguments import NanPolicy
 from tvident.derivatives import Criterion, Selection
-from tvident.identification import Preset
 from tvident.rig import Excitation, Pattern
+from tvident.settings import Form, Preset, Variation
+from tvident.settings import Selection as HowToSelect
 from tvident.status import describe
+from tvident.terms import COEFFICIENTS, Kind
 
 Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 
@@ -106,36 +109,44 @@ def demo(folder: Path, seed: int) -> None:
     """Identify a simulated recording, compare with the truth and draw the paper's figures."""
     folder.mkdir(parents=True, exist_ok=True)
     recording = tvident.simulate_torsional_rig(seed=seed)
-    result = tvident.identify(recording.angle, recording.torque, sample_rate=recording.sample_rate)
-    valid = np.isfinite(result.stiffness)
-    rows = [("parameter", "unit", "true (median)", "identified (median)", "error of the median", "rms error")]
-    units = {"inertia": "kg m^2", "damping": "N m s/rad", "stiffness": "N m/rad"}
-    for name, unit in units.items():
-        true, found = getattr(recording, name)[valid], getattr(result, name)[valid]
-        middle, median = float(np.median(true)), float(np.median(found))
-        scatter = float(np.sqrt(np.mean((found - true) ** 2)) / np.mean(true))
-        rows.append((name, unit, f"{middle:.5g}", f"{median:.5g}", f"{median / middle - 1:+.2%}", f"{scatter:.2%}"))
+    call: dict[str, Any] = {"sample_rate": recording.sample_rate}
+    result = tvident.identify(recording.angle, recording.torque, **call)
+    paper = tvident.identify(recording.angle, recording.torque, preset="paper", **call)
     click.echo(
-        f"Simulated rig: {recording.time.size} samples at {recording.sample_rate:g} Hz, a slider changes the stiffness."
+        f"Simulated rig: {recording.time.size} samples at {recording.sample_rate:g} Hz, a slider changes the stiffness.\n"
     )
-    click.echo("\n".join(["", *table.aligned(rows), "", *describe(result.status), ""]))
+    click.echo(result.summary() + "\n")
+    rows: list[tuple[str, ...]] = [
+        ("parameter", "unit", "true (median)", "identified (median)", "rms error", "with --preset paper")
+    ]
+    for name in ("inertia", "damping", "stiffness"):
+        medians = [f"{np.nanmedian(getattr(one, name)):.5g}" for one in (recording, result)]
+        errors = [f"{_rms_error(one, recording, name):.2%}" for one in (result, paper)]
+        rows.append((name, tvident.result.UNITS[name], *medians, *errors))
+    click.echo("\n".join([*table.aligned(rows), ""]))
 
     recording.save(folder / "recording.csv")
     result.save(folder / "result.csv")
     click.echo(f"Written to {folder}: recording.csv, result.csv")
     noise = 0.05 * recording.angle.std() * np.random.default_rng(seed + 1).standard_normal(recording.angle.size)
     middle_sample = recording.time.size // 2
-    window: dict[str, Any] = {"sample_rate": recording.sample_rate}
     figures = _figures()
     pictures = {
         "recording.png": figures.plot_recording(recording),
-        "window.png": figures.plot_window(recording.angle, middle_sample, **window),
-        "window-with-noise.png": figures.plot_window(recording.angle + noise, middle_sample, **window),
+        "window.png": figures.plot_window(recording.angle, middle_sample, **call),
+        "window-with-noise.png": figures.plot_window(recording.angle + noise, middle_sample, **call),
         "parameters.png": figures.plot_identification(result, recording),
+        "parameters-paper.png": figures.plot_identification(paper, recording),
     }
     for name, picture in pictures.items():
         _save_figure(picture, folder / name)
     click.echo(f"Drawn in {folder}: {', '.join(pictures)}")
+
+
+def _rms_error(result: tvident.Identification, truth: tvident.Recording, name: str) -> float:
+    """Return the rms error of a parameter over its mean."""
+    true = getattr(truth, name)
+    return float(np.sqrt(np.nanmean((getattr(result, name) - true) ** 2)) / np.mean(true))
 
 
 @main.command()
@@ -262,18 +273,43 @@ def derivatives(
 @click.option("--torque-scale", metavar="SCALE", help="Number or variable to multiply the torque by.")
 @_TIME
 @click.option(
-    "--preset", type=click.Choice(get_args(Preset)), default="paper", show_default=True, help="What is not given."
+    "--preset",
+    type=click.Choice(get_args(Preset)),
+    help="Where what is not given comes from: the recording (auto, the default), or the paper.",
 )
-@click.option("--window-length", metavar="LENGTH", help="Window of the polynomials: samples, odd, or '0.2 s'.")
-@click.option("--max-order", type=int, help="Highest candidate order.")
-@_CRITERION
-@click.option("--equations", metavar="LENGTH", help="Equations solved together: a number, or '0.2 s'.")
-@click.option("--inertia", metavar="KIND", help="windowed, constant, a known number, or a channel.")
+@click.option("--inertia", metavar="KIND", help="auto, constant, windowed, varying, a known number, or a channel.")
 @click.option("--damping", metavar="KIND", help="The same for damping; 0 leaves it out.")
 @click.option("--stiffness", metavar="KIND", help="The same for stiffness.")
 @click.option(
-    "--term", "terms", multiple=True, metavar="TERM[:KIND]", help="offset, coulomb or cubic; may be repeated."
+    "--term",
+    "terms",
+    multiple=True,
+    metavar="TERM[:KIND]",
+    help="offset, coulomb or cubic; may be repeated; none leaves out the offset of --preset auto.",
 )
+@click.option("--lag", metavar="TIME", help="By how much the torque was recorded late: seconds, or '2 ms'.")
+@click.option("--mask", metavar="NAME", help="Channel, or file, that is not zero where a sample may be used.")
+@click.option("--form", type=click.Choice(get_args(Form)), help="Test functions (weak) or derivatives (strong).")
+@click.option(
+    "--window-length", metavar="LENGTH", help="Test function, or window of the polynomials: samples, odd, or '0.2 s'."
+)
+@click.option("--exponent", metavar="NUMBER", help="Of the test function: 3 to 20, or auto.")
+@click.option("--equations", metavar="LENGTH", help="Samples solved together: a number, '0.2 s', or auto.")
+@click.option("--variation", type=click.Choice(get_args(Variation)), help="Of parameters within a window.")
+@click.option(
+    "--selection",
+    type=click.Choice(get_args(HowToSelect)),
+    help="Strong form: of orders. Weak form: one window around a sample, or an average of many.",
+)
+@click.option("--max-order", type=int, help="Strong form: highest candidate order.")
+@_CRITERION
+@click.option(
+    "--filter-torque/--no-filter-torque", default=None, help="Strong form: smooth the torque as the angle is."
+)
+@click.option(
+    "--settings", type=click.Path(), help="What an earlier run chose: a JSON file that --settings-output wrote."
+)
+@click.option("--settings-output", type=click.Path(dir_okay=False), help="JSON file for what this run chose.")
 @_RUN
 def identify(
     file: str | None,
@@ -282,34 +318,42 @@ def identify(
     angle_scale: str | None,
     torque_scale: str | None,
     time_channel: str | None,
-    inertia: str | None,
-    damping: str | None,
-    stiffness: str | None,
     terms: tuple[str, ...],
-    window_length: str | None,
-    equations: str | None,
+    lag: str | None,
+    mask: str | None,
+    settings: str | None,
+    settings_output: str | None,
     output: str | None,
     plot: str | None,
     progress: bool | None,  # noqa: FBT001 - click passes options by name
     **options: Any,
 ) -> None:
-    """Identify inertia, damping and stiffness from the angle and torque in FILE."""
+    """Identify inertia, damping and stiffness from the angle and torque in FILE.
+
+    What is not given is chosen from the recording, and the summary says what and why.
+    """
     _check_output(output, plot, file, angle, torque)
+    if settings_output is not None:
+        table.check_folder(Path(settings_output))
     if not _check_time(options["sample_rate"], options["delta"], time_channel):
         raise click.UsageError("identify needs the sample period; got none; give --sample-rate, --delta or --time")
+    if settings is not None and options["preset"] is not None:
+        raise click.UsageError("--settings hold a preset; got --preset too; drop one of them")
     channels = {} if file is None else recordings.read(file)
-    known = {"inertia": inertia, "damping": damping, "stiffness": stiffness}
     result = tvident.identify(
         _scaled(_source(channels, angle, file), angle_scale, channels, file),
         _scaled(_source(channels, torque, file), torque_scale, channels, file),
         t=None if time_channel is None else _channel(channels, time_channel, file),
-        window_length=None if window_length is None else _length(window_length),
-        equations=None if equations is None else _length(equations),
-        terms=[_term(term) for term in terms],
+        lag=None if lag is None else _seconds(lag),
+        mask=None if mask is None else _mask(_source(channels, mask, file)),
+        settings=None if settings is None else _read_settings(settings),
+        terms=_terms(terms),
         progress=_progress(progress),
-        **{name: _parameter(value, channels, file) for name, value in known.items() if value is not None},
-        **_given(options),
+        **{name: _understood(name, value, channels, file) for name, value in _given(options).items()},
     )
+    if settings_output is not None:
+        with table.replaced(Path(settings_output)) as written:
+            written.write((json.dumps(result.settings, indent=1) + "\n").encode())
     words = [result.summary()]
     for name, (value, error) in result.constants.items():
         words.append(f"{name} = {value:.8g} ± {error:.2g} {tvident.result.UNITS.get(name, '')}".rstrip())
@@ -365,9 +409,16 @@ def _scaled(
     return np.asarray(values * factor)
 
 
+def _understood(name: str, value: Any, channels: recordings.Channels, file: str | None) -> Any:
+    """Return the argument that an option stands for."""
+    if name in COEFFICIENTS:
+        return _parameter(value, channels, file)
+    return _length(value) if name in {"window_length", "equations", "exponent"} else value
+
+
 def _parameter(value: str, channels: recordings.Channels, file: str | None) -> Any:
     """Return a kind, a number, or a channel."""
-    if value in {"windowed", "constant"}:
+    if value in get_args(Kind):
         return value
     try:
         return float(value)
@@ -375,15 +426,48 @@ def _parameter(value: str, channels: recordings.Channels, file: str | None) -> A
         return recordings.channel(channels, value, file or "the command line")
 
 
-def _term(text: str) -> Any:
-    """Return a term from ``name`` or ``name:kind``."""
-    name, _, kind = text.partition(":")
-    return (name, kind) if kind else name
+def _terms(texts: tuple[str, ...]) -> list[Any] | None:
+    """Return terms from ``name`` or ``name:kind``; nothing where none are given, none where ``none`` is."""
+    if texts == ("none",):
+        return []
+    parts = [text.partition(":") for text in texts]
+    return [(name, kind) if kind else name for name, _, kind in parts] or None
 
 
 def _length(text: str) -> int | str:
     """Return a number of samples, or a duration as it is."""
     return int(text) if text.strip().lstrip("+-").isdigit() else text
+
+
+def _seconds(text: str) -> float:
+    """Return a time in seconds from a number, or from one with a unit."""
+    try:
+        return float(text)
+    except ValueError:
+        pass
+    sign, magnitude = (-1.0, text.strip()[1:]) if text.strip().startswith("-") else (1.0, text)
+    try:
+        return sign * tvident.arguments.seconds("lag", magnitude)
+    except ValueError:
+        raise click.UsageError(f"lag must be seconds or a time such as '2 ms'; got {text!r}; repair it") from None
+
+
+def _mask(values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    """Return where a channel is neither zero nor missing."""
+    return np.asarray((values != 0) & np.isfinite(values))
+
+
+def _read_settings(path: str) -> dict[str, Any]:
+    """Return what an earlier run chose."""
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (ValueError, UnicodeDecodeError) as error:
+        raise recordings.FileError(
+            f"{path}: holds no settings ({error}); give a file that --settings-output wrote"
+        ) from None
+    if not isinstance(content, dict):
+        raise recordings.FileError(f"{path}: holds no settings; give a file that --settings-output wrote")
+    return content
 
 
 def _given(options: dict[str, Any]) -> dict[str, Any]:
