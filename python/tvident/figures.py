@@ -11,6 +11,7 @@ import numpy.typing as npt
 from tvident.derivatives import LocalPolynomialFit, fit_local_polynomials
 from tvident.result import UNITS, Identification
 from tvident.rig import Recording
+from tvident.status import Status
 
 try:
     import matplotlib as mpl
@@ -242,6 +243,9 @@ def plot_derivatives(time: npt.NDArray[np.float64], fit: LocalPolynomialFit, nam
 def plot_identification(result: Identification, truth: Recording | None = None) -> Figure:
     """Draw inertia, damping and stiffness over time, with bands of two standard errors: figure 6 of the paper.
 
+    What is constant over the record is a line with its value in the title. Grey stretches have flags, as many as their samples'
+    status says; what is flagged over the whole record is named below the last panel instead.
+
     Parameters
     ----------
     result : Identification
@@ -278,17 +282,54 @@ def plot_identification(result: Identification, truth: Recording | None = None) 
         )
         for ax, name in zip(axes[:, 0], shown, strict=True):
             values = result.terms[name] if name in result.terms else getattr(result, name)
+            title = _SYMBOLS.get(name, name.capitalize())
+            _draw_flags(ax, result.time, result.status)
             _draw_parameter(ax, result.time, values, result.stderr[name])
             if truth is not None and hasattr(truth, name):
                 ax.plot(truth.time, getattr(truth, name), color=TRUTH, linewidth=1.2, label="truth")
-            ax.set_title(_SYMBOLS.get(name, name.capitalize()))
+            if name in result.constants:
+                value, error = result.constants[name]
+                title += f": {value:.5g} ± {error:.2g} {_unit(name)}".rstrip()
+                true = getattr(truth, name)[0] if truth is not None and hasattr(truth, name) else value
+                _frame_constant(ax, value, error, true)
+            ax.set_title(title)
             ax.set_ylabel(_unit(name))
         # Beside the first title, where no line runs through it.
         place: Any = {"loc": "lower right", "bbox_to_anchor": (1, 0.97), "borderaxespad": 0.2}
-        axes[0, 0].legend(ncols=3, handlelength=1.4, columnspacing=1.4, **place)
-        axes[-1, 0].set_xlabel("time (s)")
+        axes[0, 0].legend(ncols=4, handlelength=1.4, columnspacing=1.4, **place)
+        everywhere = ", ".join(flag.name or "" for flag in _everywhere(result.status))
+        axes[-1, 0].set_xlabel("time (s)" + (f"\nwhole record: {everywhere}" if everywhere else ""))
         figure.align_ylabels()
         return figure
+
+
+def _everywhere(status: npt.NDArray[np.uint16]) -> list[Status]:
+    """Return the flags that all samples have, or all but those near the ends."""
+    common = int(np.bitwise_and.reduce(status)) if status.size else 0
+    return [flag for flag in Status if common & flag]
+
+
+def _draw_flags(ax: Axes, time: npt.NDArray[np.float64], status: npt.NDArray[np.uint16]) -> None:
+    """Shade samples whose numbers deserve a second look; what holds for the whole record is said elsewhere."""
+    doubtful = Status.INVALID | Status.GAP | Status.RANK_DEFICIENT | Status.ILL_CONDITIONED
+    for flag in _everywhere(status):
+        doubtful &= ~flag
+    flagged = status & doubtful != 0
+    if not flagged.any():
+        return
+    edges = np.flatnonzero(np.diff(flagged.astype(np.int8), prepend=0, append=0))
+    shade: Any = {"color": FAINT, "alpha": 0.4, "linewidth": 0}
+    spans = np.stack([time[edges[::2]], time[edges[1::2] - 1]], axis=1)
+    # Thousands of slivers are one grey area on any screen.
+    for number, (first, last) in enumerate(spans[:: max(1, len(spans) // 500)]):
+        ax.axvspan(first, last, label="flagged" if number == 0 else None, **shade)
+
+
+def _frame_constant(ax: Axes, value: float, error: float, true: float) -> None:
+    """Show a constant from near enough to see its band, and the truth."""
+    reach = 1.3 * max(6 * error, abs(true - value), 0.01 * abs(value))
+    if np.isfinite(reach) and reach > 0:
+        ax.set_ylim(value - reach, value + reach)
 
 
 def _draw_parameter(
