@@ -11,7 +11,7 @@ tvident info rig.csv
 # The angle's velocity and acceleration, with errors, order and status; every tenth sample.
 tvident derivatives rig.csv --channel angle --time time --window-length '0.2 s' --step 10 -o derivatives.csv
 
-# Inertia, damping and stiffness in a window around every sample.
+# Inertia, damping and stiffness at every sample, with what suits this recording chosen from it.
 tvident identify rig.csv --angle angle --torque torque --time time -o result.csv --plot result.png
 
 # The same with the inertia known, as NPZ; and a look at the first lines of the result.

@@ -19,13 +19,13 @@ time = recordings.channel(channels, "time", path)
 angle = recordings.channel(channels, "angle", path)
 torque = recordings.channel(channels, "torque", path)
 
-# What could not be recorded is NaN: windows that hold it have no result, and no others. Here the cable was loose for 19 ms.
+# What could not be recorded is NaN: equations that hold it are left out, and no others. Here the cable was loose for 19 ms.
 angle[4001:4020] = np.nan
 
 result = tvident.identify(angle, torque, t=time)
-missing = result.status & tvident.Status.INVALID != 0
+bridged = result.status & tvident.Status.GAP != 0
 print(result.summary())
-print(f"no result for {missing[1000:-1000].sum()} samples in the middle")
+print(f"{bridged.sum()} samples around the gap have results from before and after it")
 
 result.save("identified.npz")
 result.plot().savefig("identified.png")

@@ -174,7 +174,7 @@ def test_settings_have_the_errors_that_are_stated() -> None:
     for column in list(rows[0])[1:]:
         recording = tvident.simulate_torsional_rig(**({} if column == "default" else call(column)))
         for row in rows:
-            settings = call(row["`identify(…)`"])
+            settings = {"preset": "paper"} | call(row["`identify(…)`"])
             result = tvident.identify(recording.angle, recording.torque, sample_rate=1000, **settings)
             assert errors(result, recording)["stiffness"] == pytest.approx(float(row[column]), rel=MEASURED)
 
@@ -192,15 +192,35 @@ def test_windows_have_the_errors_that_are_stated() -> None:
         assert np.median(fit.order) == float(row["median order"])
 
 
-def test_limits_are_the_stated_ones() -> None:
+def test_what_the_readme_says_of_the_default_holds() -> None:
+    for options, limits in (
+        ({}, {"stiffness": 0.4, "inertia": 0.1, "damping": 2.5}),
+        ({"angle_noise": 0.1}, {"stiffness": 1.0}),
+        ({"pattern": "square"}, {"stiffness": 4.0}),
+    ):
+        recording = tvident.simulate_torsional_rig(**options)
+        result = tvident.identify(recording.angle, recording.torque, sample_rate=1000)
+        found = errors(result, recording)
+        assert all(found[name] < limit for name, limit in limits.items()), found
+        if not options:
+            covered = np.abs(result.stiffness - recording.stiffness) < 2 * result.stderr["stiffness"]
+            assert covered.mean() == pytest.approx(0.97, abs=0.03)
     recording = tvident.simulate_torsional_rig()
-    result = tvident.identify(recording.angle, recording.torque, sample_rate=1000)
+    late = tvident.identify(recording.angle[1:], recording.torque[:-1], sample_rate=1000)
+    assert (late.status & Status.LAG_SUSPECTED != 0).all()
+    short = tvident.identify(recording.angle[:300], recording.torque[:300], sample_rate=1000)
+    assert (short.status & Status.WINDOW_LIMIT != 0).all()
+
+
+def test_the_papers_limits_are_the_stated_ones() -> None:
+    recording = tvident.simulate_torsional_rig()
+    result = tvident.identify(recording.angle, recording.torque, sample_rate=1000, preset="paper")
     assert errors(result, recording) == pytest.approx({"inertia": 6.5, "damping": 28, "stiffness": 7.2}, rel=MEASURED)
     clean = tvident.simulate_torsional_rig(torque_snr_db=200, angle_noise=1e-9)
-    alone = tvident.identify(clean.angle, clean.torque, sample_rate=1000)
+    alone = tvident.identify(clean.angle, clean.torque, sample_rate=1000, preset="paper")
     assert errors(alone, clean) == pytest.approx({"inertia": 6.4, "damping": 25, "stiffness": 7.0}, rel=MEASURED)
     noisy_rig = tvident.simulate_torsional_rig(angle_noise=0.1)
-    pulled = tvident.identify(noisy_rig.angle, noisy_rig.torque, sample_rate=1000)
+    pulled = tvident.identify(noisy_rig.angle, noisy_rig.torque, sample_rate=1000, preset="paper")
     assert errors(pulled, noisy_rig)["stiffness"] == pytest.approx(26, rel=MEASURED)
     for found, true in ((pulled.inertia, noisy_rig.inertia), (pulled.stiffness, noisy_rig.stiffness)):
         assert np.nanmean(found / true) == pytest.approx(1 - 0.12, rel=0.01)
@@ -216,15 +236,15 @@ def test_limits_are_the_stated_ones() -> None:
     angle: npt.NDArray[np.float64] = np.sin(omega * t)
     torque = (15 - 0.0123 * omega**2) * angle + 0.00825 * omega * np.cos(omega * t)
     noisy = angle + 1e-3 * generator.standard_normal(t.size)
-    single = tvident.identify(noisy, torque + 0.5 * generator.standard_normal(t.size), sample_rate=1000)
+    single = tvident.identify(noisy, torque + 0.5 * generator.standard_normal(t.size), sample_rate=1000, preset="paper")
     assert np.nanmedian(single.condition) > 1000
     assert np.mean(single.status & Status.ILL_CONDITIONED != 0) > 0.8
 
     # A torque that comes 1 ms late changes the damping by about (I ω² - K) τ, here with ω that of the angle.
     late = tvident.simulate_torsional_rig(pattern="constant")
     kinds: Any = {"inertia": 0.0123, "damping": "constant", "stiffness": 6.0 / 0.45}
-    on_time = tvident.identify(late.angle[:-1], late.torque[:-1], sample_rate=1000, **kinds)
-    shifted = tvident.identify(late.angle[1:], late.torque[:-1], sample_rate=1000, **kinds)
+    on_time = tvident.identify(late.angle[:-1], late.torque[:-1], sample_rate=1000, preset="paper", **kinds)
+    shifted = tvident.identify(late.angle[1:], late.torque[:-1], sample_rate=1000, preset="paper", **kinds)
     change = shifted.constants["damping"][0] - on_time.constants["damping"][0]
     squared = late.true_acceleration.var() / late.true_velocity.var()  # ω² where θ̇ weighs it
     assert change == pytest.approx((0.0123 * squared - 6.0 / 0.45) * 1e-3, rel=0.1)

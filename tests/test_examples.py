@@ -51,11 +51,13 @@ def test_derivatives(tmp_path: Path) -> None:
 
 def test_torsional_rig(tmp_path: Path) -> None:
     printed = run("torsional_rig.py", tmp_path)
-    (unknown,), (known,) = (
-        numbers(printed, rf"{how} known: +stiffness within (\S+)%") for how in ("nothing", "inertia")
+    (default,), (paper,), (known,) = (
+        numbers(printed, rf"{how}: +stiffness within (\S+)%")
+        for how in ("by default", "as in the paper", "inertia known")
     )
+    assert default < 0.5
+    assert 5 < paper < 10
     assert known < 0.5
-    assert 5 < unknown < 10
     assert (tmp_path / "torsional-rig.csv").stat().st_size > 0
 
 
@@ -69,8 +71,9 @@ def test_friction(tmp_path: Path) -> None:
 
 def test_own_file(tmp_path: Path) -> None:
     printed = run("own_file.py", tmp_path)
-    # 19 samples are missing: derivatives of 200 more, and equations of 199 more, need one of them.
-    assert numbers(printed, r"no result for (\d+) samples") == [19 + 200 + 199]
+    # 19 samples are missing, and so are equations whose test function, at most a sixteenth of the record, holds one of them.
+    (bridged,) = numbers(printed, r"(\d+) samples around the gap")
+    assert 19 < bridged <= 19 + 10_000 / 16
     assert (tmp_path / "identified.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -71,7 +71,9 @@ def test_constants_are_lines_with_their_value_and_flagged_stretches_are_shaded()
     for ax in (inertia, damping, stiffness, offset):
         labels = [str(patch.get_label()) for patch in ax.patches]
         assert "flagged" in labels
-    assert "flagged" in [text.get_text() for text in inertia.get_legend().get_texts()]
+    legend = inertia.get_legend()
+    assert legend is not None
+    assert "flagged" in [text.get_text() for text in legend.get_texts()]
 
 
 def test_what_holds_for_the_whole_record_is_written_below() -> None:

@@ -175,11 +175,11 @@ class Explained:
         if lengths and self.found["equations"] <= min(lengths):
             words = (
                 f"windows of {self.found['equations']} samples are the shortest that were tried: what is windowed changes faster than it "
-                "can be followed; excite higher frequencies, or record with less noise"
+                "can be followed, or the record is too short: record ten cycles or more, and excite higher frequencies"
             )
         else:
             words = (
-                f"a test function of {2 * self.found['half_width'] + 1} samples is the narrowest or widest that was tried: record longer, "
-                "or at a rate of 20 samples a cycle or more"
+                f"a test function of {2 * self.found['half_width'] + 1} samples is the narrowest or widest that was tried: record ten "
+                "cycles or more, at 20 samples a cycle or more; do not trust these numbers otherwise"
             )
         return [words]

@@ -60,7 +60,7 @@ class Status(enum.IntFlag):
 
     WINDOW_LIMIT = 2048
     """The best test function or length of windows is the first or last that was tried. The record may change faster than it can be
-    followed, or be too short: look at the settings."""
+    followed, or be too short: then neither values nor their errors can be trusted."""
 
     LAG_SUSPECTED = 4096
     """The torque seems to have been recorded late. Give ``lag=`` as the summary suggests."""
@@ -95,7 +95,8 @@ _ADVICE = {
         "what was taken to be constant differs between parts of the record: let it be 'auto' or 'varying'"
     ),
     Status.WINDOW_LIMIT: (
-        "the best test function or window is the first or last that was tried: too fast a change, or too short a record"
+        "the best test function or window is the first or last that was tried: too fast a change, or too short a record, whose numbers "
+        "cannot be trusted"
     ),
     Status.LAG_SUSPECTED: "the torque seems to come late: give lag= as the summary suggests",
     Status.TERM_SUSPECTED: "a term seems to be missing: add the one that the summary names",
