@@ -92,18 +92,21 @@ class Explained:
         ]
 
     def _kinds(self) -> list[str]:
-        words = [
-            f"{self.names[number]} constant: eight parts of the record differ no more than noise makes them (p = {test[0]:.2g})"
-            for number, _, _, test in self.found["constants"]
-            if test is not None and test[0] >= _NO_CHANCE
-        ]
+        tests = {self.names[number]: test for number, _, _, test in self.found["constants"] if test is not None}
+        agreeing = {name: probability for name, (probability, _) in tests.items() if probability >= _NO_CHANCE}
+        words = []
+        if agreeing:
+            chances = ", ".join(f"{probability:.2g}" for probability in agreeing.values())
+            words.append(
+                f"{_listed(list(agreeing))} constant: eight parts of the record differ no more than noise makes them (p = {chances})"
+            )
         if self.found["pooling"] is not None:
             slow = [self.names[number] for number in self.found["changing"]]
             slow = [name for name in slow if name in {"inertia", "damping"}]
             why = "parts of the record differ by more than noise" if set(slow) <= set(self.tested) else "as given"
             seconds = self.found["pooling"] * self.period
             words.append(
-                f"{' and '.join(slow)} varying: {why}; followed by quadratics in time over {seconds:.3g} s, which predict best"
+                f"{_listed(slow)} varying: {why}; followed by quadratics in time over {seconds:.3g} s, which predict best"
             )
         return words
 
@@ -161,7 +164,7 @@ class Explained:
         parts = [name for name, part in zip(constants, shares, strict=True) if abs(part) > _TAKES_PART]
         if len(parts) == 1 and "stiffness" in (self.names[number] for number in self.found["changing"]):
             parts.append("stiffness")
-        told = " and ".join(parts) if len(parts) > 1 else "the parameters"
+        told = _listed(parts) if len(parts) > 1 else "the parameters"
         words = (
             f"{told} are hardly told apart (condition {self.found['condition']:.0f}): under a single frequency they look alike; "
             "excite two or more, or give one of them as known"
@@ -183,3 +186,9 @@ class Explained:
                 "cycles or more, at 20 samples a cycle or more; do not trust these numbers otherwise"
             )
         return [words]
+
+
+def _listed(names: list[str]) -> str:
+    """Return names as they are read: one, another and a third."""
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
