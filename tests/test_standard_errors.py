@@ -39,3 +39,15 @@ def test_errors_of_frequency_and_damping_ratio_are_those_of_many_recordings(call
         assert np.median(errors) == pytest.approx(np.std(values), rel=SCATTER), name
     truth = np.sqrt(clean.stiffness[at] / clean.inertia[at]) / (2 * np.pi)
     assert np.mean([value for value, _ in found["natural_frequency"]]) == pytest.approx(truth, rel=1e-3)
+
+
+def test_errors_do_not_depend_on_the_way_the_equations_took() -> None:
+    rig = tvident.simulate_torsional_rig(4.0, pattern="constant")
+    kinds: dict[str, Any] = {"inertia": "constant", "damping": "constant", "stiffness": "constant"}
+    call: dict[str, Any] = {"sample_rate": 1000, "preset": "paper", **kinds}
+    # A mask, even one that leaves nothing out, is what rows are made one by one for.
+    plain = tvident.identify(rig.angle, rig.torque, **call)
+    masked = tvident.identify(rig.angle, rig.torque, mask=np.ones(rig.angle.size, dtype=bool), **call)
+    for name in ("inertia", "stiffness", "natural_frequency", "damping_ratio"):
+        expected = plain.stderr[name][2000]
+        assert masked.stderr[name][2000] == pytest.approx(expected, rel=0.1), name

@@ -115,6 +115,12 @@ pub fn identify_strong(
         results.condition = vec![fit.pooled.condition; samples];
         results.deviation = vec![variance.sqrt(); samples];
         results.status = vec![0; samples];
+        for one in 0..count {
+            for other in (0..one).filter(|&other| model.constant[one] < 3 && model.constant[other] < 3) {
+                pairs.push((model.constant[one], model.constant[other]));
+                results.covariances.push(vec![covariance[one * count + other]; samples]);
+            }
+        }
     } else {
         let range = 0..samples.cast_signed();
         let (ill, window) = (HARDLY_TOLD_APART, options.equations);
