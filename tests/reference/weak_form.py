@@ -10,14 +10,16 @@ Array = npt.NDArray[np.float64]
 
 
 def kernels(half: int, exponent: int, delta: float, shift: float = 0.0) -> Array:
-    """Give φ″, -φ′ and φ at the samples, scaled so that φ, where it is not shifted, sums to one."""
+    """Give φ″, -φ′ and φ at the samples, scaled so that φ, where it is not shifted, sums to one, each exact for constants."""
     phi = Polynomial([1, 0, -1]) ** exponent
     x = (np.arange(-half, half + 1) - shift) / half
     inside = np.abs(x) <= 1
     total = phi(np.arange(-half, half + 1) / half).sum()
     second = half * delta
-    rows = [phi.deriv(2)(x) / second**2, -phi.deriv(1)(x) / second, phi(x)]
-    return np.asarray(np.array(rows) * inside / total)
+    rows = np.array([phi.deriv(2)(x) / second**2, -phi.deriv(1)(x) / second, phi(x)]) * inside / total
+    # What each kernel makes of a constant: only φ leaves it.
+    wanted = np.array([0.0, 0.0, 1.0])
+    return np.asarray(rows + np.outer(wanted - rows.sum(axis=1), rows[2] / rows[2].sum()))
 
 
 def rows(angle: Array, torque: Array, half: int, exponent: int, delta: float, lag: float = 0.0) -> tuple[Array, Array]:
@@ -38,8 +40,7 @@ def rows(angle: Array, torque: Array, half: int, exponent: int, delta: float, la
 
 def profile(windowed: Array, constant: Array, b: Array, window: int, step: int) -> Array:
     """Give the constants that are best for all windows of rows together, each window with unknowns of its own."""
-    unknowns = constant.shape[1]
-    normal, side = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
+    normal, side = 0.0, 0.0
     for first in range(0, b.size - window + 1, step):
         rows_of = slice(first, first + window)
         Q, _ = np.linalg.qr(windowed[rows_of])

@@ -8,6 +8,7 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 
 use crate::samples::{Samples, is_usable};
+use crate::test_function::sum;
 
 /// Rows of a block.
 pub(crate) const BLOCK: usize = 128;
@@ -114,13 +115,6 @@ impl FilterBank {
             products.col_mut(kernel).iter_mut().for_each(|value| *value += offset);
         }
     }
-}
-
-/// The sum of a kernel from both ends inwards, so that what is odd sums to zero exactly.
-fn sum(kernel: &[f64]) -> f64 {
-    let half = kernel.len() / 2;
-    let pairs = kernel[..half].iter().zip(kernel.iter().rev()).map(|(left, right)| left + right);
-    pairs.sum::<f64>() + if kernel.len() % 2 == 1 { kernel[half] } else { 0.0 }
 }
 
 /// The one of three numbers that lies between the others: a single glitch is never it.

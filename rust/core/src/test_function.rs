@@ -5,6 +5,11 @@
 //! The kernels are the analytic derivatives of `φ` at the samples. Their sums equal the integrals up to the part of `φ`'s spectrum
 //! beyond the sample rate, which falls as the power `p + 1` of the half-width; differences of a sampled `φ` would be wrong by the square
 //! of the frequency instead.
+//!
+//! What narrow test functions still get wrong hurts most where an angle has a large constant part: multiplied with a sum of `φ″` that is
+//! not quite zero it looks like a torque. So each kernel is corrected by a multiple of `φ` until a constant is exact. At half-width 10 this
+//! takes 0.5 N off the error of a 3.2 N offset of a carriage of 95 kg at 0.2 m; from half-width 80 on it changes nothing beyond the
+//! tenth digit. (A quadratic times `φ`, which makes parabolas exact as well, is worse where there are only nine samples a cycle.)
 
 use crate::error::Error;
 
@@ -97,7 +102,21 @@ impl TestFunction {
             let slopes = [time * curvature + 2.0 * slope, -time * slope - value, time * value];
             kernels.slopes.iter_mut().zip(slopes).for_each(|(kernel, value)| kernel.push(value));
         }
+        Self::correct(&mut kernels);
         kernels
+    }
+
+    /// Makes every kernel exact for constants, by adding a multiple of `φ`.
+    fn correct(kernels: &mut Kernels) {
+        let weight = kernels.values[2].clone();
+        let total = sum(&weight);
+        let derivatives = kernels.values[..2].iter_mut().chain(&mut kernels.slopes);
+        for kernel in derivatives {
+            let left = sum(kernel) / total;
+            kernel.iter_mut().zip(&weight).for_each(|(value, weight)| *value -= left * weight);
+        }
+        // Only φ itself leaves anything of a constant: all of it.
+        kernels.values[2].iter_mut().for_each(|value| *value /= total);
     }
 
     /// `φ` and its first two derivatives by `x`, scaled; zero outside the window.
@@ -116,4 +135,11 @@ impl TestFunction {
         let half = self.half_width;
         (0..=2 * half).map(move |index| (index as f64 - half as f64 - shift) / half as f64)
     }
+}
+
+/// The sum of a kernel from both ends inwards, so that what is odd sums to zero exactly.
+pub(crate) fn sum(kernel: &[f64]) -> f64 {
+    let half = kernel.len() / 2;
+    let pairs = kernel[..half].iter().zip(kernel.iter().rev()).map(|(left, right)| left + right);
+    pairs.sum::<f64>() + if kernel.len() % 2 == 1 { kernel[half] } else { 0.0 }
 }

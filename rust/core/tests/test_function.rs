@@ -3,6 +3,9 @@
 use proptest::prelude::*;
 use tvident::TestFunction;
 
+/// Of sums of up to 79 numbers below 800, twice the square of the highest exponent.
+const ROUNDING: f64 = 79.0 * 800.0 * f64::EPSILON;
+
 fn dot(kernel: &[f64], samples: impl Fn(f64) -> f64, half: usize, delta: f64) -> f64 {
     kernel.iter().enumerate().map(|(k, value)| value * samples((k as f64 - half as f64) * delta)).sum()
 }
@@ -27,6 +30,19 @@ proptest! {
         prop_assert!((at(inertia, &angle) - at(slope, &acceleration)).abs() < 1e-11 * omega * omega * window);
         prop_assert!((at(damping, &angle) - at(slope, &velocity)).abs() < 1e-11 * omega * window);
         prop_assert!((kernels.values[2].iter().sum::<f64>() - 1.0).abs() < 1e-13);
+    }
+
+    #[test]
+    fn a_constant_is_exact_however_narrow_the_test_function(
+        half in 4..40_usize,
+        exponent in 3..21_usize,
+        shift in -0.5..0.5_f64,
+    ) {
+        let kernels = TestFunction::new(half, exponent, 1.0).expect("valid").kernels(shift);
+        for (index, kernel) in kernels.values.iter().chain(&kernels.slopes).enumerate() {
+            let expected = if index == 2 { 1.0 } else { 0.0 };
+            prop_assert!((kernel.iter().sum::<f64>() - expected).abs() < ROUNDING);
+        }
     }
 
     #[test]
