@@ -324,11 +324,9 @@ impl View<'_, '_> {
                         let first = row.saturating_sub(nearby.rows).max(wide.start) - wide.start;
                         let last = (row + nearby.rows + 1).min(wide.end) - wide.start;
                         let (sum, count) = (errors[last][0] - errors[first][0], errors[last][1] - errors[first][1]);
-                        if count == 0.0 {
-                            continue;
-                        }
-                        let exponent =
-                            0.5 * (nearby.independent * sum / count + record * candidate.record[which].min(MOST));
+                        // Within a gap nothing is known nearby, and the record decides.
+                        let here = if count == 0.0 { 0.0 } else { nearby.independent * sum / count };
+                        let exponent = 0.5 * (here + record * candidate.record[which].min(MOST));
                         self.believe(&seen, &mut numbers_here);
                         let sums = &mut sums[place * numbers..(place + 1) * numbers];
                         if exponent < least[place] {

@@ -319,7 +319,9 @@ impl Session<'_, '_, '_> {
             }
         }
         for one in 0..changing {
-            results.errors.push((0..length).map(|place| covariance(one, one, place).max(0.0).sqrt()).collect());
+            // Rounding may leave less than nothing; what is NaN stays NaN.
+            let error = |variance: f64| if variance < 0.0 { 0.0 } else { variance.sqrt() };
+            results.errors.push((0..length).map(|place| error(covariance(one, one, place))).collect());
         }
         let mut pairs = Vec::new();
         for one in 0..names.len() {
