@@ -41,6 +41,9 @@ pub(crate) struct Expected {
 }
 
 impl Expected {
+    /// Nothing is known of the noise, so no window is told from the others by its misfit.
+    pub(crate) const UNKNOWN: Self = Self { variance: f64::NAN, torque: 0.0, redundancy: 1.0 };
+
     pub(crate) fn new(covariance: &RowCovariance, torque: f64) -> Self {
         Self { variance: covariance.variance(), torque, redundancy: covariance.redundancy() }
     }

@@ -90,7 +90,7 @@ pub fn identify_strong(
     let instructions = derivatives.options().instructions;
     let mut problem = model.problem(&rows, &rows.side, 0.0, None);
     // All residuals are taken to be of one variance, which ordinary least squares reads off them.
-    let any = Expected { variance: 1.0, torque: 0.0, redundancy: 1.0 };
+    let any = Expected::UNKNOWN;
     let fit = if model.windowed.is_empty() {
         Fit::new(&problem, None, any, instructions, &mut run)?
     } else {

@@ -292,7 +292,7 @@ impl Session<'_, '_, '_> {
         } else {
             Some(scales[Scale::nearest(&scales, wanted).ok_or(self.too_short())?])
         };
-        let any = Expected { variance: 1.0, torque: 0.0, redundancy: 1.0 };
+        let any = Expected::UNKNOWN;
         let fit = Fit::new(&problem, scale, any, self.options.instructions, &mut self.run)?;
         Ok(fit.map_or([0.0; 3], |fit| self.parameters(model, &fit)))
     }
