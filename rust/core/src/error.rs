@@ -99,11 +99,13 @@ pub enum Error {
     },
     /// A record that holds too few samples to choose anything by.
     #[error(
-        "the record must be long enough for windows of several test functions; got {samples} samples; record longer"
+        "a record must hold at least {least} samples for windows of several test functions; got {samples}; record longer"
     )]
     RecordTooShortForWindows {
         /// Length of the record, samples.
         samples: usize,
+        /// The shortest allowed, samples.
+        least: usize,
     },
     /// Equations that do not determine what is constant.
     #[error("the record must determine what is constant; it does not; excite the system, or leave a parameter out")]

@@ -55,6 +55,7 @@ pub mod test_function;
 mod test_function_choice;
 mod tile;
 mod triangle;
+mod usable;
 mod varying;
 mod walk;
 mod weak_decision;

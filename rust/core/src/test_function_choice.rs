@@ -86,6 +86,8 @@ struct Tried {
     responses: [Vec<[f64; 2]>; 3],
     /// Products of the kernels with each other.
     gram: [[f64; 3]; 3],
+    /// The part of its rows that can be used.
+    share: f64,
 }
 
 /// A response below this part of the largest one lets nothing through.
@@ -93,14 +95,21 @@ const NOTHING: f64 = 1e-9;
 
 impl Candidates {
     /// Test functions of some half-widths, and of one exponent or all that are tried.
-    pub(crate) fn new(evidence: Evidence, widths: &[usize], exponent: Option<usize>) -> Self {
+    ///
+    /// `share` tells which part of the rows of a half-width holds no sample that is missing.
+    pub(crate) fn new(
+        evidence: Evidence,
+        widths: &[usize],
+        exponent: Option<usize>,
+        share: impl Fn(usize) -> f64,
+    ) -> Self {
         let exponents = exponent.map_or_else(|| EXPONENTS.to_vec(), |exponent| vec![exponent]);
         let length = 2 * (evidence.power.len() - 1);
         let functions = exponents.iter().flat_map(|&exponent| {
             let delta = evidence.delta;
             widths.iter().filter_map(move |&width| TestFunction::new(width, exponent, delta).ok())
         });
-        let tried = functions.map(|function| Tried::new(function, length)).collect();
+        let tried = functions.map(|function| Tried::new(function, length, share(function.half_width()))).collect();
         Self { evidence, tried }
     }
 
@@ -115,7 +124,7 @@ impl Candidates {
 }
 
 impl Tried {
-    fn new(function: TestFunction, length: usize) -> Self {
+    fn new(function: TestFunction, length: usize, share: f64) -> Self {
         let kernels = function.kernels(0.0).values;
         let mut responses = [0, 1, 2].map(|i: usize| response(&kernels[i], length));
         let through = |response: &[[f64; 2]]| {
@@ -129,7 +138,7 @@ impl Tried {
         }
         let dot = |i: usize, j: usize| kernels[i].iter().zip(&kernels[j]).map(|(a, b)| a * b).sum();
         let gram = std::array::from_fn(|i| std::array::from_fn(|j| dot(i, j)));
-        Self { function, responses, gram }
+        Self { function, responses, gram, share }
     }
 
     /// Half the logarithm of the determinant of the expected squared errors; infinite where the angle's noise leaves nothing.
@@ -184,6 +193,7 @@ impl Tried {
             + &left * left.transpose();
         let Ok(errors) = Llt::new(errors.as_ref(), faer::Side::Lower) else { return f64::INFINITY };
         let factor = errors.L();
-        (0..size).map(|i| factor[(i, i)].ln() + scale[i].ln()).sum()
+        // Half the rows make every variance twice as large; without any the sum is infinite.
+        (0..size).map(|i| factor[(i, i)].ln() + scale[i].ln() - 0.5 * self.share.ln()).sum()
     }
 }

@@ -20,8 +20,9 @@ use crate::selection::Selection;
 use crate::simd::Instructions;
 use crate::spectrum::power;
 use crate::suspects::{Missing, Suspect};
-use crate::test_function::TestFunction;
+use crate::test_function::{LEAST_HALF_WIDTH, TestFunction};
 use crate::test_function_choice::{Candidates, Evidence, half_widths, spectrum_length};
+use crate::usable::Usable;
 use crate::weak_form::{Record, TermSamples, WeakRows};
 use crate::weak_results::SampleResults;
 
@@ -298,7 +299,10 @@ impl Session<'_, '_, '_> {
     }
 
     pub(crate) fn too_short(&self) -> Error {
-        Error::RecordTooShortForWindows { samples: self.record.angle.len() }
+        let samples = self.record.angle.len();
+        let half = self.options.half_width.unwrap_or(LEAST_HALF_WIDTH);
+        let test_functions = if self.model().windowed.is_empty() { 8 } else { 16 };
+        Error::RecordTooShortForWindows { samples, least: (test_functions * half).max(samples + 1) }
     }
 
     fn rows(&mut self, function: TestFunction) -> Result<WeakRows, Error> {
@@ -315,7 +319,8 @@ impl Session<'_, '_, '_> {
             let parameters = self.pilot(&weak, model)?;
             return Ok(Chosen { weak, parameters, at_end: false });
         }
-        let widest = samples / 32;
+        // So many rows are left that windows of several test functions fit in.
+        let widest = samples / if model.windowed.is_empty() { 8 } else { 16 };
         let evidence = |length: usize| Evidence {
             power: power(self.record.angle, length),
             samples,
@@ -328,8 +333,11 @@ impl Session<'_, '_, '_> {
         let typical = (typical.round() as usize).max(1);
         let widths = width.map_or_else(|| half_widths((4 * typical).min(widest)), |width| vec![width]);
         let widest = *widths.last().ok_or(self.too_short())?;
-        let candidates = Candidates::new(evidence(spectrum_length(samples, widest)), &widths, exponent);
-        let mut current = TestFunction::new(width.unwrap_or(typical.max(4)), exponent.unwrap_or(9), delta)?;
+        let usable = Usable::new(self.record);
+        let share = |half: usize| usable.share(half);
+        let candidates = Candidates::new(evidence(spectrum_length(samples, widest)), &widths, exponent, share);
+        let start = width.unwrap_or_else(|| usable.widest(typical.max(LEAST_HALF_WIDTH), &widths));
+        let mut current = TestFunction::new(start, exponent.unwrap_or(9), delta)?;
         let mut seen = Vec::new();
         loop {
             let weak = self.rows(current)?;
