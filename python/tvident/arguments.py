@@ -16,6 +16,8 @@ Progress: TypeAlias = bool | Callable[[int, int], object] | None
 """``True`` shows a bar; a callable is given the work done and all of it."""
 
 NanPolicy: TypeAlias = Literal["propagate", "raise"]
+RowPolicy: TypeAlias = Literal["omit", "propagate", "raise"]
+"""What to do about values that are no number, where windows may do without some of their rows."""
 
 _READ_AS_THEY_ARE = frozenset(np.dtype(code) for code in ("f8", "f4", "i8", "i4", "i2", "i1", "u8", "u4", "u2", "u1"))
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0}
@@ -53,9 +55,9 @@ def along_axis(name: str, array: npt.NDArray[Any], axis: int) -> npt.NDArray[Any
     return np.moveaxis(array, axis, -1)
 
 
-def check_nan(name: str, array: npt.NDArray[Any], policy: str) -> None:
+def check_nan(name: str, array: npt.NDArray[Any], policy: str, policies: Any = NanPolicy) -> None:
     """Apply a policy for values that are no number, as far as it must be applied before any work."""
-    one_of("nan_policy", policy, get_args(NanPolicy))
+    one_of("nan_policy", policy, get_args(policies))
     if policy == "raise" and array.dtype.kind == "f" and not np.isfinite(array).all():
         place = tuple(int(index[0]) for index in np.nonzero(~np.isfinite(array)))
         where = place[0] if len(place) == 1 else place

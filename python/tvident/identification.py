@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _core, arguments
 from tvident.collected import Collected
-from tvident.derivatives import Criterion, plan
+from tvident.derivatives import Criterion, plan, quantisation_step
+from tvident.missing import missing, propagate
 from tvident.progress import reporter
 from tvident.reasons import Explained, Words
 from tvident.result import Identification
@@ -45,10 +46,11 @@ def identify(
     stiffness: Parameter | None = None,
     terms: Sequence[TermName | Term | tuple[TermName | Term, Kind]] | None = None,
     filter_torque: bool | None = None,
-    lag: float | None = None,
+    lag: float | Literal["auto"] | None = None,
+    quantisation: float | None = None,
     mask: npt.ArrayLike | None = None,
     step: int = 1,
-    nan_policy: arguments.NanPolicy = "propagate",
+    nan_policy: arguments.RowPolicy = "omit",
     settings: Mapping[str, Any] | None = None,
     workers: int | None = None,
     progress: arguments.Progress = None,
@@ -110,14 +112,22 @@ def identify(
         windowed where all unknown parameters are, and constant otherwise.
     filter_torque : bool, optional
         In strong form: smooth the torque with polynomials of the orders chosen for the angle.
-    lag : float, optional
-        Seconds by which the torque was recorded late; a fraction of a sample period counts too.
+    lag : float or "auto", optional
+        Seconds by which the torque was recorded late; fractions of a sample count. ``"auto"``, in weak form: the lag nearest to none at
+        which the torque's rate explains nothing more, with its standard error in ``settings["lag_stderr"]``; none where the record does
+        not tell it from the damping, as with motion at a single frequency.
+    quantisation : float, optional
+        Step to which the angle was rounded, in rad: an encoder's count. By default it is looked for in the samples, as in
+        :func:`tvident.fit_local_polynomials`. In strong form no residual is taken to be smaller than it leaves, in weak form no noise. 0
+        means none.
     mask : array_like of bool, shape (n,) or the angle's, optional
         True where a sample may be the centre of an equation.
     step : int, optional
         Every how many samples a result is wanted.
-    nan_policy : {"propagate", "raise"}, optional
-        Windows that hold a value that is not a finite number are NaN, and no others; or raise.
+    nan_policy : {"omit", "propagate", "raise"}, optional
+        What to do about values of angle and torque that are no finite numbers. ``"omit"``: they cost their own equations only; numbers
+        around them are taken from the other equations of their window and flagged GAP. ``"propagate"``: what is windowed is NaN where
+        its window holds one. ``"raise"``: refuse them.
     settings : mapping, optional
         Settings of an earlier result: what it chose is used again. What is given beside them wins. `mask`, `step` and what was known
         at every sample are not among them.
@@ -196,10 +206,13 @@ def identify(
         "terms": terms,
         "filter_torque": filter_torque,
         "lag": lag,
+        "quantisation": quantisation,
     }
     used = resolve(preset, given, settings)
+    rounded = used["quantisation"]
+    used["quantisation"] = quantisation_step(angles, rounded)
     for name, array in (("angle", angles), ("torque", torques)):
-        arguments.check_nan(name, array, nan_policy)
+        arguments.check_nan(name, array, nan_policy, arguments.RowPolicy)
     start = 0.0 if t is None else float(np.asarray(t)[0])
     task = _Task(
         angles=angles,
@@ -207,6 +220,9 @@ def identify(
         time=start + np.arange(samples, dtype=np.float64) * period,
         period=period,
         settings=used,
+        rounded=rounded,
+        holes=missing(angles, torques),
+        propagate=nan_policy == "propagate",
         mask=arguments.mask("mask", mask, angles.shape),
         step=arguments.whole_number("step", step, least=1),
         workers=arguments.worker_count(workers),
@@ -224,6 +240,9 @@ class _Task:
     time: npt.NDArray[np.float64]
     period: float
     settings: dict[str, Any]
+    rounded: float | None
+    holes: npt.NDArray[np.bool_] | None
+    propagate: bool
     mask: npt.NDArray[np.bool_] | None
     step: int
     workers: int | None
@@ -254,9 +273,10 @@ class _Task:
             arguments.check_window("equations", rows, samples, least=len(self.unknowns) + 1)
         motions = self._motions(core_plan)
         plain = not used["filter_torque"] and used["lag"] == 0 and self.mask is None
+        whole = self.holes is None or self.propagate
         with reporter(progress, "identification") as report:
             options["progress"] = report
-            if plain and kinds == {"windowed"} and used["variation"] == "constant":
+            if plain and whole and kinds == {"windowed"} and used["variation"] == "constant":
                 found.windowed(core_plan, motions, rows, **options)
             elif plain and kinds == {"constant"}:
                 found.constant(core_plan, motions, **options)
@@ -269,6 +289,8 @@ class _Task:
                     for record in range(self._records)
                 ]
                 found.records(each, self._numbers)
+                if self.propagate and self.holes is not None:
+                    propagate(found, self.holes, [(length, rows)] * self._records, self.step)
         chosen = {"chosen": (), "window_length": length, "exponent": None, "equations": rows}
         return self._result(found, chosen, Words())
 
@@ -302,7 +324,8 @@ class _Task:
                     equations=rows,
                     average=average,
                     linear=used["variation"] == "linear",
-                    lag=used["lag"] / self.period,
+                    lag=None if used["lag"] == "auto" else used["lag"] / self.period,
+                    quantisation=self.rounded,
                     mask=self._mask(record),
                     step=self.step,
                     not_missing=present,
@@ -312,10 +335,14 @@ class _Task:
                 for record, (length, exponent, rows) in enumerate(zip(lengths, exponents, equations, strict=True))
             ]
         found.records(each, self._numbers)
+        if self.propagate and self.holes is not None:
+            reached = [(2 * one["half_width"] + 1, one["equations"]) for one in each]
+            propagate(found, self.holes, reached, self.step)
         names = dict(zip(self._numbers, (unknown.name for unknown in self.unknowns), strict=True))
         tested = [one.name for one in self.unknowns if one.kind == "auto"]
         asked = {"window_length": lengths, "exponent": exponents, "equations": equations}
         automatic = tuple(name for name, values in asked.items() if None in values)
+        automatic += ("lag",) if used["lag"] == "auto" else ()
         words = [Explained(one, names, automatic, tested, self.period).words() for one in each]
         chosen: dict[str, Any] = {
             "chosen": automatic,
@@ -323,8 +350,12 @@ class _Task:
             "exponent": tuple(one["exponent"] for one in each),
             "equations": tuple(one["equations"] for one in each),
         }
+        if used["lag"] == "auto":
+            lags = [one["lag"] or (0.0, np.nan) for one in each]
+            late, error = (tuple(lag[place] * self.period for lag in lags) for place in (0, 1))
+            chosen |= {"lag": late, "lag_stderr": error}
         if len(each) == 1:
-            chosen |= {name: chosen[name][0] for name in asked}
+            chosen |= {name: value[0] for name, value in chosen.items() if name != "chosen"}
             slow = {names[number] for number in each[0]["changing"]} & set(COEFFICIENTS)
             self.unknowns = [Unknown(one.name, _in_the_end(one, slow), one.own) for one in self.unknowns]
         else:
@@ -399,6 +430,7 @@ class _Task:
             derivatives=(0, 1, 2),
             delta=self.period,
             noise=True,
+            quantisation=self.settings["quantisation"],
         )
 
     def _motions(self, core_plan: _core.LocalPolynomials | None) -> _core.Motions:
@@ -423,7 +455,17 @@ class _Task:
         kinds: dict[str, str] = dict.fromkeys(COEFFICIENTS, "known")
         kinds |= {unknown.name: unknown.kind for unknown in self.unknowns}
         used = self.settings
-        same = ("preset", "form", "max_order", "criterion", "selection", "variation", "filter_torque", "lag")
+        same = (
+            "preset",
+            "form",
+            "max_order",
+            "criterion",
+            "selection",
+            "variation",
+            "filter_torque",
+            "lag",
+            "quantisation",
+        )
         terms = tuple((one.own or one.name, one.kind) for one in self.unknowns if one.name not in COEFFICIENTS)
         return Identification(
             time=self.time[:: self.step],

@@ -14,6 +14,10 @@ from tvident.terms import COEFFICIENTS
 
 _NO_CHANCE = 3e-4
 """Probability below which parts of a record differ by more than chance: that of the core."""
+_NOISE_MODEL_FAILS = 4.0
+"""Error of prediction, over the noise's, above which the noise of the channels does not explain it: that of the core."""
+_SHOWN = 6
+"""Jumps that are listed at most."""
 _TAKES_PART = 0.3
 """A constant that has at least this share in the combination that is determined worst is named."""
 
@@ -66,8 +70,9 @@ class Explained:
                 "leave a term out, or give what is known"
             )
             return Words((self._noise(),), (undetermined,))
-        reasons = (self._noise(), self._test_function(), *self._windows(), *self._kinds())
-        advice = (*self._misfit(common), *self._suspects(), *self._contradictions(), *self._told_apart(common))
+        reasons = (self._noise(), self._test_function(), *self._lag(), *self._windows(), *self._kinds(), *self._jumps())
+        advice = (*self._misfit(common), *self._outside(), *self._suspects(), *self._contradictions())
+        advice = (*advice, *self._told_apart(common))
         return Words(reasons, (*advice, *self._limits(common)))
 
     def _noise(self) -> str:
@@ -79,6 +84,37 @@ class Explained:
         if not {"window_length", "exponent"} & set(self.chosen):
             return f"{words}: as given"
         return f"{words}: with the angle's spectrum and this noise it should leave the smallest errors"
+
+    def _lag(self) -> list[str]:
+        if "lag" not in self.chosen:
+            return []
+        if self.found["lag"] is None:
+            return [
+                "the record does not tell a lag of the torque from damping: none is taken; excite more frequencies, or give it"
+            ]
+        value, error = self.found["lag"]
+        return [f"the torque comes {value:.3f} ± {error:.1g} samples late: there its rate explains nothing more"]
+
+    def _jumps(self) -> list[str]:
+        jumps = self.found["jumps"]
+        if not jumps:
+            return []
+        shown = ", ".join(f"{jump * self.period:.6g}" for jump in jumps[:_SHOWN]) + (" …" if len(jumps) > _SHOWN else "")
+        many = f"{len(jumps)} times, at" if len(jumps) > 1 else "at"
+        return [f"what is windowed jumps {many} {shown} s: windows end there"]
+
+    def _outside(self) -> list[str]:
+        if self.found["outside_mask"] is None:
+            return []
+        differing, left = self.found["outside_mask"]
+        inside = {number: value for number, value, *_ in self.found["constants"]}
+        parts = [
+            f"{self.names[number]} {value:.4g} ± {error:.1g} instead of {inside[number]:.4g}"
+            for number, value, error in differing
+        ]
+        if left is not None and left > _NOISE_MODEL_FAILS:
+            parts.append(f"{left:.1f} times the mean square left")
+        return [f"outside the mask the model fails: {', '.join(parts)}"]
 
     def _windows(self) -> list[str]:
         if not self.found["lengths"]:
@@ -165,9 +201,10 @@ class Explained:
         if len(parts) == 1 and "stiffness" in (self.names[number] for number in self.found["changing"]):
             parts.append("stiffness")
         told = _listed(parts) if len(parts) > 1 else "the parameters"
+        noise = ", but by the noise of the angle" if self.found["mostly_noise"] else ""
         words = (
-            f"{told} are hardly told apart (condition {self.found['condition']:.0f}): under a single frequency they look alike; "
-            "excite two or more, or give one of them as known"
+            f"{told} are hardly told apart{noise} (condition {self.found['condition']:.0f}): under a single frequency they look "
+            "alike; excite two or more, or give one of them as known"
         )
         return [words]
 

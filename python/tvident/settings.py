@@ -25,6 +25,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "variation": "constant",
         "filter_torque": False,
         "lag": 0.0,
+        "quantisation": None,
         "inertia": "windowed",
         "damping": "windowed",
         "stiffness": "windowed",
@@ -41,6 +42,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "variation": "linear",
         "filter_torque": False,
         "lag": 0.0,
+        "quantisation": None,
         "inertia": "auto",
         "damping": "auto",
         "stiffness": "windowed",
@@ -76,7 +78,12 @@ def resolve(preset: str, given: Mapping[str, Any], earlier: Mapping[str, Any] | 
     choices = {"form": Form, "selection": Selection, "variation": Variation, "criterion": Criterion}
     for name, literal in choices.items():
         arguments.one_of(name, settings[name], get_args(literal))
-    settings["lag"] = arguments.finite_number("lag", settings["lag"])
+    if settings["lag"] != "auto":
+        settings["lag"] = arguments.finite_number("lag", settings["lag"])
+    elif settings["form"] == "strong":
+        raise ValueError(
+            "lag='auto' needs the weak form; got form='strong'; use form='weak', or give the lag that it finds, settings['lag']"
+        )
     if not isinstance(settings["filter_torque"], bool):
         raise TypeError(f"filter_torque must be True or False; got {settings['filter_torque']!r}; pass one of them")
     settings["form"] = "strong" if settings["form"] == "strong" else "weak"

@@ -41,6 +41,12 @@ impl Rows {
         }
     }
 
+    /// Breaks off where other rows of the same record do.
+    pub(crate) fn exclude_as(&mut self, other: &Self) {
+        self.jumps.clone_from(&other.jumps);
+        self.exclude((0..other.len()).filter(|&row| !other.usable[row]));
+    }
+
     /// Makes every column zero in a row.
     pub(crate) fn clear(&mut self, row: usize) {
         self.side[row] = 0.0;

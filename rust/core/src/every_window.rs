@@ -1,4 +1,6 @@
 //! A window of a given length around every row, as in the paper: shorter near the ends of the record, down to half of its length.
+//!
+//! The record ends where its equations do. Between them rows that are no equations, masked or missing, leave a window with fewer.
 
 use std::ops::Range;
 
@@ -63,8 +65,13 @@ pub(crate) fn every_window(
             found.sensitivities.push(solved.field(fields.solution(unknown, constant)).iter().map(|s| -s).collect());
         }
     }
+    let first = problem.usable.iter().position(|usable| *usable).unwrap_or(0);
+    let end = problem.usable.iter().rposition(|usable| *usable).map_or(first, |last| last + 1);
     for place in 0..solved.len() {
-        let status = status(&solved, fields, place, window, ill_conditioned);
+        let begin = solved.first + place.cast_signed();
+        let inside = (begin + window.cast_signed()).min(end.cast_signed()) - begin.max(first.cast_signed());
+        let inside = usize::try_from(inside).unwrap_or(0);
+        let status = status(&solved, fields, place, [window, inside], ill_conditioned);
         found.status.push(status.bits());
         let freedom = solved.field(fields.count())[place] - layout.local() as f64;
         found.deviation.push((residual(&solved, place, constants).max(0.0) / freedom.max(1.0)).sqrt());
@@ -78,12 +85,16 @@ pub(crate) fn every_window(
     Ok(found)
 }
 
-fn status(solved: &Solved, fields: Fields, place: usize, window: usize, ill_conditioned: f64) -> Status {
+/// The status of a window of which so many rows lie between the first equation and the last.
+fn status(solved: &Solved, fields: Fields, place: usize, [window, inside]: [usize; 2], ill_conditioned: f64) -> Status {
     let count = solved.field(fields.count())[place];
     let condition = solved.field(fields.condition())[place];
     let unknowns = fields.layout.local() as f64;
-    let mut status = if count < window as f64 { Status::EDGE } else { Status::GOOD };
-    if 2.0 * count < window as f64 {
+    let mut status = if inside < window { Status::EDGE } else { Status::GOOD };
+    if count < inside as f64 {
+        status |= Status::GAP;
+    }
+    if 2 * inside < window {
         status |= Status::INVALID;
     } else if count <= unknowns || !condition.is_finite() || condition * f64::EPSILON * count >= 1.0 {
         status |= Status::INVALID | Status::RANK_DEFICIENT;

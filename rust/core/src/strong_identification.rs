@@ -160,8 +160,9 @@ pub fn identify_strong(
         results.deviation = found.deviation;
         results.status = found.status;
     }
+    let ill = if fit.pooled.condition > HARDLY_TOLD_APART { Status::ILL_CONDITIONED } else { Status::GOOD };
     for (one, other) in results.status.iter_mut().zip(&differentiated.status) {
-        *one |= other & !Status::INVALID.bits();
+        *one |= other & !Status::INVALID.bits() | ill.bits();
     }
     Ok(StrongIdentified {
         constants: model

@@ -222,7 +222,7 @@ impl Session<'_, '_, '_> {
         whole: Option<&Rows>,
     ) -> Result<Vec<Jump>, Error> {
         let known = known.map_or(&[][..], Vec::as_slice);
-        let signals = signals(self.record, &decided.model).filter(|_| self.options.average);
+        let signals = signals(&self.record, &decided.model).filter(|_| self.options.average);
         let (Some(signals), Some(fit)) = (signals, &decided.fit) else { return Ok(known.to_vec()) };
         let signals: Vec<&dyn Samples> = signals.iter().map(|signal| &**signal).collect();
         let (constants, noise) = (&fit.pooled.values, self.noise[0]);
@@ -288,7 +288,7 @@ impl Session<'_, '_, '_> {
 }
 
 /// What the windowed unknowns multiply, sample by sample; nothing where there are none or jumps of one would act through a derivative.
-fn signals<'a>(record: &'a Record<'_>, model: &Model) -> Option<Vec<Box<dyn Samples + 'a>>> {
+fn signals<'a>(record: &Record<'a>, model: &Model) -> Option<Vec<Box<dyn Samples + 'a>>> {
     if model.windowed.is_empty() {
         return None;
     }

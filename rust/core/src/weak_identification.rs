@@ -5,11 +5,13 @@ use std::num::NonZeroUsize;
 use crate::constancy::Test;
 use crate::criterion::Criterion;
 use crate::error::Error;
+use crate::lag::Lag;
 use crate::local_polynomials::{Estimates, LocalPolynomials, Options, Order};
 use crate::model::{Fit, Model};
 use crate::motion::{Coefficient, Motion, Term, sign};
 use crate::noise::channel_variance;
 use crate::output::Elements;
+use crate::outside_mask::Outside;
 use crate::parallel::Watch;
 use crate::pooling::Expected;
 use crate::row_covariance::RowCovariance;
@@ -67,8 +69,10 @@ pub struct WeakOptions {
     pub kinds: Vec<Kind>,
     /// Variances of the noise of angle and torque; estimated where not given.
     pub noise: [Option<f64>; 2],
-    /// By how many samples the torque comes late.
-    pub lag: f64,
+    /// By how many samples the torque comes late; estimated where not given.
+    pub lag: Option<f64>,
+    /// The step that the angle was rounded to, zero for none; looked for where not given.
+    pub quantisation: Option<f64>,
     /// Every how many samples numbers are wanted.
     pub step: usize,
     /// Whether to look for what may have been left out, and for what not to look.
@@ -115,8 +119,14 @@ pub struct WeakIdentified {
     pub condition: f64,
     /// How much each constant takes part in the combination that is determined worst, its column scaled to a norm of one.
     pub weakest: Vec<f64>,
+    /// Whether that combination is mostly the angle's noise.
+    pub mostly_noise: bool,
     /// What may have been left out.
     pub suspects: Vec<Suspect>,
+    /// The lag that was estimated; nothing where it was given or is not determined.
+    pub lag: Option<Lag>,
+    /// What the rows say that the mask keeps out; nothing without a mask.
+    pub outside_mask: Option<Outside>,
     /// Unknowns that change, in the order of the values at the samples.
     pub changing: Vec<usize>,
     /// Pairs of unknowns whose covariances are at the samples.
@@ -138,7 +148,7 @@ pub(crate) struct Chosen {
 
 /// One record under work.
 pub(crate) struct Session<'a, 'b, 'c> {
-    pub(crate) record: &'a Record<'a>,
+    pub(crate) record: Record<'a>,
     pub(crate) options: &'a WeakOptions,
     pub(crate) noise: [f64; 2],
     pub(crate) run: Run<'b, 'c>,
@@ -180,10 +190,10 @@ pub fn identify_weak(
         torque: motion.torque,
         coefficients: motion.coefficients,
         terms: terms.collect(),
-        lag: options.lag,
+        lag: options.lag.unwrap_or(0.0),
         mask,
     };
-    identify(&record, options, workers, watch)
+    identify(record, options, workers, watch)
 }
 
 /// The velocity at every sample, from local polynomials an eighth of a typical cycle to either side.
@@ -227,20 +237,23 @@ fn velocity(
 
 /// Identifies one record.
 fn identify(
-    record: &Record<'_>,
+    record: Record<'_>,
     options: &WeakOptions,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<WeakIdentified, Error> {
     let samples = record.angle.len();
-    let level =
-        |given: Option<f64>, channel| given.unwrap_or_else(|| channel_variance(channel, None, options.instructions));
-    let noise = [level(options.noise[0], record.angle), level(options.noise[1], record.torque)];
+    let level = |given: Option<f64>, channel, quantisation| {
+        given.unwrap_or_else(|| channel_variance(channel, quantisation, options.instructions))
+    };
+    let noise =
+        [level(options.noise[0], record.angle, options.quantisation), level(options.noise[1], record.torque, None)];
     let mut session = Session { record, options, noise, run: Run::new(workers, samples, STAGES, watch) };
     let model = session.model();
-    let mut chosen = session.choose_test_function(&model)?;
-    let decided = session.decide(&mut chosen, &model)?;
-    session.report(chosen, &decided)
+    let (chosen, decided, lag) = session.choose_and_decide(&model)?;
+    let mut found = session.report(chosen, &decided)?;
+    found.lag = lag;
+    Ok(found)
 }
 
 impl Session<'_, '_, '_> {
@@ -305,13 +318,17 @@ impl Session<'_, '_, '_> {
         Error::RecordTooShortForWindows { samples, least: (test_functions * half).max(samples + 1) }
     }
 
-    fn rows(&mut self, function: TestFunction) -> Result<WeakRows, Error> {
-        let (record, delta, workers) = (self.record, self.options.delta, self.run.workers);
-        self.run.stage(|watch| WeakRows::build(record, function, delta, workers, watch))
+    pub(crate) fn rows(&mut self, function: TestFunction) -> Result<WeakRows, Error> {
+        let (delta, workers) = (self.options.delta, self.run.workers);
+        let mut record = self.record.clone();
+        if self.options.lag.is_none() {
+            record.terms.push(TermSamples::TorqueRate);
+        }
+        self.run.stage(|watch| WeakRows::build(&record, function, delta, workers, watch))
     }
 
     /// Chooses half-width and exponent where they are not given, and estimates the coefficients on the way.
-    fn choose_test_function(&mut self, model: &Model) -> Result<Chosen, Error> {
+    pub(crate) fn choose_test_function(&mut self, model: &Model) -> Result<Chosen, Error> {
         let (samples, delta) = (self.record.angle.len(), self.options.delta);
         let (width, exponent) = (self.options.half_width, self.options.exponent);
         if let (Some(width), Some(exponent)) = (width, exponent) {
@@ -333,7 +350,7 @@ impl Session<'_, '_, '_> {
         let typical = (typical.round() as usize).max(1);
         let widths = width.map_or_else(|| half_widths((4 * typical).min(widest)), |width| vec![width]);
         let widest = *widths.last().ok_or(self.too_short())?;
-        let usable = Usable::new(self.record);
+        let usable = Usable::new(&self.record);
         let share = |half: usize| usable.share(half);
         let candidates = Candidates::new(evidence(spectrum_length(samples, widest)), &widths, exponent, share);
         let start = width.unwrap_or_else(|| usable.widest(typical.max(LEAST_HALF_WIDTH), &widths));

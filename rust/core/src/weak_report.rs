@@ -2,10 +2,12 @@
 
 use crate::averaging::average;
 use crate::constancy::NO_CHANCE;
+use crate::determination::is_mostly_noise;
 use crate::error::Error;
 use crate::every_window::every_window;
 use crate::identification::HARDLY_TOLD_APART;
 use crate::model::{Fit, Predictor, without_constants};
+use crate::outside_mask::{Inside, Outside};
 use crate::pooling::{Expected, influence, is_determined, sandwich, weakest};
 use crate::row_covariance::RowCovariance;
 use crate::status::Status;
@@ -41,6 +43,20 @@ struct Tracks {
     status: Vec<u16>,
 }
 
+impl Tracks {
+    /// Marks rows that are no equations, and those outside the mask where the model fails.
+    fn mark(&mut self, usable: &[bool], outside: Option<&Outside>) {
+        let first = self.first;
+        let mut flag = |row: usize, status: Status| {
+            self.status[(row.cast_signed() - first).unsigned_abs()] |= status.bits();
+        };
+        (0..usable.len()).filter(|&row| !usable[row]).for_each(|row| flag(row, Status::GAP));
+        for &row in outside.iter().filter(|outside| outside.fails()).flat_map(|outside| &outside.rows) {
+            flag(row, Status::NOISE_MODEL);
+        }
+    }
+}
+
 impl Session<'_, '_, '_> {
     pub(crate) fn report(&mut self, chosen: Chosen, decided: &Decided) -> Result<WeakIdentified, Error> {
         let Chosen { mut weak, at_end, .. } = chosen;
@@ -57,7 +73,10 @@ impl Session<'_, '_, '_> {
             covariance: Vec::new(),
             condition: f64::INFINITY,
             weakest: Vec::new(),
+            mostly_noise: false,
             suspects: Vec::new(),
+            lag: None,
+            outside_mask: None,
             changing: decided.model.windowed.iter().chain(&decided.slow).copied().collect(),
             pairs: Vec::new(),
             jumps: decided.jumps.iter().map(|jump| jump.sample).collect(),
@@ -76,6 +95,12 @@ impl Session<'_, '_, '_> {
         let centre = |window| all.centre(window);
         let columns = influence(&problem, &all.full, windows, &all.pooled.weights, all.step, all.span, centre);
         found.covariance = sandwich(&columns, &all.pooled.inverse, &errors.covariance);
+        let (side, expected) = (decided.side(&weak.rows), errors.expected);
+        if let Some(covariance) =
+            self.covariance_beside_lag(&weak, &ordered, side, fit, expected, &errors.covariance)?
+        {
+            found.covariance = covariance;
+        }
         found.covariance.iter_mut().for_each(|entry| *entry *= errors.inflation);
 
         let slow = decided.slow.len();
@@ -95,10 +120,29 @@ impl Session<'_, '_, '_> {
         if at_end || decided.scales.first().is_some_and(|first| Some(*first) == fit.scale) && decided.scales.len() > 1 {
             status |= Status::WINDOW_LIMIT;
         }
-        if found.condition > HARDLY_TOLD_APART {
+        let weakest = &found.weakest;
+        found.mostly_noise =
+            is_mostly_noise(&problem, &weak.rows, &ordered, &all, weakest, self.noise[0], |row| nearest(&all, row));
+        if found.condition > HARDLY_TOLD_APART || found.mostly_noise {
             status |= Status::ILL_CONDITIONED;
         }
-        let tracks = self.tracks(&problem, &weak, decided, fit, &values, errors.expected)?;
+        let mut tracks = self.tracks(&problem, &weak, decided, fit, &values, errors.expected)?;
+        let variances: Vec<f64> = (slow..count).map(|place| found.covariance[place * (count + 1)]).collect();
+        let outside = self.outside_mask(
+            &weak,
+            &Inside {
+                decided,
+                fit,
+                constants: &values[slow..],
+                variances: &variances,
+                covariance: &errors.covariance,
+                expected: errors.expected,
+                inflation: errors.inflation,
+            },
+        )?;
+        let usable = &decided.whole.as_ref().unwrap_or(&weak.rows).usable;
+        tracks.mark(usable, outside.as_ref());
+        found.outside_mask = outside;
         let results = Self::rows_results(&weak, &problem, decided, &all, &errors, &tracks, &found, &values);
         let (results, pairs) = results;
         found.pairs = pairs;
@@ -131,7 +175,7 @@ impl Session<'_, '_, '_> {
     }
 
     /// Solves another problem in the windows of a fit.
-    fn refit(&mut self, problem: &Problem<'_>, fit: &Fit, expected: Expected) -> Result<Option<Fit>, Error> {
+    pub(crate) fn refit(&mut self, problem: &Problem<'_>, fit: &Fit, expected: Expected) -> Result<Option<Fit>, Error> {
         let instructions = self.options.instructions;
         if fit.scale.is_none() && problem.layout.local() > 0 {
             return Ok(Fit::in_rows(problem, fit.span, expected, instructions));
@@ -369,8 +413,11 @@ impl Session<'_, '_, '_> {
         let more = self.run.stage(|watch| WeakRows::build(&record, function, delta, workers, watch))?;
         let first = weak.rows.regressors.len();
         weak.rows.regressors.extend(more.rows.regressors.into_iter().skip(3));
-        let unusable: Vec<usize> = (0..weak.rows.len()).filter(|&row| !weak.rows.usable[row]).collect();
-        weak.rows.exclude(unusable.into_iter());
+        for row in 0..weak.rows.len() {
+            if !weak.rows.usable[row] {
+                weak.rows.clear(row);
+            }
+        }
         let mut suspects = Vec::new();
         for (place, (missing, _)) in terms.iter().enumerate() {
             let judged = Judged {

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tvident::parallel::workers as threads;
 use tvident::{
-    Constant, Instructions, Kind, Missing, SampleResults, WeakIdentified, WeakOptions, identify_weak as weak,
+    Constant, Instructions, Kind, Missing, Outside, SampleResults, WeakIdentified, WeakOptions, identify_weak as weak,
 };
 
 use crate::identification::Motions;
@@ -18,7 +18,7 @@ use crate::watch::watched;
 #[pyfunction]
 #[pyo3(signature = (
     motions, record, kinds, *, delta, half_width=None, exponent=None, equations=None, average=true, linear=true, noise=(None, None),
-    lag=0.0, mask=None, step=1, not_missing=None, workers=None, progress=None
+    lag=None, quantisation=None, mask=None, step=1, not_missing=None, workers=None, progress=None
 ))]
 pub(crate) fn identify_weak<'py>(
     py: Python<'py>,
@@ -32,7 +32,8 @@ pub(crate) fn identify_weak<'py>(
     average: bool,
     linear: bool,
     noise: (Option<f64>, Option<f64>),
-    lag: f64,
+    lag: Option<f64>,
+    quantisation: Option<f64>,
     mask: Option<PyReadonlyArray1<'py, bool>>,
     step: usize,
     not_missing: Option<Vec<String>>,
@@ -50,6 +51,7 @@ pub(crate) fn identify_weak<'py>(
         kinds: kinds.iter().map(|name| kind(name)).collect::<PyResult<_>>()?,
         noise: [noise.0, noise.1],
         lag,
+        quantisation,
         step,
         diagnose: not_missing.is_some(),
         not_missing: not_missing.unwrap_or_default().iter().filter_map(missing).collect(),
@@ -84,6 +86,7 @@ fn dictionary(py: Python<'_>, found: WeakIdentified) -> PyResult<Bound<'_, PyDic
     dict.set_item("covariance", found.covariance)?;
     dict.set_item("condition", found.condition)?;
     dict.set_item("weakest", found.weakest)?;
+    dict.set_item("mostly_noise", found.mostly_noise)?;
     let name = |missing: Missing| MISSING.iter().find(|(one, _)| *one == missing).map_or("", |(_, name)| name);
     let suspects: Vec<_> = found
         .suspects
@@ -91,6 +94,9 @@ fn dictionary(py: Python<'_>, found: WeakIdentified) -> PyResult<Bound<'_, PyDic
         .map(|suspect| (name(suspect.missing), suspect.value, suspect.error, suspect.is_conspicuous()))
         .collect();
     dict.set_item("suspects", suspects)?;
+    dict.set_item("lag", found.lag.map(|lag| (lag.value, lag.error)))?;
+    let outside = found.outside_mask.filter(Outside::fails);
+    dict.set_item("outside_mask", outside.map(|outside| (outside.differing, outside.left)))?;
     dict.set_item("jumps", found.jumps)?;
     add_results(&dict, found.changing, found.pairs, found.results)?;
     Ok(dict)
