@@ -93,8 +93,7 @@ impl Slow<'_> {
         let constants = if fields.layout.constant == 0 {
             Vec::new()
         } else {
-            let any = Expected { variance: 1.0, torque: 0.0, redundancy: 1.0 };
-            pool(&solved, 0..points, any, instructions)?.values
+            pool(&solved, 0..points, Expected::UNKNOWN, instructions)?.values
         };
         let value = |coefficient: usize, point: usize| {
             is_determined(&solved, point).then(|| crate::pooling::local(&solved, point, &constants, coefficient))
