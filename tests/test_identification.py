@@ -207,7 +207,7 @@ def test_missing_values_cost_their_own_windows_only() -> None:
     angle, torque = system(5, 3000)
     clean = tvident.identify(angle, torque, sample_rate=1000, preset="paper")
     angle[1000], torque[2500] = np.nan, np.inf
-    dirty = tvident.identify(angle, torque, sample_rate=1000, preset="paper")
+    dirty = tvident.identify(angle, torque, sample_rate=1000, preset="paper", nan_policy="propagate")
     i = np.arange(3000)
     hit = ((i > 1000 - 200) & (i <= 1000 + 200)) | ((i > 2500 - 100) & (i <= 2500 + 100))
     np.testing.assert_array_equal((dirty.status & Status.INVALID != 0)[200:-200], hit[200:-200])

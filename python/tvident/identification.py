@@ -117,9 +117,9 @@ def identify(
         which the torque's rate explains nothing more, with its standard error in ``settings["lag_stderr"]``; none where the record does
         not tell it from the damping, as with motion at a single frequency.
     quantisation : float, optional
-        Step to which the angle was rounded, in rad: an encoder's count. By default it is looked for in the samples, as in
-        :func:`tvident.fit_local_polynomials`. In strong form no residual is taken to be smaller than it leaves, in weak form no noise. 0
-        means none.
+        Step to which the angle was rounded, in rad: an encoder's count. In strong form no residual is taken to be smaller than it
+        leaves, in weak form no noise. By default it is looked for in the samples, as in :func:`tvident.fit_local_polynomials`, but not in
+        strong form with the paper's preset, whose criterion has no such bound. 0 means none.
     mask : array_like of bool, shape (n,) or the angle's, optional
         True where a sample may be the centre of an equation.
     step : int, optional

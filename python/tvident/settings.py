@@ -25,7 +25,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "variation": "constant",
         "filter_torque": False,
         "lag": 0.0,
-        "quantisation": None,
+        "quantisation": 0.0,
         "inertia": "windowed",
         "damping": "windowed",
         "stiffness": "windowed",
@@ -87,6 +87,8 @@ def resolve(preset: str, given: Mapping[str, Any], earlier: Mapping[str, Any] | 
     if not isinstance(settings["filter_torque"], bool):
         raise TypeError(f"filter_torque must be True or False; got {settings['filter_torque']!r}; pass one of them")
     settings["form"] = "strong" if settings["form"] == "strong" else "weak"
+    if settings["form"] == "weak" and not {"quantisation"} & (given.keys() | earlier.keys()):
+        settings["quantisation"] = None
     _check_form(settings, given)
     if settings["form"] == "strong":
         _settle_strong(settings, given)
