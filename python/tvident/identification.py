@@ -307,6 +307,7 @@ class _Task:
         own = any(unknown.own is not None for unknown in self.extra)
         core_plan = self._plan(min(_WINDOW_OF_TERMS, (samples - 1) // 2 * 2 + 1)) if own else None
         motions = self._motions(core_plan)
+        lags = [None if lag == "auto" else lag / self.period for lag in self._each("lag")]
         present = [unknown.name for unknown in self.extra] + ([] if used["lag"] == 0 else ["lag"])
         if not isinstance(self.parameters["stiffness"], str):
             # A cubic spring beside a known one is not a question that anybody asked.
@@ -324,7 +325,7 @@ class _Task:
                     equations=rows,
                     average=average,
                     linear=used["variation"] == "linear",
-                    lag=None if used["lag"] == "auto" else used["lag"] / self.period,
+                    lag=lag,
                     quantisation=self.rounded,
                     mask=self._mask(record),
                     step=self.step,
@@ -332,7 +333,9 @@ class _Task:
                     workers=self.workers,
                     progress=report,
                 )
-                for record, (length, exponent, rows) in enumerate(zip(lengths, exponents, equations, strict=True))
+                for record, (length, exponent, rows, lag) in enumerate(
+                    zip(lengths, exponents, equations, lags, strict=True)
+                )
             ]
         found.records(each, self._numbers)
         if self.propagate and self.holes is not None:
@@ -351,8 +354,8 @@ class _Task:
             "equations": tuple(one["equations"] for one in each),
         }
         if used["lag"] == "auto":
-            lags = [one["lag"] or (0.0, np.nan) for one in each]
-            late, error = (tuple(lag[place] * self.period for lag in lags) for place in (0, 1))
+            known = [one["lag"] or (0.0, np.nan) for one in each]
+            late, error = (tuple(lag[place] * self.period for lag in known) for place in (0, 1))
             chosen |= {"lag": late, "lag_stderr": error}
         if len(each) == 1:
             chosen |= {name: value[0] for name, value in chosen.items() if name != "chosen"}

@@ -99,7 +99,9 @@ class Explained:
         jumps = self.found["jumps"]
         if not jumps:
             return []
-        shown = ", ".join(f"{jump * self.period:.6g}" for jump in jumps[:_SHOWN]) + (" …" if len(jumps) > _SHOWN else "")
+        shown = ", ".join(f"{jump * self.period:.6g}" for jump in jumps[:_SHOWN]) + (
+            " …" if len(jumps) > _SHOWN else ""
+        )
         many = f"{len(jumps)} times, at" if len(jumps) > 1 else "at"
         return [f"what is windowed jumps {many} {shown} s: windows end there"]
 

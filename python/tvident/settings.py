@@ -78,12 +78,7 @@ def resolve(preset: str, given: Mapping[str, Any], earlier: Mapping[str, Any] | 
     choices = {"form": Form, "selection": Selection, "variation": Variation, "criterion": Criterion}
     for name, literal in choices.items():
         arguments.one_of(name, settings[name], get_args(literal))
-    if settings["lag"] != "auto":
-        settings["lag"] = arguments.finite_number("lag", settings["lag"])
-    elif settings["form"] == "strong":
-        raise ValueError(
-            "lag='auto' needs the weak form; got form='strong'; use form='weak', or give the lag that it finds, settings['lag']"
-        )
+    settings["lag"] = _lag(settings)
     if not isinstance(settings["filter_torque"], bool):
         raise TypeError(f"filter_torque must be True or False; got {settings['filter_torque']!r}; pass one of them")
     settings["form"] = "strong" if settings["form"] == "strong" else "weak"
@@ -100,6 +95,20 @@ def resolve(preset: str, given: Mapping[str, Any], earlier: Mapping[str, Any] | 
             "got 'pooled'; use one of these, or form='strong'"
         )
     return settings
+
+
+def _lag(settings: Mapping[str, Any]) -> float | str | tuple[float, ...]:
+    """Check the lag of the torque: a number, one for every record, or "auto"."""
+    lag = settings["lag"]
+    if lag == "auto":
+        if settings["form"] == "strong":
+            raise ValueError(
+                "lag='auto' needs the weak form; got form='strong'; use form='weak', or give the lag that it finds, settings['lag']"
+            )
+        return "auto"
+    if isinstance(lag, tuple | list) and settings["form"] != "strong":
+        return tuple(arguments.finite_number("lag", one) for one in lag)
+    return arguments.finite_number("lag", lag)
 
 
 def _check_form(settings: Mapping[str, Any], given: Mapping[str, Any]) -> None:

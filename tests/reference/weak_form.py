@@ -40,7 +40,7 @@ def rows(angle: Array, torque: Array, half: int, exponent: int, delta: float, la
 
 def profile(windowed: Array, constant: Array, b: Array, window: int, step: int) -> Array:
     """Give the constants that are best for all windows of rows together, each window with unknowns of its own."""
-    normal, side = 0.0, 0.0
+    normal, side = np.zeros(2 * (constant.shape[1],)), np.zeros(constant.shape[1])
     for first in range(0, b.size - window + 1, step):
         rows_of = slice(first, first + window)
         Q, _ = np.linalg.qr(windowed[rows_of])

@@ -165,21 +165,25 @@ pub fn identify_strong(
         *one |= other & !Status::INVALID.bits() | ill.bits();
     }
     Ok(StrongIdentified {
-        constants: model
-            .constant
-            .iter()
-            .enumerate()
-            .map(|(place, &unknown)| {
-                let error = covariance[place * (count + 1)].sqrt();
-                Constant { unknown, value: constants[place], error, test: None }
-            })
-            .collect(),
+        constants: listed(&model, &constants, &covariance),
         condition: fit.pooled.condition,
         changing,
         pairs,
         results: results.at_samples(samples, options.step),
         order,
     })
+}
+
+/// What is constant, with its standard errors.
+fn listed(model: &Model, values: &[f64], covariance: &[f64]) -> Vec<Constant> {
+    let numbered = model.constant.iter().zip(values).enumerate();
+    let one = |(place, (&unknown, &value)): (usize, (&usize, &f64))| Constant {
+        unknown,
+        value,
+        error: covariance[place * (values.len() + 1)].sqrt(),
+        test: None,
+    };
+    numbered.map(one).collect()
 }
 
 /// Nothing but a status.
