@@ -160,21 +160,21 @@ impl Kernel for Stack<'_> {
         let mut norms = vec![0.0; constants];
         let enough = fields.layout.regressors() as f64;
         for first in self.windows.clone().step_by(WIDTH) {
-            let weight: [f64; WIDTH] = std::array::from_fn(|lane| {
+            let mut weight = Packet::ZERO;
+            for (lane, weight) in weight.0.iter_mut().enumerate() {
                 let window = first + lane;
-                let counts = self.windows.contains(&window) && self.full.field(fields.count())[window] > enough;
-                if counts { self.weights[window - self.windows.start] } else { 0.0 }
-            });
-            let root = Packet(weight).sqrt();
-            let of = |field: usize| {
-                let values = self.full.field(field);
-                Packet(std::array::from_fn(|lane| values.get(first + lane).copied().unwrap_or(0.0)))
-            };
+                if self.windows.contains(&window) && self.full.field(fields.count())[window] > enough {
+                    *weight = self.weights[window - self.windows.start];
+                }
+            }
+            let root = weight.sqrt();
+            let place = first.cast_signed();
             for row in 0..constants {
                 for column in row..columns {
-                    rows[row * columns + column] = root * of(fields.left(row, column));
+                    let value = Packet::gather(self.full.field(fields.left(row, column)), place, 1);
+                    rows[row * columns + column] = root * value;
                 }
-                let squared = Packet(weight) * of(fields.norm(row));
+                let squared = weight * Packet::gather(self.full.field(fields.norm(row)), place, 1);
                 norms[row] += squared.0.iter().sum::<f64>();
             }
             absorb(layout, &mut factor, &mut rows, constants, true);

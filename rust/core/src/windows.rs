@@ -277,39 +277,33 @@ fn summarise(problem: &Problem<'_>, step: usize, block: isize, summary: &mut [Pa
     let layout = problem.layout;
     let (columns, q) = (layout.columns(), layout.windowed);
     summary.fill(Packet::ZERO);
-    let total = problem.rows();
-    let place = |lane: usize, offset: usize| {
-        let row = (block + lane.cast_signed()) * step.cast_signed() + offset.cast_signed();
-        usize::try_from(row).ok().filter(|&row| row < total)
-    };
+    let begin = block * step.cast_signed();
     for first in (0..step).step_by(BATCH) {
         let batch = BATCH.min(step - first);
         for offset in 0..batch {
             let time = (first + offset) as f64 * problem.period;
-            let places: [Option<usize>; WIDTH] = std::array::from_fn(|lane| place(lane, first + offset));
-            let gather = |column: &[f64]| Packet(places.map(|place| place.map_or(0.0, |place| column[place])));
+            let place = begin + (first + offset).cast_signed();
             let row = &mut rows[offset * columns..(offset + 1) * columns];
             for (value, column) in row.iter_mut().zip(&problem.windowed) {
-                *value = gather(column);
+                *value = Packet::gather(column, place, step);
             }
             if layout.linear {
                 for (i, column) in problem.companions.iter().enumerate() {
-                    row[q + i] = gather(column) + Packet::splat(time) * row[i];
+                    row[q + i] = Packet::gather(column, place, step) + Packet::splat(time) * row[i];
                 }
             }
             for (i, column) in problem.constants.iter().enumerate() {
-                row[layout.local() + i] = gather(column);
+                row[layout.local() + i] = Packet::gather(column, place, step);
             }
-            row[columns - 1] = gather(problem.side);
-            let usable =
-                Packet(places.map(|place| place.map_or(0.0, |place| f64::from(u8::from(problem.usable[place])))));
-            count(layout, summary, usable, time);
+            row[columns - 1] = Packet::gather(problem.side, place, step);
+            count(layout, summary, Packet::gather_flags(problem.usable, place, step), time);
             if let Some(correlated) = &problem.correlated {
                 for i in 0..layout.local() {
                     let noisy = match i.checked_sub(q) {
-                        None => gather(&correlated.windowed[i]),
+                        None => Packet::gather(&correlated.windowed[i], place, step),
                         Some(i) => {
-                            gather(&correlated.companions[i]) + Packet::splat(time) * gather(&correlated.windowed[i])
+                            Packet::gather(&correlated.companions[i], place, step)
+                                + Packet::splat(time) * Packet::gather(&correlated.windowed[i], place, step)
                         }
                     };
                     // Both halves of a product that the window's ends make unsymmetric.
