@@ -91,35 +91,43 @@ class Collected:
         names = dict(zip(numbers, self._names, strict=True))
         count = found[0]["status"].size
 
+        def every(arrays: list[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+            """Join one array a record, without a copy of a single one."""
+            joined = np.stack(arrays) if len(arrays) > 1 else np.asarray(arrays[0])[np.newaxis]
+            return self._shaped(joined)
+
         def gathered(name: str) -> npt.NDArray[Any]:
-            return self._shaped(np.stack([one[name] for one in found]))
+            return every([one[name] for one in found])
 
         self.residual_std, self.condition = gathered("deviations"), gathered("conditions")
         self.status = gathered("status")
         self.order = gathered("order") if "order" in found[0] else np.zeros(self.status.shape, np.uint8)
         for number, name in names.items():
-            values, errors = np.empty((2, len(found), count))
-            alone = []
-            for place, one in enumerate(found):
+            values, errors, alone = [], [], []
+            for one in found:
                 constants = {unknown: known for unknown, *known in one["constants"]}
                 if number in constants:
-                    values[place], errors[place] = constants[number][:2]
-                    alone.append(place)
+                    value, error, _ = constants[number]
+                    alone.append((value, error))
+                    values.append(np.broadcast_to(np.float64(value), count))
+                    errors.append(np.broadcast_to(np.float64(error), count))
                 else:
                     row = one["changing"].index(number)
-                    values[place], errors[place] = one["values"][row], one["errors"][row]
-            self.values[name], self.errors[name] = self._shaped(values), self._shaped(errors)
+                    values.append(one["values"][row])
+                    errors.append(one["errors"][row])
+            self.values[name], self.errors[name] = every(values), every(errors)
             if len(alone) == len(found):
                 # Where only some records say that it changes there is no one number for all.
-                self._add_constant(name, values[:, 0], errors[:, 0])
+                self._add_constant(name, *np.transpose(alone))
         coefficients = [number for number, name in names.items() if name in COEFFICIENTS]
         for first, second in combinations(coefficients, 2):
-            pair = np.zeros((len(found), count))
-            for place, record in enumerate(found):
-                for row, both in enumerate(record["pairs"]):
-                    if set(both) == {first, second}:
-                        pair[place] = record["covariances"][row]
-            self.covariances[frozenset((names[first], names[second]))] = self._shaped(pair)
+            pair = []
+            for record in found:
+                rows = [row for row, both in enumerate(record["pairs"]) if set(both) == {first, second}]
+                constant = [value for *both, value in record.get("constant_pairs", ()) if set(both) == {first, second}]
+                flat = np.broadcast_to(np.float64(constant[0] if constant else 0), count)
+                pair.append(record["covariances"][rows[0]] if rows else flat)
+            self.covariances[frozenset((names[first], names[second]))] = every(pair)
 
     def add_known(self, known: dict[str, float | npt.NDArray[np.number]], step: int) -> None:
         """Add what was known beforehand, without error."""

@@ -13,6 +13,7 @@ use crate::pooling::Expected;
 use crate::run::Run;
 use crate::scale::{Cells, Scale};
 use crate::simd::Instructions;
+use crate::thinned::holds;
 use crate::windows::Problem;
 
 /// The largest squared error, over the noise's, that a single row counts with.
@@ -23,8 +24,10 @@ const RECORD: [f64; 2] = [16.0, 5.0];
 const PIECE: usize = 8192;
 /// Cells of at least so many rows are solved once for all pieces.
 const COARSE: usize = 8;
+/// Of the lengths that thinned rows hold, so many of the longest must be hopeless for all longer ones to be so.
+const OVERLAP: usize = 2;
 /// A window that predicts so much worse over the record than the best one weighs nothing anywhere.
-const HOPELESS: f64 = 40.0;
+const HOPELESS: f64 = 24.0;
 
 /// What changes, at every row.
 #[derive(Clone, Debug, Default)]
@@ -68,56 +71,57 @@ struct Candidate {
 }
 
 /// Averages windows of several lengths at every row, for given constants. `best` is the length of the windows that predict best, in
-/// rows.
+/// rows. Where `thinned` rows stand for a long record, how well windows predict over the record is learnt from them, as far as they
+/// hold windows so long.
 pub(crate) fn average(
     problem: &Problem<'_>,
+    thinned: Option<&Problem<'_>>,
     scales: &[Scale],
     constants: &[f64],
-    expected: Expected,
-    best: usize,
+    (expected, best): (Expected, usize),
     instructions: Instructions,
     run: &mut Run<'_, '_>,
 ) -> Result<Averages, Error> {
     let rows = problem.rows();
     let reach = scales.first().map_or(1, |scale| scale.reach);
     let side = without_constants(problem, constants);
-    let mut candidates = Vec::new();
-    for &scale in scales {
-        let all = scale.side_cells(rows);
-        let cells = if scale.step >= COARSE { Some(scale.solve(problem, &all, instructions, run)?) } else { None };
-        candidates.push(Candidate { scale, cells, record: [f64::INFINITY; SIDES] });
-    }
     let view = View { problem, side: &side, constants, variance: expected.variance, reach, instructions };
+    let mut candidates: Vec<_> =
+        scales.iter().map(|&scale| Candidate { scale, cells: None, record: [f64::INFINITY; SIDES] }).collect();
+    let record = RECORD[0].max(RECORD[1] * best as f64 / expected.redundancy);
+    let hope = HOPELESS / record;
     let middle = rows / 5..(4 * rows / 5).max(rows / 5 + 1).min(rows);
-    let pieces: Vec<_> = pieces(rows).into_iter().map(|rows| Piece { size: rows.len(), content: rows }).collect();
-    let sums = run.map(
-        pieces,
-        || (),
-        |rows: Range<usize>, (): &mut ()| {
-            let counted = rows.start.max(middle.start)..rows.end.min(middle.end);
-            candidates.iter().map(|candidate| view.sums(candidate, counted.clone())).collect::<Vec<_>>()
-        },
-    )?;
-    for (index, candidate) in candidates.iter_mut().enumerate() {
-        for which in 0..SIDES {
-            let (sum, count) = sums
-                .iter()
-                .map(|sums| sums[index][which])
-                .fold((0.0, 0.0), |all, part| (all.0 + part.0, all.1 + part.1));
-            if count > 0.0 {
-                candidate.record[which] = sum / count;
-            }
+    let short = match thinned {
+        None => 0,
+        Some(thinned) => {
+            let short = scales.partition_point(|scale| holds(*scale));
+            let side = without_constants(thinned, constants);
+            let view = View { problem: thinned, side: &side, ..view };
+            view.judge(&mut candidates[..short], &(0..side.len()), run)?;
+            short
+        }
+    };
+    let errors = |candidates: &[Candidate]| {
+        candidates.iter().flat_map(|candidate| candidate.record).fold(f64::INFINITY, f64::min)
+    };
+    let long = short.saturating_sub(OVERLAP);
+    if thinned.is_none() || errors(&candidates[long..short]) <= errors(&candidates[..short]) + hope {
+        view.judge(&mut candidates[short..], &middle, run)?;
+    }
+    let hopeless = errors(&candidates) + hope;
+    for candidate in &mut candidates {
+        let chosen = candidate.record.iter().any(|&error| error <= hopeless);
+        if chosen && candidate.scale.step >= COARSE && candidate.cells.is_none() {
+            let all = candidate.scale.side_cells(rows);
+            candidate.cells = Some(candidate.scale.solve(problem, &all, instructions, run)?);
         }
     }
-    let record = RECORD[0].max(RECORD[1] * best as f64 / expected.redundancy);
-    let least = candidates.iter().flat_map(|candidate| candidate.record).fold(f64::INFINITY, f64::min);
-    let hopeless = least + HOPELESS / record;
 
     let mut averages = Averages::new(problem.layout.windowed, problem.layout.constant, rows);
     let mut work = Vec::new();
     {
         let mut parts: Vec<_> = averages.columns().map(|column| column.chunks_mut(PIECE)).collect();
-        for rows in self::pieces(rows) {
+        for rows in pieces(rows) {
             let columns: Vec<&mut [f64]> = parts.iter_mut().filter_map(Iterator::next).collect();
             work.push(Piece { size: rows.len(), content: (rows, columns) });
         }
@@ -144,6 +148,7 @@ struct Nearby {
     independent: f64,
 }
 
+#[derive(Clone, Copy)]
 struct View<'a, 'b> {
     problem: &'a Problem<'b>,
     side: &'a [f64],
@@ -226,6 +231,34 @@ impl Seen<'_, '_> {
 }
 
 impl View<'_, '_> {
+    /// Finds how well candidates predict some rows of the record.
+    fn judge(&self, candidates: &mut [Candidate], rows: &Range<usize>, run: &mut Run<'_, '_>) -> Result<(), Error> {
+        let mut solved = Vec::new();
+        for candidate in &*candidates {
+            let (scale, all) = (candidate.scale, candidate.scale.side_cells(self.problem.rows()));
+            let coarse = scale.step >= COARSE;
+            let cells = if coarse { Some(scale.solve(self.problem, &all, self.instructions, run)?) } else { None };
+            solved.push(Candidate { scale, cells, record: candidate.record });
+        }
+        let parts = pieces(self.problem.rows()).into_iter();
+        let parts: Vec<_> = parts.map(|rows| Piece { size: rows.len(), content: rows }).collect();
+        let work = |piece: Range<usize>, (): &mut ()| {
+            let counted = piece.start.max(rows.start)..piece.end.min(rows.end);
+            solved.iter().map(|candidate| self.sums(candidate, counted.clone())).collect::<Vec<_>>()
+        };
+        let sums = run.map(parts, || (), work)?;
+        for (index, candidate) in candidates.iter_mut().enumerate() {
+            for which in 0..SIDES {
+                let parts = sums.iter().map(|sums| sums[index][which]);
+                let (sum, count) = parts.fold((0.0, 0.0), |all, part| (all.0 + part.0, all.1 + part.1));
+                if count > 0.0 {
+                    candidate.record[which] = sum / count;
+                }
+            }
+        }
+        Ok(())
+    }
+
     fn nearby(&self, expected: Expected) -> Nearby {
         let rows = self.reach;
         Nearby { rows, independent: (2 * rows + 1) as f64 / expected.redundancy }
@@ -249,7 +282,7 @@ impl View<'_, '_> {
     /// Sums of squared errors and their number, by side.
     fn sums(&self, candidate: &Candidate, rows: Range<usize>) -> [(f64, f64); SIDES] {
         let mut sums = [(0.0, 0.0); SIDES];
-        if rows.is_empty() {
+        if rows.start >= rows.end {
             return sums;
         }
         let here;

@@ -34,7 +34,7 @@ pub(crate) fn validate(
     let end = scales.iter().map(|scale| scale.full_rows(rows).end).min().unwrap_or(rows).max(3 * rows / 4);
     let mut validated = Vec::new();
     for &scale in scales {
-        if let Some(fit) = Fit::new(problem, Some(scale), expected, instructions, run)? {
+        if let Some(fit) = Fit::with_hollow(problem, scale, expected, instructions, run)? {
             let error = error(problem, scale, &fit, start..end, expected.variance);
             validated.push(Validated { fit, error });
         }
@@ -50,9 +50,9 @@ pub(crate) fn error(
     rows: std::ops::Range<usize>,
     variance: f64,
 ) -> f64 {
-    let Some(cells) = &fit.cells else { return f64::NAN };
+    let Some(hollow) = &fit.hollow else { return f64::NAN };
     let side = without_constants(problem, &fit.pooled.values);
-    let predictor = Predictor::new(&cells.hollow, &fit.pooled.values);
+    let predictor = Predictor::new(hollow, &fit.pooled.values);
     let (mut sum, mut count) = (0.0, 0.0);
     for row in rows.filter(|&row| problem.usable[row]) {
         let cell = scale.cell(row);

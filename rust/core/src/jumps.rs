@@ -11,12 +11,13 @@
 //! and `τ` leaves the smallest sum of squares. It is believed where that is smaller than what the same windows leave when they predict
 //! the rows between them without a jump, by more than chance.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use crate::averaging::Around;
 use crate::pooling::Expected;
 use crate::samples::{Samples, is_usable};
-use crate::scale::{SHORTEST_ALONE, Scale};
+use crate::scale::{Cells, SHORTEST_ALONE, Scale};
 use crate::simd::Instructions;
 use crate::windows::Problem;
 
@@ -28,6 +29,9 @@ const BELIEVED: f64 = 40.0;
 
 /// The most that a jump may leave of the sum of squares: a steep slope is no jump.
 const LEFT: f64 = 0.5;
+
+/// Windows that hold a jump follow it in part: so much more is left of the rows without them.
+const CONSPICUOUS: f64 = 2.0;
 
 /// Rounds of placing a jump and taking the windows beside it again.
 const ROUNDS: usize = 4;
@@ -61,8 +65,9 @@ pub(crate) struct Search<'a> {
     pub(crate) stride: usize,
     pub(crate) expected: Expected,
     pub(crate) constants: &'a [f64],
-    /// All lengths of windows.
+    /// All lengths of windows, and those that jumps are looked for with.
     pub(crate) scales: &'a [Scale],
+    pub(crate) lengths: &'a [Scale],
     pub(crate) instructions: Instructions,
 }
 
@@ -70,34 +75,76 @@ pub(crate) struct Search<'a> {
 type Lines = Vec<[f64; 2]>;
 
 impl Search<'_> {
-    /// The jumps of the record, in order: those that are known placed again, and new ones.
-    pub(crate) fn find(&self, windows: &[Around<'_>], known: &[Jump]) -> Vec<Jump> {
-        let apart = self.apart();
-        let mut jumps: Vec<Jump> =
-            known.iter().map(|jump| self.again(windows, jump).unwrap_or_else(|| jump.clone())).collect();
-        let mut suspected = self.suspected(windows);
-        suspected.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut looked: Vec<usize> = Vec::new();
+    /// The jumps of the record, in order: those that are known placed again, and new ones. `errors` are what is left of the rows.
+    pub(crate) fn find(&self, errors: &[f64], known: &[Jump]) -> Vec<Jump> {
+        let room = self.apart() * self.stride;
         let samples = self.first * 2 + (self.problem.rows() - 1) * self.stride;
-        for (_, row, scale) in suspected {
-            if looked.iter().any(|other| other.abs_diff(row) <= apart / 2) {
-                continue;
-            }
-            looked.push(row);
-            let Some(jump) = self.place(&windows[scale], row) else { continue };
-            let room = apart * self.stride;
-            let alone = jumps.iter().all(|other| other.sample.abs_diff(jump.sample) >= room);
-            if alone && jump.sample >= room && jump.sample + room <= samples {
-                jumps.push(jump);
+        let mut jumps: BTreeMap<usize, Jump> = BTreeMap::new();
+        for jump in known {
+            let row = (jump.sample - self.first).div_ceil(self.stride);
+            let solved = self.solve(&(row..row + 1));
+            let windows = self.windows(&solved);
+            let placed = windows.iter().rev().find_map(|windows| self.placed(windows, jump.sample));
+            let jump = placed.map_or_else(|| jump.clone(), |(placed, _)| placed);
+            jumps.insert(jump.sample, jump);
+        }
+        for rows in self.conspicuous(errors) {
+            let solved = self.solve(&rows);
+            let windows = self.windows(&solved);
+            let mut suspected = self.suspected(&windows, &rows);
+            suspected.sort_by(|a, b| b.0.total_cmp(&a.0));
+            let mut looked = BTreeSet::new();
+            for (_, row, scale) in suspected {
+                let near = row.saturating_sub(self.apart() / 2)..=row + self.apart() / 2;
+                if looked.range(near).next().is_some() {
+                    continue;
+                }
+                looked.insert(row);
+                let Some(jump) = self.place(&windows[scale], row) else { continue };
+                let near = jump.sample.saturating_sub(room)..jump.sample + room;
+                if jumps.range(near).next().is_none() && jump.sample >= room && jump.sample + room <= samples {
+                    jumps.insert(jump.sample, jump);
+                }
             }
         }
-        jumps.sort_by_key(|jump| jump.sample);
-        jumps
+        jumps.into_values().collect()
     }
 
-    /// Places a known jump again with the longest windows beside it.
-    fn again(&self, windows: &[Around<'_>], jump: &Jump) -> Option<Jump> {
-        windows.iter().rev().find_map(|windows| self.placed(windows, jump.sample).map(|(placed, _)| placed))
+    /// Stretches of rows around which so much is left that a jump could be believed to make it less.
+    fn conspicuous(&self, errors: &[f64]) -> Vec<Range<usize>> {
+        let reach = 2 * (self.function.len() / 2).div_ceil(self.stride);
+        let least = BELIEVED * self.expected.redundancy * self.expected.variance / CONSPICUOUS;
+        let mut found: Vec<Range<usize>> = Vec::new();
+        let mut sum = 0.0;
+        for row in 0..errors.len() + reach {
+            sum += errors.get(row).map_or(0.0, |error| error * error);
+            sum -= row.checked_sub(2 * reach + 1).map_or(0.0, |row| errors[row] * errors[row]);
+            let Some(middle) = row.checked_sub(reach) else { continue };
+            if sum < least {
+                continue;
+            }
+            match found.last_mut() {
+                Some(last) if last.end + self.apart() >= middle => last.end = middle + 1,
+                _ => found.push(middle..middle + 1),
+            }
+        }
+        found
+    }
+
+    /// Windows of every length around some rows.
+    fn solve(&self, rows: &Range<usize>) -> Vec<(Scale, Cells)> {
+        let solve = |&scale: &Scale| {
+            let all = scale.side_cells(self.problem.rows());
+            let reach = self.function.len() / self.stride;
+            let first = scale.cell(rows.start.saturating_sub(reach)).max(all.start).min(all.end);
+            let end = (scale.cell(rows.end + reach) + 1).min(all.end).max(first);
+            (scale, scale.solve_here(self.problem, &(first..end), self.instructions))
+        };
+        self.lengths.iter().map(solve).collect()
+    }
+
+    fn windows<'a>(&self, solved: &'a [(Scale, Cells)]) -> Vec<Around<'a>> {
+        solved.iter().map(|(scale, cells)| Around::new(*scale, cells, self.constants)).collect()
     }
 
     /// Rows that jumps must be apart, so that a window that serves alone fits between them.
@@ -106,12 +153,11 @@ impl Search<'_> {
     }
 
     /// Rows where the windows before and after differ most, by how much, and the scale that says so.
-    fn suspected(&self, windows: &[Around<'_>]) -> Vec<(f64, usize, usize)> {
+    fn suspected(&self, windows: &[Around<'_>], rows: &Range<usize>) -> Vec<(f64, usize, usize)> {
         let mut found = Vec::new();
-        let rows = self.problem.rows();
         for (scale, windows) in windows.iter().enumerate() {
             let mut best: Option<(f64, usize)> = None;
-            for row in 0..rows {
+            for row in rows.clone() {
                 let differs = self.differs(windows, row).unwrap_or(0.0);
                 if differs > SUSPECTED {
                     if best.is_none_or(|best| differs > best.0) {
@@ -223,10 +269,17 @@ impl Search<'_> {
     /// Whether a jump is more than chance: windows of no length may predict the rows around it nearly as well without one.
     fn is_believed(&self, over: &Range<usize>, left: f64) -> bool {
         let rows: Vec<usize> = over.clone().filter(|&row| self.whole.usable[row]).collect();
-        let without =
-            self.scales.iter().filter_map(|scale| self.without(*scale, over, &rows)).fold(f64::INFINITY, f64::min);
-        let gain = (without - left) / self.noise(left, rows.len() as f64);
-        without.is_finite() && gain > BELIEVED && left < LEFT * without
+        let noise = self.noise(left, rows.len() as f64);
+        // Short windows follow what is steep but no jump, so they end most suspicions.
+        let mut tried = false;
+        let beaten = |without: f64| (without - left) / noise < BELIEVED || left > LEFT * without;
+        for without in self.scales.iter().filter_map(|scale| self.without(*scale, over, &rows)) {
+            if beaten(without) {
+                return false;
+            }
+            tried = true;
+        }
+        tried
     }
 
     /// The sum of squares that windows of one length leave in rows between them; nothing where they do not reach all of them.

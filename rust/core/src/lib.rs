@@ -56,6 +56,7 @@ pub mod suspects;
 mod sweep;
 pub mod test_function;
 mod test_function_choice;
+mod thinned;
 mod tile;
 mod triangle;
 mod usable;

@@ -69,8 +69,8 @@ impl Model {
 pub(crate) struct Fit {
     /// Nothing where the windows' length was given, or no unknown belongs to a window.
     pub(crate) scale: Option<Scale>,
-    /// Windows on one side and on both; nothing without a scale.
-    pub(crate) cells: Option<Cells>,
+    /// Windows on both sides of the rows between them, where they are wanted.
+    pub(crate) hollow: Option<Solved>,
     /// The windows that all unknowns are taken from.
     pub(crate) full: Solved,
     pub(crate) pooled: Pooled,
@@ -92,11 +92,24 @@ impl Fit {
             let step = problem.rows().div_ceil(BLOCKS).max(1);
             return Ok(Self::in_windows(problem, step, BLOCKS, expected, instructions));
         };
-        let cells = scale.solve(problem, &scale.full_cells(problem.rows()), instructions, run)?;
-        let full = cells.full.clone();
+        let full = scale.solve_full(problem, instructions, run)?;
         let pooled = pool(&full, 0..full.len(), expected, instructions);
         let (scale, step, span) = (Some(scale), scale.step, scale.span());
-        Ok(pooled.map(|pooled| Self { scale, cells: Some(cells), full, pooled, step, span }))
+        Ok(pooled.map(|pooled| Self { scale, hollow: None, full, pooled, step, span }))
+    }
+
+    /// As [`Fit::new`], with windows on both sides of the rows between them as well.
+    pub(crate) fn with_hollow(
+        problem: &Problem<'_>,
+        scale: Scale,
+        expected: Expected,
+        instructions: Instructions,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Option<Self>, Error> {
+        let Cells { hollow, full, .. } = scale.solve(problem, &scale.full_cells(problem.rows()), instructions, run)?;
+        let pooled = pool(&full, 0..full.len(), expected, instructions);
+        let (step, span) = (scale.step, scale.span());
+        Ok(pooled.map(|pooled| Self { scale: Some(scale), hollow: Some(hollow), full, pooled, step, span }))
     }
 
     /// Solves a problem in windows of so many rows, or in one piece if that is all of them.
@@ -122,7 +135,7 @@ impl Fit {
         let shapes = [Shape::of(0..blocks, step)];
         let full = solve_windows(problem, step, &(0..windows.cast_signed()), &shapes, instructions).swap_remove(0);
         let pooled = pool(&full, 0..full.len(), expected, instructions)?;
-        Some(Self { scale: None, cells: None, full, pooled, step, span })
+        Some(Self { scale: None, hollow: None, full, pooled, step, span })
     }
 
     /// The middle of a window, in rows.

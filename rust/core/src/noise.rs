@@ -11,14 +11,13 @@
 //!
 //! A channel that was rounded to a step `q` holds noise of at least `q²/12`, also while it rests and all its coefficients are zero.
 
-use std::ops::Range;
-
 use crate::basis::{Basis, MOST_DEGREES};
 use crate::coefficients::{Coefficients, Projected};
 use crate::error::Error;
 use crate::samples::{Samples, is_usable};
 use crate::simd::Instructions;
 use crate::spectrum::power;
+use crate::thinned::stretches;
 
 /// Half-widths of the windows that the noise is read from.
 const HALVES: [usize; 3] = [12, 20, 35];
@@ -111,7 +110,7 @@ fn variance(record: &dyn Samples, half: usize, instructions: Instructions) -> f6
     let plan = Coefficients::new(&basis, &degrees, false, instructions);
     let (mut scratch, mut projected) = (plan.scratch(), Projected::default());
     let (mut sum, mut count) = (0.0, 0);
-    for windows in stretches(record.len() + 1 - length, MOST_WINDOWS) {
+    for windows in stretches(record.len() + 1 - length, MOST_WINDOWS, STRETCHES) {
         plan.project(record, windows, 1, &mut projected, &mut scratch);
         for row in &projected.coefficients {
             for c in row.iter().filter(|c| !c.is_nan()) {
@@ -131,7 +130,7 @@ pub fn quantisation_step(record: &dyn Samples) -> f64 {
     let mut differences = Vec::new();
     let mut largest = 0.0_f64;
     let mut samples = Vec::new();
-    for places in stretches(record.len(), MOST_DIFFERENCES) {
+    for places in stretches(record.len(), MOST_DIFFERENCES, STRETCHES) {
         samples.resize(places.len(), 0.0);
         record.read(places.start, &mut samples);
         let usable = samples.iter().filter(|value| is_usable(**value));
@@ -174,22 +173,12 @@ fn common_step(differences: &[f64], rounding: f64) -> Option<f64> {
 fn largest(record: &dyn Samples) -> f64 {
     let mut samples = Vec::new();
     let mut largest = 0.0_f64;
-    for places in stretches(record.len(), MOST_WINDOWS) {
+    for places in stretches(record.len(), MOST_WINDOWS, STRETCHES) {
         samples.resize(places.len(), 0.0);
         record.read(places.start, &mut samples);
         largest = samples.iter().filter(|value| is_usable(**value)).fold(largest, |most, value| most.max(value.abs()));
     }
     largest
-}
-
-/// All places of a record, or so many of them in stretches evenly spread.
-fn stretches(places: usize, most: usize) -> impl Iterator<Item = Range<usize>> {
-    let (count, length) = if places <= most { (1, places) } else { (STRETCHES, most / STRETCHES) };
-    let room = places - length;
-    (0..count).map(move |index| {
-        let first = room * index / (count - 1).max(1);
-        first..first + length
-    })
 }
 
 #[cfg(test)]
@@ -246,12 +235,5 @@ mod tests {
         assert_eq!(quantisation_step(&[3.0; 100].as_slice()), 0.0);
         assert_eq!(quantisation_step(&[f64::NAN; 100].as_slice()), 0.0);
         assert_eq!(quantisation_step(&[].as_slice()), 0.0);
-    }
-
-    #[test]
-    fn stretches_cover_a_short_record_and_span_a_long_one() {
-        assert!(stretches(10, 100).eq(std::iter::once(0..10)));
-        let parts: Vec<Range<usize>> = stretches(1000, 128).collect();
-        assert_eq!((parts.len(), parts[0].start, parts[63].end), (64, 0, 1000));
     }
 }

@@ -156,6 +156,25 @@ impl Scale {
         Ok(join(&run.map(pieces, || (), work)?))
     }
 
+    /// Solves the full windows only, in parallel.
+    pub(crate) fn solve_full(
+        self,
+        problem: &Problem<'_>,
+        instructions: Instructions,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Solved, Error> {
+        let cells = self.full_cells(problem.rows());
+        let shapes = &self.shapes()[2..];
+        let firsts = cells.clone().step_by(PIECE);
+        let pieces = firsts.map(|first| first..(first + PIECE.cast_signed()).min(cells.end));
+        let pieces = pieces.map(|blocks| Piece { size: blocks.len() * self.step, content: blocks });
+        let work = |blocks: Range<isize>, (): &mut ()| {
+            solve_windows(problem, self.step, &blocks, shapes, instructions).swap_remove(0)
+        };
+        let solved = run.map(pieces.collect(), || (), work)?;
+        Ok(if solved.is_empty() { Solved::new(problem.layout, 0, 0) } else { Solved::join(&solved) })
+    }
+
     /// Solves the windows of some cells on this thread.
     pub(crate) fn solve_here(self, problem: &Problem<'_>, cells: &Range<isize>, instructions: Instructions) -> Cells {
         join(&[self.part(problem, &self.shapes(), cells, &(cells.start..self.after(cells.end)), instructions)])

@@ -241,7 +241,7 @@ pub(crate) fn find(search: &Search<'_>, first: Scale, run: &mut Run<'_, '_>) -> 
         let current = found.as_ref().map(|found| &found.varying);
         let side = found.as_ref().map_or_else(|| rows.side.clone(), |found| found.side.clone());
         let problem = model.problem(rows, &side, noise, None);
-        let Some(fit) = Fit::new(&problem, Some(scale), expected, instructions, run)? else { return Ok(None) };
+        let Some(fit) = Fit::with_hollow(&problem, scale, expected, instructions, run)? else { return Ok(None) };
         let ones = vec![1.0; fit.full.len()];
         let weights = if current.is_some() { &fit.pooled.weights } else { &ones };
         let companions = slow.iter().map(|&one| rows.regressors[one].companion.as_slice()).collect();
@@ -288,8 +288,7 @@ impl Slow<'_> {
     /// Mean squared error of predicting rows, over the noise's variance: slow coefficients from equations that the row had no part in,
     /// what is windowed from windows on both sides of it.
     fn error(&self, problem: &Problem<'_>, hollow: &Varying, full: &Varying, scale: Scale, variance: f64) -> f64 {
-        let Some(cells) = &self.fit.cells else { return f64::INFINITY };
-        let solved = &cells.hollow;
+        let Some(solved) = &self.fit.hollow else { return f64::INFINITY };
         let (fields, layout) = (solved.fields, problem.layout);
         let (mut sum, mut count) = (0.0, 0.0);
         let mut constants = vec![0.0; layout.constant];

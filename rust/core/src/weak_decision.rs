@@ -1,6 +1,5 @@
 //! What a record says of its unknowns: over which length windows should reach, and what is constant.
 
-use crate::averaging::Around;
 use crate::constancy::{self, Test};
 use crate::cross_validation::{Validated, validate};
 use crate::equations::Rows;
@@ -11,20 +10,26 @@ use crate::pooling::{Expected, misfits};
 use crate::row_covariance::RowCovariance;
 use crate::samples::Samples;
 use crate::scale::Scale;
+use crate::thinned::{holds, stretches_of_rows, thinned_rows};
 use crate::varying;
 use crate::weak_form::{Ones, Record, TermSamples, WeakRows, Whole};
 use crate::weak_identification::{Chosen, Kind, Session};
+use crate::weak_report::residuals;
+use crate::windows::Problem;
 
 /// The mean squared error of predicting rows, over the noise's, from which on more is tried, and the part of it that must be left to be
 /// worth it.
 const BADLY: f64 = 1.5;
 const BETTER: f64 = 0.8;
 
+/// So many of the longest windows that stretches of a long record hold are tried again on all of it, where one of them is best.
+const OVERLAP: usize = 2;
+
 /// Rounds of looking for jumps and fitting again with windows that end there.
 const JUMP_ROUNDS: usize = 4;
 
-/// Lengths of windows, from the best one on, that jumps are looked for with.
-const JUMP_SCALES: usize = 5;
+/// Lengths of windows, from the best one on and each twice the last, that jumps are looked for with.
+const JUMP_SCALES: usize = 3;
 
 /// What was decided, and the fit it rests on.
 #[derive(Clone)]
@@ -203,14 +208,42 @@ impl Session<'_, '_, '_> {
         if tried.is_empty() {
             return Err(self.too_short());
         }
-        let validated = validate(&problem, &tried, expected, instructions, &mut self.run)?;
-        let length = |one: &Validated| one.fit.scale.map_or(0, Scale::span) * stride;
-        decided.lengths = validated.iter().map(|one| (length(one), one.error)).collect();
-        if let Some(best) = validated.into_iter().min_by(|a, b| a.error.total_cmp(&b.error)) {
-            decided.error = best.error;
-            decided.fit = Some(best.fit);
+        let chosen = self.validate(&problem, rows, decided, &tried)?;
+        decided.lengths = chosen.iter().map(|(scale, error)| (scale.span() * stride, *error)).collect();
+        let best = chosen.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((scale, error)) = best {
+            decided.error = error;
+            decided.fit = Fit::new(&problem, Some(scale), expected, instructions, &mut self.run)?;
         }
         Ok(())
+    }
+
+    /// How well windows of some lengths predict what they have not seen: on stretches of a long record as far as they hold windows so
+    /// long, and on all of it beyond where the longest of those are best.
+    fn validate(
+        &mut self,
+        problem: &Problem<'_>,
+        rows: &Rows,
+        decided: &Decided,
+        scales: &[Scale],
+    ) -> Result<Vec<(Scale, f64)>, Error> {
+        let (instructions, expected) = (self.options.instructions, decided.expected);
+        let errors = |validated: Vec<Validated>| -> Vec<(Scale, f64)> {
+            validated.iter().filter_map(|one| Some((one.fit.scale?, one.error))).collect()
+        };
+        let Some(stretches) = stretches_of_rows(rows.len()).filter(|_| scales.len() > 1) else {
+            return Ok(errors(validate(problem, scales, expected, instructions, &mut self.run)?));
+        };
+        let thinned = thinned_rows(rows, &stretches);
+        let thinned = decided.model.problem(&thinned, &thinned.side, self.noise[0], Some(&decided.covariance));
+        let short = scales.partition_point(|scale| holds(*scale));
+        let found = errors(validate(&thinned, &scales[..short], expected, instructions, &mut self.run)?);
+        let best = found.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map(|(scale, _)| *scale);
+        let long = short.saturating_sub(OVERLAP);
+        if best.is_some_and(|best| !scales[long..].contains(&best)) {
+            return Ok(found);
+        }
+        Ok(errors(validate(problem, &scales[long..], expected, instructions, &mut self.run)?))
     }
 
     /// Finds jumps of what is windowed beside those that are known. `whole` holds all rows where some are over jumps.
@@ -234,14 +267,8 @@ impl Session<'_, '_, '_> {
         };
         let whole = decided.model.problem(whole, &side, noise, None);
         let best = decided.scales.iter().position(|scale| Some(*scale) == fit.scale).unwrap_or(0);
-        let scales = decided.scales[best..].iter().filter(|scale| scale.stands_alone()).take(JUMP_SCALES);
-        let mut solved = Vec::new();
-        for &scale in scales {
-            let cells = scale.side_cells(weak.rows.len());
-            solved.push((scale, scale.solve(&problem, &cells, self.options.instructions, &mut self.run)?));
-        }
-        let windows: Vec<Around<'_>> =
-            solved.iter().map(|(scale, cells)| Around::new(*scale, cells, constants)).collect();
+        let alone = decided.scales[best..].iter().filter(|scale| scale.stands_alone());
+        let lengths: Vec<Scale> = alone.step_by(2).take(JUMP_SCALES).copied().collect();
         let search = Search {
             problem: &problem,
             whole: &whole,
@@ -253,9 +280,10 @@ impl Session<'_, '_, '_> {
             expected: decided.expected,
             constants,
             scales: &decided.scales,
+            lengths: &lengths,
             instructions: self.options.instructions,
         };
-        Ok(search.find(&windows, known))
+        Ok(search.find(&residuals(&problem, fit).0, known))
     }
 
     /// Finds what changes slowly, and the other constants beside it.

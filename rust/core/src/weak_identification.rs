@@ -24,12 +24,18 @@ use crate::spectrum::power;
 use crate::suspects::{Missing, Suspect};
 use crate::test_function::{LEAST_HALF_WIDTH, TestFunction};
 use crate::test_function_choice::{Candidates, Evidence, half_widths, spectrum_length};
+use crate::thinned::{Thinned, stretches, thinned_flags};
 use crate::usable::Usable;
 use crate::weak_form::{Record, TermSamples, WeakRows};
 use crate::weak_results::SampleResults;
 
 /// Half-widths of the test function that windows span while it is chosen.
 const PILOT_WINDOW: usize = 4;
+/// Samples of a long record that the test function is chosen with, in so many stretches, each at least so many half-widths of the widest
+/// long.
+const PILOT_SAMPLES: usize = 1 << 16;
+const PILOT_STRETCHES: usize = 8;
+const PILOT_WIDTHS: usize = 64;
 /// Rounds of choosing the test function and estimating what the choice depends on.
 const ROUNDS: usize = 6;
 /// Stages of a call, about: only for showing progress.
@@ -129,6 +135,8 @@ pub struct WeakIdentified {
     pub outside_mask: Option<Outside>,
     /// Unknowns that change, in the order of the values at the samples.
     pub changing: Vec<usize>,
+    /// Pairs of constants and their covariance.
+    pub constant_pairs: Vec<(usize, usize, f64)>,
     /// Pairs of unknowns whose covariances are at the samples.
     pub pairs: Vec<(usize, usize)>,
     /// Samples before which what changes jumps.
@@ -327,6 +335,55 @@ impl Session<'_, '_, '_> {
         self.run.stage(|watch| WeakRows::build(&record, function, delta, workers, watch))
     }
 
+    /// Number of rows of the whole record with a test function.
+    fn rows_with(&self, function: TestFunction) -> usize {
+        let samples = self.record.angle.len() + function.stride();
+        samples.saturating_sub(function.window_length()) / function.stride()
+    }
+
+    /// The rows in stretches of a long record; nothing where all of it is as good. `widest` is the half-width of the widest test function.
+    fn some_rows(&mut self, function: TestFunction, widest: usize) -> Result<Option<WeakRows>, Error> {
+        let samples = self.record.angle.len();
+        let length = (PILOT_SAMPLES / PILOT_STRETCHES).max(PILOT_WIDTHS * widest);
+        if samples <= 2 * PILOT_STRETCHES * length {
+            return Ok(None);
+        }
+        let stretches: Vec<_> = stretches(samples, PILOT_STRETCHES * length, PILOT_STRETCHES).collect();
+        let thin = |channel| Thinned::new(channel, &stretches);
+        let record = &self.record;
+        let known = record.coefficients.map(|one| match one {
+            Coefficient::Record(factor) => Some(thin(factor)),
+            _ => None,
+        });
+        let terms: Vec<_> = record
+            .terms
+            .iter()
+            .map(|term| match term {
+                TermSamples::Given(samples) => Some(thin(*samples)),
+                _ => None,
+            })
+            .collect();
+        let mask = record.mask.map(|mask| thinned_flags(mask, &stretches));
+        let (angle, torque) = (thin(record.angle), thin(record.torque));
+        let thinned = Record {
+            angle: &angle,
+            torque: &torque,
+            coefficients: std::array::from_fn(|index| match &known[index] {
+                Some(factor) => Coefficient::Record(factor),
+                None => record.coefficients[index],
+            }),
+            terms: terms
+                .iter()
+                .zip(&record.terms)
+                .map(|(thinned, term)| thinned.as_ref().map_or(*term, |samples| TermSamples::Given(samples)))
+                .collect(),
+            lag: record.lag,
+            mask: mask.as_deref(),
+        };
+        let (delta, workers) = (self.options.delta, self.run.workers);
+        self.run.stage(|watch| WeakRows::build(&thinned, function, delta, workers, watch)).map(Some)
+    }
+
     /// Chooses half-width and exponent where they are not given, and estimates the coefficients on the way.
     pub(crate) fn choose_test_function(&mut self, model: &Model) -> Result<Chosen, Error> {
         let (samples, delta) = (self.record.angle.len(), self.options.delta);
@@ -357,7 +414,11 @@ impl Session<'_, '_, '_> {
         let mut current = TestFunction::new(start, exponent.unwrap_or(9), delta)?;
         let mut seen = Vec::new();
         loop {
-            let weak = self.rows(current)?;
+            let thinned = self.some_rows(current, widest)?;
+            let weak = match thinned {
+                Some(weak) => weak,
+                None => self.rows(current)?,
+            };
             let parameters = self.pilot(&weak, model)?;
             match candidates.best(parameters) {
                 Some(best) if best != current && !seen.contains(&best) && seen.len() < ROUNDS => {
@@ -366,6 +427,7 @@ impl Session<'_, '_, '_> {
                 }
                 _ => {
                     let end = [widths.first(), widths.last()].contains(&Some(&current.half_width()));
+                    let weak = if weak.rows.len() < self.rows_with(current) { self.rows(current)? } else { weak };
                     return Ok(Chosen { weak, parameters, at_end: width.is_none() && end });
                 }
             }

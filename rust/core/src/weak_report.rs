@@ -12,6 +12,7 @@ use crate::pooling::{Expected, influence, is_determined, sandwich, weakest};
 use crate::row_covariance::RowCovariance;
 use crate::status::Status;
 use crate::suspects::{Judged, Missing, Suspect};
+use crate::thinned::{holds, stretches_of_rows, thinned_column, thinned_rows};
 use crate::weak_decision::{Decided, rows_of};
 use crate::weak_form::{Record, TermSamples, WeakRows};
 use crate::weak_identification::{Chosen, Constant, NOISE_MODEL_FAILS, Session, WeakIdentified};
@@ -78,6 +79,7 @@ impl Session<'_, '_, '_> {
             lag: None,
             outside_mask: None,
             changing: decided.model.windowed.iter().chain(&decided.slow).copied().collect(),
+            constant_pairs: Vec::new(),
             pairs: Vec::new(),
             jumps: decided.jumps.iter().map(|jump| jump.sample).collect(),
             results: SampleResults::default(),
@@ -111,6 +113,12 @@ impl Session<'_, '_, '_> {
             let test = decided.tests.iter().find(|(one, _)| *one == unknown).map(|(_, test)| test.clone());
             let variance = found.covariance[(place + slow) * (count + 1)];
             found.constants.push(Constant { unknown, value: values[place + slow], error: variance.sqrt(), test });
+        }
+        let constants = ordered.constant.iter().enumerate().skip(slow);
+        for (place, &one) in constants.clone() {
+            for (before, &other) in constants.clone().take_while(|(before, _)| *before < place) {
+                found.constant_pairs.push((one, other, found.covariance[place * count + before]));
+            }
         }
         let mut status = errors.status;
         let contradicted = |one: &Constant| one.test.as_ref().is_some_and(|test| test.probability < NO_CHANCE);
@@ -256,7 +264,13 @@ impl Session<'_, '_, '_> {
                 status: found.status,
             });
         }
-        let averages = average(problem, &decided.scales, constants, expected, fit.span, instructions, &mut self.run)?;
+        let stretches = stretches_of_rows(rows.len());
+        let thinned =
+            stretches.map(|stretches| (thinned_rows(rows, &stretches), thinned_column(decided.side(rows), &stretches)));
+        let ordered = decided.ordered();
+        let thinned = thinned.as_ref().map(|(rows, side)| ordered.problem(rows, side, self.noise[0], None));
+        let (judged, run) = ((expected, fit.span), &mut self.run);
+        let averages = average(problem, thinned.as_ref(), &decided.scales, constants, judged, instructions, run)?;
         let names = fit.full.fields;
         let condition = fit.full.field(names.condition());
         let usable = &decided.whole.as_ref().unwrap_or(rows).usable;
@@ -370,7 +384,7 @@ impl Session<'_, '_, '_> {
         let mut pairs = Vec::new();
         for one in 0..names.len() {
             for other in 0..one {
-                if names[one] < 3 && names[other] < 3 {
+                if other < changing && names[one] < 3 && names[other] < 3 {
                     pairs.push((names[one], names[other]));
                     results.covariances.push((0..length).map(|place| covariance(one, other, place)).collect());
                 }
@@ -418,12 +432,17 @@ impl Session<'_, '_, '_> {
                 weak.rows.clear(row);
             }
         }
+        let mut side = side.to_vec();
+        let stretches = stretches_of_rows(weak.rows.len()).filter(|_| fit.scale.is_some_and(holds));
+        if let Some(stretches) = stretches {
+            (weak.rows, side) = (thinned_rows(&weak.rows, &stretches), thinned_column(&side, &stretches));
+        }
         let mut suspects = Vec::new();
         for (place, (missing, _)) in terms.iter().enumerate() {
             let judged = Judged {
                 rows: &weak.rows,
                 model: &decided.model,
-                side,
+                side: &side,
                 noise: self.noise[0],
                 fit,
                 covariance: &errors.covariance,
@@ -449,7 +468,7 @@ fn nearest(fit: &Fit, row: usize) -> usize {
 }
 
 /// What a fit leaves of every row, and where it says anything.
-fn residuals(problem: &Problem<'_>, fit: &Fit) -> (Vec<f64>, Vec<bool>) {
+pub(crate) fn residuals(problem: &Problem<'_>, fit: &Fit) -> (Vec<f64>, Vec<bool>) {
     let mut usable = problem.usable.to_vec();
     let mut left = without_constants(problem, &fit.pooled.values);
     if problem.layout.windowed > 0 {

@@ -3,6 +3,9 @@
 use crate::jumps::Jump;
 use crate::status::Status;
 
+/// Samples that are looked up before every column is read for them.
+const AT_A_TIME: usize = 1024;
+
 /// A place of a jump that is less probable does not count.
 const UNLIKELY: f64 = 1e-3;
 
@@ -47,27 +50,37 @@ pub struct SampleResults {
 impl RowResults {
     /// What the rows say at every `step`-th of so many samples: interpolated between them, carried on beyond the first and last.
     pub(crate) fn at_samples(&self, samples: usize, step: usize) -> SampleResults {
-        let rows = self.status.len();
-        let mut places = Vec::with_capacity(samples.div_ceil(step));
-        for sample in (0..samples).step_by(step) {
-            places.push(self.place(sample, rows));
-        }
-        let between = |column: &Vec<f64>| places.iter().map(|place| place.between(column)).collect();
-        let along = |(column, slopes): (&Vec<f64>, &Vec<f64>)| {
-            places.iter().map(|place| place.between(column) + place.beyond * slopes[place.nearest]).collect()
-        };
-        let status = places.iter().map(|place| {
-            let edge = if place.beyond == 0.0 { 0 } else { Status::EDGE.bits() };
-            self.status[place.nearest] | edge
-        });
+        let (rows, count) = (self.status.len(), samples.div_ceil(step));
+        let empty =
+            |columns: &Vec<Vec<f64>>| -> Vec<Vec<f64>> { columns.iter().map(|_| Vec::with_capacity(count)).collect() };
         let mut results = SampleResults {
-            values: self.values.iter().zip(&self.slopes).map(along).collect(),
-            errors: self.errors.iter().map(between).collect(),
-            covariances: self.covariances.iter().map(between).collect(),
-            deviation: between(&self.deviation),
-            condition: between(&self.condition),
-            status: status.collect(),
+            values: empty(&self.values),
+            errors: empty(&self.errors),
+            covariances: empty(&self.covariances),
+            deviation: Vec::with_capacity(count),
+            condition: Vec::with_capacity(count),
+            status: Vec::with_capacity(count),
         };
+        let mut places = Vec::with_capacity(AT_A_TIME);
+        for first in (0..count).step_by(AT_A_TIME) {
+            places.clear();
+            places.extend((first..count.min(first + AT_A_TIME)).map(|place| self.place(place * step, rows)));
+            let into = results.values.iter_mut().zip(&self.values).zip(&self.slopes);
+            for ((result, column), slopes) in into {
+                let along = |place: &Place| place.between(column) + place.beyond * slopes[place.nearest];
+                result.extend(places.iter().map(along));
+            }
+            let errors = results.errors.iter_mut().zip(&self.errors);
+            let covariances = results.covariances.iter_mut().zip(&self.covariances);
+            let others = [(&mut results.deviation, &self.deviation), (&mut results.condition, &self.condition)];
+            for (result, column) in errors.chain(covariances).chain(others) {
+                result.extend(places.iter().map(|place| place.between(column)));
+            }
+            results.status.extend(places.iter().map(|place| {
+                let edge = if place.beyond == 0.0 { 0 } else { Status::EDGE.bits() };
+                self.status[place.nearest] | edge
+            }));
+        }
         self.jumps.iter().for_each(|jump| self.blur(jump, samples, step, &mut results));
         results
     }

@@ -2,7 +2,7 @@
 
 use std::num::NonZeroUsize;
 
-use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
+use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -98,6 +98,7 @@ fn dictionary(py: Python<'_>, found: WeakIdentified) -> PyResult<Bound<'_, PyDic
     let outside = found.outside_mask.filter(Outside::fails);
     dict.set_item("outside_mask", outside.map(|outside| (outside.differing, outside.left)))?;
     dict.set_item("jumps", found.jumps)?;
+    dict.set_item("constant_pairs", found.constant_pairs)?;
     add_results(&dict, found.changing, found.pairs, found.results)?;
     Ok(dict)
 }
@@ -110,12 +111,12 @@ pub(crate) fn add_results(
     results: SampleResults,
 ) -> PyResult<()> {
     let py = dict.py();
-    let rows = |columns: &[Vec<f64>]| PyArray2::from_vec2(py, columns);
+    let rows = |columns: Vec<Vec<f64>>| columns.into_iter().map(|one| PyArray1::from_vec(py, one)).collect::<Vec<_>>();
     dict.set_item("changing", changing)?;
     dict.set_item("pairs", pairs)?;
-    dict.set_item("values", rows(&results.values)?)?;
-    dict.set_item("errors", rows(&results.errors)?)?;
-    dict.set_item("covariances", rows(&results.covariances)?)?;
+    dict.set_item("values", rows(results.values))?;
+    dict.set_item("errors", rows(results.errors))?;
+    dict.set_item("covariances", rows(results.covariances))?;
     dict.set_item("deviations", PyArray1::from_vec(py, results.deviation))?;
     dict.set_item("conditions", PyArray1::from_vec(py, results.condition))?;
     dict.set_item("status", PyArray1::from_vec(py, results.status))?;
