@@ -7,7 +7,7 @@ import pytest
 from scipy import linalg
 
 import tvident
-from accuracy import bound, errors, report
+from accuracy import bound, errors, methods, report
 from accuracy.cases import Case
 from accuracy.methods import METHODS
 from accuracy.results import Results
@@ -110,6 +110,13 @@ def test_a_result_follows_a_line_that_was_cut_off(tmp_path: Path) -> None:
     path.write_text('["one", {"err')
     Store(path).put([("two", {"error": 2.0})])
     assert "two" in Store(path)
+
+
+def test_words_alone_make_no_result_outdated() -> None:
+    source = 'def f(x):\n    """Say it."""\n    return x  # as it is\n'
+    reworded = 'def f(x):\n    """Say it better."""\n    return x\n'
+    assert methods._code(source) == methods._code(reworded)  # noqa: SLF001 - what results are kept by
+    assert methods._code(source) != methods._code(source.replace("return x", "return -x"))  # noqa: SLF001
 
 
 @pytest.mark.parametrize("name", ["kalman", "savgoldiff"])

@@ -58,6 +58,15 @@ class Results:
         """Return what a method said, if it was not refused."""
         return [values for values in self.of(case, name) if values and "unavailable" not in values]
 
+    def both(self, case: Case, one: str, other: str) -> list[tuple[Values, Values]]:
+        """Return what two methods said of the same recordings, where neither was refused."""
+        found = []
+        for number in range(self.recordings):
+            pair = [self.store.get(self._key(case, number, name)) for name in (one, other)]
+            if all(values is not None and "unavailable" not in values for values in pair):
+                found.append((pair[0] or {}, pair[1] or {}))
+        return found
+
     def median(self, case: Case, name: str, quantity: str) -> float:
         """Return the median over recordings; NaN where nothing is known."""
         found = [float(values[quantity]) for values in self.available(case, name) if quantity in values]

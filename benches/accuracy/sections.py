@@ -204,16 +204,12 @@ def _constancy(section: Section, results: Results) -> Lines:
 def _efficiency(section: Section, results: Results) -> Lines:
     rows = []
     for case in section.cases:
+        found = results.both(case, "ours-constants", "bound")
         cells = []
-        bounds = results.available(case, "bound")
         for parameter in PARAMETERS:
-            found = results.available(case, "ours-constants")
-            ratios = [
-                float(values[parameter]) / (100 * limit["deviations"][parameter])
-                for values, limit in zip(found, bounds, strict=False)
-            ]
+            ratios = [values[parameter] / (100 * limit["deviations"][parameter]) for values, limit in found]
             cells.append(f"{np.sqrt(np.mean(np.square(ratios))):.2f}" if ratios else report.NOTHING)
-        rows.append([case.angle_label, *cells, str(len(results.available(case, "ours-constants")))])
+        rows.append([case.angle_label, *cells, str(len(found))])
     uncertainty = 100 / np.sqrt(2 * results.recordings)
     return [
         report.stamp(section.methods, f"recordings of {section.cases[0].duration:g} s, torque SNR 20 dB"),
