@@ -59,10 +59,12 @@ def _channels(case: Case) -> list[Case]:
 
 def _counted(results: Results, cases: Sequence[Case], name: str) -> str:
     """Return a method's label, with its number of recordings where that is not what was asked for."""
-    counts = {len(results.available(case, name)) for case in cases}
-    least = min(counts)
+    counts = {len(results.available(case, name)) for case in cases} - {0}
     label = METHODS[name].label
-    return label if counts == {results.recordings} or max(counts) == 0 else f"{label} (n = {least})"
+    if counts <= {results.recordings}:
+        return label
+    least, most = min(counts), max(counts)
+    return f"{label} (n = {least})" if least == most else f"{label} (n = {least} … {most})"
 
 
 def _errors(results: Results, case: Case, name: str) -> str:
@@ -109,6 +111,14 @@ def _identification(section: Section, results: Results) -> Lines:
         "and knows which parameters change. Bold: above the goal. A star: no parameters were found for some samples.",
         "",
     ]
+    best = [
+        values["settings"]
+        for case in section.cases
+        for values in results.available(case, "best")
+        if "settings" in values
+    ]
+    weak = sum(setting.get("form") == "weak" for setting in best)
+    text += [f"* Of the {len(best)} best settings known afterwards {weak} are of the weak form."] if best else []
     return text + report.refused(results.refusals(section.cases, section.methods))
 
 
