@@ -14,7 +14,7 @@ from tvident.rig import Excitation
 from tvident.rig import Pattern as Movement
 
 Array = npt.NDArray[np.float64]
-Pattern = Literal["slider", "ramp", "square", "constant", "I and C vary", "I varies by 5 %"]
+Pattern = Literal["slider", "ramp", "square", "constant", "I and C vary", "I varies by 5 %", "I ramps by 5 %"]
 
 SAMPLE_RATE = 1000.0
 FIRST_SEED = 20_000
@@ -64,7 +64,7 @@ class Case:
 
     def record(self, number: int) -> tvident.Recording:
         """Simulate one of the recordings of this case."""
-        movement, inertia, damping = _parameters(self.pattern)
+        movement, inertia, damping = _parameters(self.pattern, self.duration)
         return tvident.simulate_torsional_rig(
             self.duration,
             SAMPLE_RATE,
@@ -88,10 +88,14 @@ class Case:
 
 def _parameters(
     pattern: Pattern,
+    duration: float,
 ) -> tuple[Movement, float | Callable[[Array], Array], float | Callable[[Array], Array]]:
     """Return how the slider moves, and inertia and damping over time."""
     if pattern == "I varies by 5 %":
         return "slider", lambda t: INERTIA * (1 + 0.05 * np.sin(2 * np.pi * 0.1 * t + 0.5)), DAMPING
+    if pattern == "I ramps by 5 %":
+        # From 5 % below to 5 % above over the whole record: what wears, or is filled, drifts.
+        return "slider", lambda t: INERTIA * (1 + 0.05 * (2 * t / duration - 1)), DAMPING
     if pattern == "I and C vary":
 
         def inertia(t: Array) -> Array:

@@ -14,6 +14,9 @@ Array = npt.NDArray[np.float64]
 PARAMETERS = ("stiffness", "inertia", "damping")
 """In the order in which the tables give them."""
 
+_NORMAL_95 = 1.959964
+"""Half-width of the nominal 95 % interval in standard errors."""
+
 _MARGIN = 0.075
 """Share of the record at either end that is no part of its interior: 3 s of 40 s."""
 
@@ -45,3 +48,9 @@ def of_acceleration(found: Array, recording: tvident.Recording) -> float:
     inside = interior(recording.time.size)
     truth = recording.true_acceleration[inside]
     return 100 * float(np.sqrt(np.mean((found[inside] - truth) ** 2)) / truth.std())
+
+
+def coverage(error: Array, deviation: Array) -> float:
+    """Return the share of samples where the nominal 95 % interval holds the truth, of those where something was found."""
+    known = np.isfinite(error) & np.isfinite(deviation)
+    return float(np.mean(np.abs(error[known]) <= _NORMAL_95 * deviation[known])) if known.any() else float("nan")

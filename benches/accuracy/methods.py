@@ -160,6 +160,9 @@ METHODS: dict[str, Method] = {
     ),
     "window-101": _derivative("AICc in every window of 101", derivatives.chosen(window_length=101)),
     "pooled-101": _derivative("AICc pooled, windows of 101", derivatives.chosen(window_length=101, selection="pooled")),
+    "average-101": _derivative(
+        "Akaike weights, windows of 101", derivatives.chosen(window_length=101, selection="average")
+    ),
     "best-order-101": _derivative("best fixed order, windows of 101", derivatives.best_order),
     "auto-window": _derivative('ours: `window_length="auto"`', derivatives.chosen(window_length="auto")),
     "best-fixed": _derivative("best fixed window and order", derivatives.best_fixed),

@@ -15,9 +15,6 @@ from tvident import Status
 Values = dict[str, Any]
 """What a method says of a recording: errors in %, and whatever else a measurement needs. Kept as JSON."""
 
-_NORMAL_95 = 1.959964
-"""Half-width of the nominal 95 % interval in standard errors."""
-
 
 def paper(recording: tvident.Recording) -> Values:
     """Identify by the paper's method."""
@@ -90,7 +87,5 @@ def _judged(identify: Callable[[], tvident.Identification], recording: tvident.R
 def _coverage(found: tvident.Identification, recording: tvident.Recording, name: str) -> float:
     """Return the share of the interior where the nominal 95 % interval holds the truth."""
     inside = errors.interior(recording.time.size)
-    error = np.abs(getattr(found, name)[inside] - getattr(recording, name)[inside])
-    deviation = found.stderr[name][inside]
-    known = np.isfinite(error) & np.isfinite(deviation)
-    return float(np.mean(error[known] <= _NORMAL_95 * deviation[known])) if known.any() else float("nan")
+    error = getattr(found, name)[inside] - getattr(recording, name)[inside]
+    return errors.coverage(error, found.stderr[name][inside])
