@@ -78,15 +78,30 @@ def pooled_scores(windows: list[Window], reach: int) -> Array:
     return np.array([scores[max(0, i - reach) : i + reach + 1].sum(axis=0) for i in range(len(windows))])
 
 
-def akaike_average(window: Window) -> tuple[Array, Array, Array]:
-    """Give Akaike's weights, the weighted average of all orders at the centre, and its standard error."""
-    half = window.gains.shape[2] // 2
-    scores = window.scores()
+def akaike_weights(scores: Array) -> Array:
+    """Give every order's weight by its criterion."""
     weights = np.exp(-(scores - scores.min()) / 2)
-    weights /= weights.sum()
+    return np.asarray(weights / weights.sum())
+
+
+def pooled_weights(sums: Array, neighbours: int, length: int) -> Array:
+    """Give every order's weight by the criterion summed over neighbours: their mean, times the windows of their own that they amount to."""
+    samples = np.convolve(np.ones(neighbours), np.ones(length))
+    worth = samples.sum() ** 2 / (length * (samples**2).sum())
+    return akaike_weights(sums * worth / neighbours)
+
+
+def errors_around(window: Window, weights: Array, value: Array) -> Array:
+    """Give standard errors of values at the centre that know what the orders disagree by."""
+    half = window.gains.shape[2] // 2
     estimates, gains = window.derivatives[:, :, half], window.gains[:, :, half]
-    average = estimates @ weights
     freedom = window.gains.shape[2] - np.arange(weights.size) - 1
     sigma = np.sqrt(window.rss / np.maximum(freedom, 1))
-    errors = np.sqrt((sigma * gains) ** 2 + (estimates - average[:, None]) ** 2) @ weights
-    return weights, average, errors
+    return np.asarray(np.sqrt((sigma * gains) ** 2 + (estimates - value[:, None]) ** 2) @ weights)
+
+
+def akaike_average(window: Window) -> tuple[Array, Array, Array]:
+    """Give Akaike's weights, the weighted average of all orders at the centre, and its standard error."""
+    weights = akaike_weights(window.scores())
+    average = window.derivatives[:, :, window.gains.shape[2] // 2] @ weights
+    return weights, average, errors_around(window, weights, average)

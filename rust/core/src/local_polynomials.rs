@@ -6,6 +6,7 @@
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use crate::basis::Basis;
 use crate::criterion::Criterion;
@@ -126,7 +127,8 @@ pub struct LocalPolynomials {
     basis: Basis,
     ends: Ends,
     engine: Box<dyn Walk>,
-    selector: Option<Selector>,
+    /// Made when it is first needed.
+    selector: OnceLock<Option<Selector>>,
 }
 
 /// What one thread needs to work: made once, used for any number of pieces.
@@ -174,8 +176,8 @@ impl LocalPolynomials {
         let basis = Basis::new(window_length, degrees);
         let residual = options.noise || matches!(options.order, Order::Chosen { .. });
         let engine = engine(&basis, Finish::new(&options, &basis), residual, options.instructions);
-        let (ends, selector) = (Ends::new(&options), Selector::new(&options, &basis));
-        Ok(Self { options, basis, ends, engine, selector })
+        let ends = Ends::new(&options);
+        Ok(Self { options, basis, ends, engine, selector: OnceLock::new() })
     }
 
     /// What was asked for.
@@ -199,7 +201,19 @@ impl LocalPolynomials {
     /// Memory for one thread.
     #[must_use]
     pub fn scratch(&self) -> Scratch {
-        Scratch { walk: self.engine.scratch(), selection: self.selector.as_ref().map(Selector::scratch) }
+        self.scratch_for(Wanted::Derivatives)
+    }
+
+    fn scratch_for(&self, wanted: Wanted) -> Scratch {
+        Scratch { walk: self.engine.scratch(), selection: self.selector(wanted).map(Selector::scratch) }
+    }
+
+    /// What looks at all orders, where it is needed: standard errors say how far the orders disagree.
+    fn selector(&self, wanted: Wanted) -> Option<&Selector> {
+        if wanted == Wanted::Derivatives && self.options.selection == Selection::Window {
+            return None;
+        }
+        self.selector.get_or_init(|| Selector::new(&self.options, &self.basis)).as_ref()
     }
 
     /// Windows that are worked on side by side: a record may be cut anywhere, but multiples of this waste nothing.
@@ -284,7 +298,7 @@ impl LocalPolynomials {
     ) {
         let before = self.before_centre();
         let windows = samples.start - before..samples.end - before;
-        if let (Some(selector), Some(scratch)) = (&self.selector, &mut scratch.selection) {
+        if let (Some(selector), Some(scratch)) = (self.selector(wanted), &mut scratch.selection) {
             selector.estimate(record, windows, wanted, estimates, scratch);
             return;
         }
@@ -302,7 +316,7 @@ impl LocalPolynomials {
 
     /// The orders that share in a window, where it does not choose for itself.
     fn orders_at(&self, record: &dyn Samples, window: usize, scratch: &mut Scratch) -> Option<Vec<(usize, f64)>> {
-        let (selector, scratch) = (self.selector.as_ref()?, scratch.selection.as_mut()?);
+        let (selector, scratch) = (self.selector(Wanted::Derivatives)?, scratch.selection.as_mut()?);
         Some(selector.orders(record, window, scratch))
     }
 
@@ -327,13 +341,13 @@ impl LocalPolynomials {
             };
             debug_assert_eq!(outcome, Ok(()), "the lengths of all records were checked");
         };
-        parallel::run(self.pieces(records, ends)?, workers, || self.scratch(), work, watch)
+        parallel::run(self.pieces(records, ends, Wanted::Derivatives)?, workers, || self.scratch(), work, watch)
     }
 
     /// Standard errors in the place of derivatives, at all samples of several records, in parallel.
     ///
-    /// They are the noise times the gain of the order chosen; where orders were averaged, `Σ w_n √(σ_n² g_n² + (d_n - d)²)`. The plan must
-    /// know the noise, and all outputs must be wanted.
+    /// They are the noise times the gain of the order that is given; where it was chosen, `Σ w_n √(σ_n² g_n² + (d_n - d)²)`, `d` the estimate.
+    /// The plan must know the noise, and all outputs must be wanted.
     ///
     /// # Errors
     /// As [`LocalPolynomials::run`].
@@ -347,7 +361,8 @@ impl LocalPolynomials {
             let outcome = self.everywhere(record, samples, Wanted::Errors, &mut estimates, scratch);
             debug_assert_eq!(outcome, Ok(()), "the lengths of all records were checked");
         };
-        parallel::run(self.pieces(records, true)?, workers, || self.scratch(), work, watch)
+        let pieces = self.pieces(records, true, Wanted::Errors)?;
+        parallel::run(pieces, workers, || self.scratch_for(Wanted::Errors), work, watch)
     }
 
     /// Cuts records into pieces of work.
@@ -355,8 +370,9 @@ impl LocalPolynomials {
         &self,
         records: Vec<(&'a dyn Samples, Estimates<'b>)>,
         ends: bool,
+        wanted: Wanted,
     ) -> Result<Vec<Piece<Part<'a, 'b>>>, Error> {
-        let least = self.selector.as_ref().map_or(0, Selector::least_piece);
+        let least = self.selector(wanted).map_or(0, Selector::least_piece);
         let piece = PIECE.max(least).next_multiple_of(self.stride());
         let mut pieces = Vec::new();
         for (record, mut estimates) in records {

@@ -17,6 +17,8 @@ pub(crate) struct Pool {
     /// Sums from an entry to the end of its block, and from the beginning of its block to it. Entry `e` is window `e - R`.
     suffix: Vec<f64>,
     prefix: Vec<f64>,
+    /// What was summed last.
+    totals: Vec<f64>,
 }
 
 impl Pool {
@@ -39,6 +41,17 @@ impl Pool {
 
     /// Tries an order, the lower ones before: `scores` are those of the windows from `first` on.
     pub(crate) fn add(&mut self, order: usize, scores: &[f64], first: usize) {
+        self.sum(scores, first);
+        let number = u8::try_from(order).unwrap_or(u8::MAX);
+        for ((total, lowest), best) in self.totals.iter().zip(&mut self.lowest).zip(&mut self.order) {
+            if total < lowest {
+                (*lowest, *best) = (*total, number);
+            }
+        }
+    }
+
+    /// Sums numbers of the windows from `first` on around each of the windows begun with.
+    pub(crate) fn sum(&mut self, scores: &[f64], first: usize) {
         let (reach, block) = (self.reach, 2 * self.reach + 1);
         let entries = entries(&self.windows, reach);
         let score = |entry: usize| entry.checked_sub(reach + first).and_then(|place| scores.get(place)).unwrap_or(&0.0);
@@ -56,16 +69,16 @@ impl Pool {
             sum = after + score(entry);
             *suffix = sum;
         }
-        let number = u8::try_from(order).unwrap_or(u8::MAX);
-        for ((window, lowest), best) in self.windows.clone().zip(&mut self.lowest).zip(&mut self.order) {
-            let mut total = self.suffix[window - entries.start];
-            if window % block != 0 {
-                total += self.prefix[window + 2 * reach - entries.start];
-            }
-            if total < *lowest {
-                (*lowest, *best) = (total, number);
-            }
-        }
+        self.totals.clear();
+        self.totals.extend(self.windows.clone().map(|window| {
+            let total = self.suffix[window - entries.start];
+            if window % block == 0 { total } else { total + self.prefix[window + 2 * reach - entries.start] }
+        }));
+    }
+
+    /// What was summed last, one number for each of the windows begun with.
+    pub(crate) fn totals(&self) -> &[f64] {
+        &self.totals
     }
 
     /// The best order of a window.

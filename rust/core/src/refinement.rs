@@ -11,6 +11,11 @@
 //! `n` the samples of the neighbourhood, `g` and `v` gain and leverage of the best there: `T` is the noise of the derivative per degree of
 //! freedom, for a fit has some `v` degrees of freedom a sample, and `σ² g/v` is a third of that of its highest frequency.
 //!
+//! The least error has bias: where `b² + v` is least over windows, with `b` of the power `p` of the half-width and `v` of the power
+//! `-(2d + 1)`, `b² = (2d + 1)/(2p) v`, a third of the variance for θ̈. So the standard error holds both. The squared bias of a
+//! candidate is its mean squared difference from the reference in the neighbourhood less the variance of that difference, or nothing
+//! where that is negative. The standard error of an average is `√Σ w_c (b_c² + σ² g_c + (d_c - d)²)` (Burnham and Anderson 2002, section 4.3.2).
+//!
 //! Sums are kept for blocks of a quarter of the half-width, and weights are linear between the blocks' centres.
 
 use std::num::NonZeroUsize;
@@ -48,8 +53,10 @@ pub(crate) struct Refinement {
     blocks: Blocks,
     /// Samples in half a neighbourhood.
     reach: f64,
-    /// By candidate of all banks: twice the covariance with the reference and what optimism adds; `T`; variance; order.
+    /// By candidate of all banks: twice the covariance with the reference and what optimism adds; variance of the difference from the
+    /// reference; `T`; variance; order.
     offsets: Vec<f64>,
+    differences: Vec<f64>,
     temperatures: Vec<f64>,
     variances: Vec<f64>,
     orders: Vec<u8>,
@@ -68,6 +75,14 @@ pub(crate) struct Outputs<'a> {
     pub(crate) values: &'a mut [f64],
     pub(crate) errors: &'a mut [f64],
     pub(crate) order: &'a mut [u8],
+}
+
+/// What is known of every candidate in every block, block by block.
+struct Weighed {
+    /// Logarithms of weights.
+    logarithms: Vec<f64>,
+    /// Squared biases.
+    biases: Vec<f64>,
 }
 
 /// Memory of one thread.
@@ -94,12 +109,14 @@ impl Refinement {
         halves.retain(|&half| half >= SHORTEST && 2 * half < samples / 2);
         let banks: Vec<Bank> = halves.into_iter().filter_map(|half| Bank::new(half, target)).collect();
         let compared = reference.bank.kernel(reference.candidate);
-        let (mut offsets, mut temperatures) = (Vec::new(), Vec::new());
+        let reference_gain = reference.bank.gains[reference.candidate];
+        let (mut offsets, mut differences, mut temperatures) = (Vec::new(), Vec::new(), Vec::new());
         let (mut variances, mut orders) = (Vec::new(), Vec::new());
         for bank in &banks {
             for (candidate, (gain, leverage)) in bank.gains.iter().zip(&bank.leverages).enumerate() {
                 let shared = product(&bank.kernel(candidate), &compared, bank.half);
                 offsets.push(variance * (2.0 * shared + (OPTIMISM - 1.0) * gain));
+                differences.push(variance * (gain + reference_gain - 2.0 * shared));
                 temperatures.push((3.0 * variance * gain / leverage).max(f64::MIN_POSITIVE));
                 variances.push(variance * gain);
             }
@@ -107,7 +124,7 @@ impl Refinement {
         }
         let blocks = Blocks::new(samples, (pair.half / BLOCKS).max(1));
         let reach = NEIGHBOURHOOD * half;
-        Some(Self { banks, reference, blocks, reach, offsets, temperatures, variances, orders })
+        Some(Self { banks, reference, blocks, reach, offsets, differences, temperatures, variances, orders })
     }
 
     pub(crate) fn reference(&self) -> &Reference {
@@ -139,7 +156,7 @@ impl Refinement {
             };
             parallel::run(pieces, workers, || self.scratch(), work, &mut |done, _| watch(done, total))?;
         }
-        let logarithms = self.weigh(&sums, &counts);
+        let weighed = self.weigh(&sums, &counts);
         drop((sums, counts));
         let mut pieces = Vec::new();
         let Outputs { values, errors, order } = outputs;
@@ -154,7 +171,7 @@ impl Refinement {
             pieces.push(Piece { size, content: (part, own) });
         }
         let work = |(part, mut outputs): (Range<usize>, Outputs<'_>), scratch: &mut Scratch| {
-            self.average(record, part, &logarithms, &mut outputs, scratch);
+            self.average(record, part, &weighed, &mut outputs, scratch);
         };
         let samples = record.len();
         parallel::run(pieces, workers, || self.scratch(), work, &mut |done, _| watch(samples + done, total))
@@ -224,8 +241,8 @@ impl Refinement {
         }
     }
 
-    /// The logarithm of every candidate's weight in every block, from the risk around it.
-    fn weigh(&self, sums: &[f64], counts: &[f64]) -> Vec<f64> {
+    /// The logarithm of every candidate's weight and its squared bias in every block, from the risk around it.
+    fn weigh(&self, sums: &[f64], counts: &[f64]) -> Weighed {
         let (blocks, candidates, length) = (self.blocks.count(), self.offsets.len(), self.blocks.length as f64);
         let bank_of: Vec<usize> =
             self.banks.iter().enumerate().flat_map(|(place, bank)| vec![place; bank.orders.len()]).collect();
@@ -237,9 +254,11 @@ impl Refinement {
         let bell: Vec<f64> = (0..=reach).map(bell).collect();
         let neighbourhood = length * (2.0 * bell.iter().sum::<f64>() - bell[0]);
         let mut weights = vec![0.0; blocks * candidates];
+        let mut biases = vec![0.0; blocks * candidates];
         let mut sum = vec![0.0; candidates];
         let mut count = vec![0.0; self.banks.len()];
-        for (block, weights) in weights.chunks_exact_mut(candidates).enumerate() {
+        let rows = weights.chunks_exact_mut(candidates).zip(biases.chunks_exact_mut(candidates));
+        for (block, (weights, biases)) in rows.enumerate() {
             sum.fill(0.0);
             count.fill(0.0);
             for other in block.saturating_sub(reach)..(block + reach + 1).min(blocks) {
@@ -247,9 +266,14 @@ impl Refinement {
                 add(&mut sum, &sums[other * candidates..(other + 1) * candidates], weight);
                 add(&mut count, &counts[other * self.banks.len()..(other + 1) * self.banks.len()], weight);
             }
-            for (candidate, weight) in weights.iter_mut().enumerate() {
+            for (candidate, (weight, bias)) in weights.iter_mut().zip(&mut *biases).enumerate() {
                 let count = count[bank_of[candidate]];
-                *weight = if count > 0.0 { sum[candidate] / count + self.offsets[candidate] } else { f64::INFINITY };
+                *weight = f64::INFINITY;
+                if count > 0.0 {
+                    let difference = sum[candidate] / count;
+                    *weight = difference + self.offsets[candidate];
+                    *bias = (difference - self.differences[candidate]).max(0.0);
+                }
             }
             let best = (0..candidates).min_by(|&a, &b| weights[a].total_cmp(&weights[b]));
             let Some(best) = best.filter(|&best| weights[best].is_finite()) else {
@@ -262,7 +286,7 @@ impl Refinement {
                 *weight = (least - *weight) / (2.0 * temperature) * neighbourhood;
             }
         }
-        weights
+        Weighed { logarithms: weights, biases }
     }
 
     /// Averages the candidates of some blocks' samples.
@@ -270,14 +294,15 @@ impl Refinement {
         &self,
         record: &dyn Samples,
         blocks: Range<usize>,
-        logarithms: &[f64],
+        weighed: &Weighed,
         outputs: &mut Outputs<'_>,
         scratch: &mut Scratch,
     ) {
         let (samples, candidates) = (self.samples(&blocks), self.offsets.len());
         // Weights are linear between the centres of neighbouring blocks.
         let around = blocks.start.saturating_sub(1)..(blocks.end + 1).min(self.blocks.count());
-        let logarithms = &logarithms[around.start * candidates..around.end * candidates];
+        let part = around.start * candidates..around.end * candidates;
+        let (logarithms, biases) = (&weighed.logarithms[part.clone()], &weighed.biases[part]);
         let mut weights = logarithms.to_vec();
         weights.chunks_exact_mut(candidates).for_each(normalise);
         let weighed = |candidate: usize| weights[candidate..].iter().step_by(candidates).any(|&weight| weight > 0.0);
@@ -286,10 +311,12 @@ impl Refinement {
         let mut missing = Vec::new();
         for (place, sample) in samples.clone().enumerate() {
             let (low, high, distance) = self.blocks.between(sample);
-            let row = |block: usize| &weights[(block - around.start) * candidates..][..candidates];
-            let (low, high) = (row(low), row(high));
-            let weight = |candidate: usize| low[candidate] + distance * (high[candidate] - low[candidate]);
-            if !self.mix(weight, &used, place, outputs, scratch) {
+            let between = |numbers: &[f64], candidate: usize| {
+                let of = |block: usize| numbers[(block - around.start) * candidates + candidate];
+                of(low) + distance * (of(high) - of(low))
+            };
+            let (weight, bias) = (|one: usize| between(&weights, one), |one: usize| between(biases, one));
+            if !self.mix(weight, bias, &used, place, outputs, scratch) {
                 missing.push((place, self.blocks.of(sample)));
             }
         }
@@ -301,11 +328,13 @@ impl Refinement {
         self.fill(record, &samples, &rest, scratch);
         let all = vec![true; candidates];
         for (place, block) in missing {
-            let row = &logarithms[(block - around.start) * candidates..][..candidates];
+            let own = (block - around.start) * candidates..(block - around.start + 1) * candidates;
+            let (row, biases) = (&logarithms[own.clone()], &biases[own]);
             let fits =
                 (0..candidates).filter(|&one| !scratch.rows[one][place].is_nan() && row[one] > f64::NEG_INFINITY);
             let best = fits.max_by(|&a, &b| row[a].total_cmp(&row[b]));
-            self.mix(|candidate| f64::from(u8::from(Some(candidate) == best)), &all, place, outputs, scratch);
+            let chosen = |candidate| f64::from(u8::from(Some(candidate) == best));
+            self.mix(chosen, |candidate| biases[candidate], &all, place, outputs, scratch);
         }
     }
 
@@ -337,6 +366,7 @@ impl Refinement {
     fn mix(
         &self,
         weight: impl Fn(usize) -> f64,
+        bias: impl Fn(usize) -> f64,
         used: &[bool],
         place: usize,
         outputs: &mut Outputs<'_>,
@@ -362,7 +392,8 @@ impl Refinement {
         }
         if let Some(error) = outputs.errors.get_mut(place) {
             let square = |(candidate, weight): (usize, f64)| {
-                weight * (self.variances[candidate] + (scratch.rows[candidate][place] - value).powi(2))
+                weight
+                    * (bias(candidate) + self.variances[candidate] + (scratch.rows[candidate][place] - value).powi(2))
             };
             *error = (known().map(square).sum::<f64>() / total).sqrt();
         }
