@@ -137,8 +137,9 @@ class LocalPolynomialFit:
         what the polynomial could not follow is not in them. Where it was chosen, or averaged, another recording would have led to
         another one, so the orders' disagreement is in them: :math:`\sum_n w_n \sqrt{σ_n^2 g_n^2 + (d_n - \hat d)^2}` around the estimate
         (Burnham and Anderson 2002, section 4.3.2), with Akaike's weights of the window's criterion; for ``selection="pooled"`` of
-        the neighbours' mean, which is worth 2.4 windows. On the simulated rig intervals of 95 % hold the truth in 92 to 97 %, where ``sigma``
-        times gain alone would do in 70 to 95 %. Where windows were chosen they hold the disagreement of all candidates and the bias
+        the neighbours' mean, which is worth 2.4 windows. On the simulated rig intervals of 95 % hold the truth in 92 to 97 %, where
+        ``sigma`` times gain alone would do in 70 to 95 %. Where windows were chosen they hold the disagreement of all candidates and
+        the bias
         found around each sample. Within half a window of the ends they are those of the order that was taken there.
 
         The cost is some 300 ns a sample; that of the fit where the order is fixed; nothing where windows were chosen.
