@@ -122,6 +122,7 @@ def test_windows_within_one_stroke_do_not_tell_friction_from_offset(folder_of_re
         position,
         force,
         sample_rate=1000,
+        preset="paper",
         form=form,
         window_length=51,
         equations="0.2 s",

@@ -166,13 +166,13 @@ def test_known_coefficients_that_change_are_integrated_by_parts_too() -> None:
             preset="paper",
             form="weak",
             window_length=161,
-            equations=400,
+            equations=200,
             variation="linear",
             **known,
         )
         valid = result.status & (Status.INVALID | Status.EDGE) == 0
         found = getattr(result, unknown)[valid]
-        # A coefficient that bends within a window of 0.4 s is followed by a line.
+        # A coefficient that bends within a window of 0.2 s is followed by a line.
         np.testing.assert_allclose(found, everything[unknown][valid] + true, rtol=0.02)
 
 

@@ -66,8 +66,9 @@ class Explained:
         common = Status(int(np.bitwise_and.reduce(self.found["status"])))
         if Status.RANK_DEFICIENT in common:
             undetermined = (
-                "the equations do not determine the parameters: check that angle and torque are the right channels and move, "
-                "leave a term out, or give what is known"
+                f"the record does not determine {_listed(list(self.names.values()))}: nothing moves, or a single frequency does not tell "
+                "inertia from stiffness: check that angle and torque are the right channels, excite two or more frequencies, leave a "
+                "term out, or give what is known"
             )
             return Words((self._noise(),), (undetermined,))
         reasons = (self._noise(), self._test_function(), *self._lag(), *self._windows(), *self._kinds(), *self._jumps())

@@ -64,6 +64,8 @@ pub(crate) struct Search<'a> {
     pub(crate) first: usize,
     pub(crate) stride: usize,
     pub(crate) expected: Expected,
+    /// What variances are multiplied by.
+    pub(crate) inflation: f64,
     pub(crate) constants: &'a [f64],
     /// All lengths of windows, and those that jumps are looked for with.
     pub(crate) scales: &'a [Scale],
@@ -113,7 +115,7 @@ impl Search<'_> {
     /// Stretches of rows around which so much is left that a jump could be believed to make it less.
     fn conspicuous(&self, errors: &[f64]) -> Vec<Range<usize>> {
         let reach = 2 * (self.function.len() / 2).div_ceil(self.stride);
-        let least = BELIEVED * self.expected.redundancy * self.expected.variance / CONSPICUOUS;
+        let least = BELIEVED * self.noise(0.0, 1.0) / CONSPICUOUS;
         let mut found: Vec<Range<usize>> = Vec::new();
         let mut sum = 0.0;
         for row in 0..errors.len() + reach {
@@ -179,7 +181,7 @@ impl Search<'_> {
         let after = windows.seen(self.problem, row, 2)?;
         let squared = (0..self.problem.layout.windowed).map(|unknown| {
             let difference = after.value(unknown) - before.value(unknown);
-            difference * difference / (after.variance(unknown) + before.variance(unknown))
+            difference * difference / (self.inflation * (after.variance(unknown) + before.variance(unknown)))
         });
         Some(squared.fold(0.0, f64::max))
     }
@@ -263,7 +265,7 @@ impl Search<'_> {
             }
             count += 1;
         }
-        (count > 2).then_some(left)
+        (2 * count >= over.len()).then_some(left)
     }
 
     /// Whether a jump is more than chance: windows of no length may predict the rows around it nearly as well without one.
@@ -300,7 +302,7 @@ impl Search<'_> {
 
     /// The variance of the sum of squares of rows that stand for one independent row, at least that of the noise.
     fn noise(&self, left: f64, count: f64) -> f64 {
-        self.expected.redundancy * self.expected.variance.max(left / count)
+        self.expected.redundancy * (self.inflation * self.expected.variance).max(left / count)
     }
 
     /// A jump with the probability of every place of it.

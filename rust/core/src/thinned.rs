@@ -139,10 +139,10 @@ mod tests {
         assert_eq!(whole.len(), 17);
         assert_eq!((whole[4], whole[6], whole[16]), (7.0, 40.0, 94.0));
         assert!(whole[5].is_nan() && whole[11].is_nan());
-        for first in 0..17 {
+        for (first, sample) in whole.iter().enumerate() {
             let mut one = [0.0];
             thinned.read(first, &mut one);
-            assert_eq!(one[0].to_bits(), whole[first].to_bits());
+            assert_eq!(one[0].to_bits(), sample.to_bits());
         }
     }
 }

@@ -13,7 +13,7 @@ use crate::scale::Scale;
 use crate::thinned::{holds, stretches_of_rows, thinned_rows};
 use crate::varying;
 use crate::weak_form::{Ones, Record, TermSamples, WeakRows, Whole};
-use crate::weak_identification::{Chosen, Kind, Session};
+use crate::weak_identification::{Chosen, Kind, NOISE_MODEL_FAILS, Session};
 use crate::weak_report::residuals;
 use crate::windows::Problem;
 
@@ -81,9 +81,7 @@ impl Session<'_, '_, '_> {
         loop {
             let mut decided = self.decide_kinds(chosen, model)?;
             let found = match jumps.len() {
-                rounds if rounds < JUMP_ROUNDS => {
-                    self.find_jumps(&chosen.weak, &decided, jumps.last(), whole.as_ref())?
-                }
+                rounds if rounds < JUMP_ROUNDS => self.find_jumps(&chosen.weak, &decided, jumps.last(), whole.as_ref()),
                 _ => jumps.last().cloned().unwrap_or_default(),
             };
             let samples = |jumps: &[Jump]| jumps.iter().map(|jump| jump.sample).collect::<Vec<_>>();
@@ -248,15 +246,19 @@ impl Session<'_, '_, '_> {
 
     /// Finds jumps of what is windowed beside those that are known. `whole` holds all rows where some are over jumps.
     fn find_jumps(
-        &mut self,
+        &self,
         weak: &WeakRows,
         decided: &Decided,
         known: Option<&Vec<Jump>>,
         whole: Option<&Rows>,
-    ) -> Result<Vec<Jump>, Error> {
+    ) -> Vec<Jump> {
         let known = known.map_or(&[][..], Vec::as_slice);
+        if decided.error > NOISE_MODEL_FAILS {
+            // What is left is more than noise everywhere, so it tells nothing of jumps.
+            return known.to_vec();
+        }
         let signals = signals(&self.record, &decided.model).filter(|_| self.options.average);
-        let (Some(signals), Some(fit)) = (signals, &decided.fit) else { return Ok(known.to_vec()) };
+        let (Some(signals), Some(fit)) = (signals, &decided.fit) else { return known.to_vec() };
         let signals: Vec<&dyn Samples> = signals.iter().map(|signal| &**signal).collect();
         let (constants, noise) = (&fit.pooled.values, self.noise[0]);
         let problem = decided.model.problem(&weak.rows, decided.side(&weak.rows), noise, Some(&decided.covariance));
@@ -278,12 +280,13 @@ impl Session<'_, '_, '_> {
             first: weak.first,
             stride: weak.stride,
             expected: decided.expected,
+            inflation: decided.error.max(1.0),
             constants,
             scales: &decided.scales,
             lengths: &lengths,
             instructions: self.options.instructions,
         };
-        Ok(search.find(&residuals(&problem, fit).0, known))
+        search.find(&residuals(&problem, fit).0, known)
     }
 
     /// Finds what changes slowly, and the other constants beside it.

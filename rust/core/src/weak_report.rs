@@ -114,12 +114,7 @@ impl Session<'_, '_, '_> {
             let variance = found.covariance[(place + slow) * (count + 1)];
             found.constants.push(Constant { unknown, value: values[place + slow], error: variance.sqrt(), test });
         }
-        let constants = ordered.constant.iter().enumerate().skip(slow);
-        for (place, &one) in constants.clone() {
-            for (before, &other) in constants.clone().take_while(|(before, _)| *before < place) {
-                found.constant_pairs.push((one, other, found.covariance[place * count + before]));
-            }
-        }
+        found.constant_pairs = pairs_of(&ordered.constant, slow, &found.covariance);
         let mut status = errors.status;
         let contradicted = |one: &Constant| one.test.as_ref().is_some_and(|test| test.probability < NO_CHANCE);
         if found.constants.iter().any(contradicted) {
@@ -457,6 +452,12 @@ impl Session<'_, '_, '_> {
         }
         Ok(suspects)
     }
+}
+
+/// Pairs of constants, those that change slowly and come first left out, and their covariance.
+fn pairs_of(constants: &[usize], slow: usize, covariance: &[f64]) -> Vec<(usize, usize, f64)> {
+    let pairs = (slow..constants.len()).flat_map(|one| (slow..one).map(move |other| (one, other)));
+    pairs.map(|(one, other)| (constants[one], constants[other], covariance[one * constants.len() + other])).collect()
 }
 
 /// The window whose middle is nearest to a row.
