@@ -34,6 +34,7 @@ class Collected:
         self.errors: dict[str, Array] = {}
         self.covariances: dict[frozenset[str], Array] = {}
         self.constants: dict[str, tuple[Any, Any]] = {}
+        self.jumps: list[list[int]] = [[]] * int(np.prod(batch, dtype=int))
 
     def _shaped(self, array: npt.NDArray[Any]) -> npt.NDArray[Any]:
         return array.reshape(*self._batch, array.shape[-1])
@@ -99,6 +100,7 @@ class Collected:
         def gathered(name: str) -> npt.NDArray[Any]:
             return every([one[name] for one in found])
 
+        self.jumps = [one.get("jumps", []) for one in found]
         self.residual_std, self.condition = gathered("deviations"), gathered("conditions")
         self.status = gathered("status")
         self.order = gathered("order") if "order" in found[0] else np.zeros(self.status.shape, np.uint8)

@@ -470,6 +470,7 @@ class _Task:
             "quantisation",
         )
         terms = tuple((one.own or one.name, one.kind) for one in self.unknowns if one.name not in COEFFICIENTS)
+        jumps: tuple[Any, ...] = tuple(tuple(self.time[samples].tolist()) for samples in found.jumps)
         return Identification(
             time=self.time[:: self.step],
             values=found.values,
@@ -481,6 +482,7 @@ class _Task:
             residual_std=found.residual_std,
             order=found.order,
             status=found.status,
+            jumps=jumps if found.status.ndim > 1 else jumps[0],
             settings={
                 **{name: used[name] for name in same},
                 "sample_rate": 1 / self.period,

@@ -150,6 +150,8 @@ class Identification:
         Order of the polynomial around each sample; 0 in weak form, which has none.
     status : ndarray of uint16, shape (\*, n)
         Flags of :class:`tvident.Status`.
+    jumps : tuple of float
+        Times in seconds at which what is windowed jumps, where windows of all lengths are averaged; one such tuple a record in a batch.
     settings : dict
         What was used, what was chosen, in words why (``"reasons"``) and what to do (``"advice"``). ``identify(…, settings=…)`` uses it
         again.
@@ -178,6 +180,7 @@ class Identification:
         residual_std: Array,
         order: npt.NDArray[np.uint8],
         status: npt.NDArray[np.uint16],
+        jumps: tuple[Any, ...],
         settings: dict[str, Any],
     ) -> None:
         self.time = time
@@ -190,6 +193,7 @@ class Identification:
         self.residual_std = residual_std
         self.order = order
         self.status = status
+        self.jumps = jumps
         self.settings = settings
         self._oscillator = _Oscillator(self.inertia, self.damping, self.stiffness, errors, covariances)
         computed = {

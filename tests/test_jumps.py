@@ -1,0 +1,95 @@
+"""Jumps of the stiffness: found where they are, and nowhere else."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import tvident
+from tvident import Status
+
+Array = npt.NDArray[np.float64]
+
+NEAR = 0.02
+"""Seconds by which a jump may be misplaced: a tenth of a cycle, for near zero of the angle a spring tells nothing."""
+ERROR = 0.03
+"""Error of the stiffness of one recording where it jumps every 4 s, rms over its mean: the median of many is below 0.015."""
+INTERIOR = slice(1500, -1500)
+
+
+def recorded(pattern: Any, *, angle_noise: float = 1e-2, counts: int | None = None, seed: int = 7) -> tvident.Recording:
+    return tvident.simulate_torsional_rig(
+        20.0,
+        seed=seed,
+        pattern=pattern,
+        torque_snr_db=20.0,
+        angle_noise=angle_noise,
+        encoder_counts=counts,
+    )
+
+
+def identify(recording: tvident.Recording) -> tvident.Identification:
+    return tvident.identify(recording.angle, recording.torque, sample_rate=1000)
+
+
+@pytest.mark.parametrize("angle_noise", [1e-6, 1e-3, 1e-2, 3e-2, 1e-1])
+def test_every_jump_is_found_and_windows_end_there(angle_noise: float) -> None:
+    recording = recorded("square", angle_noise=angle_noise)
+    result = identify(recording)
+    true = recording.time[1:][np.abs(np.diff(recording.stiffness)) > 1]
+    np.testing.assert_allclose(result.jumps, true, atol=NEAR)
+    error = (result.stiffness - recording.stiffness)[INTERIOR]
+    assert np.sqrt(np.mean(error**2)) < ERROR * recording.stiffness.mean()
+    assert "jumps 4 times, at" in result.summary()
+    # Errors hold beside jumps too, where the place of the jump is part of them.
+    beside = np.abs(recording.time[:, np.newaxis] - true).min(axis=1) < 0.1
+    within = np.abs(result.stiffness - recording.stiffness) < 4 * result.stderr["stiffness"]
+    assert within[beside].mean() > 0.95
+    assert (result.status & (Status.GAP | Status.INVALID | Status.COLOURED) == 0).all()
+
+
+@pytest.mark.parametrize("pattern", ["slider", "ramp", "constant"])
+@pytest.mark.parametrize("angle_noise", [1e-6, 1e-2, 1e-1])
+def test_none_is_invented(pattern: str, angle_noise: float) -> None:
+    for seed in range(3):
+        assert identify(recorded(pattern, angle_noise=angle_noise, seed=seed)).jumps == ()
+
+
+def test_none_is_invented_where_inertia_and_damping_change() -> None:
+    recording = tvident.simulate_torsional_rig(
+        40.0,
+        angle_noise=1e-6,
+        inertia=lambda t: 0.0123 * (1 + 0.3 * np.sin(2 * np.pi * 0.1 * t + 0.5)),
+        damping=lambda t: 0.025 * (1 + 0.5 * np.sin(2 * np.pi * 0.07 * t + 1)),
+    )
+    result = identify(recording)
+    assert result.jumps == ()
+    assert result.settings["kinds"]["inertia"] == result.settings["kinds"]["damping"] == "varying"
+
+
+def test_a_jump_between_records_that_are_masked_is_placed_by_what_is_left() -> None:
+    recording = recorded("square")
+    mask = np.ones(recording.time.size, bool)
+    mask[2000:2300] = False
+    result = tvident.identify(recording.angle, recording.torque, sample_rate=1000, mask=mask)
+    assert len(result.jumps) == 4
+    assert (result.status[2100:2200] & Status.GAP != 0).all()
+
+
+def test_an_encoder_hides_no_jump() -> None:
+    recording = recorded("square", counts=1024)
+    true = recording.time[1:][np.abs(np.diff(recording.stiffness)) > 1]
+    np.testing.assert_allclose(identify(recording).jumps, true, atol=NEAR)
+
+
+def test_every_record_of_a_batch_has_its_own() -> None:
+    both = [recorded(pattern) for pattern in ("square", "constant")]
+    angle, torque = (np.stack([getattr(one, name) for one in both]) for name in ("angle", "torque"))
+    result = tvident.identify(angle, torque, sample_rate=1000)
+    assert [len(jumps) for jumps in result.jumps] == [4, 0]
+    alone = identify(both[0])
+    assert result.jumps[0] == alone.jumps
+    np.testing.assert_array_equal(result.stiffness[0], alone.stiffness)
