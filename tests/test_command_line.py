@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import csv
 import fcntl
+import json
 import os
 import pty
 import select
@@ -229,6 +230,26 @@ def test_every_setting_has_an_option_and_may_be_kept_in_a_file(recording: Path, 
     np.testing.assert_array_equal(found["inertia [kg m^2]"], smoothed.inertia)
 
 
+def test_lag_quantisation_and_missing_values_have_options(tmp_path: Path) -> None:
+    rig = tvident.simulate_torsional_rig(duration=10, encoder_counts=4096)
+    angle, torque = rig.angle[2:].copy(), rig.torque[:-2]  # the torque comes two samples late
+    angle[3000:3010] = np.nan
+    np.savez(tmp_path / "rig.npz", angle=angle, torque=torque)
+    common = ("identify", "rig.npz", "--angle", "angle", "--torque", "torque", "--sample-rate", 1000)
+    step = 2 * np.pi / 4096
+    for policy in ("omit", "propagate"):
+        options = ("--lag", "auto", "--quantisation", step, "--nan-policy", policy)
+        done = run(*common, *options, "--settings-output", "chosen.json", "-o", "result.npz", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        expected = tvident.identify(angle, torque, sample_rate=1000, lag="auto", quantisation=step, nan_policy=policy)
+        found = recordings.read(tmp_path / "result.npz")
+        np.testing.assert_array_equal(found["stiffness [N m/rad]"], expected.stiffness)
+        assert json.loads((tmp_path / "chosen.json").read_text())["lag"] == pytest.approx(expected.settings["lag"])
+    refused = run(*common, "--nan-policy", "raise", cwd=tmp_path)
+    assert refused.returncode == 2
+    assert "angle" in refused.stderr
+
+
 GOOD = ("--angle", "angle", "--torque", "torque", "--sample-rate", "1000")
 
 
@@ -254,6 +275,7 @@ GOOD = ("--angle", "angle", "--torque", "torque", "--sample-rate", "1000")
         (("identify", "FILE", *GOOD, "--settings", "few.npz", "--preset", "paper"), 2, "--settings hold a preset"),
         (("identify", "FILE", *GOOD, "--settings-output", "no/such/s.json"), 1, "no/such: there is no such folder"),
         (("identify", "FILE", *GOOD, "--filter-torque"), 2, "filter_torque belongs to the strong form; got True"),
+        (("identify", "FILE", *GOOD, "--lag", "soon"), 2, "such as '2 ms', or 'auto'; got 'soon'"),
         (("identify", *GOOD), 2, "channel 'angle' needs a FILE"),
         (("identify", "missing.csv", *GOOD), 1, "missing.csv: there is no such file"),
         (("identify", "FILE", *GOOD, "--time", "time"), 2, "only one of --sample-rate, --delta, --time; got"),

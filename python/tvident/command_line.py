@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, Literal, TypeVar, get_args
 
 import click
 import numpy as np
@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 import tvident
 from tvident import recordings, table
-from tvident.arguments import NanPolicy
+from tvident.arguments import NanPolicy, RowPolicy
 from tvident.derivatives import Criterion, Selection
 from tvident.rig import Excitation, Pattern
 from tvident.settings import Form, Preset, Variation
@@ -79,13 +79,6 @@ _TIME = _options(
 )
 _RUN = _options(
     click.option("--step", type=int, default=1, show_default=True, help="Every how many samples a result is wanted."),
-    click.option(
-        "--nan-policy",
-        type=click.Choice(get_args(NanPolicy)),
-        default="propagate",
-        show_default=True,
-        help="Missing values.",
-    ),
     click.option("--workers", type=int, help="Threads; by default all processors."),
     click.option("--progress/--no-progress", default=None, help="Show progress; by default on a terminal."),
     click.option(
@@ -220,6 +213,13 @@ def _remark(values: npt.NDArray[Any]) -> str:
 )
 @click.option("--quantisation", type=float, help="Step that the channel was rounded to; looked for if not given.")
 @click.option("--max-deriv", type=int, default=2, show_default=True, help="Highest derivative.")
+@click.option(
+    "--nan-policy",
+    type=click.Choice(get_args(NanPolicy)),
+    default="propagate",
+    show_default=True,
+    help="Missing values.",
+)
 @_RUN
 def derivatives(
     file: str,
@@ -287,7 +287,10 @@ def derivatives(
     metavar="TERM[:KIND]",
     help="offset, coulomb or cubic; may be repeated; none leaves out the offset of --preset auto.",
 )
-@click.option("--lag", metavar="TIME", help="By how much the torque was recorded late: seconds, or '2 ms'.")
+@click.option("--lag", metavar="TIME", help="By how much the torque was recorded late: seconds, '2 ms', or auto.")
+@click.option(
+    "--quantisation", type=float, help="Step that the angle was rounded to; looked for if not given; 0: none."
+)
 @click.option("--mask", metavar="NAME", help="Channel, or file, that is not zero where a sample may be used.")
 @click.option("--form", type=click.Choice(get_args(Form)), help="Test functions (weak) or derivatives (strong).")
 @click.option(
@@ -310,6 +313,13 @@ def derivatives(
     "--settings", type=click.Path(), help="What an earlier run chose: a JSON file that --settings-output wrote."
 )
 @click.option("--settings-output", type=click.Path(dir_okay=False), help="JSON file for what this run chose.")
+@click.option(
+    "--nan-policy",
+    type=click.Choice(get_args(RowPolicy)),
+    default="omit",
+    show_default=True,
+    help="Missing values: omit their equations, propagate them to all windows that hold one, or raise.",
+)
 @_RUN
 def identify(
     file: str | None,
@@ -344,7 +354,7 @@ def identify(
         _scaled(_source(channels, angle, file), angle_scale, channels, file),
         _scaled(_source(channels, torque, file), torque_scale, channels, file),
         t=None if time_channel is None else _channel(channels, time_channel, file),
-        lag=None if lag is None else _seconds(lag),
+        lag=None if lag is None else _lag(lag),
         mask=None if mask is None else _mask(_source(channels, mask, file)),
         settings=None if settings is None else _read_settings(settings),
         terms=_terms(terms),
@@ -439,8 +449,10 @@ def _length(text: str) -> int | str:
     return int(text) if text.strip().lstrip("+-").isdigit() else text
 
 
-def _seconds(text: str) -> float:
-    """Return a time in seconds from a number, or from one with a unit."""
+def _lag(text: str) -> float | Literal["auto"]:
+    """Return a time in seconds from a number, or from one with a unit; ``auto`` as it is."""
+    if text == "auto":
+        return "auto"
     try:
         return float(text)
     except ValueError:
@@ -449,7 +461,9 @@ def _seconds(text: str) -> float:
     try:
         return sign * tvident.arguments.seconds("lag", magnitude)
     except ValueError:
-        raise click.UsageError(f"lag must be seconds or a time such as '2 ms'; got {text!r}; repair it") from None
+        raise click.UsageError(
+            f"lag must be seconds, a time such as '2 ms', or 'auto'; got {text!r}; repair it"
+        ) from None
 
 
 def _mask(values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
