@@ -117,6 +117,7 @@ pub(crate) fn average(
         }
     }
 
+    let ready = ready(&candidates, constants);
     let mut averages = Averages::new(problem.layout.windowed, problem.layout.constant, rows);
     let mut work = Vec::new();
     {
@@ -131,10 +132,16 @@ pub(crate) fn average(
         work,
         || (),
         |(rows, mut columns): (Range<usize>, Vec<&mut [f64]>), (): &mut ()| {
-            view.average(&candidates, rows, nearby, record, hopeless, &mut columns);
+            view.average((&candidates, &ready), rows, nearby, record, hopeless, &mut columns);
         },
     )?;
     Ok(averages)
+}
+
+/// Windows of the candidates whose cells are all there, ready to predict in every piece.
+fn ready<'a>(candidates: &'a [Candidate], constants: &[f64]) -> Vec<Option<Around<'a>>> {
+    let one = |candidate: &'a Candidate| Some(Around::new(candidate.scale, candidate.cells.as_ref()?, constants));
+    candidates.iter().map(one).collect()
 }
 
 fn pieces(rows: usize) -> Vec<Range<usize>> {
@@ -240,11 +247,13 @@ impl View<'_, '_> {
             let cells = if coarse { Some(scale.solve(self.problem, &all, self.instructions, run)?) } else { None };
             solved.push(Candidate { scale, cells, record: candidate.record });
         }
+        let ready = ready(&solved, self.constants);
         let parts = pieces(self.problem.rows()).into_iter();
         let parts: Vec<_> = parts.map(|rows| Piece { size: rows.len(), content: rows }).collect();
         let work = |piece: Range<usize>, (): &mut ()| {
             let counted = piece.start.max(rows.start)..piece.end.min(rows.end);
-            solved.iter().map(|candidate| self.sums(candidate, counted.clone())).collect::<Vec<_>>()
+            let both = solved.iter().zip(&ready);
+            both.map(|(candidate, ready)| self.sums(candidate, ready.as_ref(), counted.clone())).collect::<Vec<_>>()
         };
         let sums = run.map(parts, || (), work)?;
         for (index, candidate) in candidates.iter_mut().enumerate() {
@@ -280,19 +289,19 @@ impl View<'_, '_> {
     }
 
     /// Sums of squared errors and their number, by side.
-    fn sums(&self, candidate: &Candidate, rows: Range<usize>) -> [(f64, f64); SIDES] {
+    fn sums(&self, candidate: &Candidate, ready: Option<&Around<'_>>, rows: Range<usize>) -> [(f64, f64); SIDES] {
         let mut sums = [(0.0, 0.0); SIDES];
         if rows.start >= rows.end {
             return sums;
         }
-        let here;
-        let cells = if let Some(cells) = &candidate.cells {
-            cells
+        let (cells, here);
+        let around = if let Some(ready) = ready {
+            ready
         } else {
-            here = self.cells(candidate, &rows);
+            cells = self.cells(candidate, &rows);
+            here = Around::new(candidate.scale, &cells, self.constants);
             &here
         };
-        let around = Around::new(candidate.scale, cells, self.constants);
         for row in rows.filter(|&row| self.problem.usable[row]) {
             for (which, (sum, count)) in sums.iter_mut().enumerate() {
                 if let Some(seen) = around.seen(self.problem, row, which) {
@@ -307,7 +316,7 @@ impl View<'_, '_> {
     /// Averages all candidates at some rows.
     fn average(
         &self,
-        candidates: &[Candidate],
+        (candidates, ready): (&[Candidate], &[Option<Around<'_>>]),
         rows: Range<usize>,
         nearby: Nearby,
         record: f64,
@@ -330,16 +339,16 @@ impl View<'_, '_> {
             if !wanted.contains(&true) {
                 break;
             }
-            let chosen = |candidate: &&Candidate| candidate.record.iter().any(|&error| (error <= hopeless) == hope);
-            for candidate in candidates.iter().filter(chosen) {
-                let here;
-                let cells = if let Some(cells) = &candidate.cells {
-                    cells
+            let chosen = |candidate: &Candidate| candidate.record.iter().any(|&error| (error <= hopeless) == hope);
+            for (candidate, ready) in candidates.iter().zip(ready).filter(|(candidate, _)| chosen(candidate)) {
+                let (cells, here);
+                let around = if let Some(ready) = ready {
+                    ready
                 } else {
-                    here = self.cells(candidate, &wide);
+                    cells = self.cells(candidate, &wide);
+                    here = Around::new(candidate.scale, &cells, self.constants);
                     &here
                 };
-                let around = Around::new(candidate.scale, cells, self.constants);
                 for which in (0..SIDES).filter(|&which| (candidate.record[which] <= hopeless) == hope) {
                     // Running sums of the errors, so that every mean costs two differences; they restart with every piece.
                     let mut errors = vec![[0.0, 0.0]; wide.len() + 1];

@@ -170,10 +170,16 @@ pub(crate) struct Predictor<'a> {
 
 impl<'a> Predictor<'a> {
     pub(crate) fn new(solved: &'a Solved, constants: &[f64]) -> Self {
-        let unknowns = solved.fields.layout.local();
-        let values = (0..unknowns)
-            .map(|unknown| (0..solved.len()).map(|window| local(solved, window, constants, unknown)).collect())
-            .collect();
+        let (fields, layout) = (solved.fields, solved.fields.layout);
+        let value = |unknown: usize| {
+            let mut values = solved.field(fields.solution(unknown, layout.constant)).to_vec();
+            for (constant, factor) in constants.iter().enumerate() {
+                let column = solved.field(fields.solution(unknown, constant));
+                values.iter_mut().zip(column).for_each(|(value, slope)| *value -= slope * factor);
+            }
+            values
+        };
+        let values = (0..layout.local()).map(value).collect();
         let usable = (0..solved.len()).map(|window| is_determined(solved, window)).collect();
         Self { solved, values, usable }
     }
