@@ -22,11 +22,11 @@ impl Packet {
         Self([value; WIDTH])
     }
 
+    /// The first numbers of a column, which must hold as many. A copy of a slice whose length is not known would be a call.
     #[inline(always)]
     pub(crate) fn load(from: &[f64]) -> Self {
-        let mut values = [0.0; WIDTH];
-        values.copy_from_slice(&from[..WIDTH]);
-        Self(values)
+        debug_assert!(from.len() >= WIDTH, "eight numbers are read");
+        Self(from.first_chunk().copied().unwrap_or_default())
     }
 
     /// Every so-manieth number of a column from a place on; zero where there is none.
@@ -66,7 +66,10 @@ impl Packet {
 
     #[inline(always)]
     pub(crate) fn store(self, to: &mut [f64]) {
-        to[..WIDTH].copy_from_slice(&self.0);
+        debug_assert!(to.len() >= WIDTH, "eight numbers are written");
+        if let Some(to) = to.first_chunk_mut() {
+            *to = self.0;
+        }
     }
 
     #[inline(always)]

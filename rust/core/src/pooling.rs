@@ -187,7 +187,7 @@ impl Kernel for Stack<'_> {
     }
 }
 
-/// How every row moves the constants: the rows of `X̃`, one column a constant, so that they are `N⁻¹ X̃ᵀ b`.
+/// How every row within the windows moves the constants: the rows of `X̃`, one column a constant, so that they are `N⁻¹ X̃ᵀ b`.
 ///
 /// `step` and `span` are the rows from one window to the next and the rows of a window, `centres` where each is solved.
 pub(crate) fn influence(
@@ -203,7 +203,10 @@ pub(crate) fn influence(
     let (fields, q) = (full.fields, layout.windowed);
     let (rows, blocks) = (problem.rows(), span / step);
     let first_block = full.first + windows.start.cast_signed();
-    let mut columns = vec![vec![0.0; rows]; layout.constant];
+    let row =
+        |block: usize| usize::try_from((first_block + block.cast_signed()) * step.cast_signed()).unwrap_or(0).min(rows);
+    let reached = row(0)..row(windows.len() + blocks).max(row(0));
+    let mut columns = vec![vec![0.0; reached.len()]; layout.constant];
     for (constant, column) in columns.iter_mut().enumerate() {
         // Sums over windows from the first on: weights, then by regressor the part at the window's centre, its rate, and the rate times
         // the centre. The windows over a block are a stretch of them.
@@ -234,7 +237,7 @@ pub(crate) fn influence(
                 *taken = sums[covering.end * width + index] - sums[covering.start * width + index];
             }
             let last = (first + step).min(rows);
-            for (row, influence) in column.iter_mut().enumerate().take(last).skip(first) {
+            for (row, influence) in (first..last).zip(column.get_mut(first - reached.start..).unwrap_or_default()) {
                 let mut value = taken[0] * problem.constants[constant][row];
                 for (regressor, part) in taken[1..].chunks_exact(3).enumerate() {
                     let at_row = part[0] + problem.period * (row as f64 * part[1] - part[2]);
