@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use crate::error::Error;
-use crate::model::{Predictor, without_constants};
+use crate::model::Predictor;
 use crate::parallel::Piece;
 use crate::pooling::Expected;
 use crate::run::Run;
@@ -36,25 +36,18 @@ pub(crate) struct Averages {
     pub(crate) values: Vec<Vec<f64>>,
     /// What they grow by in a second.
     pub(crate) slopes: Vec<Vec<f64>>,
-    /// Their standard errors for given constants.
+    /// Their standard errors for the constants that were taken off.
     pub(crate) errors: Vec<Vec<f64>>,
-    /// How they change with each constant: unknown by unknown, constant by constant.
-    pub(crate) sensitivities: Vec<Vec<f64>>,
 }
 
 impl Averages {
-    fn new(windowed: usize, constants: usize, rows: usize) -> Self {
+    fn new(windowed: usize, rows: usize) -> Self {
         let columns = |count: usize| vec![vec![f64::NAN; rows]; count];
-        Self {
-            values: columns(windowed),
-            slopes: columns(windowed),
-            errors: columns(windowed),
-            sensitivities: columns(windowed * constants),
-        }
+        Self { values: columns(windowed), slopes: columns(windowed), errors: columns(windowed) }
     }
 
     fn columns(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
-        self.values.iter_mut().chain(&mut self.slopes).chain(&mut self.errors).chain(&mut self.sensitivities)
+        self.values.iter_mut().chain(&mut self.slopes).chain(&mut self.errors)
     }
 }
 
@@ -70,22 +63,20 @@ struct Candidate {
     record: [f64; SIDES],
 }
 
-/// Averages windows of several lengths at every row, for given constants. `best` is the length of the windows that predict best, in
+/// Averages windows of several lengths at every row of a problem without constants. `best` is the length of the windows that predict best, in
 /// rows. Where `thinned` rows stand for a long record, how well windows predict over the record is learnt from them, as far as they
 /// hold windows so long.
 pub(crate) fn average(
     problem: &Problem<'_>,
     thinned: Option<&Problem<'_>>,
     scales: &[Scale],
-    constants: &[f64],
     (expected, best): (Expected, usize),
     instructions: Instructions,
     run: &mut Run<'_, '_>,
 ) -> Result<Averages, Error> {
     let rows = problem.rows();
     let reach = scales.first().map_or(1, |scale| scale.reach);
-    let side = without_constants(problem, constants);
-    let view = View { problem, side: &side, constants, variance: expected.variance, reach, instructions };
+    let view = View { problem, variance: expected.variance, reach, instructions };
     let mut candidates: Vec<_> =
         scales.iter().map(|&scale| Candidate { scale, cells: None, record: [f64::INFINITY; SIDES] }).collect();
     let record = RECORD[0].max(RECORD[1] * best as f64 / expected.redundancy);
@@ -95,9 +86,8 @@ pub(crate) fn average(
         None => 0,
         Some(thinned) => {
             let short = scales.partition_point(|scale| holds(*scale));
-            let side = without_constants(thinned, constants);
-            let view = View { problem: thinned, side: &side, ..view };
-            view.judge(&mut candidates[..short], &(0..side.len()), run)?;
+            let view = View { problem: thinned, ..view };
+            view.judge(&mut candidates[..short], &(0..thinned.rows()), run)?;
             short
         }
     };
@@ -117,8 +107,8 @@ pub(crate) fn average(
         }
     }
 
-    let ready = ready(&candidates, constants);
-    let mut averages = Averages::new(problem.layout.windowed, problem.layout.constant, rows);
+    let ready = ready(&candidates);
+    let mut averages = Averages::new(problem.layout.windowed, rows);
     let mut work = Vec::new();
     {
         let mut parts: Vec<_> = averages.columns().map(|column| column.chunks_mut(PIECE)).collect();
@@ -139,9 +129,9 @@ pub(crate) fn average(
 }
 
 /// Windows of the candidates whose cells are all there, ready to predict in every piece.
-fn ready<'a>(candidates: &'a [Candidate], constants: &[f64]) -> Vec<Option<Around<'a>>> {
-    let one = |candidate: &'a Candidate| Some(Around::new(candidate.scale, candidate.cells.as_ref()?, constants));
-    candidates.iter().map(one).collect()
+fn ready(candidates: &[Candidate]) -> Vec<Option<Around<'_>>> {
+    let all = candidates.iter();
+    all.map(|candidate| Some(Around::new(candidate.scale, candidate.cells.as_ref()?, &[]))).collect()
 }
 
 fn pieces(rows: usize) -> Vec<Range<usize>> {
@@ -158,8 +148,6 @@ struct Nearby {
 #[derive(Clone, Copy)]
 struct View<'a, 'b> {
     problem: &'a Problem<'b>,
-    side: &'a [f64],
-    constants: &'a [f64],
     variance: f64,
     /// Rows that a test function reaches to either side.
     reach: usize,
@@ -227,10 +215,6 @@ impl Seen<'_, '_> {
         self.believed.variance(self.believed_place, unknown, self.later)
     }
 
-    fn sensitivity(&self, unknown: usize, constant: usize) -> f64 {
-        self.believed.sensitivity(self.believed_place, unknown, constant, self.later)
-    }
-
     /// What the windowed unknowns add to the row's right-hand side, from windows that have not seen it.
     pub(crate) fn predict(&self, problem: &Problem<'_>, row: usize) -> f64 {
         self.predictor.predict(problem, self.place, row, self.later)
@@ -247,7 +231,7 @@ impl View<'_, '_> {
             let cells = if coarse { Some(scale.solve(self.problem, &all, self.instructions, run)?) } else { None };
             solved.push(Candidate { scale, cells, record: candidate.record });
         }
-        let ready = ready(&solved, self.constants);
+        let ready = ready(&solved);
         let parts = pieces(self.problem.rows()).into_iter();
         let parts: Vec<_> = parts.map(|rows| Piece { size: rows.len(), content: rows }).collect();
         let work = |piece: Range<usize>, (): &mut ()| {
@@ -284,7 +268,7 @@ impl View<'_, '_> {
 
     /// Squared error of a row, over the noise's variance.
     fn error(&self, seen: &Seen<'_, '_>, row: usize) -> f64 {
-        let error = self.side[row] - seen.predict(self.problem, row);
+        let error = self.problem.side[row] - seen.predict(self.problem, row);
         (error * error / self.variance).min(MOST)
     }
 
@@ -299,7 +283,7 @@ impl View<'_, '_> {
             ready
         } else {
             cells = self.cells(candidate, &rows);
-            here = Around::new(candidate.scale, &cells, self.constants);
+            here = Around::new(candidate.scale, &cells, &[]);
             &here
         };
         for row in rows.filter(|&row| self.problem.usable[row]) {
@@ -323,11 +307,11 @@ impl View<'_, '_> {
         hopeless: f64,
         columns: &mut [&mut [f64]],
     ) {
-        let (windowed, constants) = (self.problem.layout.windowed, self.problem.layout.constant);
+        let windowed = self.problem.layout.windowed;
         let total = self.problem.rows();
         let wide = rows.start.saturating_sub(nearby.rows)..(rows.end + nearby.rows).min(total);
         let width = rows.len();
-        let numbers = 3 * windowed + windowed * constants;
+        let numbers = 3 * windowed;
         // By row: sums of weights and of weighted numbers, and the least exponent so far, which all are relative to.
         let mut weights = vec![0.0; width];
         let mut least = vec![f64::INFINITY; width];
@@ -346,7 +330,7 @@ impl View<'_, '_> {
                     ready
                 } else {
                     cells = self.cells(candidate, &wide);
-                    here = Around::new(candidate.scale, &cells, self.constants);
+                    here = Around::new(candidate.scale, &cells, &[]);
                     &here
                 };
                 for which in (0..SIDES).filter(|&which| (candidate.record[which] <= hopeless) == hope) {
@@ -393,16 +377,13 @@ impl View<'_, '_> {
         }
     }
 
-    /// What a window says at a row: values, slopes, standard errors and sensitivities.
+    /// What a window says at a row: values, slopes and standard errors.
     fn believe(&self, seen: &Seen<'_, '_>, numbers: &mut [f64]) {
-        let (windowed, constants) = (self.problem.layout.windowed, self.problem.layout.constant);
+        let windowed = self.problem.layout.windowed;
         for unknown in 0..windowed {
             numbers[unknown] = seen.value(unknown);
             numbers[windowed + unknown] = seen.slope(unknown);
             numbers[2 * windowed + unknown] = seen.variance(unknown).max(0.0).sqrt();
-            for constant in 0..constants {
-                numbers[3 * windowed + unknown * constants + constant] = seen.sensitivity(unknown, constant);
-            }
         }
     }
 }

@@ -44,10 +44,6 @@ impl Model {
         };
         let values = of(&self.windowed, |regressor| &regressor.value);
         let companions = of(&self.windowed, |regressor| &regressor.companion);
-        let mut kernels = of(&self.windowed, |regressor| &regressor.noise[0]);
-        kernels.extend(of(&self.windowed, |regressor| &regressor.noise[1]));
-        kernels.extend(of(&self.constant, |regressor| &regressor.noise[0]));
-        kernels.push(&rows.side_noise);
         let period = rows.period;
         Problem {
             layout: self.layout(),
@@ -59,8 +55,36 @@ impl Model {
             usable: &rows.usable,
             jumps: &rows.jumps,
             period,
-            noise: RowNoise::new(&kernels, noise),
+            noise: self.row_noise(rows, &rows.side_noise, noise),
         }
+    }
+
+    /// What is left of a problem once the constants are known: the same windows with fewer columns, whose numbers are the same.
+    pub(crate) fn without_constants<'a>(
+        &self,
+        rows: &Rows,
+        whole: &Problem<'a>,
+        side: &'a [f64],
+        constants: &[f64],
+        noise: f64,
+    ) -> Problem<'a> {
+        let rest = Self { constant: Vec::new(), ..self.clone() };
+        let mut side_noise = rows.side_noise.clone();
+        for (&regressor, constant) in self.constant.iter().zip(constants) {
+            let kernel = &rows.regressors[regressor].noise[0];
+            side_noise.resize(side_noise.len().max(kernel.len()), 0.0);
+            side_noise.iter_mut().zip(kernel).for_each(|(sum, value)| *sum -= constant * value);
+        }
+        let noise = rest.row_noise(rows, &side_noise, noise);
+        Problem { layout: rest.layout(), constants: Vec::new(), side, noise, ..whole.clone() }
+    }
+
+    fn row_noise(&self, rows: &Rows, side: &[f64], noise: f64) -> RowNoise {
+        let kernels = |regressors: &[usize], which: usize| -> Vec<&[f64]> {
+            regressors.iter().map(|&index| rows.regressors[index].noise[which].as_slice()).collect()
+        };
+        let windowed = [kernels(&self.windowed, 0), kernels(&self.windowed, 1)];
+        RowNoise::new(&[windowed.concat(), kernels(&self.constant, 0), vec![side]].concat(), noise)
     }
 }
 

@@ -28,6 +28,8 @@ struct Errors {
     expected: Expected,
     /// What variances are multiplied by.
     inflation: f64,
+    /// Mean squared error of predicting rows, or of what is left of them where nothing is windowed, over the noise's variance.
+    error: f64,
     /// What is wrong with the noise.
     status: Status,
 }
@@ -88,6 +90,7 @@ impl Session<'_, '_, '_> {
         let given = self.options.equations.filter(|_| !self.options.average);
         found.equations = given.unwrap_or(fit.span * stride).min(self.record.angle.len());
         let errors = self.errors(&weak, decided, fit);
+        found.prediction_error = errors.error;
         let problem = ordered.problem(&weak.rows, decided.side(&weak.rows), self.noise[0], Some(&errors.covariance));
         let all = self.refit(&problem, fit, errors.expected)?;
         let Some(all) = all else { return Ok(self.undetermined(found, decided)) };
@@ -129,7 +132,7 @@ impl Session<'_, '_, '_> {
         if found.condition > HARDLY_TOLD_APART || found.mostly_noise {
             status |= Status::ILL_CONDITIONED;
         }
-        let mut tracks = self.tracks(&problem, &weak, decided, fit, &values, errors.expected)?;
+        let mut tracks = self.tracks(&problem, &weak, decided, (fit, &all), &values, errors.expected)?;
         let variances: Vec<f64> = (slow..count).map(|place| found.covariance[place * (count + 1)]).collect();
         let outside = self.outside_mask(
             &weak,
@@ -192,6 +195,7 @@ impl Session<'_, '_, '_> {
             covariance: decided.covariance.clone(),
             expected: decided.expected,
             inflation: decided.error.max(1.0),
+            error: decided.error,
             status: Status::GOOD,
         };
         let rows = &weak.rows;
@@ -203,11 +207,11 @@ impl Session<'_, '_, '_> {
             errors.status |= Status::COLOURED;
         }
         let whole = decided.model.windowed.is_empty();
-        let error = if whole { shown.variance() / errors.expected.variance } else { decided.error };
+        errors.error = if whole { shown.variance() / errors.expected.variance } else { decided.error };
         if whole {
-            errors.inflation = error.max(1.0);
+            errors.inflation = errors.error.max(1.0);
         }
-        if error > NOISE_MODEL_FAILS {
+        if errors.error > NOISE_MODEL_FAILS {
             errors.status |= Status::NOISE_MODEL;
             errors.inflation = 1.0;
             errors.expected = Expected::new(&shown, shown.variance());
@@ -222,7 +226,7 @@ impl Session<'_, '_, '_> {
         problem: &Problem<'_>,
         weak: &WeakRows,
         decided: &Decided,
-        fit: &Fit,
+        (fit, all): (&Fit, &Fit),
         constants: &[f64],
         expected: Expected,
     ) -> Result<Tracks, Error> {
@@ -263,9 +267,16 @@ impl Session<'_, '_, '_> {
         let thinned =
             stretches.map(|stretches| (thinned_rows(rows, &stretches), thinned_column(decided.side(rows), &stretches)));
         let ordered = decided.ordered();
-        let thinned = thinned.as_ref().map(|(rows, side)| ordered.problem(rows, side, self.noise[0], None));
+        let thinned = thinned.as_ref().map(|(rows, side)| (rows, ordered.problem(rows, side, self.noise[0], None)));
+        let thinned_side = thinned.as_ref().map_or_else(Vec::new, |(_, problem)| without_constants(problem, constants));
+        let noise = self.noise[0];
+        let thinned = thinned
+            .as_ref()
+            .map(|(rows, problem)| ordered.without_constants(rows, problem, &thinned_side, constants, noise));
+        let side = without_constants(problem, constants);
+        let rest = ordered.without_constants(rows, problem, &side, constants, noise);
         let (judged, run) = ((expected, fit.span), &mut self.run);
-        let averages = average(problem, thinned.as_ref(), &decided.scales, constants, judged, instructions, run)?;
+        let averages = average(&rest, thinned.as_ref(), &decided.scales, judged, instructions, run)?;
         let names = fit.full.fields;
         let condition = fit.full.field(names.condition());
         let usable = &decided.whole.as_ref().unwrap_or(rows).usable;
@@ -297,7 +308,7 @@ impl Session<'_, '_, '_> {
                 .map(|column| column.iter().map(|slope| slope * rows.period).collect())
                 .collect(),
             values: averages.values,
-            sensitivities: averages.sensitivities,
+            sensitivities: sensitivities(problem, all),
             condition: (0..rows.len()).map(|row| condition[nearest(fit, row)]).collect(),
             status,
         })
@@ -466,6 +477,31 @@ fn nearest(fit: &Fit, row: usize) -> usize {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the windows")]
     let place = place.round().clamp(0.0, fit.full.len() as f64 - 1.0) as usize;
     place
+}
+
+/// How what is windowed changes with each constant, row by row: what the window nearest to a row says.
+fn sensitivities(problem: &Problem<'_>, all: &Fit) -> Vec<Vec<f64>> {
+    let layout = problem.layout;
+    let constants = vec![0.0; layout.constant];
+    let predictor = Predictor::new(&all.full, &constants);
+    let determined: Vec<usize> = (0..all.full.len()).filter(|&window| is_determined(&all.full, window)).collect();
+    let mut columns = vec![Vec::with_capacity(problem.rows()); layout.windowed * layout.constant];
+    for row in 0..problem.rows() {
+        let wanted = nearest(all, row);
+        let next = determined.partition_point(|&window| window < wanted);
+        let around = [next.checked_sub(1), Some(next)].into_iter().flatten();
+        let place =
+            around.filter_map(|place| determined.get(place).copied()).min_by_key(|place| place.abs_diff(wanted));
+        let place = place.unwrap_or(wanted);
+        let later = (row as f64 - all.centre(place)) * problem.period;
+        for unknown in 0..layout.windowed {
+            for constant in 0..layout.constant {
+                let value = predictor.sensitivity(place, unknown, constant, later);
+                columns[unknown * layout.constant + constant].push(value);
+            }
+        }
+    }
+    columns
 }
 
 /// What a fit leaves of every row, and where it says anything.
