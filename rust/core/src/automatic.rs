@@ -10,13 +10,15 @@ use crate::bank::Target;
 use crate::ends::End;
 use crate::error::Error;
 use crate::local_polynomials::HIGHEST_ORDER;
+use crate::noise::quantisation_step;
 use crate::parallel::Watch;
 use crate::refinement::{Outputs, Refinement};
-use crate::samples::Samples;
+use crate::samples::{Samples, is_usable};
 use crate::shrinkage;
 use crate::simd::Instructions;
 use crate::status::Status;
-use crate::survey::{Pair, Survey};
+use crate::survey::{Pair, SHORTEST, Survey, rounded};
+use crate::thinned::stretches;
 
 /// The fewest samples of a record for which a window can be chosen.
 pub const FEWEST_SAMPLES: usize = 64;
@@ -60,6 +62,13 @@ pub struct Chosen {
     pub order: usize,
 }
 
+/// Steps of a quantised signal that half of the shortest window must span, on average.
+const STEPS: f64 = 2.0;
+
+/// Differences of neighbours that tell how fast a signal moves, at most, and in how many stretches.
+const MOST_DIFFERENCES: usize = 1 << 14;
+const STRETCHES: usize = 64;
+
 /// Estimates one derivative of one record with window and order chosen, and says which suit the record as a whole: nothing where no
 /// window holds only values that can be used.
 ///
@@ -86,7 +95,8 @@ pub fn estimate_automatically(
     if highest < derivative {
         return Err(Error::OrderTooLow { order: highest, derivative });
     }
-    let target = Target { derivative, highest, fixed, delta, instructions };
+    let shortest = shortest_window(record, sigma);
+    let target = Target { derivative, highest, fixed, shortest, delta, instructions };
     let total = 2 * samples;
     let variance = sigma * sigma;
     let best = Survey::new(record).best(&target, variance, &mut || look_up(watch, 0, total))?;
@@ -127,6 +137,26 @@ pub fn estimate_automatically(
     }
     let Pair { half, order } = pair;
     Ok(Some(Chosen { window_length: 2 * half + 1, order }))
+}
+
+/// Half-width of the shortest window that may be looked at. The error of rounding is white only where the signal crosses a step or more
+/// from sample to sample; where it needs several samples to do so, shorter windows take the stairs for signal.
+fn shortest_window(record: &dyn Samples, sigma: f64) -> usize {
+    let step = quantisation_step(record);
+    if sigma > step / 2.0 {
+        return SHORTEST;
+    }
+    let (mut samples, mut sum, mut count) = (Vec::new(), 0.0, 0.0_f64);
+    for places in stretches(record.len(), MOST_DIFFERENCES, STRETCHES) {
+        samples.resize(places.len(), 0.0);
+        record.read(places.start, &mut samples);
+        for pair in samples.windows(2).filter(|pair| is_usable(pair[0]) && is_usable(pair[1])) {
+            sum += (pair[1] - pair[0]).abs();
+            count += 1.0;
+        }
+    }
+    let wanted = STEPS * step * count / sum;
+    if wanted.is_finite() { rounded(wanted).clamp(SHORTEST, (record.len() / 16).max(SHORTEST)) } else { SHORTEST }
 }
 
 fn look_up(watch: &mut Watch<'_>, done: usize, total: usize) -> Result<(), Error> {

@@ -21,6 +21,8 @@ pub(crate) struct Target {
     /// The highest order, which is the only one where it is fixed.
     pub(crate) highest: usize,
     pub(crate) fixed: bool,
+    /// Half-width of the shortest window.
+    pub(crate) shortest: usize,
     pub(crate) delta: f64,
     pub(crate) instructions: Instructions,
 }

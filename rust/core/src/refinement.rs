@@ -27,7 +27,7 @@ use crate::error::Error;
 use crate::output::split_off;
 use crate::parallel::{self, Piece, Watch};
 use crate::samples::Samples;
-use crate::survey::{OPTIMISM, Pair, SHORTEST, rounded};
+use crate::survey::{OPTIMISM, Pair, rounded};
 
 /// The windows over the record's best.
 const WINDOWS: [f64; 5] = [0.125, 0.25, 0.5, 1.0, 2.0];
@@ -97,7 +97,7 @@ impl Refinement {
     /// Prepares the candidates around a record's best pair.
     pub(crate) fn new(samples: usize, pair: Pair, target: &Target, variance: f64) -> Option<Self> {
         let half = pair.half as f64;
-        let shortened = rounded(half / REFERENCE).max(SHORTEST);
+        let shortened = rounded(half / REFERENCE).max(target.shortest);
         let with_order = |half: usize| {
             let bank = Bank::new(half, target)?;
             let candidate = bank.orders.iter().position(|&order| order == pair.order)?;
@@ -106,7 +106,7 @@ impl Refinement {
         let reference = with_order(shortened).or_else(|| with_order(pair.half))?;
         let mut halves: Vec<usize> = WINDOWS.iter().map(|ratio| rounded(half * ratio)).collect();
         halves.dedup();
-        halves.retain(|&half| half >= SHORTEST && 2 * half < samples / 2);
+        halves.retain(|&half| half >= target.shortest && 2 * half < samples / 2);
         let banks: Vec<Bank> = halves.into_iter().filter_map(|half| Bank::new(half, target)).collect();
         let compared = reference.bank.kernel(reference.candidate);
         let reference_gain = reference.bank.gains[reference.candidate];

@@ -82,7 +82,7 @@ impl<'a> Survey<'a> {
     /// Those of `look_up`, at once.
     pub(crate) fn best(&self, target: &Target, variance: f64, look_up: &mut LookUp<'_>) -> Result<Option<Pair>, Error> {
         let mut ladder = Vec::new();
-        for half in ladder_of_windows(self.record.len()) {
+        for half in ladder_of_windows(self.record.len(), target.shortest) {
             if let Some(bank) = Bank::new(half, target) {
                 ladder.push(self.look(bank));
             }
@@ -116,7 +116,7 @@ impl<'a> Survey<'a> {
         for step in REFINEMENTS {
             let centre = pair.half as f64;
             for half in [rounded(centre * (-step).exp2()), rounded(centre * step.exp2())] {
-                if half == pair.half || half < SHORTEST || 2 * half >= self.record.len() / 2 {
+                if half == pair.half || half < target.shortest || 2 * half >= self.record.len() / 2 {
                     continue;
                 }
                 if let Some((risk, found)) = best_of(half)
@@ -211,8 +211,8 @@ fn shorter(ladder: &[Surveyed], window: usize, order: usize) -> Option<(usize, u
 }
 
 /// Half-widths from the shortest on, each √2 times the last, of windows that are at most half the record.
-fn ladder_of_windows(samples: usize) -> impl Iterator<Item = usize> {
-    let half = |index: i32| rounded(SHORTEST as f64 * (0.5 * f64::from(index)).exp2());
+fn ladder_of_windows(samples: usize, shortest: usize) -> impl Iterator<Item = usize> {
+    let half = move |index: i32| rounded(shortest as f64 * (0.5 * f64::from(index)).exp2());
     (0..).map(half).take_while(move |&half| 2 * half < samples / 2 && half <= LONGEST)
 }
 
