@@ -262,3 +262,46 @@ def test_a_step_of_the_angle_is_found_or_given(rig: tvident.Recording) -> None:
         assert given.settings["quantisation"] == step
     with pytest.raises(ValueError, match="quantisation must be positive and finite; got -1"):
         identify(angle, rig.torque, "auto", quantisation=-1)
+
+
+@pytest.mark.parametrize("seed", [40, 43, 47])
+def test_noise_of_a_tenth_of_the_angle_does_not_pass_for_its_movement(seed: int) -> None:
+    recording = tvident.simulate_torsional_rig(10.0, seed=seed, angle_noise=0.1)
+    result = tvident.identify(recording.angle, recording.torque, sample_rate=1000)
+    # A cycle of the rig's resonance has 150 to 220 samples; noise alone would look ten times as fast.
+    assert result.settings["window_length"] > 100
+    assert (result.status & Status.WINDOW_LIMIT == 0).all()
+    inertia, error_of_it = result.constants["inertia"]
+    assert abs(inertia - recording.inertia[0]) < CLOSE * error_of_it
+    assert abs(inertia / recording.inertia[0] - 1) < 0.03
+
+
+def test_a_number_known_at_every_sample_is_a_known_number() -> None:
+    recording = tvident.simulate_torsional_rig(10.0, pattern="constant", angle_noise=0.1)
+    known = float(recording.stiffness[0])
+    one, every = (
+        tvident.identify(recording.angle, recording.torque, sample_rate=1000, stiffness=stiffness).constants
+        for stiffness in (known, recording.stiffness)
+    )
+    for name, numbers in one.items():
+        np.testing.assert_allclose(every[name], numbers, rtol=UNITS_OF_ROUNDING)
+
+
+def test_what_is_known_must_be_known_everywhere(rig: tvident.Recording) -> None:
+    inertia = rig.inertia.copy()
+    inertia[100] = np.nan
+    with pytest.raises(ValueError, match="a known inertia must be finite at every sample; got 1 values that are not"):
+        tvident.identify(rig.angle, rig.torque, sample_rate=1000, inertia=inertia)
+
+
+@pytest.mark.parametrize("lag", [1e300, -12.0])
+def test_a_lag_is_shorter_than_the_record(rig: tvident.Recording, lag: float) -> None:
+    with pytest.raises(ValueError, match="lag must be shorter than the record of 12 s; got "):
+        tvident.identify(rig.angle, rig.torque, sample_rate=1000, lag=lag)
+
+
+def test_words_about_the_noise_model_say_how_bad_it_is(rig: tvident.Recording) -> None:
+    result = identify(rig.angle, rig.torque, "auto", inertia="constant", damping="constant", stiffness="constant")
+    assert (result.status & Status.NOISE_MODEL != 0).all()
+    words = next(line for line in result.summary().splitlines() if "times the variance of the noise" in line)
+    assert float(words.split(" times")[0].split()[-1]) > 4

@@ -213,6 +213,13 @@ def identify(
     used["quantisation"] = quantisation_step(angles, rounded)
     for name, array in (("angle", angles), ("torque", torques)):
         arguments.check_nan(name, array, nan_policy, arguments.RowPolicy)
+    lags = used["lag"] if isinstance(used["lag"], tuple) else (used["lag"],)
+    for late in lags:
+        if late != "auto" and abs(late) >= samples * period:
+            raise ValueError(
+                f"lag must be shorter than the record of {samples * period:.6g} s; got {late:.6g} s; "
+                "give it in seconds, or align the channels"
+            )
     start = 0.0 if t is None else float(np.asarray(t)[0])
     task = _Task(
         angles=angles,

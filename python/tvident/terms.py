@@ -92,6 +92,11 @@ def parameter(name: str, value: object, shape: tuple[int, ...]) -> Kind | float 
             raise ValueError(f"{name} must be finite; got {number}; give a number, or 'windowed' where it is unknown")
         return number
     known = arguments.real_array(name, array)
+    if not np.isfinite(known).all():
+        raise ValueError(
+            f"a known {name} must be finite at every sample; got {np.count_nonzero(~np.isfinite(known))} values that are not; "
+            "interpolate them, or leave these samples out with mask="
+        )
     try:
         return np.broadcast_to(known, shape)
     except ValueError:

@@ -18,8 +18,9 @@ const EXPONENTS: [usize; 2] = [5, 9];
 /// The part of the angle's noise that its correction is taken to leave.
 const LEFT_BY_CORRECTION: f64 = 0.1;
 
-/// By how much half the logarithm may exceed the least: the narrower of two follows changes better.
-const AS_GOOD: f64 = 0.0;
+/// A frequency holds signal where its power exceeds the noise's so many times: the mean of as few as three segments does so once in ten
+/// million by chance.
+const ABOVE_NOISE: f64 = 8.0;
 
 /// What the choice is made from.
 #[derive(Clone, Debug)]
@@ -43,8 +44,9 @@ impl Evidence {
         let (mut sum, mut weights) = (0.0, 0.0);
         for (bin, &power) in self.power.iter().enumerate().skip(1) {
             let frequency = bin as f64 / length as f64;
-            // What scatters about the noise does not count.
-            let weight = (power - 3.0 * self.noise[0]).max(0.0) * frequency * frequency;
+            // What scatters about the noise does not count: high frequencies are many, and weigh most.
+            let signal = if power > ABOVE_NOISE * self.noise[0] { power - self.noise[0] } else { 0.0 };
+            let weight = signal * frequency * frequency;
             sum += weight * frequency;
             weights += weight;
         }
@@ -118,7 +120,7 @@ impl Candidates {
     pub(crate) fn best(&self, parameters: [f64; 3]) -> Option<TestFunction> {
         let scores: Vec<f64> = self.tried.iter().map(|tried| tried.score(&self.evidence, parameters)).collect();
         let least = scores.iter().copied().fold(f64::INFINITY, f64::min);
-        let good = self.tried.iter().zip(&scores).filter(|(_, score)| **score <= least + AS_GOOD && score.is_finite());
+        let good = self.tried.iter().zip(&scores).filter(|(_, score)| **score <= least && score.is_finite());
         good.map(|(tried, _)| tried.function).min_by_key(TestFunction::half_width)
     }
 }

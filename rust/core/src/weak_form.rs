@@ -232,7 +232,7 @@ fn tasks<'a>(
 }
 
 /// The mean of the samples that can be used.
-fn mean(samples: &dyn Samples) -> f64 {
+pub(crate) fn mean(samples: &dyn Samples) -> f64 {
     let mut buffer = vec![0.0; samples.len()];
     samples.read(0, &mut buffer);
     let (sum, count) = buffer

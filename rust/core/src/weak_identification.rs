@@ -26,7 +26,7 @@ use crate::test_function::{LEAST_HALF_WIDTH, TestFunction};
 use crate::test_function_choice::{Candidates, Evidence, half_widths, spectrum_length};
 use crate::thinned::{Thinned, stretches, thinned_flags};
 use crate::usable::Usable;
-use crate::weak_form::{Record, TermSamples, WeakRows};
+use crate::weak_form::{Record, TermSamples, WeakRows, mean};
 use crate::weak_results::SampleResults;
 
 /// Half-widths of the test function that windows span while it is chosen.
@@ -285,7 +285,7 @@ impl Session<'_, '_, '_> {
     pub(crate) fn parameters(&self, model: &Model, fit: &Fit) -> [f64; 3] {
         std::array::from_fn(|index| match self.record.coefficients[index] {
             Coefficient::Number(number) => number,
-            Coefficient::Record(_) => 0.0,
+            Coefficient::Record(known) => mean(known),
             Coefficient::Unknown => {
                 let constant = model.constant.iter().position(|&one| one == index);
                 let windowed = model.windowed.iter().position(|&one| one == index);
