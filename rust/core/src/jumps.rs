@@ -36,9 +36,11 @@ const CONSPICUOUS: f64 = 2.0;
 /// Rounds of placing a jump and taking the windows beside it again.
 const ROUNDS: usize = 4;
 
-/// The part of a test function that may reach over a jump unnoticed, and the probability that its place may be missed by.
+/// The part of a test function that may reach over a jump unnoticed.
 const UNNOTICED: f64 = 1e-4;
-const UNLIKELY: f64 = 1e-3;
+
+/// A place of a jump that is less probable does not count.
+pub(crate) const UNLIKELY: f64 = 1e-3;
 
 /// A jump of what is windowed.
 #[derive(Clone, Debug, PartialEq)]

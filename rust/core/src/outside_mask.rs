@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::model::Fit;
 use crate::pooling::{Expected, influence, sandwich};
 use crate::row_covariance::RowCovariance;
+use crate::varying;
 use crate::weak_decision::Decided;
 use crate::weak_form::{Record, WeakRows};
 use crate::weak_identification::{NOISE_MODEL_FAILS, Session};
@@ -65,23 +66,13 @@ impl Session<'_, '_, '_> {
         }
         let Inside { decided, fit, constants, variances, covariance, expected, inflation } = *inside;
         if let Some(found) = &decided.found {
-            for (place, &unknown) in decided.slow.iter().enumerate() {
-                let regressor = &rows.regressors[unknown];
-                for (row, side) in rows.side.iter_mut().enumerate() {
-                    let (value, slope) = found.varying.at(place, row as f64);
-                    *side -= value * regressor.value[row] + slope / rows.period * regressor.companion[row];
-                }
+            rows.side = varying::without(&rows, &decided.slow, &found.varying);
+        }
+        for row in 0..rows.len() {
+            if !rows.usable[row] {
+                rows.clear(row);
             }
         }
-        let usable = rows.usable.clone();
-        let clear = |column: &mut Vec<f64>| {
-            column.iter_mut().zip(&usable).filter(|(_, usable)| !**usable).for_each(|(value, _)| *value = 0.0);
-        };
-        rows.regressors.iter_mut().for_each(|regressor| {
-            clear(&mut regressor.value);
-            clear(&mut regressor.companion);
-        });
-        clear(&mut rows.side);
         let model = &decided.model;
         let problem = model.problem(&rows, &rows.side, self.noise[0], Some(covariance));
         let left = model.windowed.is_empty().then(|| {

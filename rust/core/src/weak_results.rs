@@ -1,13 +1,10 @@
 //! Results of weak rows, and what they say at every sample.
 
-use crate::jumps::Jump;
+use crate::jumps::{Jump, UNLIKELY};
 use crate::status::Status;
 
 /// Samples that are looked up before every column is read for them.
 const AT_A_TIME: usize = 1024;
-
-/// A place of a jump that is less probable does not count.
-const UNLIKELY: f64 = 1e-3;
 
 /// Numbers at every row.
 #[derive(Clone, Debug, Default)]
