@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 import tvident
 from reference.local_polynomials import akaike_weights, errors_around, fit_window
+from signals import signal
 from tvident import Status, _core
 
 Array = npt.NDArray[np.float64]
@@ -21,14 +22,6 @@ Array = npt.NDArray[np.float64]
 SCALE = 1e-9
 # Scores are sums of M logarithms of numbers good to about 1e-10: closer than this, rounding decides.
 TIE = 1e-6
-
-
-def signal(seed: int, n: int, noise: float) -> Array:
-    generator = np.random.default_rng(seed)
-    t = np.arange(n)
-    frequencies = generator.uniform(0.001, 0.05, 4)
-    waves = sum(np.sin(2 * np.pi * f * t + generator.uniform(0, 6)) for f in frequencies)
-    return np.asarray(waves + noise * generator.standard_normal(n))
 
 
 def assert_agrees(

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import tvident
 from reference.exact import Window, gains
+from signals import signal
 from tvident import Status, _core
 
 Array = npt.NDArray[np.float64]
@@ -26,13 +27,6 @@ TIE = 1e-6
 """Scores are sums of M logarithms of residuals good to 1e-9 or so: closer than this, rounding decides."""
 PARAMETERS = 1e-8
 """Promised error of parameters over their scale, times the squared condition number."""
-
-
-def signal(seed: int, n: int, noise: float = 0.01) -> Array:
-    generator = np.random.default_rng(seed)
-    t = np.arange(n)
-    waves = sum(np.sin(2 * np.pi * f * t + generator.uniform(0, 6)) for f in generator.uniform(0.001, 0.05, 4))
-    return np.asarray(waves + noise * generator.standard_normal(n))
 
 
 def with_bad_samples(y: Array, seed: int, count: int) -> Array:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import tvident
 from reference.local_polynomials import akaike_average, errors_around, fit_window, pooled_scores, pooled_weights
+from signals import signal
 from tvident import Status, _core
 
 Array = npt.NDArray[np.float64]
@@ -22,14 +23,6 @@ SELECTIONS: tuple[Selection, ...] = ("window", "pooled", "average")
 SCALE = 1e-9
 # Scores are sums of logarithms of numbers good to about 1e-10: closer than this, rounding decides.
 TIE = 1e-6
-
-
-def signal(seed: int, n: int, noise: float) -> Array:
-    generator = np.random.default_rng(seed)
-    t = np.arange(n)
-    frequencies = generator.uniform(0.001, 0.05, 4)
-    waves = sum(np.sin(2 * np.pi * f * t + generator.uniform(0, 6)) for f in frequencies)
-    return np.asarray(waves + noise * generator.standard_normal(n))
 
 
 records = st.fixed_dictionaries(
