@@ -5,6 +5,9 @@ import numpy as np
 import numpy.typing as npt
 
 __all__ = [
+    "FEWEST_SAMPLES",
+    "NOISE_MODEL_FAILS",
+    "NO_CHANCE",
     "LocalPolynomials",
     "Motions",
     "available_instructions",
@@ -20,6 +23,10 @@ __all__ = [
     "rolling_least_squares",
     "status_flags",
 ]
+
+FEWEST_SAMPLES: int
+NOISE_MODEL_FAILS: float
+NO_CHANCE: float
 
 @final
 class LocalPolynomials:

@@ -8,14 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from tvident import _core
 from tvident.result import UNITS
 from tvident.status import Status
 from tvident.terms import COEFFICIENTS
 
-_NO_CHANCE = 3e-4
-"""Probability below which parts of a record differ by more than chance: that of the core."""
-_NOISE_MODEL_FAILS = 4.0
-"""Error of prediction, over the noise's, above which the noise of the channels does not explain it: that of the core."""
 _SHOWN = 6
 """Jumps that are listed at most."""
 _TAKES_PART = 0.3
@@ -115,7 +112,7 @@ class Explained:
             f"{self.names[number]} {value:.4g} ± {error:.1g} instead of {inside[number]:.4g}"
             for number, value, error in differing
         ]
-        if left is not None and left > _NOISE_MODEL_FAILS:
+        if left is not None and left > _core.NOISE_MODEL_FAILS:
             parts.append(f"{left:.1f} times the mean square left")
         return [f"outside the mask the model fails: {', '.join(parts)}"]
 
@@ -132,7 +129,7 @@ class Explained:
 
     def _kinds(self) -> list[str]:
         tests = {self.names[number]: test for number, _, _, test in self.found["constants"] if test is not None}
-        agreeing = {name: probability for name, (probability, _) in tests.items() if probability >= _NO_CHANCE}
+        agreeing = {name: probability for name, (probability, _) in tests.items() if probability >= _core.NO_CHANCE}
         words = []
         if agreeing:
             chances = ", ".join(f"{probability:.2g}" for probability in agreeing.values())
@@ -179,7 +176,7 @@ class Explained:
     def _contradictions(self) -> list[str]:
         words = []
         for number, _, _, test in self.found["constants"]:
-            if test is None or test[0] >= _NO_CHANCE:
+            if test is None or test[0] >= _core.NO_CHANCE:
                 continue
             name = self.names[number]
             if name in COEFFICIENTS:

@@ -11,9 +11,6 @@ import numpy.typing as npt
 
 from tvident import _core
 
-FEWEST_SAMPLES = 64
-"""No window is chosen for a shorter record."""
-
 
 @dataclass(frozen=True)
 class Found:
@@ -46,9 +43,9 @@ def choose(
 ) -> Found:
     """Choose window and order for every record along the last axis and every derivative, and estimate."""
     count = samples.shape[-1]
-    if count < FEWEST_SAMPLES:
+    if count < _core.FEWEST_SAMPLES:
         raise ValueError(
-            f"a record must hold at least {FEWEST_SAMPLES} samples where window_length='auto'; got {count}; "
+            f"a record must hold at least {_core.FEWEST_SAMPLES} samples where window_length='auto'; got {count}; "
             "give a window of some length or a longer record"
         )
     highest = max_order if order is None else order
@@ -75,7 +72,7 @@ def choose(
 
     def plan_of(index: tuple[int, ...]) -> _core.LocalPolynomials:
         # A record of nothing but missing values has no window; any will do to say so.
-        return plan_of_window(int(lengths[(-1, *index)]) or FEWEST_SAMPLES - 1)
+        return plan_of_window(int(lengths[(-1, *index)]) or _core.FEWEST_SAMPLES - 1)
 
     shape = (*leading, len(range(0, count, step)))
     return Found(

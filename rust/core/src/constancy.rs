@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use crate::model::Fit;
-use crate::pooling::{Expected, Pooled, influence, pool, sandwich};
+use crate::pooling::{Expected, pool};
 use crate::row_covariance::RowCovariance;
 use crate::simd::Instructions;
 use crate::windows::Problem;
@@ -15,7 +15,7 @@ use crate::windows::Problem;
 const BLOCKS: usize = 8;
 
 /// Probability below which a difference is no chance: once in 3000 records.
-pub(crate) const NO_CHANCE: f64 = 3e-4;
+pub const NO_CHANCE: f64 = 3e-4;
 
 /// What became of one constant.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,13 +45,12 @@ pub(crate) fn test(
         if windows.is_empty() {
             continue;
         }
-        let Some(Pooled { values, inverse, weights, .. }) = pool(&fit.full, windows.clone(), expected, instructions)
-        else {
-            continue;
-        };
-        let columns = influence(problem, &fit.full, windows, &weights, step, span, |window| fit.centre(window));
-        let variances = sandwich(&columns, &inverse, covariance);
-        estimates.push((values, (0..constants).map(|i| inflation * variances[i * constants + i]).collect::<Vec<_>>()));
+        let Some(pooled) = pool(&fit.full, windows.clone(), expected, instructions) else { continue };
+        let variances = fit.covariance_of(problem, windows, &pooled, covariance);
+        estimates.push((
+            pooled.values,
+            (0..constants).map(|i| inflation * variances[i * constants + i]).collect::<Vec<_>>(),
+        ));
     }
     (0..constants)
         .map(|constant| {

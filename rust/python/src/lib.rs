@@ -40,6 +40,16 @@ mod _core {
     #[pymodule_export]
     use crate::weak_identification::identify_weak;
 
+    /// Probability below which parts of a record differ by more than chance.
+    #[pymodule_export]
+    const NO_CHANCE: f64 = tvident::constancy::NO_CHANCE;
+    /// Error of prediction, over the noise's, above which the noise of the channels does not explain it.
+    #[pymodule_export]
+    const NOISE_MODEL_FAILS: f64 = tvident::weak_identification::NOISE_MODEL_FAILS;
+    /// The shortest record that a window is chosen for.
+    #[pymodule_export]
+    const FEWEST_SAMPLES: usize = tvident::automatic::FEWEST_SAMPLES;
+
     /// Every flag of a status: name and bits.
     #[pyfunction]
     fn status_flags() -> Vec<(&'static str, u16)> {
