@@ -1,6 +1,6 @@
 //! A channel that comes late, by whole samples or a fraction.
 
-use crate::samples::Samples;
+use crate::samples::{Samples, read_around};
 
 /// Neighbours that a fraction of a sample is interpolated from.
 const NEIGHBOURS: usize = 8;
@@ -39,15 +39,8 @@ impl Samples for Delayed<'_> {
     }
 
     fn read(&self, first: usize, into: &mut [f64]) {
-        let begin = first.cast_signed() + self.first;
-        let end = begin + (into.len() + self.weights.len()).cast_signed() - 1;
-        let present = begin.max(0)..end.min(self.len().cast_signed());
-        let mut samples = vec![f64::NAN; (end - begin).unsigned_abs()];
-        if !present.is_empty() {
-            let place = (present.start - begin).unsigned_abs();
-            let count = (present.end - present.start).unsigned_abs();
-            self.channel.read(present.start.unsigned_abs(), &mut samples[place..place + count]);
-        }
+        let mut samples = vec![0.0; into.len() + self.weights.len() - 1];
+        read_around(self.channel, first.cast_signed() + self.first, &mut samples);
         for (value, samples) in into.iter_mut().zip(samples.windows(self.weights.len())) {
             *value = samples.iter().zip(&self.weights).map(|(sample, weight)| sample * weight).sum();
         }

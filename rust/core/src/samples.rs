@@ -32,6 +32,18 @@ impl Samples for &[f64] {
     }
 }
 
+/// Copies samples from a place on that may lie before the record or reach beyond its end: what is not there is missing.
+pub(crate) fn read_around(channel: &dyn Samples, begin: isize, into: &mut [f64]) {
+    let end = begin + into.len().cast_signed();
+    let present = begin.max(0)..end.min(channel.len().cast_signed());
+    into.fill(f64::NAN);
+    if !present.is_empty() {
+        let place = (present.start - begin).unsigned_abs();
+        let count = (present.end - present.start).unsigned_abs();
+        channel.read(present.start.unsigned_abs(), &mut into[place..place + count]);
+    }
+}
+
 /// Whether all samples can be worked with.
 #[inline]
 #[must_use]

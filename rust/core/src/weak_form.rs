@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::filter_bank::{BLOCK, FilterBank, Scratch};
 use crate::motion::Coefficient;
 use crate::parallel::{self, Piece, Watch};
-use crate::samples::Samples;
+use crate::samples::{Samples, read_around};
 use crate::test_function::{Kernels, TestFunction};
 
 /// Rows in a piece of work.
@@ -280,15 +280,7 @@ impl Samples for Late<'_> {
     }
 
     fn read(&self, first: usize, into: &mut [f64]) {
-        let begin = first.cast_signed() + self.samples;
-        let end = begin + into.len().cast_signed();
-        let present = begin.max(0)..end.min(self.len().cast_signed());
-        into.fill(f64::NAN);
-        if !present.is_empty() {
-            let place = (present.start - begin).unsigned_abs();
-            let count = (present.end - present.start).unsigned_abs();
-            self.channel.read(present.start.unsigned_abs(), &mut into[place..place + count]);
-        }
+        read_around(self.channel, first.cast_signed() + self.samples, into);
     }
 }
 
