@@ -52,7 +52,18 @@ impl Summary {
         if self.factor.nrows() < p || squared.iter().any(|norm| *norm <= 0.0) {
             return None;
         }
-        let scaled = Mat::from_fn(p, p, |i, j| self.factor[(i, j)] / squared[j].sqrt());
+        let norms: Vec<f64> = squared.iter().map(|norm| norm.sqrt()).collect();
+        let (inverse, condition) = self.scaled_inverse(&norms)?;
+        let gram = &inverse * inverse.transpose();
+        let entry = |i: usize, j: usize| gram[(i, j)] / (squared[i] * squared[j]).sqrt();
+        let normal = (0..p * p).map(|index| entry(index / p, index % p)).collect();
+        Some((self.values(&inverse, &norms), normal, condition))
+    }
+
+    /// The inverse of the factor with each column divided by a number, and its condition number; nothing where rounding decides.
+    fn scaled_inverse(&self, norms: &[f64]) -> Option<(Mat<f64>, f64)> {
+        let p = norms.len();
+        let scaled = Mat::from_fn(p, p, |i, j| self.factor[(i, j)] / norms[j]);
         let mut inverse = Mat::<f64>::identity(p, p);
         faer::linalg::triangular_solve::solve_upper_triangular_in_place(
             scaled.as_ref(),
@@ -60,14 +71,15 @@ impl Summary {
             faer::Par::Seq,
         );
         let condition = (p as f64).sqrt() * inverse.norm_l2();
-        if condition.is_nan() || condition * f64::EPSILON * self.rows as f64 >= 1.0 {
-            return None;
-        }
-        let value = |i: usize| (i..p).map(|j| inverse[(i, j)] * self.factor[(j, p)]).sum::<f64>() / squared[i].sqrt();
-        let gram = &inverse * inverse.transpose();
-        let entry = |i: usize, j: usize| gram[(i, j)] / (squared[i] * squared[j]).sqrt();
-        let normal = (0..p * p).map(|index| entry(index / p, index % p)).collect();
-        Some(((0..p).map(value).collect(), normal, condition))
+        let is_determined = condition * f64::EPSILON * (self.rows as f64) < 1.0;
+        is_determined.then_some((inverse, condition))
+    }
+
+    /// The parameters, from the inverse of the scaled factor.
+    fn values(&self, inverse: &Mat<f64>, norms: &[f64]) -> Vec<f64> {
+        let p = norms.len();
+        let value = |i: usize| (i..p).map(|j| inverse[(i, j)] * self.factor[(j, p)]).sum::<f64>() / norms[i];
+        (0..p).map(value).collect()
     }
 
     /// The direction in which columns, each scaled by the square root of a number, are smallest: the last right singular vector.
@@ -101,20 +113,10 @@ impl Summary {
         if norms.contains(&0.0) {
             return None;
         }
-        let scaled = Mat::from_fn(p, p, |i, j| self.factor[(i, j)] / norms[j]);
-        let mut inverse = Mat::<f64>::identity(p, p);
-        faer::linalg::triangular_solve::solve_upper_triangular_in_place(
-            scaled.as_ref(),
-            inverse.as_mut(),
-            faer::Par::Seq,
-        );
-        let condition = (p as f64).sqrt() * inverse.norm_l2();
-        if condition.is_nan() || condition * f64::EPSILON * self.rows as f64 >= 1.0 {
-            return None;
-        }
-        let side = |i: usize| self.factor[(i, p)];
-        let values = (0..p).map(|i| (i..p).map(|j| inverse[(i, j)] * side(j)).sum::<f64>() / norms[i]).collect();
-        let residual = if self.factor.nrows() > p { side(p).abs() / ((self.rows - p) as f64).sqrt() } else { 0.0 };
+        let (inverse, condition) = self.scaled_inverse(&norms)?;
+        let values = self.values(&inverse, &norms);
+        let residual =
+            if self.factor.nrows() > p { self.factor[(p, p)].abs() / ((self.rows - p) as f64).sqrt() } else { 0.0 };
         let gram = &inverse * inverse.transpose();
         let entry = |i: usize, j: usize| residual * residual * gram[(i, j)] / (norms[i] * norms[j]);
         let covariance = (0..p * p).map(|index| entry(index / p, index % p)).collect();
