@@ -8,7 +8,7 @@
 
 use crate::error::Error;
 use crate::model::{Fit, Model};
-use crate::pooling::{Expected, influence, sandwich};
+use crate::pooling::Expected;
 use crate::row_covariance::RowCovariance;
 use crate::suspects::Judged;
 use crate::weak_decision::Decided;
@@ -148,11 +148,10 @@ impl Session<'_, '_, '_> {
         let mut model = model.clone();
         model.constant.push(self.rate());
         let problem = model.problem(&weak.rows, side, self.noise[0], Some(covariance));
-        let Some(all) = self.refit(&problem, fit, expected)? else { return Ok(None) };
-        let windows = 0..all.full.len();
-        let centre = |window| all.centre(window);
-        let columns = influence(&problem, &all.full, windows, &all.pooled.weights, all.step, all.span, centre);
-        let both = sandwich(&columns, &all.pooled.inverse, covariance);
+        let Some(all) = fit.again(&problem, expected, self.options.instructions, &mut self.run)? else {
+            return Ok(None);
+        };
+        let both = all.covariance(&problem, covariance);
         let count = problem.layout.constant;
         let rows = both.chunks_exact(count).take(count - 1);
         Ok(Some(rows.flat_map(|row| row[..count - 1].to_vec()).collect()))

@@ -1,13 +1,15 @@
 //! Which unknowns of the equation of motion belong to every window and which are the same over the record, and what windows of one
 //! length say of both.
 
+use std::ops::Range;
+
 use crate::equations::{Regressor, Rows};
 use crate::error::Error;
 use crate::factor::{Layout, RowNoise};
-use crate::pooling::{Expected, Pooled, is_determined, local, pool};
+use crate::pooling::{Expected, Pooled, influence, is_determined, local, pool, sandwich};
 use crate::row_covariance::RowCovariance;
 use crate::run::Run;
-use crate::scale::{Cells, Scale};
+use crate::scale::Scale;
 use crate::simd::Instructions;
 use crate::windows::{Problem, Shape, Solved, solve_windows};
 
@@ -27,6 +29,15 @@ pub(crate) struct Model {
 }
 
 impl Model {
+    /// Sorts unknowns by whether they belong to windows.
+    pub(crate) fn new(unknowns: &[usize], windowed: impl Iterator<Item = bool>, linear: bool) -> Self {
+        let mut model = Self { linear, ..Self::default() };
+        for (&index, windowed) in unknowns.iter().zip(windowed) {
+            if windowed { model.windowed.push(index) } else { model.constant.push(index) }
+        }
+        model
+    }
+
     pub(crate) fn layout(&self) -> Layout {
         Layout { windowed: self.windowed.len(), linear: self.linear, constant: self.constant.len() }
     }
@@ -130,10 +141,42 @@ impl Fit {
         instructions: Instructions,
         run: &mut Run<'_, '_>,
     ) -> Result<Option<Self>, Error> {
-        let Cells { hollow, full, .. } = scale.solve(problem, &scale.full_cells(problem.rows()), instructions, run)?;
+        let (hollow, full) = scale.solve_hollow(problem, instructions, run)?;
         let pooled = pool(&full, 0..full.len(), expected, instructions);
         let (step, span) = (scale.step, scale.span());
         Ok(pooled.map(|pooled| Self { scale: Some(scale), hollow: Some(hollow), full, pooled, step, span }))
+    }
+
+    /// Solves another problem in the same windows.
+    pub(crate) fn again(
+        &self,
+        problem: &Problem<'_>,
+        expected: Expected,
+        instructions: Instructions,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Option<Self>, Error> {
+        if self.scale.is_none() && problem.layout.local() > 0 {
+            return Ok(Self::in_rows(problem, self.span, expected, instructions));
+        }
+        Self::new(problem, self.scale, expected, instructions, run)
+    }
+
+    /// The covariance of the constants of the problem that was solved, row by row.
+    pub(crate) fn covariance(&self, problem: &Problem<'_>, covariance: &RowCovariance) -> Vec<f64> {
+        self.covariance_of(problem, 0..self.full.len(), &self.pooled, covariance)
+    }
+
+    /// The same for constants that were taken from some of the windows.
+    pub(crate) fn covariance_of(
+        &self,
+        problem: &Problem<'_>,
+        windows: Range<usize>,
+        pooled: &Pooled,
+        covariance: &RowCovariance,
+    ) -> Vec<f64> {
+        let centre = |window| self.centre(window);
+        let columns = influence(problem, &self.full, windows, &pooled.weights, self.step, self.span, centre);
+        sandwich(&columns, &pooled.inverse, covariance)
     }
 
     /// Solves a problem in windows of so many rows, or in one piece if that is all of them.

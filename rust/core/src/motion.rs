@@ -116,6 +116,12 @@ impl Motion<'_> {
     }
 }
 
+/// Which columns of the equations have unknown factors: coefficients, then that many terms.
+pub(crate) fn unknowns(coefficients: &[Coefficient<'_>; 3], terms: usize) -> Vec<usize> {
+    let unknown = (0..3).filter(|&index| matches!(coefficients[index], Coefficient::Unknown));
+    unknown.chain(3..3 + terms).collect()
+}
+
 /// The sign of a number; zero has none.
 pub(crate) fn sign(value: f64) -> f64 {
     if value == 0.0 { 0.0 } else { value.signum() }

@@ -5,7 +5,7 @@
 
 use crate::error::Error;
 use crate::model::Fit;
-use crate::pooling::{Expected, influence, sandwich};
+use crate::pooling::Expected;
 use crate::row_covariance::RowCovariance;
 use crate::varying;
 use crate::weak_decision::Decided;
@@ -85,12 +85,8 @@ impl Session<'_, '_, '_> {
             square(&problem) / square(&inner)
         });
         let mut differing = Vec::new();
-        if let Some(other) = self.refit(&problem, fit, expected)? {
-            let windows = 0..other.full.len();
-            let centre = |window| other.centre(window);
-            let weights = &other.pooled.weights;
-            let columns = influence(&problem, &other.full, windows, weights, other.step, other.span, centre);
-            let own = sandwich(&columns, &other.pooled.inverse, covariance);
+        if let Some(other) = fit.again(&problem, expected, self.options.instructions, &mut self.run)? {
+            let own = other.covariance(&problem, covariance);
             let count = model.constant.len();
             for (place, &unknown) in model.constant.iter().enumerate() {
                 let value = other.pooled.values[place];

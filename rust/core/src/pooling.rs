@@ -271,6 +271,32 @@ pub(crate) fn sandwich(influence: &[Vec<f64>], inverse: &[f64], covariance: &Row
     (0..size * size).map(|index| f64::midpoint(result[index], result[index % size * size + index / size])).collect()
 }
 
+/// The covariance of two unknowns, of which the first `windowed` ones depend on `constants` others that come after them: the covariance of
+/// their `own`, for given constants, and what the constants pass on to them.
+pub(crate) fn joint_covariance(
+    [one, other]: [usize; 2],
+    [windowed, constants]: [usize; 2],
+    own: impl Fn(usize, usize) -> f64,
+    sensitive: impl Fn(usize, usize) -> f64,
+    between: impl Fn(usize, usize) -> f64,
+) -> f64 {
+    let to = |unknown: usize, constant: usize| -> f64 {
+        (0..constants).map(|k| sensitive(unknown, k) * between(k, constant)).sum()
+    };
+    match (one.checked_sub(windowed), other.checked_sub(windowed)) {
+        (Some(one), Some(other)) => between(one, other),
+        (Some(constant), None) => to(other, constant),
+        (None, Some(constant)) => to(one, constant),
+        (None, None) => {
+            let passed_on: f64 = (0..constants)
+                .flat_map(|i| (0..constants).map(move |j| (i, j)))
+                .map(|(i, j)| sensitive(one, i) * sensitive(other, j) * between(i, j))
+                .sum();
+            own(one, other) + passed_on
+        }
+    }
+}
+
 /// What a window says of its own unknown at its centre, and per second, for given constants.
 pub(crate) fn local(full: &Solved, window: usize, values: &[f64], local: usize) -> f64 {
     let fields = full.fields;

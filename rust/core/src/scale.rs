@@ -163,16 +163,41 @@ impl Scale {
         instructions: Instructions,
         run: &mut Run<'_, '_>,
     ) -> Result<Solved, Error> {
+        let [_, _, full] = self.shapes();
+        Ok(self.solve_shapes(problem, &[full], instructions, run)?.swap_remove(0))
+    }
+
+    /// Solves the full windows and the same without what lies between both sides, in parallel: the hollow ones come first.
+    pub(crate) fn solve_hollow(
+        self,
+        problem: &Problem<'_>,
+        instructions: Instructions,
+        run: &mut Run<'_, '_>,
+    ) -> Result<(Solved, Solved), Error> {
+        let [_, hollow, full] = self.shapes();
+        let mut solved = self.solve_shapes(problem, &[hollow, full], instructions, run)?;
+        let full = solved.swap_remove(1);
+        Ok((solved.swap_remove(0), full))
+    }
+
+    /// Solves windows of some shapes around all cells whose full windows lie within the rows.
+    fn solve_shapes(
+        self,
+        problem: &Problem<'_>,
+        shapes: &[Shape],
+        instructions: Instructions,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Vec<Solved>, Error> {
         let cells = self.full_cells(problem.rows());
-        let shapes = &self.shapes()[2..];
         let firsts = cells.clone().step_by(PIECE);
         let pieces = firsts.map(|first| first..(first + PIECE.cast_signed()).min(cells.end));
         let pieces = pieces.map(|blocks| Piece { size: blocks.len() * self.step, content: blocks });
-        let work = |blocks: Range<isize>, (): &mut ()| {
-            solve_windows(problem, self.step, &blocks, shapes, instructions).swap_remove(0)
-        };
+        let work = |blocks: Range<isize>, (): &mut ()| solve_windows(problem, self.step, &blocks, shapes, instructions);
         let solved = run.map(pieces.collect(), || (), work)?;
-        Ok(if solved.is_empty() { Solved::new(problem.layout, 0, 0) } else { Solved::join(&solved) })
+        if solved.is_empty() {
+            return Ok(vec![Solved::new(problem.layout, 0, 0); shapes.len()]);
+        }
+        Ok((0..shapes.len()).map(|shape| join_shape(&solved, shape)).collect())
     }
 
     /// Solves the windows of some cells on this thread.
@@ -210,6 +235,9 @@ impl Scale {
 
 /// Puts the parts of each shape together.
 fn join(parts: &[Vec<Solved>]) -> Cells {
-    let of = |shape: usize| Solved::join(&parts.iter().map(|part| part[shape].clone()).collect::<Vec<_>>());
-    Cells { sides: of(0), hollow: of(1), full: of(2) }
+    Cells { sides: join_shape(parts, 0), hollow: join_shape(parts, 1), full: join_shape(parts, 2) }
+}
+
+fn join_shape(parts: &[Vec<Solved>], shape: usize) -> Solved {
+    Solved::join(&parts.iter().map(|part| part[shape].clone()).collect::<Vec<_>>())
 }

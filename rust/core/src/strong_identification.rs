@@ -12,10 +12,10 @@ use crate::every_window::every_window;
 use crate::identification::HARDLY_TOLD_APART;
 use crate::local_polynomials::{Estimates, LocalPolynomials, Options, Order};
 use crate::model::{Fit, Model, without_constants};
-use crate::motion::{Coefficient, Motion, Term};
+use crate::motion::{Coefficient, Motion, Term, unknowns};
 use crate::output::Elements;
 use crate::parallel::Watch;
-use crate::pooling::{Expected, influence, sandwich};
+use crate::pooling::{Expected, influence, joint_covariance, sandwich};
 use crate::row_covariance::RowCovariance;
 use crate::run::Run;
 use crate::samples::{Samples, is_usable};
@@ -78,15 +78,9 @@ pub fn identify_strong(
     let mut run = Run::new(workers, samples, STAGES, watch);
     let differentiated = differentiate(derivatives, motion, options, &mut run)?;
     let rows = rows(derivatives, motion, mask, options, &differentiated);
-    let unknowns: Vec<usize> = (0..3)
-        .filter(|&index| matches!(motion.coefficients[index], Coefficient::Unknown))
-        .chain(3..3 + motion.terms.len())
-        .collect();
-    let of = |windowed: bool| {
-        let kinds = unknowns.iter().zip(&options.kinds);
-        kinds.filter(|(_, kind)| (**kind == Kind::Windowed) == windowed).map(|(index, _)| *index).collect()
-    };
-    let model = Model { windowed: of(true), constant: of(false), linear: options.linear };
+    let kinds = options.kinds.iter();
+    let windowed = kinds.map(|kind| *kind == Kind::Windowed);
+    let model = Model::new(&unknowns(&motion.coefficients, motion.terms.len()), windowed, options.linear);
     let instructions = derivatives.options().instructions;
     let mut problem = model.problem(&rows, &rows.side, 0.0, None);
     // All residuals are taken to be of one variance, which ordinary least squares reads off them.
@@ -126,24 +120,10 @@ pub fn identify_strong(
         let (ill, window) = (HARDLY_TOLD_APART, options.equations);
         let found = every_window(&problem, window, range, &constants, ill, instructions, &mut run)?;
         let windowed = model.windowed.len();
-        let between = |one: usize, other: usize, row: usize| -> f64 {
+        let between = |one: usize, other: usize, row: usize| {
+            let own = |one, other| found.covariances[crate::factor::symmetric(one, other)][row];
             let sensitive = |unknown: usize, k: usize| found.sensitivities[unknown * count + k][row];
-            match (one.checked_sub(windowed), other.checked_sub(windowed)) {
-                (Some(one), Some(other)) => covariance[one * count + other],
-                (Some(constant), None) => {
-                    (0..count).map(|k| sensitive(other, k) * covariance[k * count + constant]).sum()
-                }
-                (None, Some(constant)) => {
-                    (0..count).map(|k| sensitive(one, k) * covariance[k * count + constant]).sum()
-                }
-                (None, None) => {
-                    let passed_on: f64 = (0..count)
-                        .flat_map(|i| (0..count).map(move |j| (i, j)))
-                        .map(|(i, j)| sensitive(one, i) * sensitive(other, j) * covariance[i * count + j])
-                        .sum();
-                    found.covariances[crate::factor::symmetric(one, other)][row] + passed_on
-                }
-            }
+            joint_covariance([one, other], [windowed, count], own, sensitive, |i, j| covariance[i * count + j])
         };
         results.errors =
             (0..windowed).map(|one| (0..samples).map(|row| between(one, one, row).sqrt()).collect()).collect();
@@ -188,22 +168,13 @@ fn listed(model: &Model, values: &[f64], covariance: &[f64]) -> Vec<Constant> {
 
 /// Nothing but a status.
 fn undetermined(model: &Model, samples: usize, step: usize, order: Vec<u8>) -> StrongIdentified {
-    let elements = samples.div_ceil(step);
-    let nothing = || vec![f64::NAN; elements];
     let nan = |&unknown: &usize| Constant { unknown, value: f64::NAN, error: f64::NAN, test: None };
     StrongIdentified {
         constants: model.constant.iter().map(nan).collect(),
         condition: f64::INFINITY,
         changing: model.windowed.clone(),
         pairs: Vec::new(),
-        results: SampleResults {
-            values: model.windowed.iter().map(|_| nothing()).collect(),
-            errors: model.windowed.iter().map(|_| nothing()).collect(),
-            covariances: Vec::new(),
-            deviation: nothing(),
-            condition: vec![f64::INFINITY; elements],
-            status: vec![(Status::INVALID | Status::RANK_DEFICIENT).bits(); elements],
-        },
+        results: SampleResults::undetermined(model.windowed.len(), samples.div_ceil(step)),
         order,
     }
 }

@@ -6,7 +6,7 @@ use crate::equations::Rows;
 use crate::error::Error;
 use crate::factor::Layout;
 use crate::model::{Fit, Model};
-use crate::pooling::{Expected, influence, sandwich};
+use crate::pooling::Expected;
 use crate::row_covariance::RowCovariance;
 use crate::run::Run;
 use crate::simd::Instructions;
@@ -67,18 +67,10 @@ impl Judged<'_> {
         let mut model = self.model.clone();
         model.constant.push(regressor);
         let problem = model.problem(self.rows, self.side, self.noise, Some(self.covariance));
-        let fit = match self.fit.scale {
-            None if self.fit.full.fields.layout.local() > 0 => {
-                Fit::in_rows(&problem, self.fit.span, self.expected, self.instructions)
-            }
-            scale => Fit::new(&problem, scale, self.expected, self.instructions, run)?,
-        };
+        let fit = self.fit.again(&problem, self.expected, self.instructions, run)?;
         let Some(fit) = fit else { return Ok(None) };
-        let windows = 0..fit.full.len();
         let Layout { constant, .. } = problem.layout;
-        let centre = |window| fit.centre(window);
-        let columns = influence(&problem, &fit.full, windows, &fit.pooled.weights, fit.step, fit.span, centre);
-        let variances = sandwich(&columns, &fit.pooled.inverse, self.covariance);
+        let variances = fit.covariance(&problem, self.covariance);
         let variance = self.inflation * variances[constant * constant - 1];
         Ok(Some((fit.pooled.values[constant - 1], variance.sqrt())))
     }

@@ -76,16 +76,16 @@ impl Decided {
 impl Session<'_, '_, '_> {
     /// Chooses the length of windows where it is not given, tests what is constant, and finds jumps of what is windowed.
     pub(crate) fn decide(&mut self, chosen: &mut Chosen, model: &Model) -> Result<Decided, Error> {
-        let mut jumps = Vec::new();
-        let mut whole = None;
+        let (mut jumps, mut whole, mut round) = (Vec::new(), None, 0);
         loop {
             let mut decided = self.decide_kinds(chosen, model)?;
-            let found = match jumps.len() {
-                rounds if rounds < JUMP_ROUNDS => self.find_jumps(&chosen.weak, &decided, jumps.last(), whole.as_ref()),
-                _ => jumps.last().cloned().unwrap_or_default(),
+            let found = if round < JUMP_ROUNDS {
+                self.find_jumps(&chosen.weak, &decided, &jumps, whole.as_ref())
+            } else {
+                jumps.clone()
             };
             let samples = |jumps: &[Jump]| jumps.iter().map(|jump| jump.sample).collect::<Vec<_>>();
-            if samples(&found) == jumps.last().map_or_else(Vec::new, |known| samples(known)) {
+            if samples(&found) == samples(&jumps) {
                 (decided.jumps, decided.whole) = (found, whole);
                 return Ok(decided);
             }
@@ -95,7 +95,7 @@ impl Session<'_, '_, '_> {
             let (function, rows) = (&weak.kernels.values[2], weak.rows.len());
             weak.rows.exclude(jumps::rows_over(&found, function, weak.first, weak.stride, rows));
             weak.rows.jumps = found.iter().map(|jump| (jump.sample - weak.first).div_ceil(weak.stride)).collect();
-            jumps.push(found);
+            (jumps, round) = (found, round + 1);
         }
     }
 
@@ -245,14 +245,7 @@ impl Session<'_, '_, '_> {
     }
 
     /// Finds jumps of what is windowed beside those that are known. `whole` holds all rows where some are over jumps.
-    fn find_jumps(
-        &self,
-        weak: &WeakRows,
-        decided: &Decided,
-        known: Option<&Vec<Jump>>,
-        whole: Option<&Rows>,
-    ) -> Vec<Jump> {
-        let known = known.map_or(&[][..], Vec::as_slice);
+    fn find_jumps(&self, weak: &WeakRows, decided: &Decided, known: &[Jump], whole: Option<&Rows>) -> Vec<Jump> {
         if decided.error > NOISE_MODEL_FAILS {
             // What is left is more than noise everywhere, so it tells nothing of jumps.
             return known.to_vec();

@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::lag::Lag;
 use crate::local_polynomials::{Estimates, LocalPolynomials, Options, Order};
 use crate::model::{Fit, Model};
-use crate::motion::{Coefficient, Motion, Term, sign};
+use crate::motion::{Coefficient, Motion, Term, sign, unknowns};
 use crate::noise::channel_variance;
 use crate::output::Elements;
 use crate::outside_mask::Outside;
@@ -267,18 +267,12 @@ fn identify(
 impl Session<'_, '_, '_> {
     /// Regressors of the unknowns: coefficients that are not known, then terms.
     pub(crate) fn unknowns(&self) -> Vec<usize> {
-        let coefficients = self.record.coefficients.iter().enumerate();
-        let unknown = coefficients.filter(|(_, one)| matches!(one, Coefficient::Unknown)).map(|(index, _)| index);
-        unknown.chain((0..self.record.terms.len()).map(|term| 3 + term)).collect()
+        unknowns(&self.record.coefficients, self.record.terms.len())
     }
 
     pub(crate) fn model(&self) -> Model {
-        let unknowns = self.unknowns();
-        let of = |windowed: bool| {
-            let kinds = unknowns.iter().zip(&self.options.kinds);
-            kinds.filter(|(_, kind)| (**kind == Kind::Windowed) == windowed).map(|(index, _)| *index).collect()
-        };
-        Model { windowed: of(true), constant: of(false), linear: self.options.linear }
+        let windowed = self.options.kinds.iter().map(|kind| *kind == Kind::Windowed);
+        Model::new(&self.unknowns(), windowed, self.options.linear)
     }
 
     /// Inertia, damping and stiffness as far as a fit knows them.

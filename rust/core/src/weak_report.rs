@@ -7,8 +7,9 @@ use crate::error::Error;
 use crate::every_window::every_window;
 use crate::identification::HARDLY_TOLD_APART;
 use crate::model::{Fit, Predictor, without_constants};
+use crate::motion::sign;
 use crate::outside_mask::{Inside, Outside};
-use crate::pooling::{Expected, influence, is_determined, sandwich, weakest};
+use crate::pooling::{Expected, is_determined, joint_covariance, weakest};
 use crate::row_covariance::RowCovariance;
 use crate::status::Status;
 use crate::suspects::{Judged, Missing, Suspect};
@@ -92,14 +93,11 @@ impl Session<'_, '_, '_> {
         let errors = self.errors(&weak, decided, fit);
         found.prediction_error = errors.error;
         let problem = ordered.problem(&weak.rows, decided.side(&weak.rows), self.noise[0], Some(&errors.covariance));
-        let all = self.refit(&problem, fit, errors.expected)?;
+        let all = fit.again(&problem, errors.expected, self.options.instructions, &mut self.run)?;
         let Some(all) = all else { return Ok(self.undetermined(found, decided)) };
         found.condition = all.pooled.condition;
         found.weakest = weakest(&all.full, &all.pooled.weights);
-        let windows = 0..all.full.len();
-        let centre = |window| all.centre(window);
-        let columns = influence(&problem, &all.full, windows, &all.pooled.weights, all.step, all.span, centre);
-        found.covariance = sandwich(&columns, &all.pooled.inverse, &errors.covariance);
+        found.covariance = all.covariance(&problem, &errors.covariance);
         let (side, expected) = (decided.side(&weak.rows), errors.expected);
         if let Some(covariance) =
             self.covariance_beside_lag(&weak, &ordered, side, fit, expected, &errors.covariance)?
@@ -165,28 +163,11 @@ impl Session<'_, '_, '_> {
     /// Nothing but a status.
     fn undetermined(&self, mut found: WeakIdentified, decided: &Decided) -> WeakIdentified {
         let elements = self.record.angle.len().div_ceil(self.options.step);
-        let nothing = || vec![f64::NAN; elements];
         for &unknown in &decided.model.constant {
             found.constants.push(Constant { unknown, value: f64::NAN, error: f64::NAN, test: None });
         }
-        found.results = SampleResults {
-            values: found.changing.iter().map(|_| nothing()).collect(),
-            errors: found.changing.iter().map(|_| nothing()).collect(),
-            covariances: Vec::new(),
-            deviation: nothing(),
-            condition: vec![f64::INFINITY; elements],
-            status: vec![(Status::INVALID | Status::RANK_DEFICIENT).bits(); elements],
-        };
+        found.results = SampleResults::undetermined(found.changing.len(), elements);
         found
-    }
-
-    /// Solves another problem in the windows of a fit.
-    pub(crate) fn refit(&mut self, problem: &Problem<'_>, fit: &Fit, expected: Expected) -> Result<Option<Fit>, Error> {
-        let instructions = self.options.instructions;
-        if fit.scale.is_none() && problem.layout.local() > 0 {
-            return Ok(Fit::in_rows(problem, fit.span, expected, instructions));
-        }
-        Fit::new(problem, fit.scale, expected, instructions, &mut self.run)
     }
 
     /// The covariance that errors are made from: that of the channels' noise, or where it fails to explain the residuals, theirs.
@@ -343,24 +324,10 @@ impl Session<'_, '_, '_> {
         };
         let sensitive =
             |unknown: usize, constant: usize, place: usize| tracks.sensitivities[unknown * count + constant][place];
-        let covariance = |one: usize, other: usize, place: usize| -> f64 {
-            match (one.checked_sub(windowed), other.checked_sub(windowed)) {
-                (Some(one), Some(other)) => between(one, other, place),
-                (Some(constant), None) => {
-                    (0..count).map(|k| sensitive(other, k, place) * between(k, constant, place)).sum()
-                }
-                (None, Some(constant)) => {
-                    (0..count).map(|k| sensitive(one, k, place) * between(k, constant, place)).sum()
-                }
-                (None, None) => {
-                    let own = tracks.covariances[crate::factor::symmetric(one, other)][place] * errors.inflation;
-                    let passed_on: f64 = (0..count)
-                        .flat_map(|i| (0..count).map(move |j| (i, j)))
-                        .map(|(i, j)| sensitive(one, i, place) * sensitive(other, j, place) * between(i, j, place))
-                        .sum();
-                    own + passed_on
-                }
-            }
+        let covariance = |one: usize, other: usize, place: usize| {
+            let own = |one, other| tracks.covariances[crate::factor::symmetric(one, other)][place] * errors.inflation;
+            let sensitive = |unknown, constant| sensitive(unknown, constant, place);
+            joint_covariance([one, other], [windowed, count], own, sensitive, |i, j| between(i, j, place))
         };
         let names: Vec<usize> =
             decided.model.windowed.iter().chain(&decided.slow).chain(&decided.model.constant).copied().collect();
@@ -565,5 +532,5 @@ fn direction(weak: &WeakRows, samples: usize) -> Vec<f64> {
         let part = (place - row as f64).clamp(0.0, 1.0);
         velocity[row] + part * (velocity[(row + 1).min(last)] - velocity[row])
     };
-    (0..samples).map(at).map(|velocity| if velocity == 0.0 { 0.0 } else { velocity.signum() }).collect()
+    (0..samples).map(|sample| sign(at(sample))).collect()
 }

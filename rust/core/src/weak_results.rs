@@ -44,6 +44,21 @@ pub struct SampleResults {
     pub status: Vec<u16>,
 }
 
+impl SampleResults {
+    /// Nothing but a status.
+    pub(crate) fn undetermined(changing: usize, elements: usize) -> Self {
+        let nothing = || vec![f64::NAN; elements];
+        Self {
+            values: (0..changing).map(|_| nothing()).collect(),
+            errors: (0..changing).map(|_| nothing()).collect(),
+            covariances: Vec::new(),
+            deviation: nothing(),
+            condition: vec![f64::INFINITY; elements],
+            status: vec![(Status::INVALID | Status::RANK_DEFICIENT).bits(); elements],
+        }
+    }
+}
+
 impl RowResults {
     /// What the rows say at every `step`-th of so many samples: interpolated between them, carried on beyond the first and last.
     pub(crate) fn at_samples(&self, samples: usize, step: usize) -> SampleResults {
