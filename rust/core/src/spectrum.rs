@@ -4,51 +4,68 @@ use std::f64::consts::PI;
 
 use crate::samples::{Samples, is_usable};
 
-/// Segments that are averaged at most, spread over the record.
+/// Segments that are averaged at most, spread over the record: so many, or fewer long ones that hold so many samples together.
 const MOST_SEGMENTS: usize = 256;
+const MOST_SAMPLES: usize = 1 << 20;
+const FEWEST_SEGMENTS: usize = 32;
 
-/// The discrete Fourier transform of a real sequence of a length that is a power of two: frequencies from zero to half the sample rate,
-/// real and imaginary parts.
-pub(crate) fn transform(samples: &[f64]) -> Vec<[f64; 2]> {
-    let length = samples.len();
-    assert!(length.is_power_of_two(), "the length {length} is no power of two");
-    let bits = length.trailing_zeros();
-    let mut values: Vec<[f64; 2]> = (0..length)
-        .map(|i| [samples[if bits == 0 { 0 } else { i.reverse_bits() >> (usize::BITS - bits) }], 0.0])
-        .collect();
-    let turns: Vec<[f64; 2]> = (0..length / 2)
-        .map(|k| {
-            let (sine, cosine) = (-2.0 * PI * k as f64 / length as f64).sin_cos();
-            [cosine, sine]
-        })
-        .collect();
-    let mut half = 1;
-    while half < length {
-        let stride = length / (2 * half);
-        for pair in values.chunks_exact_mut(2 * half) {
-            let (low, high) = pair.split_at_mut(half);
-            for (k, (a, b)) in low.iter_mut().zip(high).enumerate() {
-                let [cosine, sine] = turns[k * stride];
-                let turned = [cosine * b[0] - sine * b[1], cosine * b[1] + sine * b[0]];
-                *b = [a[0] - turned[0], a[1] - turned[1]];
-                *a = [a[0] + turned[0], a[1] + turned[1]];
-            }
-        }
-        half *= 2;
-    }
-    values.truncate(length / 2 + 1);
-    values
+/// The discrete Fourier transform of real sequences of one length that is a power of two.
+#[derive(Clone, Debug)]
+pub(crate) struct Transform {
+    /// Where each value goes before the first step.
+    order: Vec<usize>,
+    /// Factors `exp(-πik/m)`, `k < m`, of the steps that join sequences of `m` = 1, 2, 4, … values, one step after another.
+    turns: Vec<[f64; 2]>,
 }
 
-/// The frequency response of a kernel that is centred on its middle sample, padded to a power of two.
-pub(crate) fn response(kernel: &[f64], length: usize) -> Vec<[f64; 2]> {
-    let half = kernel.len() / 2;
-    let mut padded = vec![0.0; length];
-    for (k, &value) in kernel.iter().enumerate() {
-        // A dot product reads forwards in time, so the response is that of the kernel turned round.
-        padded[(length + half - k) % length] += value;
+impl Transform {
+    pub(crate) fn new(length: usize) -> Self {
+        assert!(length.is_power_of_two(), "the length {length} is no power of two");
+        let bits = length.trailing_zeros();
+        let reversed = |i: usize| if bits == 0 { 0 } else { i.reverse_bits() >> (usize::BITS - bits) };
+        let turn = |k: usize, half: usize| {
+            let (sine, cosine) = (-PI * k as f64 / half as f64).sin_cos();
+            [cosine, sine]
+        };
+        let halves = (0..bits).map(|step| 1_usize << step);
+        Self {
+            order: (0..length).map(reversed).collect(),
+            turns: halves.flat_map(|half| (0..half).map(move |k| turn(k, half))).collect(),
+        }
     }
-    transform(&padded)
+
+    /// Frequencies from zero to half the sample rate, real and imaginary parts.
+    pub(crate) fn of(&self, samples: &[f64]) -> Vec<[f64; 2]> {
+        let length = self.order.len();
+        assert_eq!(samples.len(), length, "a transform is for sequences of its length");
+        let mut values: Vec<[f64; 2]> = self.order.iter().map(|&place| [samples[place], 0.0]).collect();
+        let mut half = 1;
+        while half < length {
+            let turns = &self.turns[half - 1..2 * half - 1];
+            for pair in values.chunks_exact_mut(2 * half) {
+                let (low, high) = pair.split_at_mut(half);
+                for ((a, b), [cosine, sine]) in low.iter_mut().zip(high).zip(turns) {
+                    let turned = [cosine * b[0] - sine * b[1], cosine * b[1] + sine * b[0]];
+                    *b = [a[0] - turned[0], a[1] - turned[1]];
+                    *a = [a[0] + turned[0], a[1] + turned[1]];
+                }
+            }
+            half *= 2;
+        }
+        values.truncate(length / 2 + 1);
+        values
+    }
+
+    /// The frequency response of a kernel that is centred on its middle sample.
+    pub(crate) fn response(&self, kernel: &[f64]) -> Vec<[f64; 2]> {
+        let (half, length) = (kernel.len() / 2, self.order.len());
+        let mut padded = vec![0.0; length];
+        for (k, &value) in kernel.iter().enumerate() {
+            // A dot product reads forwards in time, so the response is that of the kernel turned round.
+            padded[(length + half - k) % length] += value;
+        }
+        self.of(&padded)
+    }
 }
 
 /// The power of a record by frequency, so that its mean over all frequencies, both signs, is the mean square: of segments of `length`
@@ -63,7 +80,9 @@ pub(crate) fn power(record: &dyn Samples, length: usize) -> Vec<f64> {
     let mut count = 0.0_f64;
     let mut samples = vec![0.0; length];
     let last = record.len().saturating_sub(length);
-    let every = (length / 2).max(last / MOST_SEGMENTS).max(1);
+    let most = (MOST_SAMPLES / length).clamp(FEWEST_SEGMENTS, MOST_SEGMENTS);
+    let every = (length / 2).max(last / most).max(1);
+    let transform = Transform::new(length);
     for first in (0..=last).step_by(every).take_while(|_| record.len() >= length) {
         record.read(first, &mut samples);
         if !bridge(&mut samples) {
@@ -71,7 +90,7 @@ pub(crate) fn power(record: &dyn Samples, length: usize) -> Vec<f64> {
         }
         let mean = samples.iter().sum::<f64>() / length as f64;
         samples.iter_mut().zip(&fade).for_each(|(value, fade)| *value = (*value - mean) * fade);
-        for (sum, [real, imaginary]) in sum.iter_mut().zip(transform(&samples)) {
+        for (sum, [real, imaginary]) in sum.iter_mut().zip(transform.of(&samples)) {
             *sum += (real * real + imaginary * imaginary) / energy;
         }
         count += 1.0;
@@ -84,10 +103,10 @@ pub(crate) fn power(record: &dyn Samples, length: usize) -> Vec<f64> {
 
 /// Puts a line where samples cannot be used; whether at least half of them can.
 fn bridge(samples: &mut [f64]) -> bool {
-    let usable: Vec<usize> = (0..samples.len()).filter(|&place| is_usable(samples[place])).collect();
-    if usable.len() == samples.len() {
+    if samples.iter().all(|&value| is_usable(value)) {
         return true;
     }
+    let usable: Vec<usize> = (0..samples.len()).filter(|&place| is_usable(samples[place])).collect();
     let (Some(&first), Some(&last)) = (usable.first(), usable.last()) else { return false };
     for pair in usable.windows(2) {
         let (from, to) = (pair[0], pair[1]);
@@ -118,7 +137,7 @@ mod tests {
     fn a_transform_is_the_sum_it_is_defined_by() {
         for length in [1_u32, 2, 8, 64] {
             let samples: Vec<f64> = (0..length).map(|i| (f64::from(i) * 1.7).sin() + 0.1 * f64::from(i)).collect();
-            for (k, [real, imaginary]) in transform(&samples).into_iter().enumerate() {
+            for (k, [real, imaginary]) in Transform::new(samples.len()).of(&samples).into_iter().enumerate() {
                 let angle = |i: usize| -2.0 * PI * (k * i) as f64 / f64::from(length);
                 let expected = [
                     samples.iter().enumerate().map(|(i, value)| value * angle(i).cos()).sum::<f64>(),
@@ -141,7 +160,7 @@ mod tests {
     #[test]
     fn a_response_tells_what_a_kernel_makes_of_a_sine() {
         let kernel: Vec<f64> = (-3..=3).map(|k| f64::from(k * k + k)).collect();
-        let found = response(&kernel, 32)[5];
+        let found = Transform::new(32).response(&kernel)[5];
         let omega = 2.0 * PI * 5.0 / 32.0;
         let expected = kernel.iter().enumerate().fold([0.0, 0.0], |[real, imaginary], (k, value)| {
             let angle = omega * (k as f64 - 3.0);

@@ -9,7 +9,7 @@
 use faer::Mat;
 use faer::linalg::solvers::{DenseSolveCore, Llt, Solve};
 
-use crate::spectrum::response;
+use crate::spectrum::Transform;
 use crate::test_function::{LEAST_HALF_WIDTH, TestFunction};
 
 /// Exponents tried.
@@ -111,7 +111,8 @@ impl Candidates {
             let delta = evidence.delta;
             widths.iter().filter_map(move |&width| TestFunction::new(width, exponent, delta).ok())
         });
-        let tried = functions.map(|function| Tried::new(function, length, share(function.half_width()))).collect();
+        let transform = Transform::new(length);
+        let tried = functions.map(|function| Tried::new(function, &transform, share(function.half_width()))).collect();
         Self { evidence, tried }
     }
 
@@ -126,9 +127,9 @@ impl Candidates {
 }
 
 impl Tried {
-    fn new(function: TestFunction, length: usize, share: f64) -> Self {
+    fn new(function: TestFunction, transform: &Transform, share: f64) -> Self {
         let kernels = function.kernels(0.0).values;
-        let mut responses = [0, 1, 2].map(|i: usize| response(&kernels[i], length));
+        let mut responses = [0, 1, 2].map(|i: usize| transform.response(&kernels[i]));
         let through = |response: &[[f64; 2]]| {
             let largest = response.iter().map(|[a, b]| a * a + b * b).fold(0.0, f64::max);
             let last = response.iter().rposition(|[a, b]| a * a + b * b > NOTHING * NOTHING * largest);
