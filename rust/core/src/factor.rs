@@ -341,6 +341,10 @@ pub(crate) fn solve(
 ) {
     let (p, local) = (layout.regressors(), layout.local());
     let Scratch { square, factor, side, column, inverse, pivots } = scratch;
+    // Lengths that the compiler sees.
+    let (square, factor) = (&mut square[..p * p], &mut factor[..p * p]);
+    let (side, column, pivots) = (&mut side[..p], &mut column[..p.max(1)], &mut pivots[..p]);
+    let inverse = &mut inverse[..local * local];
     for i in 0..p {
         pivots[i] = summary[layout.entry(i, i)].inverse_or_zero();
         side[i] = summary[layout.entry(i, p)];
