@@ -1,5 +1,7 @@
 //! Rows of the equation of motion of one record, whatever form they were made in.
 
+use std::ops::Range;
+
 /// One regressor in every row.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Regressor {
@@ -57,4 +59,13 @@ impl Rows {
             }
         }
     }
+}
+
+/// Where one stretch ends and the next begins, counted along them.
+pub(crate) fn joints(stretches: &[Range<usize>]) -> Vec<usize> {
+    let ends = stretches.iter().scan(0, |end, stretch| {
+        *end += stretch.len();
+        Some(*end)
+    });
+    ends.take(stretches.len().saturating_sub(1)).collect()
 }

@@ -7,6 +7,7 @@ mod averaging;
 mod bank;
 pub mod basis;
 mod blocks;
+mod channels;
 mod coefficients;
 pub mod constancy;
 pub mod criterion;

@@ -55,7 +55,7 @@ impl Session<'_, '_, '_> {
         }
         let record = Record { mask: None, ..self.record.clone() };
         let (function, delta, workers) = (weak.function, self.options.delta, self.run.workers);
-        let mut rows = self.run.stage(|watch| WeakRows::build(&record, function, delta, workers, watch))?.rows;
+        let mut rows = self.run.stage(|watch| WeakRows::build(&record, function, delta, None, workers, watch))?.rows;
         // Rows over a jump are inside all the same.
         let within = &inside.decided.whole.as_ref().unwrap_or(&weak.rows).usable;
         rows.usable.iter_mut().zip(within).for_each(|(usable, inside)| *usable &= !inside);

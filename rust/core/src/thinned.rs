@@ -5,7 +5,7 @@
 use std::ops::Range;
 
 use crate::equations::{Regressor, Rows};
-use crate::samples::Samples;
+use crate::filter_bank::BLOCK;
 use crate::scale::Scale;
 
 /// All places, or so many of them in a number of stretches evenly spread.
@@ -18,56 +18,9 @@ pub(crate) fn stretches(places: usize, most: usize, count: usize) -> impl Iterat
     })
 }
 
-/// Stretches of a record, one after another with a missing sample between them.
-pub(crate) struct Thinned<'a> {
-    channel: &'a dyn Samples,
-    stretches: &'a [Range<usize>],
-}
-
-impl<'a> Thinned<'a> {
-    /// Stretches of the same length.
-    pub(crate) fn new(channel: &'a dyn Samples, stretches: &'a [Range<usize>]) -> Self {
-        Self { channel, stretches }
-    }
-
-    /// Samples of a stretch and what separates it from the next.
-    fn pitch(&self) -> usize {
-        self.stretches.first().map_or(0, Range::len) + 1
-    }
-}
-
-impl Samples for Thinned<'_> {
-    fn len(&self) -> usize {
-        (self.stretches.len() * self.pitch()).saturating_sub(1)
-    }
-
-    fn read(&self, first: usize, into: &mut [f64]) {
-        let pitch = self.pitch();
-        let mut done = 0;
-        while done < into.len() {
-            let (stretch, offset) = ((first + done) / pitch, (first + done) % pitch);
-            let from = &self.stretches[stretch];
-            if offset == from.len() {
-                into[done] = f64::NAN;
-                done += 1;
-            } else {
-                let count = (from.len() - offset).min(into.len() - done);
-                self.channel.read(from.start + offset, &mut into[done..done + count]);
-                done += count;
-            }
-        }
-    }
-}
-
-/// Flags in stretches, one after another with one that is not set between them.
-pub(crate) fn thinned_flags(flags: &[bool], stretches: &[Range<usize>]) -> Vec<bool> {
-    let mut thinned = Vec::new();
-    for stretch in stretches {
-        thinned.extend_from_slice(&flags[stretch.clone()]);
-        thinned.push(false);
-    }
-    thinned.pop();
-    thinned
+/// The same for rows, each stretch from the beginning of a block of them.
+pub(crate) fn stretches_of_blocks(rows: usize, most: usize, count: usize) -> Vec<Range<usize>> {
+    stretches(rows, most, count).map(|one| one.start - one.start % BLOCK..one.end - one.start % BLOCK).collect()
 }
 
 /// A column in stretches, one after another.
@@ -110,7 +63,7 @@ const STRETCHES: usize = 8;
 
 /// The stretches that stand for so many rows, where those are many.
 pub(crate) fn stretches_of_rows(rows: usize) -> Option<Vec<Range<usize>>> {
-    (rows > LONG).then(|| stretches(rows, MOST_ROWS, STRETCHES).collect())
+    (rows > LONG).then(|| stretches_of_blocks(rows, MOST_ROWS, STRETCHES))
 }
 
 /// Whether stretches of rows hold enough windows of a length.
@@ -130,19 +83,12 @@ mod tests {
     }
 
     #[test]
-    fn a_thinned_record_reads_the_same_in_any_pieces() {
-        let samples: Vec<f64> = (0..100).map(f64::from).collect();
-        let (samples, parts) = (samples.as_slice(), [3..8, 40..45, 90..95]);
-        let thinned = Thinned::new(&samples, &parts);
-        let mut whole = vec![0.0; thinned.len()];
-        thinned.read(0, &mut whole);
-        assert_eq!(whole.len(), 17);
-        assert_eq!((whole[4], whole[6], whole[16]), (7.0, 40.0, 94.0));
-        assert!(whole[5].is_nan() && whole[11].is_nan());
-        for (first, sample) in whole.iter().enumerate() {
-            let mut one = [0.0];
-            thinned.read(first, &mut one);
-            assert_eq!(one[0].to_bits(), sample.to_bits());
+    fn stretches_of_rows_begin_with_a_block() {
+        for rows in [40_000, 1_000_003] {
+            let parts = stretches_of_rows(rows).unwrap();
+            assert_eq!(parts.iter().map(Range::len).sum::<usize>(), MOST_ROWS);
+            assert!(parts.iter().all(|part| part.start % BLOCK == 0 && part.end <= rows));
+            assert!(rows - parts[STRETCHES - 1].end < BLOCK);
         }
     }
 }

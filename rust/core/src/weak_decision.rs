@@ -1,5 +1,6 @@
 //! What a record says of its unknowns: over which length windows should reach, and what is constant.
 
+use crate::channels::{Ones, Whole};
 use crate::constancy::{self, Test};
 use crate::cross_validation::{Validated, validate};
 use crate::equations::Rows;
@@ -12,10 +13,9 @@ use crate::samples::Samples;
 use crate::scale::Scale;
 use crate::thinned::{holds, stretches_of_rows, thinned_rows};
 use crate::varying;
-use crate::weak_form::{Ones, Record, TermSamples, WeakRows, Whole};
+use crate::weak_form::{Record, TermSamples, WeakRows};
 use crate::weak_identification::{Chosen, Kind, NOISE_MODEL_FAILS, Session};
 use crate::weak_report::residuals;
-use crate::windows::Problem;
 
 /// The mean squared error of predicting rows, over the noise's, from which on more is tried, and the part of it that must be left to be
 /// worth it.
@@ -121,9 +121,6 @@ impl Session<'_, '_, '_> {
             decided.scales = Scale::all(rows.len(), chosen.weak.reach());
         }
         self.fit_constants(&chosen.weak, &mut decided)?;
-        if let Some(fit) = &decided.fit {
-            (decided.covariance, decided.expected) = self.covariance(&chosen.weak, self.parameters(model, fit));
-        }
         decided.slow = self.of_kind(Kind::Varying);
         loop {
             if !decided.slow.is_empty() {
@@ -178,24 +175,31 @@ impl Session<'_, '_, '_> {
         unknowns.iter().zip(&self.options.kinds).filter(|(_, one)| **one == kind).map(|(index, _)| *index).collect()
     }
 
-    /// Fits everything that is not windowed as constant, in windows of the length that predicts best.
+    /// Fits everything that is not windowed as constant, in windows of the length that predicts best. What the noise makes of rows depends on
+    /// the parameters, so a first fit gives those that the last one is made with.
     fn fit_constants(&mut self, weak: &WeakRows, decided: &mut Decided) -> Result<(), Error> {
         let (rows, stride) = (&weak.rows, weak.stride);
         let instructions = self.options.instructions;
-        let (expected, model) = (decided.expected, &decided.model);
-        let problem = model.problem(rows, &rows.side, self.noise[0], Some(&decided.covariance));
-        if model.windowed.is_empty() {
-            decided.fit = Fit::new(&problem, None, expected, instructions, &mut self.run)?;
-            return Ok(());
-        }
+        let model = decided.model.clone();
         let wanted = self.options.equations.map(|samples| rows_of(samples, stride));
-        if !self.options.average {
+        if model.windowed.is_empty() || !self.options.average {
             let window = wanted.unwrap_or(rows.len()).min(rows.len());
-            decided.fit = Fit::in_rows(&problem, window, expected, instructions);
-            decided.error = decided.fit.as_ref().map_or(1.0, |fit| {
-                let misfits = misfits(&fit.full, &fit.pooled.values, expected);
-                misfits.iter().sum::<f64>() / misfits.len().max(1) as f64
-            });
+            for last in [false, true] {
+                let problem = model.problem(rows, &rows.side, self.noise[0], Some(&decided.covariance));
+                decided.fit = if model.windowed.is_empty() {
+                    Fit::new(&problem, None, decided.expected, instructions, &mut self.run)?
+                } else {
+                    Fit::in_rows(&problem, window, decided.expected, instructions)
+                };
+                let Some(fit) = &decided.fit else { return Ok(()) };
+                if !model.windowed.is_empty() {
+                    let misfits = misfits(&fit.full, &fit.pooled.values, decided.expected);
+                    decided.error = misfits.iter().sum::<f64>() / misfits.len().max(1) as f64;
+                }
+                if !last {
+                    (decided.covariance, decided.expected) = self.covariance(weak, self.parameters(&model, fit));
+                }
+            }
             return Ok(());
         }
         let scales = &decided.scales;
@@ -206,42 +210,38 @@ impl Session<'_, '_, '_> {
         if tried.is_empty() {
             return Err(self.too_short());
         }
-        let chosen = self.validate(&problem, rows, decided, &tried)?;
-        decided.lengths = chosen.iter().map(|(scale, error)| (scale.span() * stride, *error)).collect();
-        let best = chosen.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
-        if let Some((scale, error)) = best {
-            decided.error = error;
-            decided.fit = Fit::new(&problem, Some(scale), expected, instructions, &mut self.run)?;
-        }
+        let validated = self.validate(rows, decided, &tried)?;
+        let span = |one: &Validated| one.fit.scale.map_or(0, |scale| scale.span() * stride);
+        decided.lengths = validated.iter().map(|one| (span(one), one.error)).collect();
+        let Some(best) = validated.iter().min_by(|a, b| a.error.total_cmp(&b.error)) else { return Ok(()) };
+        decided.error = best.error;
+        (decided.covariance, decided.expected) = self.covariance(weak, self.parameters(&model, &best.fit));
+        let scale = best.fit.scale;
+        drop(validated);
+        let problem = model.problem(rows, &rows.side, self.noise[0], Some(&decided.covariance));
+        decided.fit = Fit::new(&problem, scale, decided.expected, instructions, &mut self.run)?;
         Ok(())
     }
 
     /// How well windows of some lengths predict what they have not seen: on stretches of a long record as far as they hold windows so
     /// long, and on all of it beyond where the longest of those are best.
-    fn validate(
-        &mut self,
-        problem: &Problem<'_>,
-        rows: &Rows,
-        decided: &Decided,
-        scales: &[Scale],
-    ) -> Result<Vec<(Scale, f64)>, Error> {
+    fn validate(&mut self, rows: &Rows, decided: &Decided, scales: &[Scale]) -> Result<Vec<Validated>, Error> {
         let (instructions, expected) = (self.options.instructions, decided.expected);
-        let errors = |validated: Vec<Validated>| -> Vec<(Scale, f64)> {
-            validated.iter().filter_map(|one| Some((one.fit.scale?, one.error))).collect()
+        let mut validated = |rows: &Rows, scales: &[Scale]| {
+            let problem = decided.model.problem(rows, &rows.side, self.noise[0], Some(&decided.covariance));
+            validate(&problem, scales, expected, instructions, &mut self.run)
         };
         let Some(stretches) = stretches_of_rows(rows.len()).filter(|_| scales.len() > 1) else {
-            return Ok(errors(validate(problem, scales, expected, instructions, &mut self.run)?));
+            return validated(rows, scales);
         };
-        let thinned = thinned_rows(rows, &stretches);
-        let thinned = decided.model.problem(&thinned, &thinned.side, self.noise[0], Some(&decided.covariance));
         let short = scales.partition_point(|scale| holds(*scale));
-        let found = errors(validate(&thinned, &scales[..short], expected, instructions, &mut self.run)?);
-        let best = found.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map(|(scale, _)| *scale);
+        let found = validated(&thinned_rows(rows, &stretches), &scales[..short])?;
+        let best = found.iter().min_by(|a, b| a.error.total_cmp(&b.error)).and_then(|best| best.fit.scale);
         let long = short.saturating_sub(OVERLAP);
         if best.is_some_and(|best| !scales[long..].contains(&best)) {
             return Ok(found);
         }
-        Ok(errors(validate(problem, &scales[long..], expected, instructions, &mut self.run)?))
+        validated(rows, &scales[long..])
     }
 
     /// Finds jumps of what is windowed beside those that are known. `whole` holds all rows where some are over jumps.

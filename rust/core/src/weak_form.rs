@@ -8,12 +8,13 @@
 use std::num::NonZeroUsize;
 use std::ops::Range;
 
-use crate::equations::{Regressor, Rows};
+use crate::channels::{Late, Scaled, Whole};
+use crate::equations::{Regressor, Rows, joints};
 use crate::error::Error;
 use crate::filter_bank::{BLOCK, FilterBank, Scratch};
 use crate::motion::Coefficient;
 use crate::parallel::{self, Piece, Watch};
-use crate::samples::{Samples, read_around};
+use crate::samples::Samples;
 use crate::test_function::{Kernels, TestFunction};
 
 /// Rows in a piece of work.
@@ -65,17 +66,25 @@ struct Task<'a> {
 }
 
 impl WeakRows {
-    /// Builds the rows of a record, in parallel.
+    /// How many rows a record of so many samples has.
+    pub(crate) fn count(function: TestFunction, samples: usize) -> usize {
+        (samples + function.stride()).saturating_sub(function.window_length()) / function.stride()
+    }
+
+    /// Builds rows of a record, in parallel: all of them, or those in some stretches, one after another. Stretches begin at multiples of
+    /// [`BLOCK`], and windows do not reach from one to the next.
     pub(crate) fn build(
         record: &Record<'_>,
         function: TestFunction,
         delta: f64,
+        stretches: Option<&[Range<usize>]>,
         workers: NonZeroUsize,
         watch: &mut Watch<'_>,
     ) -> Result<Self, Error> {
-        let (half, length, stride) = (function.half_width(), function.window_length(), function.stride());
-        let samples = record.angle.len();
-        let count = if samples < length { 0 } else { (samples - length) / stride + 1 };
+        let (half, stride) = (function.half_width(), function.stride());
+        let all = 0..Self::count(function, record.angle.len());
+        let stretches = stretches.unwrap_or(std::slice::from_ref(&all));
+        let count = stretches.iter().map(Range::len).sum();
         let kernels = function.kernels(0.0);
         let whole = record.lag.round();
         let late = function.kernels(record.lag - whole);
@@ -83,15 +92,20 @@ impl WeakRows {
 
         let mut columns = vec![vec![0.0; count]; width];
         let mut usable: Vec<bool> = match record.mask {
-            Some(mask) => (0..count).map(|row| mask[half + row * stride]).collect(),
+            Some(mask) => stretches.iter().cloned().flatten().map(|row| mask[half + row * stride]).collect(),
             None => vec![true; count],
         };
         let mut pieces = Vec::new();
         {
-            let mut parts: Vec<_> = columns.iter_mut().map(|column| column.chunks_mut(PIECE)).collect();
-            for (number, usable) in usable.chunks_mut(PIECE).enumerate() {
-                let outputs: Vec<&mut [f64]> = parts.iter_mut().filter_map(Iterator::next).collect();
-                pieces.push(Piece { size: usable.len() * stride, content: (number * PIECE, outputs, usable) });
+            let mut outputs: Vec<&mut [f64]> = columns.iter_mut().map(Vec::as_mut_slice).collect();
+            let mut usable = usable.as_mut_slice();
+            for stretch in stretches {
+                for first in stretch.clone().step_by(PIECE) {
+                    let rows = ..PIECE.min(stretch.end - first);
+                    let outputs: Vec<_> = outputs.iter_mut().filter_map(|output| output.split_off_mut(rows)).collect();
+                    let usable = usable.split_off_mut(rows).unwrap_or_default();
+                    pieces.push(Piece { size: usable.len() * stride, content: (first, outputs, usable) });
+                }
             }
         }
         let work = |(first, mut outputs, usable): (usize, Vec<&mut [f64]>, &mut [bool]), scratch: &mut Scratch| {
@@ -109,7 +123,7 @@ impl WeakRows {
             torque,
             first: half,
             stride,
-            rows: Rows { usable, period: stride as f64 * delta, ..Rows::default() },
+            rows: Rows { usable, jumps: joints(stretches), period: stride as f64 * delta, ..Rows::default() },
             kernels,
         };
         rows.assemble(record, columns);
@@ -240,81 +254,4 @@ pub(crate) fn mean(samples: &dyn Samples) -> f64 {
         .filter(|&&value| crate::samples::is_usable(value))
         .fold((0.0, 0.0_f64), |(sum, count), value| (sum + value, count + 1.0));
     sum / count.max(1.0)
-}
-
-/// One at every sample.
-pub(crate) struct Ones(pub(crate) usize);
-
-impl Samples for Ones {
-    fn len(&self) -> usize {
-        self.0
-    }
-
-    fn read(&self, _first: usize, into: &mut [f64]) {
-        into.fill(1.0);
-    }
-}
-
-/// A channel as it is.
-pub(crate) struct Whole<'a>(pub(crate) &'a dyn Samples);
-
-impl Samples for Whole<'_> {
-    fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    fn read(&self, first: usize, into: &mut [f64]) {
-        self.0.read(first, into);
-    }
-}
-
-/// A channel that comes late by whole samples. What would lie beyond its ends is missing.
-pub(crate) struct Late<'a> {
-    pub(crate) channel: &'a dyn Samples,
-    pub(crate) samples: isize,
-}
-
-impl Samples for Late<'_> {
-    fn len(&self) -> usize {
-        self.channel.len()
-    }
-
-    fn read(&self, first: usize, into: &mut [f64]) {
-        read_around(self.channel, first.cast_signed() + self.samples, into);
-    }
-}
-
-/// A derivative of a known coefficient times the angle.
-struct Scaled<'a> {
-    factor: &'a dyn Samples,
-    angle: &'a dyn Samples,
-    derivative: usize,
-    delta: f64,
-}
-
-impl Samples for Scaled<'_> {
-    fn len(&self) -> usize {
-        self.angle.len()
-    }
-
-    fn read(&self, first: usize, into: &mut [f64]) {
-        self.angle.read(first, into);
-        let total = self.factor.len();
-        let begin = first.saturating_sub(1);
-        let mut factor = vec![0.0; (first + into.len() + 1).min(total) - begin];
-        self.factor.read(begin, &mut factor);
-        // Beyond an end the coefficient stays as it is.
-        let at = |sample: isize| {
-            let place = (sample - begin.cast_signed()).clamp(0, factor.len().cast_signed() - 1);
-            factor[place.unsigned_abs()]
-        };
-        for (sample, value) in (first.cast_signed()..).zip(into) {
-            let (before, here, after) = (at(sample - 1), at(sample), at(sample + 1));
-            *value *= match self.derivative {
-                0 => here,
-                1 => (after - before) / (2.0 * self.delta),
-                _ => (after - 2.0 * here + before) / (self.delta * self.delta),
-            };
-        }
-    }
 }

@@ -2,6 +2,7 @@
 
 use std::num::NonZeroUsize;
 
+use crate::channels::Cubed;
 use crate::constancy::Test;
 use crate::criterion::Criterion;
 use crate::error::Error;
@@ -24,7 +25,7 @@ use crate::spectrum::power;
 use crate::suspects::{Missing, Suspect};
 use crate::test_function::{LEAST_HALF_WIDTH, TestFunction};
 use crate::test_function_choice::{Candidates, Evidence, half_widths, spectrum_length};
-use crate::thinned::{Thinned, stretches, thinned_flags};
+use crate::thinned::stretches_of_blocks;
 use crate::usable::Usable;
 use crate::weak_form::{Record, TermSamples, WeakRows, mean};
 use crate::weak_results::SampleResults;
@@ -173,20 +174,13 @@ pub fn identify_weak(
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<WeakIdentified, Error> {
-    let samples = motion.angle.len();
-    let mut angle = Vec::new();
-    if motion.terms.iter().any(|term| matches!(term, Term::Coulomb | Term::Cubic)) {
-        angle.resize(samples, 0.0);
-        motion.angle.read(0, &mut angle);
-    }
     let velocity = if motion.terms.iter().any(|term| matches!(term, Term::Coulomb)) {
         velocity(motion.angle, options, workers, watch)?
     } else {
         Vec::new()
     };
-    let cubed: Vec<f64> = angle.iter().map(|angle| angle * angle * angle).collect();
     let direction: Vec<f64> = velocity.iter().map(|&velocity| sign(velocity)).collect();
-    let (cubed, direction) = (cubed.as_slice(), direction.as_slice());
+    let (cubed, direction) = (Cubed(motion.angle), direction.as_slice());
     let terms = motion.terms.iter().map(|term| match *term {
         Term::Offset => TermSamples::One,
         Term::Coulomb => TermSamples::Given(&direction),
@@ -326,13 +320,7 @@ impl Session<'_, '_, '_> {
         if self.options.lag.is_none() {
             record.terms.push(TermSamples::TorqueRate);
         }
-        self.run.stage(|watch| WeakRows::build(&record, function, delta, workers, watch))
-    }
-
-    /// Number of rows of the whole record with a test function.
-    fn rows_with(&self, function: TestFunction) -> usize {
-        let samples = self.record.angle.len() + function.stride();
-        samples.saturating_sub(function.window_length()) / function.stride()
+        self.run.stage(|watch| WeakRows::build(&record, function, delta, None, workers, watch))
     }
 
     /// The rows in stretches of a long record; nothing where all of it is as good. `widest` is the half-width of the widest test function.
@@ -342,40 +330,10 @@ impl Session<'_, '_, '_> {
         if samples <= 2 * PILOT_STRETCHES * length {
             return Ok(None);
         }
-        let stretches: Vec<_> = stretches(samples, PILOT_STRETCHES * length, PILOT_STRETCHES).collect();
-        let thin = |channel| Thinned::new(channel, &stretches);
-        let record = &self.record;
-        let known = record.coefficients.map(|one| match one {
-            Coefficient::Record(factor) => Some(thin(factor)),
-            _ => None,
-        });
-        let terms: Vec<_> = record
-            .terms
-            .iter()
-            .map(|term| match term {
-                TermSamples::Given(samples) => Some(thin(*samples)),
-                _ => None,
-            })
-            .collect();
-        let mask = record.mask.map(|mask| thinned_flags(mask, &stretches));
-        let (angle, torque) = (thin(record.angle), thin(record.torque));
-        let thinned = Record {
-            angle: &angle,
-            torque: &torque,
-            coefficients: std::array::from_fn(|index| match &known[index] {
-                Some(factor) => Coefficient::Record(factor),
-                None => record.coefficients[index],
-            }),
-            terms: terms
-                .iter()
-                .zip(&record.terms)
-                .map(|(thinned, term)| thinned.as_ref().map_or(*term, |samples| TermSamples::Given(samples)))
-                .collect(),
-            lag: record.lag,
-            mask: mask.as_deref(),
-        };
-        let (delta, workers) = (self.options.delta, self.run.workers);
-        self.run.stage(|watch| WeakRows::build(&thinned, function, delta, workers, watch)).map(Some)
+        let most = PILOT_STRETCHES * length / function.stride();
+        let stretches = stretches_of_blocks(WeakRows::count(function, samples), most, PILOT_STRETCHES);
+        let (record, delta, workers) = (&self.record, self.options.delta, self.run.workers);
+        self.run.stage(|watch| WeakRows::build(record, function, delta, Some(&stretches), workers, watch)).map(Some)
     }
 
     /// Chooses half-width and exponent where they are not given, and estimates the coefficients on the way.
@@ -421,7 +379,8 @@ impl Session<'_, '_, '_> {
                 }
                 _ => {
                     let end = [widths.first(), widths.last()].contains(&Some(&current.half_width()));
-                    let weak = if weak.rows.len() < self.rows_with(current) { self.rows(current)? } else { weak };
+                    let weak =
+                        if weak.rows.len() < WeakRows::count(current, samples) { self.rows(current)? } else { weak };
                     return Ok(Chosen { weak, parameters, at_end: width.is_none() && end });
                 }
             }

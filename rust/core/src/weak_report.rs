@@ -1,13 +1,15 @@
 //! What is said of a record once it is decided what changes: values at every sample, their errors, and what looks wrong.
 
+use std::borrow::Cow;
+
 use crate::averaging::average;
+use crate::channels::{Cubed, Direction};
 use crate::constancy::NO_CHANCE;
 use crate::determination::is_mostly_noise;
 use crate::error::Error;
 use crate::every_window::every_window;
 use crate::identification::HARDLY_TOLD_APART;
 use crate::model::{Fit, Predictor, without_constants};
-use crate::motion::sign;
 use crate::outside_mask::{Inside, Outside};
 use crate::pooling::{Expected, is_determined, joint_covariance, weakest};
 use crate::row_covariance::RowCovariance;
@@ -93,8 +95,8 @@ impl Session<'_, '_, '_> {
         let errors = self.errors(&weak, decided, fit);
         found.prediction_error = errors.error;
         let problem = ordered.problem(&weak.rows, decided.side(&weak.rows), self.noise[0], Some(&errors.covariance));
-        let all = fit.again(&problem, errors.expected, self.options.instructions, &mut self.run)?;
-        let Some(all) = all else { return Ok(self.undetermined(found, decided)) };
+        let all = self.all_unknowns(&problem, decided, fit, &errors)?;
+        let Some(all) = all.as_deref() else { return Ok(self.undetermined(found, decided)) };
         found.condition = all.pooled.condition;
         found.weakest = weakest(&all.full, &all.pooled.weights);
         found.covariance = all.covariance(&problem, &errors.covariance);
@@ -126,11 +128,11 @@ impl Session<'_, '_, '_> {
         }
         let weakest = &found.weakest;
         found.mostly_noise =
-            is_mostly_noise(&problem, &weak.rows, &ordered, &all, weakest, self.noise[0], |row| nearest(&all, row));
+            is_mostly_noise(&problem, &weak.rows, &ordered, all, weakest, self.noise[0], |row| nearest(all, row));
         if found.condition > HARDLY_TOLD_APART || found.mostly_noise {
             status |= Status::ILL_CONDITIONED;
         }
-        let mut tracks = self.tracks(&problem, &weak, decided, (fit, &all), &values, errors.expected)?;
+        let mut tracks = self.tracks(&problem, &weak, decided, (fit, all), &values, errors.expected)?;
         let variances: Vec<f64> = (slow..count).map(|place| found.covariance[place * (count + 1)]).collect();
         let outside = self.outside_mask(
             &weak,
@@ -147,7 +149,7 @@ impl Session<'_, '_, '_> {
         let usable = &decided.whole.as_ref().unwrap_or(&weak.rows).usable;
         tracks.mark(usable, outside.as_ref());
         found.outside_mask = outside;
-        let results = Self::rows_results(&weak, &problem, decided, &all, &errors, &tracks, &found, &values);
+        let results = Self::rows_results(&weak, &problem, decided, all, &errors, &tracks, &found, &values);
         let (results, pairs) = results;
         found.pairs = pairs;
         let side = decided.side(&weak.rows).to_vec();
@@ -158,6 +160,22 @@ impl Session<'_, '_, '_> {
         found.results = results.at_samples(self.record.angle.len(), self.options.step);
         found.results.status.iter_mut().for_each(|one| *one |= status.bits());
         Ok(found)
+    }
+
+    /// The fit of all unknowns that do not belong to windows. The one at hand is, unless some change slowly or the noise fails to explain what
+    /// is left of the rows.
+    fn all_unknowns<'a>(
+        &mut self,
+        problem: &Problem<'_>,
+        decided: &Decided,
+        fit: &'a Fit,
+        errors: &Errors,
+    ) -> Result<Option<Cow<'a, Fit>>, Error> {
+        if decided.slow.is_empty() && errors.covariance == decided.covariance {
+            return Ok(Some(Cow::Borrowed(fit)));
+        }
+        let again = fit.again(problem, errors.expected, self.options.instructions, &mut self.run)?;
+        Ok(again.map(Cow::Owned))
     }
 
     /// Nothing but a status.
@@ -379,14 +397,9 @@ impl Session<'_, '_, '_> {
         if !self.options.diagnose {
             return Ok(Vec::new());
         }
-        let samples = self.record.angle.len();
-        let mut cubed = vec![0.0; samples];
-        self.record.angle.read(0, &mut cubed);
-        for angle in &mut cubed {
-            *angle = angle.powi(3);
-        }
-        let direction = direction(weak, samples);
-        let (cubed, direction) = (cubed.as_slice(), direction.as_slice());
+        let (velocity, samples) = (weak.rows.regressors[1].value.clone(), self.record.angle.len());
+        let cubed = Cubed(self.record.angle);
+        let direction = Direction { velocity: &velocity, first: weak.first, stride: weak.stride, samples };
         let all = [
             (Missing::Offset, TermSamples::One),
             (Missing::Coulomb, TermSamples::Given(&direction)),
@@ -397,18 +410,19 @@ impl Session<'_, '_, '_> {
             all.into_iter().filter(|(missing, _)| !self.options.not_missing.contains(missing)).collect();
         let record = Record { terms: terms.iter().map(|(_, samples)| *samples).collect(), ..self.record.clone() };
         let (function, delta, workers) = (weak.function, self.options.delta, self.run.workers);
-        let more = self.run.stage(|watch| WeakRows::build(&record, function, delta, workers, watch))?;
+        let stretches = stretches_of_rows(weak.rows.len()).filter(|_| fit.scale.is_some_and(holds));
+        let mut side = side.to_vec();
+        if let Some(stretches) = &stretches {
+            (weak.rows, side) = (thinned_rows(&weak.rows, stretches), thinned_column(&side, stretches));
+        }
+        let stretches = stretches.as_deref();
+        let more = self.run.stage(|watch| WeakRows::build(&record, function, delta, stretches, workers, watch))?;
         let first = weak.rows.regressors.len();
         weak.rows.regressors.extend(more.rows.regressors.into_iter().skip(3));
         for row in 0..weak.rows.len() {
             if !weak.rows.usable[row] {
                 weak.rows.clear(row);
             }
-        }
-        let mut side = side.to_vec();
-        let stretches = stretches_of_rows(weak.rows.len()).filter(|_| fit.scale.is_some_and(holds));
-        if let Some(stretches) = stretches {
-            (weak.rows, side) = (thinned_rows(&weak.rows, &stretches), thinned_column(&side, &stretches));
         }
         let mut suspects = Vec::new();
         for (place, (missing, _)) in terms.iter().enumerate() {
@@ -519,18 +533,4 @@ fn deviation(problem: &Problem<'_>, tracks: &Tracks, constants: &[f64], span: us
             if count > 0.0 { (sum / count).max(0.0).sqrt() } else { f64::NAN }
         })
         .collect()
-}
-
-/// The sign of the velocity at every sample, as the rows see it.
-fn direction(weak: &WeakRows, samples: usize) -> Vec<f64> {
-    let velocity = &weak.rows.regressors[1].value;
-    let last = velocity.len() - 1;
-    let at = |sample: usize| {
-        let place = (sample as f64 - weak.first as f64) / weak.stride as f64;
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the rows")]
-        let row = place.floor().clamp(0.0, last as f64) as usize;
-        let part = (place - row as f64).clamp(0.0, 1.0);
-        velocity[row] + part * (velocity[(row + 1).min(last)] - velocity[row])
-    };
-    (0..samples).map(|sample| sign(at(sample))).collect()
 }
