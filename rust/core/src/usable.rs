@@ -6,9 +6,13 @@ use crate::weak_form::Record;
 /// A width that leaves less than this part of the rows that the narrowest leaves is no place to begin.
 const FEW: f64 = 0.5;
 
+/// Samples that are looked at together.
+const PIECE: usize = 4096;
+
 /// Where samples are missing and where centres may lie.
 pub(crate) struct Usable {
-    /// Missing samples before each sample.
+    samples: usize,
+    /// Missing samples before each sample, and in all; nothing where none is missing.
     missing: Vec<u32>,
     /// Samples that may be centres, where not all may.
     centres: Option<Vec<usize>>,
@@ -17,30 +21,38 @@ pub(crate) struct Usable {
 impl Usable {
     pub(crate) fn new(record: &Record<'_>) -> Self {
         let samples = record.angle.len();
-        let (mut angle, mut torque) = (vec![0.0; samples], vec![0.0; samples]);
-        record.angle.read(0, &mut angle);
-        record.torque.read(0, &mut torque);
-        let mut missing = Vec::with_capacity(samples + 1);
+        let (mut angle, mut torque) = (vec![0.0; PIECE], vec![0.0; PIECE]);
+        let mut missing = Vec::new();
         let mut count = 0;
-        missing.push(count);
-        for (angle, torque) in angle.iter().zip(&torque) {
-            count += u32::from(!is_usable(*angle) || !is_usable(*torque));
-            missing.push(count);
+        for first in (0..samples).step_by(PIECE) {
+            let piece = PIECE.min(samples - first);
+            record.angle.read(first, &mut angle[..piece]);
+            record.torque.read(first, &mut torque[..piece]);
+            let lost = |place: usize| !is_usable(angle[place]) || !is_usable(torque[place]);
+            if missing.is_empty() && !(0..piece).any(lost) {
+                continue;
+            }
+            missing.resize(missing.len().max(first + 1), 0);
+            missing.extend((0..piece).map(|place| {
+                count += u32::from(lost(place));
+                count
+            }));
         }
         let centres = record.mask.map(|mask| (0..samples).filter(|&sample| mask[sample]).collect());
-        Self { missing, centres }
+        Self { samples, missing, centres }
     }
 
     /// The part of all rows of a half-width that can be used.
     pub(crate) fn share(&self, half: usize) -> f64 {
-        let samples = self.missing.len() - 1;
+        let samples = self.samples;
         if samples <= 2 * half {
             return 0.0;
         }
         let inside = half..samples - half;
-        let whole = |centre: &usize| self.missing[centre + half + 1] == self.missing[centre - half];
+        let missing = &self.missing;
+        let whole = |centre: &usize| missing.is_empty() || missing[centre + half + 1] == missing[centre - half];
         let count = match &self.centres {
-            None if self.missing[samples] == 0 => return 1.0,
+            None if missing.is_empty() => return 1.0,
             None => inside.clone().filter(whole).count(),
             Some(centres) => {
                 centres.iter().filter(|centre| inside.contains(centre)).filter(|centre| whole(centre)).count()
