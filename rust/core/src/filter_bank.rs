@@ -1,6 +1,6 @@
 //! Dot products of a channel with several kernels, around every so-manieth sample.
 //!
-//! A fixed kernel as wide as a window carries all its information at every eighth of its half-width or so, so all rows of a block are one
+//! A fixed kernel as wide as a window carries all its information at every sixth of its half-width or so, so all rows of a block are one
 //! product of matrices: the Hankel matrix of the samples, which is only a view of them, and the kernels side by side. Blocks lie on a
 //! grid of absolute row numbers and always have the same shape, so the numbers do not depend on how the work is cut.
 

@@ -15,17 +15,17 @@ use crate::windows::{Problem, Shape, Solved, solve_windows};
 /// Cells in a piece of work.
 const PIECE: usize = 512;
 
-/// Rows of the smallest blocks: a quarter of a test function's half-width.
+/// Rows of the smallest blocks: a third of a test function's half-width.
 const FINEST: usize = 2;
 
 /// Lengths of windows on one side, in blocks of two rows, then of four and so on.
-const BLOCKS: [usize; 2] = [8, 12];
+const BLOCKS: [usize; 2] = [6, 9];
 
 /// Shorter windows on one side, in the smallest blocks. They only serve two at a time.
-const SHORT: [usize; 4] = [2, 3, 4, 6];
+const SHORT: [usize; 3] = [2, 3, 4];
 
 /// The shortest window that may serve alone, in rows: two and a half half-widths.
-pub(crate) const SHORTEST_ALONE: usize = 20;
+pub(crate) const SHORTEST_ALONE: usize = 15;
 
 /// One length of windows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
