@@ -149,7 +149,7 @@ pub fn identify_strong(
         condition: fit.pooled.condition,
         changing,
         pairs,
-        results: results.at_samples(samples, options.step),
+        results: results.at_samples(samples, options.step, &mut run)?,
         order,
     })
 }

@@ -157,7 +157,7 @@ impl Session<'_, '_, '_> {
         for suspect in found.suspects.iter().filter(|suspect| suspect.is_conspicuous()) {
             status |= if suspect.missing == Missing::Lag { Status::LAG_SUSPECTED } else { Status::TERM_SUSPECTED };
         }
-        found.results = results.at_samples(self.record.angle.len(), self.options.step);
+        found.results = results.at_samples(self.record.angle.len(), self.options.step, &mut self.run)?;
         found.results.status.iter_mut().for_each(|one| *one |= status.bits());
         Ok(found)
     }

@@ -1,10 +1,18 @@
 //! Results of weak rows, and what they say at every sample.
 
+use std::ops::Range;
+
+use crate::error::Error;
 use crate::jumps::{Jump, UNLIKELY};
+use crate::parallel::Piece;
+use crate::run::Run;
 use crate::status::Status;
 
-/// Samples that are looked up before every column is read for them.
-const AT_A_TIME: usize = 1024;
+/// Rows in a piece of work.
+const PIECE: usize = 8192;
+
+/// Numbers at the rows, and what they grow by from row to row where they are carried on beyond the ends.
+type Source<'a> = (&'a Vec<f64>, Option<&'a Vec<f64>>);
 
 /// Numbers at every row.
 #[derive(Clone, Debug, Default)]
@@ -61,45 +69,130 @@ impl SampleResults {
 
 impl RowResults {
     /// What the rows say at every `step`-th of so many samples: interpolated between them, carried on beyond the first and last.
-    pub(crate) fn at_samples(&self, samples: usize, step: usize) -> SampleResults {
+    pub(crate) fn at_samples(
+        &self,
+        samples: usize,
+        step: usize,
+        run: &mut Run<'_, '_>,
+    ) -> Result<SampleResults, Error> {
         let (rows, count) = (self.status.len(), samples.div_ceil(step));
-        let empty =
-            |columns: &Vec<Vec<f64>>| -> Vec<Vec<f64>> { columns.iter().map(|_| Vec::with_capacity(count)).collect() };
-        let mut results = SampleResults {
-            values: empty(&self.values),
-            errors: empty(&self.errors),
-            covariances: empty(&self.covariances),
-            deviation: Vec::with_capacity(count),
-            condition: Vec::with_capacity(count),
-            status: Vec::with_capacity(count),
-        };
-        let mut places = Vec::with_capacity(AT_A_TIME);
-        for first in (0..count).step_by(AT_A_TIME) {
-            places.clear();
-            places.extend((first..count.min(first + AT_A_TIME)).map(|place| self.place(place * step, rows)));
-            let into = results.values.iter_mut().zip(&self.values).zip(&self.slopes);
-            for ((result, column), slopes) in into {
-                let along = |place: &Place| place.between(column) + place.beyond * slopes[place.nearest];
-                result.extend(places.iter().map(along));
+        let carried = self.values.iter().zip(&self.slopes).map(|(column, slopes)| (column, Some(slopes)));
+        let kept = self.errors.iter().chain(&self.covariances).chain([&self.deviation, &self.condition]);
+        let sources: Vec<Source<'_>> = carried.chain(kept.map(|column| (column, None))).collect();
+        let mut columns = vec![vec![0.0; count]; sources.len()];
+        let mut status = vec![0; count];
+        let mut pieces = Vec::new();
+        {
+            let mut columns: Vec<&mut [f64]> = columns.iter_mut().map(Vec::as_mut_slice).collect();
+            let (mut status, mut done) = (status.as_mut_slice(), 0);
+            for first in (0..rows).step_by(PIECE) {
+                let rows = first..rows.min(first + PIECE);
+                let end = if rows.end == self.status.len() { count } else { self.element(rows.end, step).min(count) };
+                let here = ..end - done;
+                let columns: Vec<_> = columns.iter_mut().filter_map(|column| column.split_off_mut(here)).collect();
+                let status = status.split_off_mut(here).unwrap_or_default();
+                pieces.push(Piece { size: status.len() * step, content: (done, rows, columns, status) });
+                done = end;
             }
-            let errors = results.errors.iter_mut().zip(&self.errors);
-            let covariances = results.covariances.iter_mut().zip(&self.covariances);
-            let others = [(&mut results.deviation, &self.deviation), (&mut results.condition, &self.condition)];
-            for (result, column) in errors.chain(covariances).chain(others) {
-                result.extend(places.iter().map(|place| place.between(column)));
-            }
-            results.status.extend(places.iter().map(|place| {
-                let edge = if place.beyond == 0.0 { 0 } else { Status::EDGE.bits() };
-                self.status[place.nearest] | edge
-            }));
         }
+        run.map(
+            pieces,
+            || (),
+            |(first, rows, columns, status): (_, _, Vec<&mut [f64]>, &mut [u16]), (): &mut ()| {
+                self.between(&sources, step, first, rows, columns, status);
+            },
+        )?;
+        let mut columns = columns.into_iter();
+        let mut next = |count: usize| columns.by_ref().take(count).collect();
+        let mut results = SampleResults {
+            values: next(self.values.len()),
+            errors: next(self.errors.len()),
+            covariances: next(self.covariances.len()),
+            deviation: Vec::new(),
+            condition: Vec::new(),
+            status,
+        };
+        results.deviation = columns.next().unwrap_or_default();
+        results.condition = columns.next().unwrap_or_default();
         self.jumps.iter().for_each(|jump| self.blur(jump, samples, step, &mut results));
-        results
+        Ok(results)
+    }
+
+    /// The first element at or after a row, for one every `step` samples.
+    fn element(&self, row: usize, step: usize) -> usize {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a row of the record, or before it")]
+        let element = (self.at(row) / step as f64).ceil().max(0.0) as usize;
+        element
+    }
+
+    /// The sample of a row.
+    fn at(&self, row: usize) -> f64 {
+        self.first + row as f64 * self.stride
+    }
+
+    /// Fills elements from `first` on, which lie between rows and the rows after them.
+    fn between(
+        &self,
+        sources: &[Source<'_>],
+        step: usize,
+        first: usize,
+        rows: Range<usize>,
+        mut columns: Vec<&mut [f64]>,
+        status: &mut [u16],
+    ) {
+        let total = self.status.len();
+        let end = first + status.len();
+        let mut parts = Vec::new();
+        let mut done = first;
+        for row in rows {
+            let next = if row + 1 == total { end } else { self.element(row + 1, step).min(end) };
+            let here = done - first..next - first;
+            // What lies before the first row or beyond the last, next to a gap or over a jump is looked up sample by sample.
+            let alone = row == 0 && done < self.element(0, step) || row + 1 == total || self.breaks_after(row);
+            parts.clear();
+            if alone {
+                for (place, element) in here.zip(done..) {
+                    let found = self.place(element * step, total);
+                    for ((column, slopes), result) in sources.iter().zip(&mut columns) {
+                        let carried = slopes.map_or(0.0, |slopes| found.beyond * slopes[found.nearest]);
+                        result[place] = found.between(column) + carried;
+                    }
+                    let edge = if found.beyond == 0.0 { 0 } else { Status::EDGE.bits() };
+                    status[place] = self.status[found.nearest] | edge;
+                }
+            } else {
+                parts.extend((done..next).map(|element| ((element * step) as f64 - self.at(row)) / self.stride));
+                for ((column, _), result) in sources.iter().zip(&mut columns) {
+                    let (before, after) = (column[row], column[row + 1]);
+                    for (value, part) in result[here.clone()].iter_mut().zip(&parts) {
+                        *value = before + part * (after - before);
+                    }
+                    if parts.first() == Some(&0.0) {
+                        result[here.start] = before;
+                    }
+                }
+                for (status, &part) in status[here].iter_mut().zip(&parts) {
+                    *status = self.status[if part < 0.5 { row } else { row + 1 }];
+                }
+            }
+            done = next;
+        }
+    }
+
+    /// Whether there is a jump between a row and the next, or a number at only one of them.
+    fn breaks_after(&self, row: usize) -> bool {
+        let next = self.jumps.partition_point(|jump| jump.sample as f64 <= self.at(row));
+        self.is_usable(row) != self.is_usable(row + 1)
+            || self.jumps.get(next).is_some_and(|jump| jump.sample as f64 <= self.at(row + 1))
+    }
+
+    fn is_usable(&self, row: usize) -> bool {
+        self.status[row] & Status::INVALID.bits() == 0
     }
 
     /// Where a jump may or may not have happened the values are the mean of both, and its spread is part of their errors.
     fn blur(&self, jump: &Jump, samples: usize, step: usize, results: &mut SampleResults) {
-        let (rows, at) = (self.status.len(), |row: usize| self.first + row as f64 * self.stride);
+        let rows = self.status.len();
         let exact = (jump.sample as f64 - self.first) / self.stride;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the rows")]
         let after = exact.ceil().clamp(1.0, rows as f64 - 1.0) as usize;
@@ -113,7 +206,7 @@ impl RowResults {
             for ((column, slopes), (values, errors)) in
                 self.values.iter().zip(&self.slopes).zip(results.values.iter_mut().zip(&mut results.errors))
             {
-                let on = |row: usize| column[row] + (sample as f64 - at(row)) / self.stride * slopes[row];
+                let on = |row: usize| column[row] + (sample as f64 - self.at(row)) / self.stride * slopes[row];
                 let (left, right) = (on(after - 1), on(after));
                 values[place] = left + happened * (right - left);
                 errors[place] = errors[place].hypot((happened * (1.0 - happened)).sqrt() * (right - left));
@@ -129,17 +222,15 @@ impl RowResults {
         let next = (row + 1).min(rows - 1);
         let part = inside - row as f64;
         let mut place = Place { row, next, part, beyond: exact - inside, nearest: if part < 0.5 { row } else { next } };
-        let usable = |row: usize| self.status[row] & Status::INVALID.bits() == 0;
-        if usable(row) != usable(next) && part != 0.0 {
+        if self.is_usable(row) != self.is_usable(next) && part != 0.0 {
             // The number beside a gap is better than none.
-            let only = if usable(row) { row } else { next };
+            let only = if self.is_usable(row) { row } else { next };
             place = Place { row: only, next: only, part: 0.0, beyond: exact - only as f64, nearest: only };
         }
         // A jump between two rows: the one on the sample's side of it is carried on.
         let jump = self.jumps.partition_point(|jump| jump.sample <= sample);
-        let at = |row: usize| self.first + row as f64 * self.stride;
-        let before = jump.checked_sub(1).is_some_and(|index| self.jumps[index].sample as f64 > at(row));
-        let after = self.jumps.get(jump).is_some_and(|jump| jump.sample as f64 <= at(next));
+        let before = jump.checked_sub(1).is_some_and(|index| self.jumps[index].sample as f64 > self.at(row));
+        let after = self.jumps.get(jump).is_some_and(|jump| jump.sample as f64 <= self.at(next));
         match (before, after) {
             (true, false) => Place { row: next, next, part: 0.0, beyond: exact - next as f64, nearest: next },
             (false, true) => Place { row, next: row, part: 0.0, beyond: exact - row as f64, nearest: row },
