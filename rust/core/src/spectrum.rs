@@ -1,6 +1,9 @@
-//! Power spectra: a Fourier transform of a power of two, and the averaged spectrum of a record.
+//! Power spectra: Fourier transforms, and the averaged spectrum of a record.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
+
+use realfft::{RealFftPlanner, RealToComplex};
 
 use crate::samples::{Samples, is_usable};
 
@@ -9,67 +12,37 @@ const MOST_SEGMENTS: usize = 256;
 const MOST_SAMPLES: usize = 1 << 20;
 const FEWEST_SEGMENTS: usize = 32;
 
-/// The discrete Fourier transform of real sequences of one length that is a power of two.
-#[derive(Clone, Debug)]
-pub(crate) struct Transform {
-    /// Where each value goes before the first step.
-    order: Vec<usize>,
-    /// Factors `exp(-πik/m)`, `k < m`, of the steps that join sequences of `m` = 1, 2, 4, … values, one step after another.
-    turns: Vec<[f64; 2]>,
-}
+/// The discrete Fourier transform of real sequences of one length.
+pub(crate) struct Transform(Arc<dyn RealToComplex<f64>>);
 
 impl Transform {
     pub(crate) fn new(length: usize) -> Self {
-        assert!(length.is_power_of_two(), "the length {length} is no power of two");
-        let bits = length.trailing_zeros();
-        let reversed = |i: usize| if bits == 0 { 0 } else { i.reverse_bits() >> (usize::BITS - bits) };
-        let turn = |k: usize, half: usize| {
-            let (sine, cosine) = (-PI * k as f64 / half as f64).sin_cos();
-            [cosine, sine]
-        };
-        let halves = (0..bits).map(|step| 1_usize << step);
-        Self {
-            order: (0..length).map(reversed).collect(),
-            turns: halves.flat_map(|half| (0..half).map(move |k| turn(k, half))).collect(),
-        }
+        Self(RealFftPlanner::new().plan_fft_forward(length))
     }
 
-    /// Frequencies from zero to half the sample rate, real and imaginary parts.
-    pub(crate) fn of(&self, samples: &[f64]) -> Vec<[f64; 2]> {
-        let length = self.order.len();
-        assert_eq!(samples.len(), length, "a transform is for sequences of its length");
-        let mut values: Vec<[f64; 2]> = self.order.iter().map(|&place| [samples[place], 0.0]).collect();
-        let mut half = 1;
-        while half < length {
-            let turns = &self.turns[half - 1..2 * half - 1];
-            for pair in values.chunks_exact_mut(2 * half) {
-                let (low, high) = pair.split_at_mut(half);
-                for ((a, b), [cosine, sine]) in low.iter_mut().zip(high).zip(turns) {
-                    let turned = [cosine * b[0] - sine * b[1], cosine * b[1] + sine * b[0]];
-                    *b = [a[0] - turned[0], a[1] - turned[1]];
-                    *a = [a[0] + turned[0], a[1] + turned[1]];
-                }
-            }
-            half *= 2;
-        }
-        values.truncate(length / 2 + 1);
-        values
+    /// Frequencies from zero to half the sample rate, real and imaginary parts. The samples are used up.
+    pub(crate) fn of(&self, samples: &mut [f64]) -> Vec<[f64; 2]> {
+        let mut values = self.0.make_output_vec();
+        // It fails for another length only, and is all zero then.
+        let done = self.0.process(samples, &mut values);
+        debug_assert!(done.is_ok(), "a transform is for sequences of its length");
+        values.iter().map(|value| [value.re, value.im]).collect()
     }
 
     /// The frequency response of a kernel that is centred on its middle sample.
     pub(crate) fn response(&self, kernel: &[f64]) -> Vec<[f64; 2]> {
-        let (half, length) = (kernel.len() / 2, self.order.len());
+        let (half, length) = (kernel.len() / 2, self.0.len());
         let mut padded = vec![0.0; length];
         for (k, &value) in kernel.iter().enumerate() {
             // A dot product reads forwards in time, so the response is that of the kernel turned round.
             padded[(length + half - k) % length] += value;
         }
-        self.of(&padded)
+        self.of(&mut padded)
     }
 }
 
 /// The power of a record by frequency, so that its mean over all frequencies, both signs, is the mean square: of segments of `length`
-/// samples, a power of two, that overlap by half and fade in and out. Samples that cannot be used are bridged by a line, and segments where
+/// samples that overlap by half and fade in and out. Samples that cannot be used are bridged by a line, and segments where
 /// they are the greater part are left out.
 ///
 /// Only the changes are of interest, so the mean of each segment is taken off.
@@ -78,11 +51,11 @@ pub(crate) fn power(record: &dyn Samples, length: usize) -> Vec<f64> {
     let energy: f64 = fade.iter().map(|value| value * value).sum();
     let mut sum = vec![0.0; length / 2 + 1];
     let mut count = 0.0_f64;
-    let mut samples = vec![0.0; length];
     let last = record.len().saturating_sub(length);
     let most = (MOST_SAMPLES / length).clamp(FEWEST_SEGMENTS, MOST_SEGMENTS);
     let every = (length / 2).max(last / most).max(1);
     let transform = Transform::new(length);
+    let mut samples = vec![0.0; length];
     for first in (0..=last).step_by(every).take_while(|_| record.len() >= length) {
         record.read(first, &mut samples);
         if !bridge(&mut samples) {
@@ -90,7 +63,7 @@ pub(crate) fn power(record: &dyn Samples, length: usize) -> Vec<f64> {
         }
         let mean = samples.iter().sum::<f64>() / length as f64;
         samples.iter_mut().zip(&fade).for_each(|(value, fade)| *value = (*value - mean) * fade);
-        for (sum, [real, imaginary]) in sum.iter_mut().zip(transform.of(&samples)) {
+        for (sum, [real, imaginary]) in sum.iter_mut().zip(transform.of(&mut samples)) {
             *sum += (real * real + imaginary * imaginary) / energy;
         }
         count += 1.0;
@@ -137,7 +110,8 @@ mod tests {
     fn a_transform_is_the_sum_it_is_defined_by() {
         for length in [1_u32, 2, 8, 64] {
             let samples: Vec<f64> = (0..length).map(|i| (f64::from(i) * 1.7).sin() + 0.1 * f64::from(i)).collect();
-            for (k, [real, imaginary]) in Transform::new(samples.len()).of(&samples).into_iter().enumerate() {
+            let found = Transform::new(samples.len()).of(&mut samples.clone());
+            for (k, [real, imaginary]) in found.into_iter().enumerate() {
                 let angle = |i: usize| -2.0 * PI * (k * i) as f64 / f64::from(length);
                 let expected = [
                     samples.iter().enumerate().map(|(i, value)| value * angle(i).cos()).sum::<f64>(),
