@@ -52,7 +52,8 @@ pub(crate) fn every_window(
     let work = |blocks: Range<isize>, (): &mut ()| {
         solve_windows(problem, 1, &blocks, std::slice::from_ref(&shape), instructions).swap_remove(0)
     };
-    let solved = Solved::join(&run.map(pieces, || (), work)?);
+    let solved = run.map(pieces, || (), work)?;
+    let solved = Solved::join(&solved.iter().collect::<Vec<_>>());
     let (fields, layout) = (solved.fields, problem.layout);
     let predictor = Predictor::new(&solved, constants);
     let mut found = EveryWindow { condition: solved.field(fields.condition()).to_vec(), ..EveryWindow::default() };

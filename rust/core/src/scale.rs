@@ -227,7 +227,7 @@ impl Scale {
         let mut solved = solve_windows(problem, self.step, &whole, shapes, instructions);
         if !rest.is_empty() {
             let sides = solve_windows(problem, self.step, &rest, &shapes[..1], instructions);
-            solved[0] = Solved::join(&[solved[0].clone(), sides[0].clone()]);
+            solved[0] = Solved::join(&[&solved[0], &sides[0]]);
         }
         solved
     }
@@ -239,5 +239,5 @@ fn join(parts: &[Vec<Solved>]) -> Cells {
 }
 
 fn join_shape(parts: &[Vec<Solved>], shape: usize) -> Solved {
-    Solved::join(&parts.iter().map(|part| part[shape].clone()).collect::<Vec<_>>())
+    Solved::join(&parts.iter().map(|part| &part[shape]).collect::<Vec<_>>())
 }

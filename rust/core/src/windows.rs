@@ -4,11 +4,15 @@
 //! block on are merged from each other, and any window from those of its length's binary digits. Eight neighbouring windows are
 //! worked on side by side. A window's numbers depend only on the rows in it, so every way of cutting gives the same bits.
 
+use std::cell::RefCell;
 use std::ops::Range;
 
 use crate::factor::{Fields, Layout, RowNoise, Scratch, absorb, count, merge, recentre, solve, symmetric};
 use crate::packet::{Packet, WIDTH};
 use crate::simd::{Instructions, Kernel, Lanes, dispatch};
+
+/// Numbers of one length of windows whose memory a thread keeps for its next piece of work.
+const MOST_KEPT: usize = 1 << 17;
 
 /// Rows absorbed at a time.
 const BATCH: usize = 8;
@@ -88,8 +92,8 @@ impl Solved {
     }
 
     /// Puts windows that follow these after them.
-    pub(crate) fn join(parts: &[Self]) -> Self {
-        let mut all = Self::new(parts[0].fields.layout, parts[0].first, parts.iter().map(Self::len).sum());
+    pub(crate) fn join(parts: &[&Self]) -> Self {
+        let mut all = Self::new(parts[0].fields.layout, parts[0].first, parts.iter().map(|part| part.count).sum());
         for field in 0..all.fields.size() {
             let mut place = field * all.padded;
             for part in parts {
@@ -114,16 +118,20 @@ impl Solved {
 }
 
 /// Summaries of consecutive windows of one length.
+#[derive(Clone, Debug, Default)]
 struct Table {
     padded: usize,
     values: Vec<f64>,
 }
 
 impl Table {
-    fn new(size: usize, count: usize) -> Self {
+    /// Makes room for so many. What is beyond those that are stored does not matter.
+    fn resize(&mut self, size: usize, count: usize) {
         // A packet may begin at any window, so the last may reach beyond.
-        let padded = count.next_multiple_of(WIDTH) + WIDTH;
-        Self { padded, values: vec![0.0; size * padded] }
+        self.padded = count.next_multiple_of(WIDTH) + WIDTH;
+        if self.values.len() < size * self.padded {
+            self.values.resize(size * self.padded, 0.0);
+        }
     }
 
     #[inline(always)]
@@ -185,7 +193,10 @@ pub(crate) fn solve_windows(
     shapes: &[Shape],
     instructions: Instructions,
 ) -> Vec<Solved> {
-    let mut solved = dispatch(instructions, Work { problem, step, blocks, shapes });
+    let mut tables = TABLES.take();
+    let mut solved = dispatch(instructions, Work { problem, step, blocks, shapes, tables: &mut tables });
+    tables.iter_mut().filter(|table| table.values.len() > MOST_KEPT).for_each(|table| *table = Table::default());
+    TABLES.set(tables);
     if !problem.jumps.is_empty() {
         for (shape, solved) in shapes.iter().zip(&mut solved) {
             let first = shape.parts.iter().map(|part| part.start).min().unwrap_or(0);
@@ -198,6 +209,11 @@ pub(crate) fn solve_windows(
         }
     }
     solved
+}
+
+thread_local! {
+    /// Summaries of the last piece of work of every thread, for their memory.
+    static TABLES: RefCell<Vec<Table>> = const { RefCell::new(Vec::new()) };
 }
 
 /// Memory for eight windows.
@@ -225,6 +241,7 @@ struct Work<'a, 'b> {
     step: usize,
     blocks: &'a Range<isize>,
     shapes: &'a [Shape],
+    tables: &'a mut Vec<Table>,
 }
 
 impl Kernel for Work<'_, '_> {
@@ -248,7 +265,7 @@ const BESIDE_TWO: Layout = Layout { constant: 2, ..ALONE };
 impl Work<'_, '_> {
     #[inline(always)]
     fn with(self, layout: Layout) -> Vec<Solved> {
-        let Self { problem, step, blocks, shapes } = self;
+        let Self { problem, step, blocks, shapes, tables } = self;
         let windows = blocks.len();
         let mut results: Vec<_> = shapes.iter().map(|_| Solved::new(layout, blocks.start, windows)).collect();
         if windows == 0 {
@@ -266,7 +283,8 @@ impl Work<'_, '_> {
         let (summary, other) = (&mut summary[..layout.size()], &mut other[..layout.size()]);
         let fields = &mut fields[..Fields { layout }.size()];
         let count = windows + reach.max(1) - 1;
-        let mut tables = vec![Table::new(layout.size(), count)];
+        tables.resize(tables.len().max(levels + 1), Table::default());
+        tables[0].resize(layout.size(), count);
         for place in (0..count).step_by(WIDTH) {
             summarise(problem, layout, step, blocks.start + place.cast_signed(), summary, rows);
             tables[0].store(place, summary);
@@ -274,14 +292,15 @@ impl Work<'_, '_> {
         for level in 0..levels {
             let half = 1 << level;
             let count = count + 1 - 2 * half;
-            let mut table = Table::new(layout.size(), count);
+            let (below, table) = tables.split_at_mut(level + 1);
+            let (below, table) = (&below[level], &mut table[0]);
+            table.resize(layout.size(), count);
             for place in (0..count).step_by(WIDTH) {
-                tables[level].load(place, summary);
-                tables[level].load(place + half, other);
+                below.load(place, summary);
+                below.load(place + half, other);
                 merge(layout, summary, other, half as f64 * block_period, rows);
                 table.store(place, summary);
             }
-            tables.push(table);
         }
         let mut scratch = Scratch::new(layout);
         let variance = problem.correlated.as_ref().map(|correlated| correlated.variance);
