@@ -28,8 +28,8 @@ const LOWEST_DEGREE: usize = MOST_DEGREES - 4;
 /// The fewest samples that noise can be read from: one of the shortest windows.
 pub const FEWEST_SAMPLES: usize = 2 * HALVES[0] + 1;
 
-/// Windows that are looked at, at most. A quarter of a million know the variance to half a percent.
-const MOST_WINDOWS: usize = 1 << 18;
+/// Windows that are looked at, at most: so many know the variance to 0.7 %.
+const MOST_WINDOWS: usize = 1 << 17;
 
 /// Differences that a step is sought in, at most, and those that must be whole steps before it is believed.
 const MOST_DIFFERENCES: usize = 1 << 12;
@@ -63,7 +63,7 @@ pub struct Noise {
 /// The noise of a channel, whose quantisation is looked for where it is not known. NaN where no window is without values that cannot be
 /// used.
 ///
-/// Costs `O(n)`, some 60 ns a sample up to 250 000 samples and nothing more beyond.
+/// Costs `O(n)`, some 60 ns a sample up to 130 000 samples and nothing more beyond.
 ///
 /// # Errors
 /// If there are fewer than [`FEWEST_SAMPLES`].
