@@ -239,34 +239,42 @@ impl Search<'_> {
         let mut left = vec![0.0; candidates.len()];
         let mut samples = vec![0.0; length];
         let mut products = vec![[0.0, 0.0]; length];
+        // What is left of a row where the line before the jump holds for so many of its samples.
+        let mut errors = vec![0.0; length + 1];
         let mut count = 0;
         for one in over.clone().filter(|&one| self.whole.usable[one]) {
             let begin = self.first + one * self.stride - half;
             products.fill([0.0, 0.0]);
             for (unknown, signal) in self.signals.iter().enumerate() {
                 signal.read(begin, &mut samples);
-                for (place, product) in products.iter_mut().enumerate() {
-                    let value = samples[place];
-                    if !is_usable(value) {
-                        return None;
-                    }
-                    let weight = self.function[place] * value;
-                    let later = (begin + place) as f64 - (self.first + row * self.stride) as f64;
-                    let later = later / self.stride as f64;
-                    product[0] += weight * (before[unknown][0] + later * before[unknown][1]);
-                    product[1] += weight * (after[unknown][0] + (later + 1.0) * after[unknown][1]);
+                if !samples.iter().all(|&value| is_usable(value)) {
+                    return None;
+                }
+                let ([from, rise], [to, growth]) = (before[unknown], after[unknown]);
+                let per_sample = 1.0 / self.stride as f64;
+                let first = (begin as f64 - (self.first + row * self.stride) as f64) * per_sample;
+                for (place, ((product, value), factor)) in
+                    products.iter_mut().zip(&samples).zip(self.function).enumerate()
+                {
+                    let (weight, later) = (factor * value, first + place as f64 * per_sample);
+                    product[0] += weight * (from + later * rise);
+                    product[1] += weight * (to + (later + 1.0) * growth);
                 }
             }
             let total: f64 = products.iter().map(|product| product[1]).sum();
-            let mut error = self.side[one] - total;
-            let mut place = 0;
-            for (candidate, left) in candidates.clone().zip(&mut left) {
-                while place < length && begin + place < candidate {
-                    error += products[place][1] - products[place][0];
-                    place += 1;
-                }
-                *left += error * error;
+            errors[0] = self.side[one] - total;
+            for (place, product) in products.iter().enumerate() {
+                errors[place + 1] = errors[place] + product[1] - product[0];
             }
+            // Candidates before the row's samples, within them and behind.
+            let within = |candidate: usize| (candidate.max(begin) - begin).min(length);
+            let (first, last) = (within(candidates.start), within(candidates.end));
+            let (before, rest) =
+                left.split_at_mut((begin + first).clamp(candidates.start, candidates.end) - candidates.start);
+            let (inside, behind) = rest.split_at_mut(last - first);
+            let (all, none) = (std::iter::repeat(&errors[0]), std::iter::repeat(&errors[length]));
+            let left = before.iter_mut().zip(all).chain(inside.iter_mut().zip(&errors[first..]));
+            left.chain(behind.iter_mut().zip(none)).for_each(|(left, error)| *left += error * error);
             count += 1;
         }
         (2 * count >= over.len()).then_some(left)
