@@ -305,3 +305,22 @@ def test_words_about_the_noise_model_say_how_bad_it_is(rig: tvident.Recording) -
     assert (result.status & Status.NOISE_MODEL != 0).all()
     words = next(line for line in result.summary().splitlines() if "times the variance of the noise" in line)
     assert float(words.split(" times")[0].split()[-1]) > 4
+
+
+def test_errors_are_numbers_wherever_values_are() -> None:
+    rig = tvident.simulate_torsional_rig(3.0)
+    # What varies slowly is known much less well at one end of this record than within it.
+    calls: list[dict[str, Any]] = [{"lag": 0.5}, {"window_length": 9}]
+    for call in calls:
+        result = tvident.identify(rig.angle, rig.torque, sample_rate=1000, **call)
+        good = result.status & Status.INVALID == 0
+        for name in ("inertia", "damping", "stiffness"):
+            assert np.isfinite(result.stderr[name][good]).all(), (call, name)
+
+
+def test_a_record_too_short_for_its_test_function_is_told_the_length_it_needs(rig: tvident.Recording) -> None:
+    call: dict[str, Any] = {"sample_rate": 1000, "window_length": 101, "equations": 100}
+    message = r"at least 450 samples for windows of several test functions; got 300; .* or give a shorter window_length"
+    with pytest.raises(ValueError, match=message):
+        tvident.identify(rig.angle[:300], rig.torque[:300], **call)
+    tvident.identify(rig.angle[:450], rig.torque[:450], **call)

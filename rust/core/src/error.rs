@@ -99,7 +99,8 @@ pub enum Error {
     },
     /// A record that holds too few samples to choose anything by.
     #[error(
-        "a record must hold at least {least} samples for windows of several test functions; got {samples}; record longer"
+        "a record must hold at least {least} samples for windows of several test functions; got {samples}; \
+         record longer, or give a shorter window_length"
     )]
     RecordTooShortForWindows {
         /// Length of the record, samples.

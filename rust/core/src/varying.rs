@@ -44,7 +44,13 @@ impl Varying {
 
     /// Its variance over that of a row's noise.
     pub(crate) fn variance(&self, coefficient: usize, row: f64) -> f64 {
-        interpolate(&self.variances[coefficient], (row - self.first) / self.spacing, 1.0).0
+        let (points, place) = (&self.variances[coefficient], (row - self.first) / self.spacing);
+        let last = points.len() - 1;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the points")]
+        let index = (place.clamp(0.0, last as f64).floor() as usize).min(last.saturating_sub(1));
+        // Where the variance falls steeply the cubic overshoots, below zero too.
+        let least = points[index].min(points[(index + 1).min(last)]);
+        interpolate(points, place, 1.0).0.max(least)
     }
 }
 

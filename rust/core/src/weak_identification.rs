@@ -309,9 +309,13 @@ impl Session<'_, '_, '_> {
 
     pub(crate) fn too_short(&self) -> Error {
         let samples = self.record.angle.len();
-        let half = self.options.half_width.unwrap_or(LEAST_HALF_WIDTH);
-        let test_functions = if self.model().windowed.is_empty() { 8 } else { 16 };
-        Error::RecordTooShortForWindows { samples, least: (test_functions * half).max(samples + 1) }
+        let least = match self.options.half_width {
+            // The shortest windows on both sides of a row that keep a test function apart.
+            Some(half) => 9 * half,
+            None if self.model().windowed.is_empty() => 8 * LEAST_HALF_WIDTH,
+            None => 16 * LEAST_HALF_WIDTH,
+        };
+        Error::RecordTooShortForWindows { samples, least: least.max(samples + 1) }
     }
 
     pub(crate) fn rows(&mut self, function: TestFunction) -> Result<WeakRows, Error> {
