@@ -234,9 +234,9 @@ def test_the_papers_limits_are_the_stated_ones() -> None:
     assert errors(pulled, noisy_rig)["stiffness"] == pytest.approx(26, rel=MEASURED)
     for found, true in ((pulled.inertia, noisy_rig.inertia), (pulled.stiffness, noisy_rig.stiffness)):
         assert np.nanmean(found / true) == pytest.approx(1 - 0.12, rel=0.01)
-    # Two standard errors cover the truth in 55 % of the windows.
+    # Two standard errors cover the truth in 93 % of the windows.
     covered = np.abs(result.stiffness - recording.stiffness) < 2 * result.stderr["stiffness"]
-    assert covered.mean() == pytest.approx(0.55, rel=MEASURED)
+    assert covered.mean() == pytest.approx(0.93, rel=MEASURED)
     assert np.nanmedian(result.condition) == pytest.approx(15, rel=0.1)
 
     # Under a single sine the condition number is 1000 and more, and windows are flagged.

@@ -6,6 +6,7 @@ import numpy.typing as npt
 
 __all__ = [
     "FEWEST_SAMPLES",
+    "HARDLY_TOLD_APART",
     "NOISE_MODEL_FAILS",
     "NO_CHANCE",
     "LocalPolynomials",
@@ -25,6 +26,7 @@ __all__ = [
 ]
 
 FEWEST_SAMPLES: int
+HARDLY_TOLD_APART: float
 NOISE_MODEL_FAILS: float
 NO_CHANCE: float
 
@@ -103,6 +105,7 @@ def identify_windowed(
     npt.NDArray[np.float64],
     npt.NDArray[np.uint16],
     npt.NDArray[np.uint8],
+    npt.NDArray[np.float64],
 ]: ...
 def identify_constant(
     plan: LocalPolynomials,

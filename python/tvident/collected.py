@@ -33,6 +33,8 @@ class Collected:
         self.values: dict[str, Array] = {}
         self.errors: dict[str, Array] = {}
         self.covariances: dict[frozenset[str], Array] = {}
+        self.factors: dict[str, Array] = {}
+        """What standard errors are still to be multiplied by, where that is left to those who ask for them."""
         self.constants: dict[str, tuple[Any, Any]] = {}
         self.jumps: list[list[int]] = [[]] * int(np.prod(batch, dtype=int))
 
@@ -42,12 +44,13 @@ class Collected:
     def windowed(self, core_plan: _core.LocalPolynomials, motions: _core.Motions, rows: int, **options: Any) -> None:
         """Identify everything in a window around every sample, in strong form."""
         pairs = list(combinations(range(sum(name in COEFFICIENTS for name in self._names)), 2))
-        parameters, errors, covariances, deviation, condition, status, order = _core.identify_windowed(
+        parameters, errors, covariances, deviation, condition, status, order, factors = _core.identify_windowed(
             core_plan, motions, rows, pairs, **options
         )
         for index, name in enumerate(self._names):
             self.values[name] = self._shaped(parameters[:, index])
             self.errors[name] = self._shaped(errors[:, index])
+            self.factors[name] = factors[:, index].reshape(*self._batch, 1)
         for index, (one, other) in enumerate(pairs):
             pair = frozenset((self._names[one], self._names[other]))
             self.covariances[pair] = self._shaped(covariances[:, index])
@@ -73,7 +76,9 @@ class Collected:
         self.residual_std, self.condition = spread(deviation), spread(condition)
         undetermined = np.isinf(self.condition)
         flags = np.uint16(Status.INVALID | Status.RANK_DEFICIENT)
+        ill = ~undetermined & (self.condition > _core.HARDLY_TOLD_APART)
         self.status = np.where(undetermined, self.status | flags, self.status)
+        self.status = np.where(ill, self.status | np.uint16(Status.ILL_CONDITIONED), self.status)
 
     def _add_constant(self, name: str, values: Array, errors: Array) -> None:
         value, error = values.reshape(self._batch), errors.reshape(self._batch)

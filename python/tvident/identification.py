@@ -154,9 +154,9 @@ def identify(
     Within 0.2 s inertia and stiffness are nearly collinear unless several frequencies are excited: under a single sine they cannot be
     told apart at all. ``condition`` says so, and ``stderr`` by how much.
 
-    Standard errors of the strong form take the equations for independent: see :class:`Identification`. Those of the weak form follow
-    from the known covariance of its overlapping rows, times the mean squared error of predicting rows that were not seen, over the
-    noise's.
+    Standard errors of the strong form follow from how far windows scatter that share no equation: see :class:`Identification`. Those of
+    the weak form follow from the known covariance of its overlapping rows, times the mean squared error of predicting rows that were
+    not seen, over the noise's.
 
     In strong form, where all unknowns are of one kind, the cost is some 60 ns a sample and thread, whatever the windows, and memory is
     that of the results, but for terms of one's own, which need the derivatives of the whole record. In weak form and where kinds are
@@ -483,6 +483,7 @@ class _Task:
             values=found.values,
             errors=found.errors,
             covariances=found.covariances,
+            factors=found.factors,
             constants=found.constants,
             terms=[unknown.name for unknown in self.extra],
             condition=found.condition,

@@ -9,10 +9,12 @@ use crate::local_polynomials::{Estimates, LocalPolynomials};
 use crate::motion::Motion;
 use crate::output::{Elements, split_off};
 use crate::parallel::{self, GoOn, Piece, Watch};
+use crate::redundancy::{Stretched, enlarge};
 use crate::rolling::{Equations, Regressions, RollingLeastSquares};
 use crate::samples::{Samples, is_usable};
 use crate::shared_parameters::{SharedParameters, Summary};
 use crate::status::Status;
+use crate::thinned::stretches;
 
 /// A condition number of the equations of motion from which on they hardly tell the parameters apart.
 ///
@@ -21,6 +23,10 @@ pub const HARDLY_TOLD_APART: f64 = 500.0;
 
 /// Rows in a piece of work, about.
 const PIECE: usize = 1 << 14;
+
+/// Rows that the correlation of residuals is read off in a long record, and in how many stretches.
+const MOST_ROWS: usize = 1 << 14;
+const STRETCHES: usize = 8;
 
 /// Where results of one record are written. An empty slice stands for what is not wanted.
 #[derive(Debug, Default)]
@@ -39,7 +45,7 @@ impl Identified<'_> {
 }
 
 /// Rows of a record between two samples.
-struct Chunk {
+pub(crate) struct Chunk {
     first: usize,
     /// Angle and its derivatives.
     derivatives: [Vec<f64>; 3],
@@ -47,12 +53,12 @@ struct Chunk {
     status: Vec<u16>,
     known: Vec<f64>,
     /// Unknowns, then the right-hand side.
-    columns: Vec<Vec<f64>>,
+    pub(crate) columns: Vec<Vec<f64>>,
     polynomials: crate::local_polynomials::Scratch,
 }
 
 /// One column of a chunk, known by absolute sample numbers. Beyond the chunk, where no window that is wanted reaches, it is zero.
-struct Column<'a> {
+pub(crate) struct Column<'a> {
     first: usize,
     values: &'a [f64],
     samples: usize,
@@ -73,7 +79,7 @@ impl Samples for Column<'_> {
 }
 
 impl Chunk {
-    fn new(plan: &LocalPolynomials, columns: usize) -> Self {
+    pub(crate) fn new(plan: &LocalPolynomials, columns: usize) -> Self {
         Self {
             first: 0,
             derivatives: Default::default(),
@@ -86,7 +92,12 @@ impl Chunk {
     }
 
     /// Differentiates the angle at some samples and builds their rows.
-    fn fill(&mut self, plan: &LocalPolynomials, motion: &Motion<'_>, samples: Range<usize>) -> Result<(), Error> {
+    pub(crate) fn fill(
+        &mut self,
+        plan: &LocalPolynomials,
+        motion: &Motion<'_>,
+        samples: Range<usize>,
+    ) -> Result<(), Error> {
         self.first = samples.start;
         motion.take_back(&mut self.derivatives, &mut self.columns);
         for derivative in &mut self.derivatives {
@@ -105,10 +116,20 @@ impl Chunk {
         motion.rows(self.first, &mut self.derivatives, &mut self.known, &mut self.columns);
         Ok(())
     }
+
+    /// The columns by the sample numbers of their record.
+    pub(crate) fn columns(&self, samples: usize) -> Vec<Column<'_>> {
+        self.columns.iter().map(|values| Column { first: self.first, values, samples }).collect()
+    }
+
+    /// Whether a row of the chunk is an equation, of those of the record, and can be used.
+    pub(crate) fn is_equation(&self, row: usize, rows: &Range<usize>) -> bool {
+        rows.contains(&(self.first + row)) && self.columns.iter().all(|column| is_usable(column[row]))
+    }
 }
 
 /// The samples that are equations: those around which a full window of the angle lies.
-fn equations(plan: &LocalPolynomials, samples: usize) -> Range<usize> {
+pub(crate) fn equations(plan: &LocalPolynomials, samples: usize) -> Range<usize> {
     let before = plan.before_centre();
     before..(samples + before + 1).saturating_sub(plan.options().window_length).max(before)
 }
@@ -116,6 +137,7 @@ fn equations(plan: &LocalPolynomials, samples: usize) -> Range<usize> {
 /// Identifies parameters in a window of equations around every sample: (3) and (4) of the paper, in parallel over all records.
 ///
 /// `derivatives` must be a plan for the value and the first two derivatives, `least_squares` one with the unknowns of the motions.
+/// Standard errors are those of ordinary least squares; [`scatter`](crate::scatter()) says by what they are too small.
 ///
 /// # Errors
 /// If a record is shorter than the window of the polynomials, or the watch cancels.
@@ -146,8 +168,7 @@ pub fn identify_windowed(
             return;
         }
         let total = motion.angle.len();
-        let column = |values| Column { first: chunk.first, values, samples: total };
-        let columns: Vec<Column<'_>> = chunk.columns.iter().map(|values| column(values.as_slice())).collect();
+        let columns = chunk.columns(total);
         let equations = Equations {
             columns: columns.iter().map(|column| column as &dyn Samples).collect(),
             rows: equations(derivatives, total),
@@ -176,7 +197,8 @@ fn finish(chunk: &Chunk, samples: Range<usize>, part: &mut Identified<'_>) {
 /// Identifies parameters that are the same over the whole record, one result a record; nothing where they are not determined.
 ///
 /// `derivatives` must be a plan for the value and the first two derivatives. Equations that hold a value that is no number are left
-/// out. Of the outputs only orders and statuses are written.
+/// out. Of the outputs only orders and statuses are written. Standard errors hold the correlation of neighbouring rows, as residuals of
+/// at most 16 384 rows show it.
 ///
 /// # Errors
 /// If a record is shorter than the window of the polynomials, or the watch cancels.
@@ -208,9 +230,7 @@ pub fn identify_constant(
             return;
         }
         let rows = equations(derivatives, motion.angle.len());
-        let summary = Summary::of(&chunk.columns, |row| {
-            rows.contains(&(chunk.first + row)) && chunk.columns.iter().all(|column| is_usable(column[row]))
-        });
+        let summary = Summary::of(&chunk.columns, |row| chunk.is_equation(row, &rows));
         finish(chunk, samples, &mut part);
         summaries.lock().unwrap_or_else(PoisonError::into_inner)[place] = Some(summary);
     };
@@ -224,5 +244,35 @@ pub fn identify_constant(
             totals[owner].add(summary);
         }
     }
-    Ok(totals.iter().map(Summary::solve).collect())
+    let mut solved: Vec<_> = totals.iter().map(Summary::solve).collect();
+    let pieces = solved.iter_mut().zip(&motions).map(|content| Piece { size: 1, content }).collect();
+    let work = |(solved, motion): (&mut Option<SharedParameters>, &Motion<'_>), chunk: &mut Chunk| {
+        if let Some(solved) = solved {
+            enlarge(&mut solved.covariance, &redundancies(derivatives, motion, chunk)?);
+        }
+        Ok(())
+    };
+    let samples = motions.iter().map(|motion| motion.angle.len()).sum();
+    let chunk = || Chunk::new(derivatives, unknowns + 1);
+    let done: Result<(), Error> =
+        parallel::map(pieces, workers, chunk, work, &mut |_, _| watch(samples, samples))?.into_iter().collect();
+    done.map(|()| solved)
+}
+
+/// By how much the standard errors of constants exceed those of ordinary least squares, from stretches of a long record.
+pub(crate) fn redundancies(
+    derivatives: &LocalPolynomials,
+    motion: &Motion<'_>,
+    chunk: &mut Chunk,
+) -> Result<Vec<f64>, Error> {
+    let rows = equations(derivatives, motion.angle.len());
+    // Polynomials weigh the middle half of their windows: beyond that derivatives hardly share noise.
+    let reach = derivatives.options().window_length / 2;
+    let most = MOST_ROWS.max(4 * STRETCHES * reach);
+    let mut stretched = Stretched::new(motion.unknowns() + 1, reach);
+    for stretch in stretches(rows.len(), most, STRETCHES) {
+        chunk.fill(derivatives, motion, rows.start + stretch.start..rows.start + stretch.end)?;
+        stretched.push(&chunk.columns, |row| chunk.is_equation(row, &rows));
+    }
+    Ok(stretched.factors().unwrap_or_else(|| vec![1.0; motion.unknowns()]))
 }

@@ -138,6 +138,11 @@ impl RollingLeastSquares {
         self.window * self.instructions.lanes()
     }
 
+    /// Rows of a window.
+    pub(crate) fn window(&self) -> usize {
+        self.window
+    }
+
     /// Memory for one thread.
     #[must_use]
     pub fn scratch(&self) -> Scratch {

@@ -19,7 +19,8 @@ pub(crate) struct Summary {
 pub struct SharedParameters {
     /// The values.
     pub values: Vec<f64>,
-    /// Their covariance, row by row: ordinary least squares, for residuals that are independent and of one variance.
+    /// Their covariance, row by row. Out of a summary it is that of ordinary least squares, for residuals that are independent and of
+    /// one variance.
     pub covariance: Vec<f64>,
     /// Standard deviation of the residuals.
     pub residual: f64,

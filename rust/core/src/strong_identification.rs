@@ -1,7 +1,7 @@
 //! Identification in strong form with kinds of its own for every parameter: some in every window, some constant over the record.
 //!
-//! The rows are those of the paper, one a sample, from derivatives of local polynomials. Standard errors are those of ordinary least
-//! squares.
+//! The rows are those of the paper, one a sample, from derivatives of local polynomials. Standard errors hold that neighbouring rows are
+//! correlated: those of constants by the covariance of the residuals, those of windows by how far windows scatter (see the module `scatter`).
 
 use std::num::NonZeroUsize;
 
@@ -16,12 +16,17 @@ use crate::motion::{Coefficient, Motion, Term, unknowns};
 use crate::output::Elements;
 use crate::parallel::Watch;
 use crate::pooling::{Expected, influence, joint_covariance, sandwich};
+use crate::redundancy::{Stretched, at_least};
 use crate::row_covariance::RowCovariance;
 use crate::run::Run;
 use crate::samples::{Samples, is_usable};
+use crate::scatter::{Track, scatter_of, slices};
 use crate::status::Status;
+use crate::thinned::stretches_of_rows;
 use crate::weak_identification::{Constant, Kind};
+use crate::weak_report::residuals;
 use crate::weak_results::{RowResults, SampleResults};
+use crate::windows::Problem;
 
 /// Stages of a call, about: only for showing progress.
 const STAGES: usize = 6;
@@ -101,7 +106,10 @@ pub fn identify_strong(
     let centre = |window| fit.centre(window);
     let columns = influence(&problem, &fit.full, windows, &ones, fit.step, fit.span, centre);
     let variance = variance(&problem, &fit);
-    let covariance = sandwich(&columns, &fit.pooled.inverse, &RowCovariance { lags: vec![variance] });
+    let reach = derivatives.options().window_length / 2;
+    let sandwich = |rows: &RowCovariance| sandwich(&columns, &fit.pooled.inverse, rows);
+    let ordinary = sandwich(&RowCovariance { lags: vec![variance] });
+    let covariance = at_least(sandwich(&row_covariance(&problem, &fit, reach, variance)), &ordinary, count);
     problem.constants.truncate(count);
     let mut results = RowResults { stride: 1.0, ..RowResults::default() };
     let mut pairs = Vec::new();
@@ -120,8 +128,16 @@ pub fn identify_strong(
         let (ill, window) = (HARDLY_TOLD_APART, options.equations);
         let found = every_window(&problem, window, range, &constants, ill, instructions, &mut run)?;
         let windowed = model.windowed.len();
+        let own = |one, other, row: usize| found.covariances[crate::factor::symmetric(one, other)][row];
+        let errors: Vec<Vec<f64>> =
+            (0..windowed).map(|one| (0..samples).map(|row| own(one, one, row).sqrt()).collect()).collect();
+        let (values, errors) = (slices(&found.values), slices(&errors));
+        let track = Track { values: &values, errors: &errors };
+        let factors = scatter_of(derivatives, window, samples, track)
+            .or_else(|| redundancies(&problem, reach))
+            .unwrap_or_else(|| vec![1.0; windowed]);
         let between = |one: usize, other: usize, row: usize| {
-            let own = |one, other| found.covariances[crate::factor::symmetric(one, other)][row];
+            let own = |one: usize, other: usize| own(one, other, row) * factors[one] * factors[other];
             let sensitive = |unknown: usize, k: usize| found.sensitivities[unknown * count + k][row];
             joint_covariance([one, other], [windowed, count], own, sensitive, |i, j| covariance[i * count + j])
         };
@@ -179,8 +195,39 @@ fn undetermined(model: &Model, samples: usize, step: usize, order: Vec<u8>) -> S
     }
 }
 
+/// The covariance of rows that residuals show, for residuals of some variance; of a long record, those of stretches.
+fn row_covariance(problem: &Problem<'_>, fit: &Fit, reach: usize, variance: f64) -> RowCovariance {
+    let (mut left, mut usable) = residuals(problem, fit);
+    let stretches = stretches_of_rows(left.len());
+    if let Some(stretches) = stretches.filter(|stretches| stretches.iter().all(|part| part.len() > 4 * reach)) {
+        let (all, all_usable) = (std::mem::take(&mut left), std::mem::take(&mut usable));
+        for stretch in stretches {
+            left.extend_from_slice(&all[stretch.clone()]);
+            usable.extend_from_slice(&all_usable[stretch]);
+            // Rows of different stretches have no product.
+            left.resize(left.len() + reach, 0.0);
+            usable.resize(left.len(), false);
+        }
+    }
+    let mut covariance = RowCovariance::of_residuals(&left, &usable, reach);
+    let shown = covariance.variance();
+    if shown > 0.0 {
+        covariance.lags.iter_mut().for_each(|lag| *lag *= variance / shown);
+    }
+    covariance
+}
+
+/// By how much standard errors of what is windowed exceed those of ordinary least squares, where all is taken as constant.
+fn redundancies(problem: &Problem<'_>, reach: usize) -> Option<Vec<f64>> {
+    let columns = problem.windowed.iter().chain(&problem.constants).chain([&problem.side]);
+    let columns: Vec<Vec<f64>> = columns.map(|column| column.to_vec()).collect();
+    let mut stretched = Stretched::new(columns.len(), reach);
+    stretched.push(&columns, |row| problem.usable[row]);
+    stretched.factors()
+}
+
 /// Variance of what a fit leaves, its unknowns counted once.
-fn variance(problem: &crate::windows::Problem<'_>, fit: &Fit) -> f64 {
+fn variance(problem: &Problem<'_>, fit: &Fit) -> f64 {
     let usable = problem.usable.iter().filter(|usable| **usable).count() as f64;
     if problem.layout.windowed == 0 {
         let left = without_constants(problem, &fit.pooled.values);

@@ -8,8 +8,8 @@ use pyo3::prelude::*;
 use tvident::identification::HARDLY_TOLD_APART;
 use tvident::parallel::workers as threads;
 use tvident::{
-    Coefficient, Elements, Identified, Instructions, Motion, Regressions, RollingLeastSquares, Samples, Term,
-    identify_constant as constant, identify_windowed as windowed,
+    Coefficient, Elements, Identified, Instructions, Motion, Regressions, RollingLeastSquares, Samples, Term, Track,
+    identify_constant as constant, identify_windowed as windowed, scatter,
 };
 
 use crate::local_polynomials::LocalPolynomials;
@@ -123,7 +123,8 @@ fn one(records: &[StridedSamples], record: usize) -> PyResult<&dyn Samples> {
     })
 }
 
-/// Parameters, standard errors, covariances, residual standard deviations, condition numbers, statuses and orders of every window.
+/// Parameters, standard errors, covariances, residual standard deviations, condition numbers, statuses and orders of every window; what
+/// the standard errors of every unknown are to be multiplied by.
 type Windowed<'py> = (
     Bound<'py, PyArray3<f64>>,
     Bound<'py, PyArray3<f64>>,
@@ -132,6 +133,7 @@ type Windowed<'py> = (
     Bound<'py, PyArray2<f64>>,
     Bound<'py, PyArray2<u16>>,
     Bound<'py, PyArray2<u8>>,
+    Bound<'py, PyArray2<f64>>,
 );
 
 /// Identifies what is unknown in a window of equations around every sample. Records lie along the last axis; all outputs have the
@@ -149,7 +151,8 @@ pub(crate) fn identify_windowed<'py>(
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Windowed<'py>> {
     let samples = motions.samples.div_ceil(step);
-    let motions = motions.all()?;
+    let all = motions;
+    let motions = all.all()?;
     let unknowns = motions.first().map_or(0, Motion::unknowns);
     let (count, pair_count) = (motions.len(), pairs.len());
     let least_squares =
@@ -190,7 +193,26 @@ pub(crate) fn identify_windowed<'py>(
         let records = motions.into_iter().map(outputs).collect();
         watched(py, progress, |watch| windowed(plan.plan(), &least_squares, records, threads(workers), watch))?;
     }
-    Ok((parameters, errors, covariances, deviations, condition, status, order))
+    let factors = PyArray2::zeros(py, [count, unknowns], false);
+    {
+        let (parameters, errors) = (parameters.readonly(), errors.readonly());
+        let parameters: Vec<&[f64]> = parameters.as_slice()?.chunks_exact(samples).collect();
+        let errors: Vec<&[f64]> = errors.as_slice()?.chunks_exact(samples).collect();
+        let tracks = parameters.chunks_exact(unknowns).zip(errors.chunks_exact(unknowns));
+        // With a larger step they do not hold every window.
+        let tracks = tracks.map(|(values, errors)| (step == 1).then_some(Track { values, errors }));
+        let records: Vec<_> = all.all()?.into_iter().zip(tracks).collect();
+        let mut found = Vec::new();
+        watched(py, None, |watch| {
+            found = scatter(plan.plan(), &least_squares, records, threads(workers), watch)?;
+            Ok(())
+        })?;
+        let mut factors = factors.readwrite();
+        for (row, found) in factors.as_slice_mut()?.chunks_exact_mut(unknowns).zip(&found) {
+            row.copy_from_slice(found);
+        }
+    }
+    Ok((parameters, errors, covariances, deviations, condition, status, order, factors))
 }
 
 /// Values, covariances, residual standard deviations and condition numbers of every record; statuses and orders of every sample.

@@ -46,6 +46,9 @@ mod _core {
     /// Error of prediction, over the noise's, above which the noise of the channels does not explain it.
     #[pymodule_export]
     const NOISE_MODEL_FAILS: f64 = tvident::weak_identification::NOISE_MODEL_FAILS;
+    /// Condition number from which on equations hardly tell parameters apart.
+    #[pymodule_export]
+    const HARDLY_TOLD_APART: f64 = tvident::identification::HARDLY_TOLD_APART;
     /// The shortest record that a window is chosen for.
     #[pymodule_export]
     const FEWEST_SAMPLES: usize = tvident::automatic::FEWEST_SAMPLES;

@@ -1,0 +1,242 @@
+//! How far windows scatter, over what their standard errors say.
+//!
+//! Ordinary least squares take equations as independent and unknowns as constant within a window. Neither holds: derivatives at
+//! neighbouring samples come from nearly the same samples, and what changes within a window pulls its unknowns. Windows that share no
+//! equation tell what both amount to. The second difference of three of them, `x₀ − (x₋ + x₊)/2`, has the variance `v₀ + (v₋ + v₊)/4` if
+//! their variances are right, and a steady drift adds nothing to it. What every window is wrong by alike is not seen.
+
+use std::num::NonZeroUsize;
+use std::ops::Range;
+
+use crate::error::Error;
+use crate::identification::{Chunk, equations, redundancies};
+use crate::local_polynomials::LocalPolynomials;
+use crate::motion::Motion;
+use crate::output::Elements;
+use crate::parallel::{self, Piece, Watch};
+use crate::rolling::{Equations, Regressions, RollingLeastSquares};
+use crate::samples::Samples;
+use crate::thinned::stretches;
+
+/// Windows that are looked at in a long record, and in how many stretches at most.
+const MOST_WINDOWS: usize = 1 << 15;
+const STRETCHES: usize = 8;
+
+/// Differences that begin within the distance of two windows.
+const DENSITY: usize = 8;
+
+/// A squared difference counts at most so many times what the median says of its mean: a jump is no error of the windows around it.
+const MOST: f64 = 25.0;
+
+/// The median of a χ² variable with one degree of freedom.
+const MEDIAN: f64 = 0.454_936;
+
+/// What windows around samples say: unknowns and their standard errors, one slice an unknown.
+#[derive(Clone, Copy, Debug)]
+pub struct Track<'a> {
+    /// Values by unknown.
+    pub values: &'a [&'a [f64]],
+    /// Standard errors by unknown.
+    pub errors: &'a [&'a [f64]],
+}
+
+/// By how much standard errors of windowed unknowns exceed those of ordinary least squares: one factor an unknown, in every record.
+///
+/// `tracks` holds what [`identify_windowed`](crate::identify_windowed) found at every sample of a record, where that is known; otherwise
+/// some windows are solved again. The factors are the same, and never less than one. Where a record is too short for windows that share
+/// no equation they come from the correlation of the residuals. They cost well below a millisecond with tracks, and as much as 32 768
+/// windows without.
+///
+/// # Errors
+/// If a record is shorter than the window of the polynomials, or the watch cancels.
+pub fn scatter(
+    derivatives: &LocalPolynomials,
+    least_squares: &RollingLeastSquares,
+    records: Vec<(Motion<'_>, Option<Track<'_>>)>,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<Vec<f64>>, Error> {
+    let pieces = records.into_iter().map(|content| Piece { size: 1, content }).collect();
+    let work =
+        |(motion, track): (Motion<'_>, Option<Track<'_>>), (): &mut ()| one(derivatives, least_squares, &motion, track);
+    parallel::map(pieces, workers, || (), work, watch)?.into_iter().collect()
+}
+
+/// The factors of one record.
+fn one(
+    derivatives: &LocalPolynomials,
+    least_squares: &RollingLeastSquares,
+    motion: &Motion<'_>,
+    track: Option<Track<'_>>,
+) -> Result<Vec<f64>, Error> {
+    let compared = Compared::new(derivatives, least_squares.window(), motion.angle.len());
+    let chunk = || Chunk::new(derivatives, least_squares.columns());
+    let mut squares = vec![Vec::new(); motion.unknowns()];
+    for around in compared.stretches() {
+        if let Some(track) = track {
+            track.add(&mut squares, around, compared.distance);
+        } else {
+            let (values, errors) = solved(derivatives, least_squares, motion, around.clone(), &mut chunk())?;
+            let (values, errors) = (slices(&values), slices(&errors));
+            let track = Track { values: &values, errors: &errors };
+            track.add(&mut squares, 0..around.len(), compared.distance);
+        }
+    }
+    match factors(&mut squares) {
+        Some(factors) => Ok(factors),
+        None => redundancies(derivatives, motion, &mut chunk()),
+    }
+}
+
+/// Which windows are compared.
+struct Compared {
+    /// Samples from one window of a difference to the next: they share no equation, nor nearly any of the polynomials' windows.
+    distance: usize,
+    /// Samples around which a full window of equations lies.
+    inside: Range<usize>,
+}
+
+impl Compared {
+    fn new(derivatives: &LocalPolynomials, window: usize, samples: usize) -> Self {
+        let rows = equations(derivatives, samples);
+        Self {
+            distance: window + derivatives.options().window_length / 2,
+            inside: rows.start + window / 2..(rows.end + window / 2 + 1).saturating_sub(window),
+        }
+    }
+
+    /// Parts of the record that are looked at: none where it is too short for one difference that is independent of another.
+    fn stretches(&self) -> Vec<Range<usize>> {
+        if self.inside.len() < 3 * self.distance {
+            return Vec::new();
+        }
+        let most = MOST_WINDOWS.max(12 * self.distance);
+        let count = (most / (4 * self.distance)).min(STRETCHES);
+        let first = self.inside.start;
+        stretches(self.inside.len(), most, count).map(|part| first + part.start..first + part.end).collect()
+    }
+}
+
+/// The factors for what windows say that were solved around every sample of a record; nothing where it is too short.
+pub(crate) fn scatter_of(
+    derivatives: &LocalPolynomials,
+    window: usize,
+    samples: usize,
+    track: Track<'_>,
+) -> Option<Vec<f64>> {
+    let compared = Compared::new(derivatives, window, samples);
+    let mut squares = vec![Vec::new(); track.values.len()];
+    for around in compared.stretches() {
+        track.add(&mut squares, around, compared.distance);
+    }
+    factors(&mut squares)
+}
+
+/// Columns as slices.
+pub(crate) fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
+    columns.iter().map(Vec::as_slice).collect()
+}
+
+/// Values and standard errors, by unknown.
+type Solved = (Vec<Vec<f64>>, Vec<Vec<f64>>);
+
+/// Solves the windows around some samples.
+fn solved(
+    derivatives: &LocalPolynomials,
+    least_squares: &RollingLeastSquares,
+    motion: &Motion<'_>,
+    around: Range<usize>,
+    chunk: &mut Chunk,
+) -> Result<Solved, Error> {
+    let samples = motion.angle.len();
+    chunk.fill(derivatives, motion, least_squares.rows_needed(around.clone(), samples))?;
+    let columns = chunk.columns(samples);
+    let equations = Equations {
+        columns: columns.iter().map(|column| column as &dyn Samples).collect(),
+        rows: equations(derivatives, samples),
+    };
+    let (mut values, mut errors) = (vec![vec![0.0; around.len()]; motion.unknowns()], Vec::new());
+    errors.clone_from(&values);
+    let mut regressions = Regressions {
+        elements: Elements { first: around.start, step: 1 },
+        parameters: values.iter_mut().map(Vec::as_mut_slice).collect(),
+        errors: errors.iter_mut().map(Vec::as_mut_slice).collect(),
+        ..Regressions::default()
+    };
+    least_squares.solve(&equations, around, &mut regressions, &mut least_squares.scratch());
+    Ok((values, errors))
+}
+
+impl Track<'_> {
+    /// Adds squared differences of windows around some samples over the variances that their standard errors give them.
+    fn add(&self, squares: &mut [Vec<f64>], around: Range<usize>, distance: usize) {
+        for ((squares, values), errors) in squares.iter_mut().zip(self.values).zip(self.errors) {
+            let centres = around.start + distance..around.end.saturating_sub(distance);
+            for centre in centres.step_by((distance / DENSITY).max(1)) {
+                let (before, after) = (centre - distance, centre + distance);
+                let difference = values[centre] - f64::midpoint(values[before], values[after]);
+                let variance = errors[centre].powi(2) + (errors[before].powi(2) + errors[after].powi(2)) / 4.0;
+                let square = difference * difference / variance;
+                if square.is_finite() {
+                    squares.push(square);
+                }
+            }
+        }
+    }
+}
+
+/// The root of the mean of squared differences of every unknown, of which none counts too much; nothing where one has none.
+fn factors(squares: &mut [Vec<f64>]) -> Option<Vec<f64>> {
+    let factor = |squares: &mut Vec<f64>| {
+        if squares.is_empty() {
+            return None;
+        }
+        let middle = squares.len() / 2;
+        let most = MOST / MEDIAN * *squares.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let mean = squares.iter().map(|square| square.min(most)).sum::<f64>() / squares.len() as f64;
+        Some(mean.sqrt().max(1.0))
+    };
+    squares.iter_mut().map(factor).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::redundancy::tests::white;
+
+    /// The factor of one unknown with the same standard error everywhere.
+    fn factor(values: &[f64], error: f64) -> f64 {
+        let (mut squares, errors) = (vec![Vec::new()], vec![error; values.len()]);
+        Track { values: &[values], errors: &[&errors] }.add(&mut squares, 0..values.len(), 24);
+        factors(&mut squares).expect("long enough")[0]
+    }
+
+    // 13 000 differences: the root of their mean square scatters by a hundredth.
+    const CHANCE: f64 = 0.05;
+
+    #[test]
+    fn errors_that_are_right_keep_their_size_and_others_get_it() {
+        let values = white(40_000, 3);
+        for (stated, expected) in [(1.0, 1.0), (0.25, 4.0), (4.0, 1.0)] {
+            assert!((factor(&values, stated) / expected - 1.0).abs() < CHANCE);
+        }
+    }
+
+    #[test]
+    fn a_drift_and_a_jump_are_no_errors() {
+        let noise = white(40_000, 5);
+        let drifting: Vec<f64> = (0..40_000).map(|row| noise[row] + 0.01 * row as f64).collect();
+        // Of 13 000 differences 16 reach over the jump, each of which counts 25 times at most.
+        let jumping: Vec<f64> = (0..40_000).map(|row| noise[row] + if row < 20_000 { 0.0 } else { 1e6 }).collect();
+        for values in [drifting, jumping] {
+            assert!((factor(&values, 1.0) - 1.0).abs() < CHANCE);
+        }
+    }
+
+    #[test]
+    fn a_record_too_short_for_differences_has_no_stretches() {
+        let compared = Compared { distance: 100, inside: 50..349 };
+        assert!(compared.stretches().is_empty());
+        assert_eq!(Compared { inside: 50..350, ..compared }.stretches(), [50..350]);
+    }
+}
