@@ -17,6 +17,7 @@ from tvident.progress import reporter
 from tvident.reasons import Explained, Words
 from tvident.result import Identification
 from tvident.settings import Form, Preset, Selection, Variation, resolve
+from tvident.strong_reasons import ExplainedStrong
 from tvident.terms import COEFFICIENTS, Kind, Parameter, Term, TermName, Unknown, all_terms, parameter
 
 _SHORTEST_WINDOW = 5
@@ -272,6 +273,7 @@ class _Task:
         arguments.check_window("window_length", length, samples, least=_SHORTEST_WINDOW)
         rows = arguments.window_length("equations", used["equations"], self.period, odd=False)
         core_plan = self._plan(length)
+        untested = [one.name for one in self.unknowns if one.kind == "auto" and _in_strong_form(one) == "constant"]
         self.unknowns = [Unknown(one.name, _in_strong_form(one), one.own) for one in self.unknowns]
         kinds = {unknown.kind for unknown in self.unknowns}
         found = Collected(self.angles.shape[:-1], [unknown.name for unknown in self.unknowns])
@@ -299,7 +301,19 @@ class _Task:
                 if self.propagate and self.holes is not None:
                     propagate(found, self.holes, [(length, rows)] * self._records, self.step)
         chosen = {"chosen": (), "window_length": length, "exponent": None, "equations": rows}
-        return self._result(found, chosen, Words())
+        explained = ExplainedStrong(
+            values=found.values,
+            errors=found.errors,
+            covariances=found.covariances,
+            factors=found.factors,
+            kinds={unknown.name: unknown.kind for unknown in self.unknowns},
+            untested=untested,
+            condition=found.condition,
+            order=found.order,
+            status=found.status,
+            settings=used | {"window_length": length},
+        )
+        return self._result(found, chosen, explained.words())
 
     def weak(self, progress: arguments.Progress) -> Identification:
         """Identify in weak form."""

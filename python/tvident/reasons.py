@@ -63,7 +63,7 @@ class Explained:
         common = Status(int(np.bitwise_and.reduce(self.found["status"])))
         if Status.RANK_DEFICIENT in common:
             undetermined = (
-                f"the record does not determine {_listed(list(self.names.values()))}: nothing moves, or a single frequency does not tell "
+                f"the record does not determine {listed(list(self.names.values()))}: nothing moves, or a single frequency does not tell "
                 "inertia from stiffness: check that angle and torque are the right channels, excite two or more frequencies, leave a "
                 "term out, or give what is known"
             )
@@ -134,7 +134,7 @@ class Explained:
         if agreeing:
             chances = ", ".join(f"{probability:.2g}" for probability in agreeing.values())
             words.append(
-                f"{_listed(list(agreeing))} constant: eight parts of the record differ no more than noise makes them (p = {chances})"
+                f"{listed(list(agreeing))} constant: eight parts of the record differ no more than noise makes them (p = {chances})"
             )
         if self.found["pooling"] is not None:
             slow = [self.names[number] for number in self.found["changing"]]
@@ -142,7 +142,7 @@ class Explained:
             why = "parts of the record differ by more than noise" if set(slow) <= set(self.tested) else "as given"
             seconds = self.found["pooling"] * self.period
             words.append(
-                f"{_listed(slow)} varying: {why}; followed by quadratics in time over {seconds:.3g} s, which predict best"
+                f"{listed(slow)} varying: {why}; followed by quadratics in time over {seconds:.3g} s, which predict best"
             )
         return words
 
@@ -200,7 +200,7 @@ class Explained:
         parts = [name for name, part in zip(constants, shares, strict=True) if abs(part) > _TAKES_PART]
         if len(parts) == 1 and "stiffness" in (self.names[number] for number in self.found["changing"]):
             parts.append("stiffness")
-        told = _listed(parts) if len(parts) > 1 else "the parameters"
+        told = listed(parts) if len(parts) > 1 else "the parameters"
         noise = ", but by the noise of the angle" if self.found["mostly_noise"] else ""
         words = (
             f"{told} are hardly told apart{noise} (condition {self.found['condition']:.0f}): under a single frequency they look "
@@ -225,7 +225,7 @@ class Explained:
         return [words]
 
 
-def _listed(names: list[str]) -> str:
+def listed(names: list[str]) -> str:
     """Return names as they are read: one, another and a third."""
     *first, last = names
     return f"{', '.join(first)} and {last}" if first else last

@@ -1,0 +1,97 @@
+"""What the strong form says in words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import tvident
+from tvident import Status
+
+Array = npt.NDArray[np.float64]
+
+RIG = tvident.simulate_torsional_rig(8.0)
+
+
+def paper(angle: Array, torque: Array, **call: Any) -> tvident.Identification:
+    return tvident.identify(angle, torque, sample_rate=1000, preset="paper", **call)
+
+
+def advice(result: tvident.Identification) -> str:
+    assert all(sentence in result.summary() for sentence in result.settings["advice"])
+    return "\n".join(result.settings["advice"])
+
+
+def single_sine() -> tuple[Array, Array]:
+    generator = np.random.default_rng(0)
+    t = np.arange(8000) / 1000
+    omega = 6 * np.pi
+    angle = np.sin(omega * t)
+    torque = (15 - 0.0123 * omega**2) * angle + 0.00825 * omega * np.cos(omega * t)
+    return angle + 1e-3 * generator.standard_normal(t.size), torque + 0.5 * generator.standard_normal(t.size)
+
+
+def test_a_good_recording_is_told_what_was_chosen_and_what_would_help_most() -> None:
+    result = paper(RIG.angle, RIG.torque)
+    orders, errors = result.settings["reasons"]
+    assert "of up to 15, in every window by aicc" in orders
+    assert "times those of independent equations" in errors
+    assert "give inertia='constant', or its value" in advice(result)
+    followed = paper(RIG.angle, RIG.torque, inertia="constant", damping="constant")
+    assert advice(followed) == ""
+
+
+def test_kinds_that_nothing_tests_are_named() -> None:
+    result = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, form="strong")
+    assert "inertia and damping constant: the strong form does not test it" in "\n".join(result.settings["reasons"])
+
+
+@pytest.mark.parametrize("kind", ["windowed", "constant"])
+def test_a_single_sine_does_not_tell_inertia_from_stiffness(kind: str) -> None:
+    kinds: dict[str, Any] = dict.fromkeys(("inertia", "damping", "stiffness"), kind)
+    result = paper(*single_sine(), **kinds)
+    assert "inertia and stiffness are hardly told apart" in advice(result)
+    assert np.mean(result.status & Status.ILL_CONDITIONED != 0) > 0.8
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        ({"window_length": 401}, "make window_length shorter until that is rare"),
+        ({"max_order": 5}, "raise max_order= above 5, or make window_length shorter"),
+        ({"window_length": 9, "criterion": "aic"}, "all that so few samples can judge: make window_length longer"),
+    ],
+)
+def test_orders_at_the_end_of_the_candidates_get_the_papers_advice(call: dict[str, Any], words: str) -> None:
+    found = advice(paper(RIG.angle, RIG.torque, **call))
+    assert "the highest order was best" in found
+    assert words in found
+
+
+def test_what_rests_is_told_to_be_left_out() -> None:
+    angle = RIG.angle.copy()
+    angle[2000:5000] = angle[2000]
+    found = advice(paper(angle, RIG.torque))
+    assert "% of the windows do not determine inertia, damping and stiffness" in found
+    assert "order 0 was best: the angle rests there" in found
+    nothing = paper(np.zeros(2000), np.zeros(2000))
+    assert advice(nothing).startswith("the record does not determine inertia, damping and stiffness: nothing moves")
+    missing = paper(np.full(2000, np.nan), np.zeros(2000))
+    assert advice(missing).startswith("no window holds enough equations")
+
+
+def test_a_term_that_looks_like_another_is_told() -> None:
+    # Within 0.05 s the motion mostly keeps its direction, so friction looks like an offset.
+    found = advice(paper(RIG.angle, RIG.torque, stiffness=0, equations=50, terms=["coulomb", "offset"]))
+    assert "one term looks like another as long as the motion keeps its direction" in found
+
+
+def test_many_records_are_spoken_of_together() -> None:
+    angles = np.stack([RIG.angle] * 3)
+    torques = np.stack([RIG.torque] * 3)
+    result = paper(angles, torques, window_length=401)
+    alone = paper(RIG.angle, RIG.torque, window_length=401)
+    assert result.settings["advice"] == alone.settings["advice"]
