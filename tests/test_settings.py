@@ -99,6 +99,10 @@ def test_selection_of_the_strong_form_is_that_of_the_derivatives() -> None:
     ("call", "message"),
     [
         ({"form": "strong", "exponent": 6}, "exponent belongs to the weak form; got 6 with form='strong'"),
+        ({"form": "strong", "exponent": "auto"}, "exponent belongs to the weak form; got 'auto' with form='strong'"),
+        ({"preset": "paper", "exponent": 9}, "exponent belongs to the weak form.*leave it out, or give form='weak'"),
+        ({"form": "weak", "max_order": 15}, "max_order belongs to the strong form; got 15 with form='weak'"),
+        ({"form": "weak", "criterion": "aicc"}, "criterion belongs to the strong form; got 'aicc' with form='weak'"),
         ({"max_order": 9}, "max_order belongs to the strong form; got 9 with form='weak'.*give form='strong'"),
         ({"filter_torque": True}, "filter_torque belongs to the strong form; got True"),
         ({"selection": "pooled"}, "selection must be 'window' or 'average' in weak form.*or form='strong'"),

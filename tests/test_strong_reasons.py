@@ -95,3 +95,12 @@ def test_many_records_are_spoken_of_together() -> None:
     result = paper(angles, torques, window_length=401)
     alone = paper(RIG.angle, RIG.torque, window_length=401)
     assert result.settings["advice"] == alone.settings["advice"]
+
+
+def test_the_weak_form_says_why_it_was_taken() -> None:
+    calls: list[dict[str, Any]] = [{}, {"form": "auto"}, {"preset": "paper", "form": "auto", "window_length": 101}]
+    for call in calls:
+        result = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, **call)
+        assert result.settings["reasons"][0].startswith("weak form: on simulated recordings")
+    given = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, form="weak")
+    assert not any("weak form" in reason for reason in given.settings["reasons"])

