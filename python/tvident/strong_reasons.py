@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 from typing import Any
 
@@ -14,8 +15,8 @@ from tvident.reasons import Words, listed
 from tvident.status import Status
 from tvident.terms import COEFFICIENTS
 
-_LOOKED_AT = 1 << 15
-"""Samples that statuses are counted at, evenly spread: their shares are known well enough, and a long record costs no more."""
+_LOOKED_AT = 1 << 10
+"""Samples that statuses are counted at, evenly spread: shares are known within some percent, and a long record costs no more."""
 _OFTEN = 0.1
 """A share of the samples from which on a flag is worth a sentence: the paper's advice about orders, as a tenth."""
 _ALIKE = 0.9
@@ -79,11 +80,15 @@ class ExplainedStrong:
             return np.asarray(values.reshape(-1, n)[:: every // n, n // 2])
         return np.asarray(values[..., ::every].ravel())
 
+    @cached_property
+    def _flags(self) -> npt.NDArray[np.uint16]:
+        return np.asarray(self._some(self.status))
+
     def _share(self, flag: Status) -> float:
-        return float(np.mean(self._some(self.status) & flag != 0))
+        return float(np.mean(self._flags & flag != 0))
 
     def _orders(self) -> list[str]:
-        order = self._some(self.order)[self._some(self.status) & Status.INVALID == 0]
+        order = self._some(self.order)[self._flags & Status.INVALID == 0]
         if not order.size:
             return []
         low, middle, high = (round(float(one)) for one in np.percentile(order, [5, 50, 95]))
@@ -135,7 +140,7 @@ class ExplainedStrong:
         ]
 
     def _told_apart(self) -> list[str]:
-        flags = self._some(self.status)
+        flags = self._flags
         good = flags & Status.INVALID == 0
         ill = good & (flags & Status.ILL_CONDITIONED != 0)
         share = float(np.mean(ill))
