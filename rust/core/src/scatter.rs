@@ -237,6 +237,7 @@ mod tests {
     fn a_record_too_short_for_differences_has_no_stretches() {
         let compared = Compared { distance: 100, inside: 50..349 };
         assert!(compared.stretches().is_empty());
-        assert_eq!(Compared { inside: 50..350, ..compared }.stretches(), [50..350]);
+        let stretches = Compared { inside: 50..350, ..compared }.stretches();
+        assert_eq!((stretches.len(), stretches.first()), (1, Some(&(50..350))));
     }
 }
