@@ -14,13 +14,13 @@ def scatter(values: Array, errors: Array, window: int, half: int) -> Array | Non
     """Compare windows that share no row by second differences; None where the record is too short. One column an unknown."""
     n = len(values)
     first, end = half + window // 2, n - half + window // 2 + 1 - window
-    distance = window + half
+    distance = -(-(window + half) // 8) * 8  # a multiple of the eight differences that begin within it
     if end - first < 3 * distance:
         return None
     factors = []
     for x, error in zip(values.T, errors.T, strict=True):
         squares = []
-        for i in range(first + distance, end - distance, max(distance // 8, 1)):
+        for i in range(first + distance, end - distance, distance // 8):
             difference = x[i] - (x[i - distance] + x[i + distance]) / 2
             variance = error[i] ** 2 + (error[i - distance] ** 2 + error[i + distance] ** 2) / 4
             squares.append(difference**2 / variance)

@@ -148,11 +148,28 @@ pub fn identify_windowed(
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<(), Error> {
+    let whole = |(motion, identified): (Motion<'_>, _)| (0..motion.angle.len(), identified);
     let motions: Vec<Motion<'_>> = records.iter().map(|(motion, _)| motion.clone()).collect();
+    let parts = motions.iter().zip(records).map(|(motion, record)| (motion, whole(record))).collect();
+    identify_parts(derivatives, least_squares, parts, workers, watch)
+}
+
+/// The same for some samples of each record, which all outputs belong to.
+pub(crate) fn identify_parts(
+    derivatives: &LocalPolynomials,
+    least_squares: &RollingLeastSquares,
+    parts: Vec<(&Motion<'_>, (Range<usize>, Identified<'_>))>,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<(), Error> {
     let mut pieces = Vec::new();
-    for (motion, (_, mut identified)) in motions.iter().zip(records) {
+    for (motion, (wanted, mut identified)) in parts {
         derivatives.windows(motion.angle.len())?;
         for samples in least_squares.pieces(motion.angle.len(), PIECE) {
+            let samples = samples.start.max(wanted.start)..samples.end.min(wanted.end);
+            if samples.is_empty() {
+                continue;
+            }
             let part = identified.split_off_before(samples.end);
             pieces.push(Piece { size: samples.len(), content: (motion, samples, part) });
         }

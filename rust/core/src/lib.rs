@@ -86,7 +86,7 @@ pub use output::Elements;
 pub use outside_mask::Outside;
 pub use rolling::{Equations, Regressions, RollingLeastSquares};
 pub use samples::Samples;
-pub use scatter::{Track, scatter};
+pub use scatter::{Track, identify_with_scatter, scatter};
 pub use selection::Selection;
 pub use shared_parameters::SharedParameters;
 pub use simd::Instructions;

@@ -9,20 +9,19 @@ use std::num::NonZeroUsize;
 use std::ops::Range;
 
 use crate::error::Error;
-use crate::identification::{Chunk, equations, redundancies};
+use crate::identification::{Chunk, Identified, equations, identify_parts, redundancies};
 use crate::local_polynomials::LocalPolynomials;
 use crate::motion::Motion;
 use crate::output::Elements;
-use crate::parallel::{self, Piece, Watch};
-use crate::rolling::{Equations, Regressions, RollingLeastSquares};
-use crate::samples::Samples;
+use crate::parallel::Watch;
+use crate::rolling::{Regressions, RollingLeastSquares};
 use crate::thinned::stretches;
 
 /// Windows that are looked at in a long record, and in how many stretches at most.
 const MOST_WINDOWS: usize = 1 << 15;
 const STRETCHES: usize = 8;
 
-/// Differences that begin within the distance of two windows.
+/// Differences that begin within the distance of two windows, which is a multiple of it.
 const DENSITY: usize = 8;
 
 /// A squared difference counts at most so many times what the median says of its mean: a jump is no error of the windows around it.
@@ -42,49 +41,67 @@ pub struct Track<'a> {
 
 /// By how much standard errors of windowed unknowns exceed those of ordinary least squares: one factor an unknown, in every record.
 ///
-/// `tracks` holds what [`identify_windowed`](crate::identify_windowed) found at every sample of a record, where that is known; otherwise
-/// some windows are solved again. The factors are the same, and never less than one. Where a record is too short for windows that share
-/// no equation they come from the correlation of the residuals. They cost well below a millisecond with tracks, and as much as 32 768
-/// windows without.
+/// The tracks hold what [`identify_windowed`](crate::identify_windowed) found at every sample. The factors are never less than one. Where
+/// a record is too short for windows that share no equation they come from the correlation of the residuals. They cost well below a
+/// millisecond.
 ///
 /// # Errors
-/// If a record is shorter than the window of the polynomials, or the watch cancels.
+/// If a record is shorter than the window of the polynomials.
 pub fn scatter(
     derivatives: &LocalPolynomials,
     least_squares: &RollingLeastSquares,
-    records: Vec<(Motion<'_>, Option<Track<'_>>)>,
+    records: &[(Motion<'_>, Track<'_>)],
+) -> Result<Vec<Vec<f64>>, Error> {
+    let mut all = Vec::new();
+    for (motion, track) in records {
+        let compared = Compared::new(derivatives, least_squares.window(), motion.angle.len());
+        let taken = compared.stretches().into_iter().map(|around| Taken::of(*track, around, &compared));
+        all.push(factors_of(derivatives, least_squares, motion, taken)?);
+    }
+    Ok(all)
+}
+
+/// Identifies as [`identify_windowed`](crate::identify_windowed) does, for outputs of which not every sample has an element, and returns
+/// the factors of [`scatter`] as well: the windows that they need, 32 768 or so, are solved in the same go.
+///
+/// # Errors
+/// If a record is shorter than the window of the polynomials, or the watch cancels.
+pub fn identify_with_scatter(
+    derivatives: &LocalPolynomials,
+    least_squares: &RollingLeastSquares,
+    records: Vec<(Motion<'_>, Identified<'_>)>,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<Vec<f64>>, Error> {
-    let pieces = records.into_iter().map(|content| Piece { size: 1, content }).collect();
-    let work =
-        |(motion, track): (Motion<'_>, Option<Track<'_>>), (): &mut ()| one(derivatives, least_squares, &motion, track);
-    parallel::map(pieces, workers, || (), work, watch)?.into_iter().collect()
+    let (motions, outputs): (Vec<Motion<'_>>, Vec<Identified<'_>>) = records.into_iter().unzip();
+    let taken = |motion: &Motion<'_>| -> Vec<Taken> {
+        let compared = Compared::new(derivatives, least_squares.window(), motion.angle.len());
+        let stretches = compared.stretches().into_iter();
+        stretches.map(|around| Taken::empty(motion.unknowns(), around, &compared)).collect()
+    };
+    let mut taken: Vec<Vec<Taken>> = motions.iter().map(taken).collect();
+    let mut parts = Vec::new();
+    for ((motion, identified), taken) in motions.iter().zip(outputs).zip(&mut taken) {
+        parts.push((motion, (0..motion.angle.len(), identified)));
+        parts.extend(taken.iter_mut().map(|taken| (motion, (taken.around.clone(), taken.outputs()))));
+    }
+    identify_parts(derivatives, least_squares, parts, workers, watch)?;
+    let each = motions.iter().zip(taken);
+    each.map(|(motion, taken)| factors_of(derivatives, least_squares, motion, taken)).collect()
 }
 
 /// The factors of one record.
-fn one(
+fn factors_of(
     derivatives: &LocalPolynomials,
     least_squares: &RollingLeastSquares,
     motion: &Motion<'_>,
-    track: Option<Track<'_>>,
+    taken: impl IntoIterator<Item = Taken>,
 ) -> Result<Vec<f64>, Error> {
-    let compared = Compared::new(derivatives, least_squares.window(), motion.angle.len());
-    let chunk = || Chunk::new(derivatives, least_squares.columns());
     let mut squares = vec![Vec::new(); motion.unknowns()];
-    for around in compared.stretches() {
-        if let Some(track) = track {
-            track.add(&mut squares, around, compared.distance);
-        } else {
-            let (values, errors) = solved(derivatives, least_squares, motion, around.clone(), &mut chunk())?;
-            let (values, errors) = (slices(&values), slices(&errors));
-            let track = Track { values: &values, errors: &errors };
-            track.add(&mut squares, 0..around.len(), compared.distance);
-        }
-    }
+    taken.into_iter().for_each(|taken| taken.add(&mut squares));
     match factors(&mut squares) {
         Some(factors) => Ok(factors),
-        None => redundancies(derivatives, motion, &mut chunk()),
+        None => redundancies(derivatives, motion, &mut Chunk::new(derivatives, least_squares.columns())),
     }
 }
 
@@ -100,7 +117,7 @@ impl Compared {
     fn new(derivatives: &LocalPolynomials, window: usize, samples: usize) -> Self {
         let rows = equations(derivatives, samples);
         Self {
-            distance: window + derivatives.options().window_length / 2,
+            distance: (window + derivatives.options().window_length / 2).next_multiple_of(DENSITY),
             inside: rows.start + window / 2..(rows.end + window / 2 + 1).saturating_sub(window),
         }
     }
@@ -117,6 +134,58 @@ impl Compared {
     }
 }
 
+/// What windows of a stretch say, one in every eighth of a distance: by unknown.
+struct Taken {
+    around: Range<usize>,
+    step: usize,
+    values: Vec<Vec<f64>>,
+    errors: Vec<Vec<f64>>,
+}
+
+impl Taken {
+    fn empty(unknowns: usize, around: Range<usize>, compared: &Compared) -> Self {
+        let step = compared.distance / DENSITY;
+        let values = vec![vec![0.0; around.len().div_ceil(step)]; unknowns];
+        Self { around, step, errors: values.clone(), values }
+    }
+
+    /// Picked from the windows around every sample of a record.
+    fn of(track: Track<'_>, around: Range<usize>, compared: &Compared) -> Self {
+        let step = compared.distance / DENSITY;
+        let pick = |columns: &[&[f64]]| {
+            let some = columns.iter().map(|column| column[around.clone()].iter().copied().step_by(step).collect());
+            some.collect()
+        };
+        Self { step, values: pick(track.values), errors: pick(track.errors), around }
+    }
+
+    /// Where windows that are solved for it go.
+    fn outputs(&mut self) -> Identified<'_> {
+        let regressions = Regressions {
+            elements: Elements { first: self.around.start, step: self.step },
+            parameters: self.values.iter_mut().map(Vec::as_mut_slice).collect(),
+            errors: self.errors.iter_mut().map(Vec::as_mut_slice).collect(),
+            ..Regressions::default()
+        };
+        Identified { regressions, order: &mut [] }
+    }
+
+    /// Adds squared differences over the variances that standard errors give them, by unknown.
+    fn add(&self, squares: &mut [Vec<f64>]) {
+        for ((squares, values), errors) in squares.iter_mut().zip(&self.values).zip(&self.errors) {
+            for centre in DENSITY..values.len().saturating_sub(DENSITY) {
+                let (before, after) = (centre - DENSITY, centre + DENSITY);
+                let difference = values[centre] - f64::midpoint(values[before], values[after]);
+                let variance = errors[centre].powi(2) + (errors[before].powi(2) + errors[after].powi(2)) / 4.0;
+                let square = difference * difference / variance;
+                if square.is_finite() {
+                    squares.push(square);
+                }
+            }
+        }
+    }
+}
+
 /// The factors for what windows say that were solved around every sample of a record; nothing where it is too short.
 pub(crate) fn scatter_of(
     derivatives: &LocalPolynomials,
@@ -127,7 +196,7 @@ pub(crate) fn scatter_of(
     let compared = Compared::new(derivatives, window, samples);
     let mut squares = vec![Vec::new(); track.values.len()];
     for around in compared.stretches() {
-        track.add(&mut squares, around, compared.distance);
+        Taken::of(track, around, &compared).add(&mut squares);
     }
     factors(&mut squares)
 }
@@ -135,54 +204,6 @@ pub(crate) fn scatter_of(
 /// Columns as slices.
 pub(crate) fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
     columns.iter().map(Vec::as_slice).collect()
-}
-
-/// Values and standard errors, by unknown.
-type Solved = (Vec<Vec<f64>>, Vec<Vec<f64>>);
-
-/// Solves the windows around some samples.
-fn solved(
-    derivatives: &LocalPolynomials,
-    least_squares: &RollingLeastSquares,
-    motion: &Motion<'_>,
-    around: Range<usize>,
-    chunk: &mut Chunk,
-) -> Result<Solved, Error> {
-    let samples = motion.angle.len();
-    chunk.fill(derivatives, motion, least_squares.rows_needed(around.clone(), samples))?;
-    let columns = chunk.columns(samples);
-    let equations = Equations {
-        columns: columns.iter().map(|column| column as &dyn Samples).collect(),
-        rows: equations(derivatives, samples),
-    };
-    let (mut values, mut errors) = (vec![vec![0.0; around.len()]; motion.unknowns()], Vec::new());
-    errors.clone_from(&values);
-    let mut regressions = Regressions {
-        elements: Elements { first: around.start, step: 1 },
-        parameters: values.iter_mut().map(Vec::as_mut_slice).collect(),
-        errors: errors.iter_mut().map(Vec::as_mut_slice).collect(),
-        ..Regressions::default()
-    };
-    least_squares.solve(&equations, around, &mut regressions, &mut least_squares.scratch());
-    Ok((values, errors))
-}
-
-impl Track<'_> {
-    /// Adds squared differences of windows around some samples over the variances that their standard errors give them.
-    fn add(&self, squares: &mut [Vec<f64>], around: Range<usize>, distance: usize) {
-        for ((squares, values), errors) in squares.iter_mut().zip(self.values).zip(self.errors) {
-            let centres = around.start + distance..around.end.saturating_sub(distance);
-            for centre in centres.step_by((distance / DENSITY).max(1)) {
-                let (before, after) = (centre - distance, centre + distance);
-                let difference = values[centre] - f64::midpoint(values[before], values[after]);
-                let variance = errors[centre].powi(2) + (errors[before].powi(2) + errors[after].powi(2)) / 4.0;
-                let square = difference * difference / variance;
-                if square.is_finite() {
-                    squares.push(square);
-                }
-            }
-        }
-    }
 }
 
 /// The root of the mean of squared differences of every unknown, of which none counts too much; nothing where one has none.
@@ -207,7 +228,8 @@ mod tests {
     /// The factor of one unknown with the same standard error everywhere.
     fn factor(values: &[f64], error: f64) -> f64 {
         let (mut squares, errors) = (vec![Vec::new()], vec![error; values.len()]);
-        Track { values: &[values], errors: &[&errors] }.add(&mut squares, 0..values.len(), 24);
+        let (track, all) = (Track { values: &[values], errors: &[&errors] }, 0..values.len());
+        Taken::of(track, all.clone(), &Compared { distance: 24, inside: all }).add(&mut squares);
         factors(&mut squares).expect("long enough")[0]
     }
 

@@ -9,7 +9,7 @@ use tvident::identification::HARDLY_TOLD_APART;
 use tvident::parallel::workers as threads;
 use tvident::{
     Coefficient, Elements, Identified, Instructions, Motion, Regressions, RollingLeastSquares, Samples, Term, Track,
-    identify_constant as constant, identify_windowed as windowed, scatter,
+    identify_constant as constant, identify_windowed as windowed, identify_with_scatter, scatter,
 };
 
 use crate::local_polynomials::LocalPolynomials;
@@ -166,6 +166,7 @@ pub(crate) fn identify_windowed<'py>(
     let condition = PyArray2::zeros(py, [count, samples], false);
     let status = PyArray2::zeros(py, [count, samples], false);
     let order = PyArray2::zeros(py, [count, samples], false);
+    let mut found = Vec::new();
     {
         let (mut parameters, mut errors) = (parameters.readwrite(), errors.readwrite());
         let (mut covariances, mut deviations) = (covariances.readwrite(), deviations.readwrite());
@@ -191,26 +192,30 @@ pub(crate) fn identify_windowed<'py>(
             (motion, Identified { regressions, order: order.next().unwrap_or_default() })
         };
         let records = motions.into_iter().map(outputs).collect();
-        watched(py, progress, |watch| windowed(plan.plan(), &least_squares, records, threads(workers), watch))?;
+        watched(py, progress, |watch| {
+            let (plan, workers) = (plan.plan(), threads(workers));
+            if step == 1 {
+                return windowed(plan, &least_squares, records, workers, watch);
+            }
+            found = identify_with_scatter(plan, &least_squares, records, workers, watch)?;
+            Ok(())
+        })?;
     }
-    let factors = PyArray2::zeros(py, [count, unknowns], false);
-    {
+    if step == 1 {
         let (parameters, errors) = (parameters.readonly(), errors.readonly());
         let parameters: Vec<&[f64]> = parameters.as_slice()?.chunks_exact(samples).collect();
         let errors: Vec<&[f64]> = errors.as_slice()?.chunks_exact(samples).collect();
         let tracks = parameters.chunks_exact(unknowns).zip(errors.chunks_exact(unknowns));
-        // With a larger step they do not hold every window.
-        let tracks = tracks.map(|(values, errors)| (step == 1).then_some(Track { values, errors }));
+        let tracks = tracks.map(|(values, errors)| Track { values, errors });
         let records: Vec<_> = all.all()?.into_iter().zip(tracks).collect();
-        let mut found = Vec::new();
-        watched(py, None, |watch| {
-            found = scatter(plan.plan(), &least_squares, records, threads(workers), watch)?;
+        watched(py, None, |_| {
+            found = scatter(plan.plan(), &least_squares, &records)?;
             Ok(())
         })?;
-        let mut factors = factors.readwrite();
-        for (row, found) in factors.as_slice_mut()?.chunks_exact_mut(unknowns).zip(&found) {
-            row.copy_from_slice(found);
-        }
+    }
+    let factors = PyArray2::zeros(py, [count, unknowns], false);
+    for (row, found) in factors.readwrite().as_slice_mut()?.chunks_exact_mut(unknowns).zip(&found) {
+        row.copy_from_slice(found);
     }
     Ok((parameters, errors, covariances, deviations, condition, status, order, factors))
 }
