@@ -112,9 +112,8 @@ pub fn estimate_automatically(
     let mut outputs = Outputs { values: estimates.values, errors: estimates.errors, order: estimates.order };
     refinement.estimate(record, &mut outputs, workers, watch)?;
     for end in [End::First, End::Last] {
-        let reference = refinement.reference();
         let mut look_up = || look_up(watch, total, total);
-        let at_end = shrinkage::estimate(record, end, pair, &target, variance, reference, &mut look_up)?;
+        let at_end = shrinkage::estimate(record, end, pair, &target, variance, &mut look_up)?;
         for (place, (&value, &error)) in at_end.values.iter().zip(&at_end.errors).enumerate() {
             let sample = if end == End::First { place } else { samples - 1 - place };
             // What the windows at the end cannot give may still come from shorter ones inside.

@@ -69,6 +69,18 @@ pub(crate) struct Reference {
     pub(crate) candidate: usize,
 }
 
+impl Reference {
+    /// The same order in a window so much shorter, or else in the same window.
+    pub(crate) fn new(pair: Pair, shorter: f64, target: &Target) -> Option<Self> {
+        let with_order = |half: usize| {
+            let bank = Bank::new(half, target)?;
+            let candidate = bank.orders.iter().position(|&order| order == pair.order)?;
+            Some(Self { bank, candidate })
+        };
+        with_order(rounded(pair.half as f64 / shorter).max(target.shortest)).or_else(|| with_order(pair.half))
+    }
+}
+
 /// Where the estimates of one record go. Slices that are empty are not wanted.
 #[derive(Debug)]
 pub(crate) struct Outputs<'a> {
@@ -97,13 +109,7 @@ impl Refinement {
     /// Prepares the candidates around a record's best pair.
     pub(crate) fn new(samples: usize, pair: Pair, target: &Target, variance: f64) -> Option<Self> {
         let half = pair.half as f64;
-        let shortened = rounded(half / REFERENCE).max(target.shortest);
-        let with_order = |half: usize| {
-            let bank = Bank::new(half, target)?;
-            let candidate = bank.orders.iter().position(|&order| order == pair.order)?;
-            Some(Reference { bank, candidate })
-        };
-        let reference = with_order(shortened).or_else(|| with_order(pair.half))?;
+        let reference = Reference::new(pair, REFERENCE, target)?;
         let mut halves: Vec<usize> = WINDOWS.iter().map(|ratio| rounded(half * ratio)).collect();
         halves.dedup();
         halves.retain(|&half| half >= target.shortest && 2 * half < samples / 2);
@@ -125,10 +131,6 @@ impl Refinement {
         let blocks = Blocks::new(samples, (pair.half / BLOCKS).max(1));
         let reach = NEIGHBOURHOOD * half;
         Some(Self { banks, reference, blocks, reach, offsets, differences, temperatures, variances, orders })
-    }
-
-    pub(crate) fn reference(&self) -> &Reference {
-        &self.reference
     }
 
     /// Estimates wherever a window of any candidate lies in the record; NaN elsewhere.

@@ -13,8 +13,9 @@
 //! looks the same forwards and backwards. All derivatives at all places of the window follow from `ĉ`.
 //!
 //! What this is worth at a place is measured: the same is done in all these windows, forwards and backwards, and compared there with an
-//! estimate from the centre of a window. From windows of several lengths the estimates are averaged with weights that fall with the square
-//! of the risk so measured.
+//! estimate from the centre of a window half as long as the record's best. In a record of a few windows the best one is chosen with
+//! little to go by and may smooth too much; what is half as long sees that, and is noisier, which is taken off. From windows of several
+//! lengths the estimates are averaged with weights that fall with the square of the risk so measured.
 
 use std::ops::Range;
 
@@ -30,6 +31,9 @@ use crate::survey::{LookUp, Pair, rounded};
 
 /// The windows over the record's best, in half steps of a doubling.
 const LADDER: Range<i32> = -4..5;
+
+/// What is compared with has a window so much shorter than the record's best.
+const REFERENCE: f64 = 2.0;
 
 /// Half-width of the shortest window.
 const SHORTEST: usize = 8;
@@ -79,16 +83,16 @@ pub(crate) fn estimate(
     pair: Pair,
     target: &Target,
     variance: f64,
-    reference: &Reference,
     look_up: &mut LookUp<'_>,
 ) -> Result<AtEnd, Error> {
     let samples = record.len();
+    let Some(reference) = Reference::new(pair, REFERENCE, target) else { return Ok(average(&[], pair.half)) };
     let length = (NEAR * pair.half).max(LEAST_NEAR).min(samples);
     let near = match end {
         End::First => 0..length,
         End::Last => samples - length..samples,
     };
-    let near = Near::new(record, end, near, reference);
+    let near = Near::new(record, end, near, &reference);
     let mut found = Vec::new();
     for step in LADDER {
         let half = rounded(pair.half as f64 * (0.5 * f64::from(step)).exp2());
