@@ -5,9 +5,12 @@
 
 use std::ops::Range;
 
+use crate::error::Error;
 use crate::model::Fit;
+use crate::parallel::Piece;
 use crate::pooling::{Expected, pool};
 use crate::row_covariance::RowCovariance;
+use crate::run::Run;
 use crate::simd::Instructions;
 use crate::windows::Problem;
 
@@ -34,31 +37,33 @@ pub(crate) fn test(
     covariance: &RowCovariance,
     inflation: f64,
     instructions: Instructions,
-) -> Vec<Option<Test>> {
+    run: &mut Run<'_, '_>,
+) -> Result<Vec<Option<Test>>, Error> {
     let rows = problem.rows();
     let constants = problem.layout.constant;
     let (step, span) = (fit.step, fit.span);
-    let mut estimates = Vec::new();
-    for block in 0..BLOCKS {
+    let estimate = |block: usize, (): &mut ()| {
         let (first, end) = (block * rows / BLOCKS, (block + 1) * rows / BLOCKS);
         let windows = within(fit, first..end, step, span);
         if windows.is_empty() {
-            continue;
+            return None;
         }
-        let Some(pooled) = pool(&fit.full, windows.clone(), expected, instructions) else { continue };
+        let pooled = pool(&fit.full, windows.clone(), expected, instructions)?;
         let variances = fit.covariance_of(problem, windows, &pooled, covariance);
-        estimates.push((
-            pooled.values,
-            (0..constants).map(|i| inflation * variances[i * constants + i]).collect::<Vec<_>>(),
-        ));
-    }
-    (0..constants)
+        let variances: Vec<f64> = (0..constants).map(|i| inflation * variances[i * constants + i]).collect();
+        Some((pooled.values, variances))
+    };
+    let blocks = (0..BLOCKS).map(|block| Piece { size: rows.div_ceil(BLOCKS), content: block });
+    let estimates = run.map(blocks.collect(), || (), estimate)?;
+    let estimates: Vec<_> = estimates.into_iter().flatten().collect();
+    let tests = (0..constants)
         .map(|constant| {
             let parts: Vec<(f64, f64)> =
                 estimates.iter().map(|(values, variances)| (values[constant], variances[constant])).collect();
             compare(&parts)
         })
-        .collect()
+        .collect();
+    Ok(tests)
 }
 
 /// Windows that lie within some rows.

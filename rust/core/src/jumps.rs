@@ -15,7 +15,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use crate::averaging::Around;
+use crate::error::Error;
+use crate::parallel::Piece;
 use crate::pooling::Expected;
+use crate::run::Run;
 use crate::samples::{Samples, is_usable};
 use crate::scale::{Cells, SHORTEST_ALONE, Scale};
 use crate::simd::Instructions;
@@ -80,40 +83,50 @@ type Lines = Vec<[f64; 2]>;
 
 impl Search<'_> {
     /// The jumps of the record, in order: those that are known placed again, and new ones. `errors` are what is left of the rows.
-    pub(crate) fn find(&self, errors: &[f64], known: &[Jump]) -> Vec<Jump> {
+    pub(crate) fn find(&self, errors: &[f64], known: &[Jump], run: &mut Run<'_, '_>) -> Result<Vec<Jump>, Error> {
         let room = self.apart() * self.stride;
         let samples = self.first * 2 + (self.problem.rows() - 1) * self.stride;
-        let mut jumps: BTreeMap<usize, Jump> = BTreeMap::new();
-        for jump in known {
-            let row = (jump.sample - self.first).div_ceil(self.stride);
-            let solved = self.solve(&(row..row + 1));
-            let windows = self.windows(&solved);
-            let placed = windows.iter().rev().find_map(|windows| self.placed(windows, jump.sample));
-            // What is known to be there moves a little at most.
-            let near = placed.map(|(placed, _)| placed).filter(|placed| 4 * placed.sample.abs_diff(jump.sample) < room);
-            let jump = near.unwrap_or_else(|| jump.clone());
-            jumps.insert(jump.sample, jump);
-        }
-        for rows in self.conspicuous(errors) {
-            let solved = self.solve(&rows);
-            let windows = self.windows(&solved);
-            let mut suspected = self.suspected(&windows, &rows);
-            suspected.sort_by(|a, b| b.0.total_cmp(&a.0));
-            let mut looked = BTreeSet::new();
-            for (_, row, scale) in suspected {
-                let near = row.saturating_sub(self.apart() / 2)..=row + self.apart() / 2;
-                if looked.range(near).next().is_some() {
-                    continue;
-                }
-                looked.insert(row);
-                let Some(jump) = self.place(&windows[scale], row) else { continue };
-                let near = jump.sample.saturating_sub(room)..jump.sample + room;
-                if jumps.range(near).next().is_none() && jump.sample >= room && jump.sample + room <= samples {
-                    jumps.insert(jump.sample, jump);
-                }
+        let pieces = known.iter().map(|jump| Piece { size: room, content: jump });
+        let again = run.map(pieces.collect(), || (), |jump: &Jump, (): &mut ()| self.again(jump, room))?;
+        let mut jumps: BTreeMap<usize, Jump> = again.into_iter().map(|jump| (jump.sample, jump)).collect();
+        let conspicuous = self.conspicuous(errors).into_iter();
+        let pieces = conspicuous.map(|rows| Piece { size: rows.len() * self.stride, content: rows });
+        let new = run.map(pieces.collect(), || (), |rows: Range<usize>, (): &mut ()| self.within(&rows))?;
+        for jump in new.into_iter().flatten() {
+            let near = jump.sample.saturating_sub(room)..jump.sample + room;
+            if jumps.range(near).next().is_none() && jump.sample >= room && jump.sample + room <= samples {
+                jumps.insert(jump.sample, jump);
             }
         }
-        jumps.into_values().collect()
+        Ok(jumps.into_values().collect())
+    }
+
+    /// Places a jump that is known again. What is known to be there moves a little at most: by less than a quarter of the room between jumps.
+    fn again(&self, jump: &Jump, room: usize) -> Jump {
+        let row = (jump.sample - self.first).div_ceil(self.stride);
+        let solved = self.solve(&(row..row + 1));
+        let windows = self.windows(&solved);
+        let placed = windows.iter().rev().find_map(|windows| self.placed(windows, jump.sample));
+        let near = placed.map(|(placed, _)| placed).filter(|placed| 4 * placed.sample.abs_diff(jump.sample) < room);
+        near.unwrap_or_else(|| jump.clone())
+    }
+
+    /// The jumps in some rows, the most conspicuous first.
+    fn within(&self, rows: &Range<usize>) -> Vec<Jump> {
+        let solved = self.solve(rows);
+        let windows = self.windows(&solved);
+        let mut suspected = self.suspected(&windows, rows);
+        suspected.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let (mut looked, mut jumps) = (BTreeSet::new(), Vec::new());
+        for (_, row, scale) in suspected {
+            let near = row.saturating_sub(self.apart() / 2)..=row + self.apart() / 2;
+            if looked.range(near).next().is_some() {
+                continue;
+            }
+            looked.insert(row);
+            jumps.extend(self.place(&windows[scale], row));
+        }
+        jumps
     }
 
     /// Stretches of rows around which so much is left that a jump could be believed to make it less.

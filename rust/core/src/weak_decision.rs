@@ -80,7 +80,7 @@ impl Session<'_, '_, '_> {
         loop {
             let mut decided = self.decide_kinds(chosen, model)?;
             let found = if round < JUMP_ROUNDS {
-                self.find_jumps(&chosen.weak, &decided, &jumps, whole.as_ref())
+                self.find_jumps(&chosen.weak, &decided, &jumps, whole.as_ref())?
             } else {
                 jumps.clone()
             };
@@ -126,7 +126,7 @@ impl Session<'_, '_, '_> {
             if !decided.slow.is_empty() {
                 self.set_free(rows, model, &mut decided)?;
             }
-            let Some(worst) = self.test(rows, &mut decided) else { break };
+            let Some(worst) = self.test(rows, &mut decided)? else { break };
             decided.slow.push(worst);
         }
         self.set_others_free(rows, model, &mut decided)?;
@@ -134,12 +134,13 @@ impl Session<'_, '_, '_> {
     }
 
     /// Tests every constant. Returns the one that differs most between the parts of the record, if it may be set free.
-    fn test(&self, rows: &Rows, decided: &mut Decided) -> Option<usize> {
-        let fit = decided.fit.as_ref()?;
+    fn test(&mut self, rows: &Rows, decided: &mut Decided) -> Result<Option<usize>, Error> {
+        let Some(fit) = &decided.fit else { return Ok(None) };
         let problem = decided.model.problem(rows, decided.side(rows), self.noise[0], Some(&decided.covariance));
         let (expected, inflation) = (decided.expected, decided.error.max(1.0));
         let instructions = self.options.instructions;
-        let results = constancy::test(&problem, fit, expected, &decided.covariance, inflation, instructions);
+        let results =
+            constancy::test(&problem, fit, expected, &decided.covariance, inflation, instructions, &mut self.run)?;
         // Tests of what was set free before stand as they were.
         decided.tests.retain(|(one, _)| decided.slow.contains(one));
         let constants = decided.model.constant.iter().zip(results);
@@ -148,8 +149,8 @@ impl Session<'_, '_, '_> {
         let conspicuous = decided.tests.iter().filter(|(one, test)| {
             tested.contains(one) && !decided.slow.contains(one) && test.probability < constancy::NO_CHANCE
         });
-        fit.scale?;
-        conspicuous.min_by(|a, b| a.1.probability.total_cmp(&b.1.probability)).map(|(one, _)| *one)
+        let worst = conspicuous.min_by(|a, b| a.1.probability.total_cmp(&b.1.probability)).map(|(one, _)| *one);
+        Ok(worst.filter(|_| fit.scale.is_some()))
     }
 
     /// Sets all that was tested free where one of them changes and yet the rows are predicted badly: what changes beside what is held
@@ -245,13 +246,19 @@ impl Session<'_, '_, '_> {
     }
 
     /// Finds jumps of what is windowed beside those that are known. `whole` holds all rows where some are over jumps.
-    fn find_jumps(&self, weak: &WeakRows, decided: &Decided, known: &[Jump], whole: Option<&Rows>) -> Vec<Jump> {
+    fn find_jumps(
+        &mut self,
+        weak: &WeakRows,
+        decided: &Decided,
+        known: &[Jump],
+        whole: Option<&Rows>,
+    ) -> Result<Vec<Jump>, Error> {
         if decided.error > NOISE_MODEL_FAILS {
             // What is left is more than noise everywhere, so it tells nothing of jumps.
-            return known.to_vec();
+            return Ok(known.to_vec());
         }
         let signals = signals(&self.record, &decided.model).filter(|_| self.options.average);
-        let (Some(signals), Some(fit)) = (signals, &decided.fit) else { return known.to_vec() };
+        let (Some(signals), Some(fit)) = (signals, &decided.fit) else { return Ok(known.to_vec()) };
         let signals: Vec<&dyn Samples> = signals.iter().map(|signal| &**signal).collect();
         let (constants, noise) = (&fit.pooled.values, self.noise[0]);
         let problem = decided.model.problem(&weak.rows, decided.side(&weak.rows), noise, Some(&decided.covariance));
@@ -279,7 +286,7 @@ impl Session<'_, '_, '_> {
             lengths: &lengths,
             instructions: self.options.instructions,
         };
-        search.find(&residuals(&problem, fit).0, known)
+        search.find(&residuals(&problem, fit).0, known, &mut self.run)
     }
 
     /// Finds what changes slowly, and the other constants beside it.
