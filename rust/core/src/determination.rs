@@ -4,15 +4,23 @@
 //! equations look well conditioned the noisier it is. So what is left of the weakest combination of regressors, once what is windowed has
 //! been eliminated, is compared with what noise of the known variance would leave.
 
+use std::ops::Range;
+
 use crate::equations::Rows;
+use crate::error::Error;
 use crate::model::{Fit, Model, Predictor};
+use crate::parallel::Piece;
+use crate::run::Run;
 use crate::windows::Problem;
 
 /// What is left, in units of what noise leaves, below which noise is all there is: twice itself would mean as much signal as noise.
 const MOSTLY_NOISE: f64 = 2.0;
 
+/// Rows in a piece of work.
+const PIECE: usize = 1 << 14;
+
 /// Whether the weakest combination of constants, given by their parts, each of a column of norm one, is mostly noise. `variance` is that
-/// of the angle's noise, `nearest` gives the window of a row.
+/// of the angle's noise.
 pub(crate) fn is_mostly_noise(
     problem: &Problem<'_>,
     rows: &Rows,
@@ -20,10 +28,10 @@ pub(crate) fn is_mostly_noise(
     fit: &Fit,
     weakest: &[f64],
     variance: f64,
-    nearest: impl Fn(usize) -> usize,
-) -> bool {
+    run: &mut Run<'_, '_>,
+) -> Result<bool, Error> {
     if variance == 0.0 || weakest.is_empty() {
-        return false;
+        return Ok(false);
     }
     let norm = |column: &[f64]| column.iter().map(|value| value * value).sum::<f64>().sqrt();
     let parts: Vec<f64> = weakest.iter().zip(&problem.constants).map(|(part, column)| part / norm(column)).collect();
@@ -34,25 +42,34 @@ pub(crate) fn is_mostly_noise(
     let gram: Vec<f64> = (0..size * size).map(|index| product(index / size, index % size)).collect();
     let predictor = Predictor::new(&fit.full, &fit.pooled.values);
     let windowed = model.windowed.len();
-    let (mut left, mut noise) = (0.0, 0.0);
-    let mut factors = vec![0.0; size];
-    factors[..parts.len()].copy_from_slice(&parts);
-    for row in (0..problem.rows()).filter(|&row| problem.usable[row]) {
-        if windowed > 0 {
-            let place = nearest(row);
-            let later = (row as f64 - fit.centre(place)) * problem.period;
-            for (unknown, factor) in factors[parts.len()..].iter_mut().enumerate() {
-                *factor = parts
-                    .iter()
-                    .enumerate()
-                    .map(|(c, part)| part * predictor.sensitivity(place, unknown, c, later))
-                    .sum();
+    let of = |rows: Range<usize>, (): &mut ()| {
+        let (mut left, mut noise) = (0.0, 0.0);
+        let mut factors = vec![0.0; size];
+        factors[..parts.len()].copy_from_slice(&parts);
+        for row in rows.filter(|&row| problem.usable[row]) {
+            if windowed > 0 {
+                let place = fit.nearest(row);
+                let later = (row as f64 - fit.centre(place)) * problem.period;
+                for (unknown, factor) in factors[parts.len()..].iter_mut().enumerate() {
+                    *factor = parts
+                        .iter()
+                        .enumerate()
+                        .map(|(c, part)| part * predictor.sensitivity(place, unknown, c, later))
+                        .sum();
+                }
             }
+            let constants = parts.iter().zip(&problem.constants).map(|(part, column)| part * column[row]);
+            let others =
+                factors[parts.len()..].iter().zip(&problem.windowed).map(|(factor, column)| factor * column[row]);
+            left += constants.chain(others).sum::<f64>().powi(2);
+            noise +=
+                (0..size * size).map(|index| factors[index / size] * factors[index % size] * gram[index]).sum::<f64>();
         }
-        let constants = parts.iter().zip(&problem.constants).map(|(part, column)| part * column[row]);
-        let others = factors[parts.len()..].iter().zip(&problem.windowed).map(|(factor, column)| factor * column[row]);
-        left += constants.chain(others).sum::<f64>().powi(2);
-        noise += (0..size * size).map(|index| factors[index / size] * factors[index % size] * gram[index]).sum::<f64>();
-    }
-    left < MOSTLY_NOISE * variance * noise
+        [left, noise]
+    };
+    let pieces = (0..problem.rows()).step_by(PIECE).map(|first| first..problem.rows().min(first + PIECE));
+    let pieces = pieces.map(|rows| Piece { size: rows.len(), content: rows });
+    let sums = run.map(pieces.collect(), || (), of)?;
+    let [left, noise] = sums.iter().fold([0.0, 0.0], |[a, b], [c, d]| [a + c, b + d]);
+    Ok(left < MOSTLY_NOISE * variance * noise)
 }

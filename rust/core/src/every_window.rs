@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::factor::Fields;
 use crate::model::Predictor;
 use crate::parallel::Piece;
-use crate::pooling::residual;
+use crate::pooling::sums_of_squares;
 use crate::run::Run;
 use crate::simd::Instructions;
 use crate::status::Status;
@@ -68,6 +68,7 @@ pub(crate) fn every_window(
     }
     let first = problem.usable.iter().position(|usable| *usable).unwrap_or(0);
     let end = problem.usable.iter().rposition(|usable| *usable).map_or(first, |last| last + 1);
+    let left = sums_of_squares(&solved, &(0..solved.len()), constants);
     for place in 0..solved.len() {
         let begin = solved.first + place.cast_signed();
         let inside = (begin + window.cast_signed()).min(end.cast_signed()) - begin.max(first.cast_signed());
@@ -75,7 +76,7 @@ pub(crate) fn every_window(
         let status = status(&solved, fields, place, [window, inside], ill_conditioned);
         found.status.push(status.bits());
         let freedom = solved.field(fields.count())[place] - layout.local() as f64;
-        found.deviation.push((residual(&solved, place, constants).max(0.0) / freedom.max(1.0)).sqrt());
+        found.deviation.push((left[place].max(0.0) / freedom.max(1.0)).sqrt());
         if status.contains(Status::INVALID) {
             found.values.iter_mut().for_each(|column| column[place] = f64::NAN);
             found.deviation[place] = f64::NAN;

@@ -211,6 +211,14 @@ impl Fit {
         first as f64 + (self.span as f64 - 1.0) / 2.0
     }
 
+    /// The window whose middle is nearest to a row.
+    pub(crate) fn nearest(&self, row: usize) -> usize {
+        let place = (row as f64 - (self.span as f64 - 1.0) / 2.0) / self.step as f64;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the windows")]
+        let place = place.round().clamp(0.0, self.full.len() as f64 - 1.0) as usize;
+        place
+    }
+
     /// The median over all windows of what they say of a windowed unknown.
     pub(crate) fn median(&self, unknown: usize) -> f64 {
         let windows = (0..self.full.len()).filter(|&window| is_determined(&self.full, window));

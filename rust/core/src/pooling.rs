@@ -64,7 +64,7 @@ pub(crate) fn pool(
         return Some(Pooled { weights, ..pooled });
     }
     for _ in 0..ROUNDS {
-        let misfits: Vec<f64> = windows.clone().map(|window| misfit(full, window, &pooled.values, expected)).collect();
+        let misfits = misfits(full, &windows, &pooled.values, expected);
         let mut sorted: Vec<f64> = misfits
             .iter()
             .zip(&weights)
@@ -76,8 +76,9 @@ pub(crate) fn pool(
         }
         let middle = sorted.len() / 2;
         let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
-        for ((window, weight), misfit) in windows.clone().zip(&mut weights).zip(&misfits) {
-            let independent = (full.field(fields.count())[window] / expected.redundancy - 2.0).max(1.0);
+        let counts = &full.field(fields.count())[windows.clone()];
+        for ((count, weight), misfit) in counts.iter().zip(&mut weights).zip(&misfits) {
+            let independent = (count / expected.redundancy - 2.0).max(1.0);
             let most = median.max(1.0) * (1.0 + TOLERATED * (2.0 / independent).sqrt());
             if *weight > 0.0 {
                 *weight = if *misfit > most { (most / misfit).powi(2) } else { 1.0 };
@@ -88,33 +89,32 @@ pub(crate) fn pool(
     Some(Pooled { weights, ..pooled })
 }
 
-/// The residual sum of squares of every window over what its noise should leave.
-pub(crate) fn misfits(full: &Solved, values: &[f64], expected: Expected) -> Vec<f64> {
-    (0..full.len()).map(|window| misfit(full, window, values, expected)).collect()
-}
-
-/// A window's residual sum of squares over what its noise should leave.
-fn misfit(full: &Solved, window: usize, values: &[f64], expected: Expected) -> f64 {
-    let fields = full.fields;
-    let count = full.field(fields.count())[window];
-    let noise = count * expected.variance;
-    let left = (noise - full.field(fields.freedom())[window]).max(0.3 * noise);
-    (residual(full, window, values) + count * (expected.variance - expected.torque)) / left
-}
-
-/// A window's residual sum of squares for given constants, the angle's noise taken off.
-pub(crate) fn residual(full: &Solved, window: usize, values: &[f64]) -> f64 {
-    let fields = full.fields;
-    let constants = fields.layout.constant;
-    let mut sum = full.field(fields.left(constants, constants))[window];
-    for row in 0..constants {
-        let mut error = full.field(fields.left(row, constants))[window];
-        for (column, value) in values.iter().enumerate().take(constants).skip(row) {
-            error -= full.field(fields.left(row, column))[window] * value;
-        }
-        sum += error * error;
+/// The residual sums of squares of some windows over what their noise should leave.
+pub(crate) fn misfits(full: &Solved, windows: &Range<usize>, values: &[f64], expected: Expected) -> Vec<f64> {
+    let field = |field: usize| &full.field(field)[windows.clone()];
+    let (counts, freedoms) = (field(full.fields.count()), field(full.fields.freedom()));
+    let mut misfits = sums_of_squares(full, windows, values);
+    for ((misfit, &count), &freedom) in misfits.iter_mut().zip(counts).zip(freedoms) {
+        let noise = count * expected.variance;
+        let left = (noise - freedom).max(0.3 * noise);
+        *misfit = (*misfit + count * (expected.variance - expected.torque)) / left;
     }
-    sum
+    misfits
+}
+
+/// The residual sums of squares of some windows for given constants, the angle's noise taken off.
+pub(crate) fn sums_of_squares(full: &Solved, windows: &Range<usize>, values: &[f64]) -> Vec<f64> {
+    let (fields, constants) = (full.fields, full.fields.layout.constant);
+    let left = |row: usize, column: usize| &full.field(fields.left(row, column))[windows.clone()];
+    let mut sums = left(constants, constants).to_vec();
+    for row in 0..constants {
+        let mut errors = left(row, constants).to_vec();
+        for (column, value) in values.iter().enumerate().take(constants).skip(row) {
+            errors.iter_mut().zip(left(row, column)).for_each(|(error, factor)| *error -= factor * value);
+        }
+        sums.iter_mut().zip(errors).for_each(|(sum, error)| *sum += error * error);
+    }
+    sums
 }
 
 /// How much each constant takes part in the combination that all windows together determine worst, its column scaled to its norm.

@@ -15,7 +15,7 @@ use crate::model::{Fit, Model, without_constants};
 use crate::motion::{Coefficient, Motion, Term, unknowns};
 use crate::output::Elements;
 use crate::parallel::Watch;
-use crate::pooling::{Expected, influence, joint_covariance, sandwich};
+use crate::pooling::{Expected, influence, joint_covariance, sandwich, sums_of_squares};
 use crate::redundancy::{Stretched, at_least};
 use crate::row_covariance::RowCovariance;
 use crate::run::Run;
@@ -235,11 +235,9 @@ fn variance(problem: &Problem<'_>, fit: &Fit) -> f64 {
             / (usable - problem.layout.constant as f64).max(1.0);
     }
     let fields = fit.full.fields;
-    let (mut sum, mut freedom) = (0.0, 0.0);
-    for window in 0..fit.full.len() {
-        sum += crate::pooling::residual(&fit.full, window, &fit.pooled.values);
-        freedom += (fit.full.field(fields.count())[window] - problem.layout.local() as f64).max(0.0);
-    }
+    let sum: f64 = sums_of_squares(&fit.full, &(0..fit.full.len()), &fit.pooled.values).iter().sum();
+    let counts = fit.full.field(fields.count()).iter();
+    let freedom: f64 = counts.map(|count| (count - problem.layout.local() as f64).max(0.0)).sum();
     sum / freedom.max(1.0)
 }
 

@@ -194,7 +194,7 @@ impl Session<'_, '_, '_> {
                 };
                 let Some(fit) = &decided.fit else { return Ok(()) };
                 if !model.windowed.is_empty() {
-                    let misfits = misfits(&fit.full, &fit.pooled.values, decided.expected);
+                    let misfits = misfits(&fit.full, &(0..fit.full.len()), &fit.pooled.values, decided.expected);
                     decided.error = misfits.iter().sum::<f64>() / misfits.len().max(1) as f64;
                 }
                 if !last {

@@ -13,7 +13,7 @@ use crate::motion::{Coefficient, Motion, Term, sign, unknowns};
 use crate::noise::channel_variance;
 use crate::output::Elements;
 use crate::outside_mask::Outside;
-use crate::parallel::Watch;
+use crate::parallel::{Piece, Watch};
 use crate::pooling::Expected;
 use crate::row_covariance::RowCovariance;
 use crate::run::Run;
@@ -245,12 +245,14 @@ fn identify(
     watch: &mut Watch<'_>,
 ) -> Result<WeakIdentified, Error> {
     let samples = record.angle.len();
-    let level = |given: Option<f64>, channel, quantisation| {
-        given.unwrap_or_else(|| channel_variance(channel, quantisation, options.instructions))
+    let mut run = Run::new(workers, samples, STAGES, watch);
+    let channels = [(record.angle, options.noise[0], options.quantisation), (record.torque, options.noise[1], None)];
+    let pieces = channels.map(|channel| Piece { size: samples, content: channel });
+    let level = |(channel, given, step): (_, Option<f64>, _), (): &mut ()| {
+        given.unwrap_or_else(|| channel_variance(channel, step, options.instructions))
     };
-    let noise =
-        [level(options.noise[0], record.angle, options.quantisation), level(options.noise[1], record.torque, None)];
-    let mut session = Session { record, options, noise, run: Run::new(workers, samples, STAGES, watch) };
+    let levels = run.map(pieces.into(), || (), level)?;
+    let mut session = Session { record, options, noise: [levels[0], levels[1]], run };
     let model = session.model();
     let (chosen, decided, lag) = session.choose_and_decide(&model)?;
     let mut found = session.report(chosen, &decided)?;

@@ -127,8 +127,8 @@ impl Session<'_, '_, '_> {
             status |= Status::WINDOW_LIMIT;
         }
         let weakest = &found.weakest;
-        found.mostly_noise =
-            is_mostly_noise(&problem, &weak.rows, &ordered, all, weakest, self.noise[0], |row| nearest(all, row));
+        let noise = self.noise[0];
+        found.mostly_noise = is_mostly_noise(&problem, &weak.rows, &ordered, all, weakest, noise, &mut self.run)?;
         if found.condition > HARDLY_TOLD_APART || found.mostly_noise {
             status |= Status::ILL_CONDITIONED;
         }
@@ -284,7 +284,7 @@ impl Session<'_, '_, '_> {
             if averages.values.iter().any(|column| column[row].is_nan()) {
                 status |= Status::INVALID;
             }
-            if condition[nearest(fit, row)] > HARDLY_TOLD_APART {
+            if condition[fit.nearest(row)] > HARDLY_TOLD_APART {
                 status |= Status::ILL_CONDITIONED;
             }
             status.bits()
@@ -308,7 +308,7 @@ impl Session<'_, '_, '_> {
                 .collect(),
             values: averages.values,
             sensitivities: sensitivities(problem, all),
-            condition: (0..rows.len()).map(|row| condition[nearest(fit, row)]).collect(),
+            condition: (0..rows.len()).map(|row| condition[fit.nearest(row)]).collect(),
             status,
         })
     }
@@ -452,14 +452,6 @@ fn pairs_of(constants: &[usize], slow: usize, covariance: &[f64]) -> Vec<(usize,
     pairs.map(|(one, other)| (constants[one], constants[other], covariance[one * constants.len() + other])).collect()
 }
 
-/// The window whose middle is nearest to a row.
-fn nearest(fit: &Fit, row: usize) -> usize {
-    let place = (row as f64 - (fit.span as f64 - 1.0) / 2.0) / fit.step as f64;
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the windows")]
-    let place = place.round().clamp(0.0, fit.full.len() as f64 - 1.0) as usize;
-    place
-}
-
 /// How what is windowed changes with each constant, row by row: what the window nearest to a row says.
 fn sensitivities(problem: &Problem<'_>, all: &Fit) -> Vec<Vec<f64>> {
     let layout = problem.layout;
@@ -468,7 +460,7 @@ fn sensitivities(problem: &Problem<'_>, all: &Fit) -> Vec<Vec<f64>> {
     let determined: Vec<usize> = (0..all.full.len()).filter(|&window| is_determined(&all.full, window)).collect();
     let mut columns = vec![Vec::with_capacity(problem.rows()); layout.windowed * layout.constant];
     for row in 0..problem.rows() {
-        let wanted = nearest(all, row);
+        let wanted = all.nearest(row);
         let next = determined.partition_point(|&window| window < wanted);
         let around = [next.checked_sub(1), Some(next)].into_iter().flatten();
         let place =
@@ -492,7 +484,7 @@ pub(crate) fn residuals(problem: &Problem<'_>, fit: &Fit) -> (Vec<f64>, Vec<bool
     if problem.layout.windowed > 0 {
         let predictor = Predictor::new(&fit.full, &fit.pooled.values);
         for (row, left) in left.iter_mut().enumerate().filter(|(row, _)| problem.usable[*row]) {
-            let place = nearest(fit, row);
+            let place = fit.nearest(row);
             if !is_determined(&fit.full, place) {
                 (*left, usable[row]) = (0.0, false);
                 continue;
