@@ -21,8 +21,8 @@ const FINEST: usize = 2;
 /// Lengths of windows on one side, in blocks of two rows, then of four and so on.
 const BLOCKS: [usize; 2] = [6, 9];
 
-/// Shorter windows on one side, in the smallest blocks. They only serve two at a time.
-const SHORT: [usize; 3] = [2, 3, 4];
+/// Shorter windows on one side: rows of a block, and blocks. They only serve two at a time.
+const SHORT: [[usize; 2]; 4] = [[1, 3], [FINEST, 2], [FINEST, 3], [FINEST, 4]];
 
 /// The shortest window that may serve alone, in rows: two and a half half-widths.
 pub(crate) const SHORTEST_ALONE: usize = 15;
@@ -55,7 +55,7 @@ pub(crate) struct Cells {
 impl Scale {
     /// All lengths that fit into so many rows, from the shortest to half of the rows.
     pub(crate) fn all(rows: usize, reach: usize) -> Vec<Self> {
-        let mut scales: Vec<Self> = SHORT.iter().map(|&blocks| Self::new(FINEST, blocks, reach)).collect();
+        let mut scales: Vec<Self> = SHORT.iter().map(|&[step, blocks]| Self::new(step, blocks, reach)).collect();
         let mut step = FINEST;
         while scales.last().is_some_and(|scale| 2 * scale.span() <= rows) {
             scales.extend(BLOCKS.map(|blocks| Self::new(step, blocks, reach)));
