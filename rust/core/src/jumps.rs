@@ -277,7 +277,7 @@ impl Search<'_> {
             let total: f64 = products.iter().map(|product| product[1]).sum();
             errors[0] = self.side[one] - total;
             for (place, product) in products.iter().enumerate() {
-                errors[place + 1] = errors[place] + product[1] - product[0];
+                errors[place + 1] = errors[place] + (product[1] - product[0]);
             }
             // Candidates before the row's samples, within them and behind.
             let within = |candidate: usize| (candidate.max(begin) - begin).min(length);
@@ -285,9 +285,16 @@ impl Search<'_> {
             let (before, rest) =
                 left.split_at_mut((begin + first).clamp(candidates.start, candidates.end) - candidates.start);
             let (inside, behind) = rest.split_at_mut(last - first);
-            let (all, none) = (std::iter::repeat(&errors[0]), std::iter::repeat(&errors[length]));
-            let left = before.iter_mut().zip(all).chain(inside.iter_mut().zip(&errors[first..]));
-            left.chain(behind.iter_mut().zip(none)).for_each(|(left, error)| *left += error * error);
+            let squares = [errors[0] * errors[0], errors[length] * errors[length]];
+            for left in before {
+                *left += squares[0];
+            }
+            for (left, error) in inside.iter_mut().zip(&errors[first..]) {
+                *left += error * error;
+            }
+            for left in behind {
+                *left += squares[1];
+            }
             count += 1;
         }
         (2 * count >= over.len()).then_some(left)

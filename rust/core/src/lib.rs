@@ -33,6 +33,7 @@ pub mod noise;
 pub mod output;
 pub mod outside_mask;
 mod packet;
+mod pages;
 pub mod parallel;
 mod pool;
 mod pooling;

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::jumps::{Jump, UNLIKELY};
+use crate::pages::zeros;
 use crate::parallel::Piece;
 use crate::run::Run;
 use crate::status::Status;
@@ -79,7 +80,7 @@ impl RowResults {
         let carried = self.values.iter().zip(&self.slopes).map(|(column, slopes)| (column, Some(slopes)));
         let kept = self.errors.iter().chain(&self.covariances).chain([&self.deviation, &self.condition]);
         let sources: Vec<Source<'_>> = carried.chain(kept.map(|column| (column, None))).collect();
-        let mut columns = vec![vec![0.0; count]; sources.len()];
+        let mut columns: Vec<Vec<f64>> = sources.iter().map(|_| zeros(count)).collect();
         let mut status = vec![0; count];
         let mut pieces = Vec::new();
         {
