@@ -122,7 +122,7 @@ def test_constants_beside_what_is_windowed_are_best_for_all_windows_together(var
         preset="paper",
         form="weak",
         window_length=2 * half + 1,
-        equations=window * 5,
+        equations=window * 6,
         variation=variation,  # type: ignore[arg-type]
         inertia="constant",
         damping="constant",
@@ -133,7 +133,7 @@ def test_constants_beside_what_is_windowed_are_best_for_all_windows_together(var
         # ⟨φ τ θ⟩ around each row's centre, and the row's own time.
         kernel = np.arange(-half, half + 1) * 1e-3 * (1 - (np.arange(-half, half + 1) / half) ** 2) ** exponent
         kernel /= ((1 - (np.arange(-half, half + 1) / half) ** 2) ** exponent).sum()
-        centres = np.arange(half, angle.size - half, 5)
+        centres = np.arange(half, angle.size - half, 6)
         companion = np.array([kernel @ angle[c - half : c + half + 1] for c in centres])
         columns.append(companion + centres * 1e-3 * A[:, 2])
     expected = profile(np.stack(columns, axis=1), A[:, :2], b, window, 8)
@@ -189,7 +189,7 @@ def test_missing_and_masked_samples_cost_their_own_rows_only() -> None:
     }
     angle[3000], noisy[1000] = np.nan, np.inf
     found = tvident.identify(angle, noisy, **call)
-    centres = np.arange(80, 6000 - 80, 10)
+    centres = np.arange(80, 6000 - 80, 13)
     hit = (np.abs(centres - 3000) <= 80) | (np.abs(centres - 1000) <= 80)
     A, b = rows(np.nan_to_num(angle), np.nan_to_num(noisy, posinf=0.0), 80, 8, 1e-3)
     expected = np.linalg.lstsq(A[~hit], b[~hit])[0]

@@ -24,7 +24,7 @@ def kernels(half: int, exponent: int, delta: float, shift: float = 0.0) -> Array
 
 def rows(angle: Array, torque: Array, half: int, exponent: int, delta: float, lag: float = 0.0) -> tuple[Array, Array]:
     """Give the regressors of inertia, damping and stiffness and the right-hand side, NaN where a window does not fit."""
-    stride = max(1, half // 8)
+    stride = max(1, half // 6)
     kernel = kernels(half, exponent, delta)
     whole = int(np.rint(lag))
     late = kernels(half, exponent, delta, lag - whole)[2]
