@@ -41,6 +41,9 @@ pub(crate) struct Decided {
     pub(crate) found: Option<varying::Found>,
     /// Nothing where the constants are not determined.
     pub(crate) fit: Option<Fit>,
+    /// The length of windows that predicts best while nothing changes slowly. What changes is looked for from there: windows that were chosen while
+    /// too little was free are so short that nothing else is found from them.
+    first: Option<Scale>,
     /// Mean squared error of predicting a row from others, over the noise's.
     pub(crate) error: f64,
     pub(crate) tests: Vec<(usize, Test)>,
@@ -108,6 +111,7 @@ impl Session<'_, '_, '_> {
             slow: Vec::new(),
             found: None,
             fit: None,
+            first: None,
             error: 1.0,
             tests: Vec::new(),
             lengths: Vec::new(),
@@ -214,10 +218,13 @@ impl Session<'_, '_, '_> {
         let validated = self.validate(rows, decided, &tried)?;
         let span = |one: &Validated| one.fit.scale.map_or(0, |scale| scale.span() * stride);
         decided.lengths = validated.iter().map(|one| (span(one), one.error)).collect();
-        let Some(best) = validated.iter().min_by(|a, b| a.error.total_cmp(&b.error)) else { return Ok(()) };
-        decided.error = best.error;
+        // Where no row can be predicted any length is as good, and the longest tells most.
+        let predicts = validated.iter().filter(|one| one.error.is_finite()).min_by(|a, b| a.error.total_cmp(&b.error));
+        let Some(best) = predicts.or(validated.last()) else { return Ok(()) };
+        decided.error = if best.error.is_finite() { best.error } else { 1.0 };
         (decided.covariance, decided.expected) = self.covariance(weak, self.parameters(&model, &best.fit));
         let scale = best.fit.scale;
+        decided.first = scale;
         drop(validated);
         let problem = model.problem(rows, &rows.side, self.noise[0], Some(&decided.covariance));
         decided.fit = Fit::new(&problem, scale, decided.expected, instructions, &mut self.run)?;
@@ -237,12 +244,15 @@ impl Session<'_, '_, '_> {
         };
         let short = scales.partition_point(|scale| holds(*scale));
         let found = validated(&thinned_rows(rows, &stretches), &scales[..short])?;
-        let best = found.iter().min_by(|a, b| a.error.total_cmp(&b.error)).and_then(|best| best.fit.scale);
+        let finite = found.iter().filter(|one| one.error.is_finite());
+        let best = finite.min_by(|a, b| a.error.total_cmp(&b.error)).and_then(|best| best.fit.scale);
         let long = short.saturating_sub(OVERLAP);
-        if best.is_some_and(|best| !scales[long..].contains(&best)) {
-            return Ok(found);
+        match best {
+            Some(best) if !scales[long..].contains(&best) => Ok(found),
+            Some(_) => validated(rows, &scales[long..]),
+            // The stretches miss the few rows that there are.
+            None => validated(rows, scales),
         }
-        validated(rows, &scales[long..])
     }
 
     /// Finds jumps of what is windowed beside those that are known. `whole` holds all rows where some are over jumps.
@@ -292,7 +302,7 @@ impl Session<'_, '_, '_> {
     /// Finds what changes slowly, and the other constants beside it.
     fn set_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided) -> Result<(), Error> {
         let instructions = self.options.instructions;
-        let Some(first) = decided.fit.as_ref().and_then(|fit| fit.scale) else { return Ok(()) };
+        let Some(first) = decided.first else { return Ok(()) };
         let rest = model.constant.iter().copied().filter(|one| !decided.slow.contains(one)).collect();
         decided.model = Model { constant: rest, ..model.clone() };
         let ordered = decided.ordered();
