@@ -14,6 +14,9 @@ use crate::simd::Instructions;
 use crate::status::Status;
 use crate::windows::{Problem, Shape, Solved, solve_windows};
 
+/// The condition number of a window is at least the number of its unknowns, but for rounding; a column of zeros takes its share away.
+const LEAST_CONDITION: f64 = 0.999;
+
 /// Rows in a piece of work.
 const PIECE: usize = 2048;
 
@@ -78,7 +81,7 @@ pub(crate) fn every_window(
         let freedom = solved.field(fields.count())[place] - layout.local() as f64;
         found.deviation.push((left[place].max(0.0) / freedom.max(1.0)).sqrt());
         if status.contains(Status::INVALID) {
-            found.values.iter_mut().for_each(|column| column[place] = f64::NAN);
+            found.values.iter_mut().chain(&mut found.covariances).for_each(|column| column[place] = f64::NAN);
             found.deviation[place] = f64::NAN;
             let rank_deficient = status.contains(Status::RANK_DEFICIENT);
             found.condition[place] = if rank_deficient { f64::INFINITY } else { f64::NAN };
@@ -98,7 +101,11 @@ fn status(solved: &Solved, fields: Fields, place: usize, [window, inside]: [usiz
     }
     if 2 * inside < window {
         status |= Status::INVALID;
-    } else if count <= unknowns || !condition.is_finite() || condition * f64::EPSILON * count >= 1.0 {
+    } else if count <= unknowns
+        || condition < LEAST_CONDITION * unknowns
+        || !condition.is_finite()
+        || condition * f64::EPSILON * count >= 1.0
+    {
         status |= Status::INVALID | Status::RANK_DEFICIENT;
     } else if condition > ill_conditioned {
         status |= Status::ILL_CONDITIONED;

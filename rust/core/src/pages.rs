@@ -14,7 +14,8 @@ pub(crate) fn zeros(count: usize) -> Vec<f64> {
     if count * size_of::<f64>() >= 2 * HUGE {
         let before = column.as_ptr().align_offset(PAGE);
         let first = column[before.min(count)..].as_ptr();
-        // SAFETY: the range lies within the column, begins with a page, and advice changes no contents. Refused advice is no error.
+        // SAFETY: the range begins with a page of the column and ends within it, or with the page of its last number; advice changes no
+        // contents. Refused advice is no error.
         unsafe { libc::madvise(first.cast_mut().cast(), (count - before) * size_of::<f64>(), libc::MADV_HUGEPAGE) };
     }
     column

@@ -65,6 +65,12 @@ impl Scale {
         scales
     }
 
+    /// The fewest rows that windows of any length fit into.
+    pub(crate) fn fewest_rows(reach: usize) -> usize {
+        let spans = SHORT.iter().map(|&[step, blocks]| Self::new(step, blocks, reach).span());
+        2 * spans.min().unwrap_or(0)
+    }
+
     fn new(step: usize, blocks: usize, reach: usize) -> Self {
         // Every row of a cell keeps its distance from both sides.
         Self { step, blocks, gap: (2 * reach + step).saturating_sub(2).div_ceil(step), reach }

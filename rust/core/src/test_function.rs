@@ -85,7 +85,12 @@ impl TestFunction {
     /// hundredth of its largest value, for exponents from 5 to 12.
     #[must_use]
     pub fn stride(&self) -> usize {
-        (self.half_width / 6).max(1)
+        Self::stride_of(self.half_width)
+    }
+
+    /// The same for a half-width.
+    pub(crate) fn stride_of(half_width: usize) -> usize {
+        (half_width / 6).max(1)
     }
 
     /// The kernels for samples that come `shift` sample periods late.

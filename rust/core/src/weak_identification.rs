@@ -313,7 +313,10 @@ impl Session<'_, '_, '_> {
         let samples = self.record.angle.len();
         let least = match self.options.half_width {
             // The shortest windows on both sides of a row that keep a test function apart.
-            Some(half) => 9 * half,
+            Some(half) => {
+                let stride = TestFunction::stride_of(half);
+                2 * half + 1 + (Scale::fewest_rows(half.div_ceil(stride)) - 1) * stride
+            }
             None if self.model().windowed.is_empty() => 8 * LEAST_HALF_WIDTH,
             None => 16 * LEAST_HALF_WIDTH,
         };
