@@ -107,3 +107,31 @@ def test_the_weak_form_says_why_it_was_taken() -> None:
         assert result.settings["reasons"][0].startswith("weak form: on simulated recordings")
     given = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, form="weak")
     assert not any("weak form" in reason for reason in given.settings["reasons"])
+
+
+def test_a_torque_that_is_mostly_zero_is_no_error() -> None:
+    rig = tvident.simulate_torsional_rig(6.0, angle_noise=1e-3)
+    torque = rig.torque.copy()
+    torque[:4200] = 0
+    result = tvident.identify(rig.angle, torque, sample_rate=1000, preset="paper", window_length=61, equations=60)
+    assert "inf" not in " ".join(result.settings["advice"]) + result.summary()
+
+
+def test_a_second_in_a_quarter_of_an_hour_is_told_of() -> None:
+    rig = tvident.simulate_torsional_rig(1.0)
+    angle, torque = np.full(1_000_000, np.nan), np.zeros(1_000_000)
+    angle[500_600:501_600], torque[500_600:501_600] = rig.angle, rig.torque
+    result = tvident.identify(angle, torque, sample_rate=1000, preset="paper")
+    # 800 equations, and windows of 200 of which at least half are there.
+    assert np.count_nonzero(result.status & Status.INVALID == 0) == 801
+    assert not any("no window holds enough equations" in one for one in result.settings["advice"])
+    assert any(one.startswith("orders ") for one in result.settings["reasons"])
+
+
+@pytest.mark.parametrize("step", [1, 7])
+def test_advice_is_on_what_the_mask_leaves(step: int) -> None:
+    rig = tvident.simulate_torsional_rig(40.0)
+    angle, torque, mask = rig.angle.copy(), rig.torque.copy(), np.ones(40_000, bool)
+    angle[10_000:30_000], torque[10_000:30_000], mask[9800:30_200] = angle[10_000], 0, False
+    result = tvident.identify(angle, torque, sample_rate=1000, preset="paper", mask=mask, step=step)
+    assert not any("mask=" in one for one in result.settings["advice"])

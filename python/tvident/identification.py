@@ -313,6 +313,7 @@ class _Task:
             order=found.order,
             status=found.status,
             settings=used | {"window_length": length},
+            mask=None if self.mask is None else self.mask[..., :: self.step],
         )
         return self._result(found, chosen, explained.words())
 

@@ -6,17 +6,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
+from math import gcd
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _core
 from tvident.reasons import Words, listed
 from tvident.status import Status
 from tvident.terms import COEFFICIENTS
 
 _LOOKED_AT = 1 << 10
 """Samples that statuses are counted at, evenly spread: shares are known within some percent, and a long record costs no more."""
+_FEW = 30
+"""So few samples with an answer tell nothing of the others."""
 _OFTEN = 0.1
 """A share of the samples from which on a flag is worth a sentence: the paper's advice about orders, as a tenth."""
 _ALIKE = 0.9
@@ -50,6 +54,8 @@ class ExplainedStrong:
     order, status : ndarray, shape (\*, n)
     settings : mapping
         What was used.
+    mask : ndarray of bool, shape (n,), optional
+        Where a sample may be the centre of an equation.
     """
 
     values: Mapping[str, Array]
@@ -62,23 +68,37 @@ class ExplainedStrong:
     order: npt.NDArray[np.uint8]
     status: npt.NDArray[np.uint16]
     settings: Mapping[str, Any]
+    mask: npt.NDArray[np.bool_] | None = None
 
     def words(self) -> Words:
         """Return what there is to say."""
         if not self.status.size:
             return Words()
-        if self._share(Status.INVALID) == 1:
+        if (self.status & Status.INVALID != 0).all():
             return Words((), tuple(self._nothing()))
         reasons = (*self._orders(), *self._kinds(), *self._errors())
         return Words(reasons, (*self._undetermined(), *self._told_apart(), *self._limits()))
 
     def _some(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Return some samples of all records."""
-        n = values.shape[-1]
-        every = max(1, values.size // _LOOKED_AT)
-        if values.ndim > 1 and every >= n:
-            return np.asarray(values.reshape(-1, n)[:: every // n, n // 2])
-        return np.asarray(values[..., ::every].ravel())
+        """Return the samples that are looked at, of all records."""
+        return np.asarray(np.broadcast_to(values, self.status.shape).reshape(-1)[self._places])
+
+    @cached_property
+    def _places(self) -> npt.NDArray[np.intp]:
+        """Samples spread over what the mask leaves; where hardly one of them has an answer, samples that have one."""
+        n, status = self.status.shape[-1], self.status.reshape(-1)
+        if self.mask is None:
+            every = max(1, status.size // _LOOKED_AT)
+            while gcd(every, n) > 1:  # not the same sample of every record
+                every += 1
+            places = np.arange(0, status.size, every)
+        else:
+            places = np.flatnonzero(np.broadcast_to(self.mask, self.status.shape))
+            places = places[:: max(1, places.size // _LOOKED_AT)]
+        if np.count_nonzero(status[places] & Status.INVALID == 0) < _FEW:
+            places = np.flatnonzero(status & Status.INVALID == 0)
+            places = places[:: max(1, places.size // _LOOKED_AT)]
+        return places
 
     @cached_property
     def _flags(self) -> npt.NDArray[np.uint16]:
@@ -115,16 +135,20 @@ class ExplainedStrong:
         ]
 
     def _nothing(self) -> list[str]:
-        if self._share(Status.RANK_DEFICIENT) == 0:
+        if not (self.status & Status.RANK_DEFICIENT != 0).any() or self._is_missing():
             return ["no window holds enough equations: look for missing values, shorten the windows, or record longer"]
         return [
             (
                 f"the record does not determine {listed(list(self.kinds))}: nothing moves, or a single frequency does "
                 "not tell inertia from "
-                "stiffness: check that angle and torque are the right channels, excite two or more frequencies, leave a term out, or give "
+                "stiffness: check that angle and torque are the right channels and hold numbers, excite two or more frequencies, leave a term out, or give "
                 "what is known"
             )
         ]
+
+    def _is_missing(self) -> bool:
+        """Return whether every window lacks samples."""
+        return bool((self.status & Status.GAP != 0).all())
 
     def _undetermined(self) -> list[str]:
         share = self._share(Status.RANK_DEFICIENT)
@@ -148,16 +172,17 @@ class ExplainedStrong:
             names = self._alike(ill)
             told = listed(names) if names else "the parameters"
             condition = float(np.median(self._some(self.condition)[ill]))
+            # What is flagged may be constants, whose condition number is not that of the windows.
+            number = f" (condition {condition:.3g}, the median there)" if condition > _core.HARDLY_TOLD_APART else ""
             return [
                 (
-                    f"{told} are hardly told apart in {share:.0%} of the record (condition {condition:.3g}, the median "
-                    "there): under a single "
+                    f"{told} are hardly told apart in {share:.0%} of the record{number}: under a single "
                     "frequency they look alike; excite two or more, make windows of equations longer, or give one of them as known"
                 )
             ]
         names = [name for name in self._alike(good) if self.kinds[name] == "windowed"]
         wide = {name: self._relative(name, good) for name in names}
-        if "inertia" not in wide or min(wide.values()) < _LARGE:
+        if "inertia" not in wide or not all(np.isfinite(error) and error >= _LARGE for error in wide.values()):
             return []
         return [
             (
@@ -169,7 +194,8 @@ class ExplainedStrong:
     def _relative(self, name: str, where: npt.NDArray[np.bool_]) -> float:
         value, error = (self._some(np.asarray(one[name]))[where] for one in (self.values, self.errors))
         factor = float(np.median(self.factors[name])) if name in self.factors else 1.0
-        return factor * float(np.median(error)) / abs(float(np.median(value)))
+        middle = abs(float(np.median(value)))
+        return factor * float(np.median(error)) / middle if middle > 0 else np.inf
 
     def _alike(self, where: npt.NDArray[np.bool_]) -> list[str]:
         """Return the two parameters whose errors are correlated most, if that is nearly completely."""
