@@ -139,10 +139,9 @@ class ExplainedStrong:
             return ["no window holds enough equations: look for missing values, shorten the windows, or record longer"]
         return [
             (
-                f"the record does not determine {listed(list(self.kinds))}: nothing moves, or a single frequency does "
-                "not tell inertia from "
-                "stiffness: check that angle and torque are the right channels and hold numbers, excite two or more frequencies, leave a term out, or give "
-                "what is known"
+                f"the record does not determine {listed(list(self.kinds))}: nothing moves, or a single frequency does not tell inertia "
+                "from stiffness: check that angle and torque are the right channels and hold numbers, excite two or more frequencies, "
+                "leave a term out, or give what is known"
             )
         ]
 
