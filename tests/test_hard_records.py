@@ -320,7 +320,7 @@ def test_errors_are_numbers_wherever_values_are() -> None:
 
 def test_a_record_too_short_for_its_test_function_is_told_the_length_it_needs(rig: tvident.Recording) -> None:
     call: dict[str, Any] = {"sample_rate": 1000, "window_length": 101, "equations": 100}
-    message = r"at least 450 samples for windows of several test functions; got 300; .* or give a shorter window_length"
+    message = r"at least 397 samples for windows of several test functions; got 396; .* or give a shorter window_length"
     with pytest.raises(ValueError, match=message):
-        tvident.identify(rig.angle[:300], rig.torque[:300], **call)
-    tvident.identify(rig.angle[:450], rig.torque[:450], **call)
+        tvident.identify(rig.angle[:396], rig.torque[:396], **call)
+    tvident.identify(rig.angle[:397], rig.torque[:397], **call)
