@@ -17,8 +17,8 @@ use crate::windows::Problem;
 /// Blocks that a record is cut into.
 const BLOCKS: usize = 8;
 
-/// Probability below which a difference is no chance: once in 1000 records.
-pub const NO_CHANCE: f64 = 1e-3;
+/// Probability below which a difference is no chance: once in 2000 records.
+pub const NO_CHANCE: f64 = 5e-4;
 
 /// What became of one constant.
 #[derive(Clone, Debug, PartialEq)]
