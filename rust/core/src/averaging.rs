@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::model::Predictor;
-use crate::parallel::Piece;
+use crate::parallel::{Piece, ranges};
 use crate::pooling::Expected;
 use crate::run::Run;
 use crate::scale::{Cells, Scale};
@@ -112,9 +112,9 @@ pub(crate) fn average(
     let mut work = Vec::new();
     {
         let mut parts: Vec<_> = averages.columns().map(|column| column.chunks_mut(PIECE)).collect();
-        for rows in pieces(rows) {
+        for Piece { size, content } in ranges(rows, PIECE) {
             let columns: Vec<&mut [f64]> = parts.iter_mut().filter_map(Iterator::next).collect();
-            work.push(Piece { size: rows.len(), content: (rows, columns) });
+            work.push(Piece { size, content: (content, columns) });
         }
     }
     let nearby = view.nearby(expected);
@@ -132,10 +132,6 @@ pub(crate) fn average(
 fn ready(candidates: &[Candidate]) -> Vec<Option<Around<'_>>> {
     let all = candidates.iter();
     all.map(|candidate| Some(Around::new(candidate.scale, candidate.cells.as_ref()?, &[]))).collect()
-}
-
-fn pieces(rows: usize) -> Vec<Range<usize>> {
-    (0..rows).step_by(PIECE).map(|first| first..rows.min(first + PIECE)).collect()
 }
 
 /// Rows around a row that its errors are averaged over, to either side, and how many independent ones that makes.
@@ -232,14 +228,12 @@ impl View<'_, '_> {
             solved.push(Candidate { scale, cells, record: candidate.record });
         }
         let ready = ready(&solved);
-        let parts = pieces(self.problem.rows()).into_iter();
-        let parts: Vec<_> = parts.map(|rows| Piece { size: rows.len(), content: rows }).collect();
         let work = |piece: Range<usize>, (): &mut ()| {
             let counted = piece.start.max(rows.start)..piece.end.min(rows.end);
             let both = solved.iter().zip(&ready);
             both.map(|(candidate, ready)| self.sums(candidate, ready.as_ref(), counted.clone())).collect::<Vec<_>>()
         };
-        let sums = run.map(parts, || (), work)?;
+        let sums = run.map(ranges(self.problem.rows(), PIECE), || (), work)?;
         for (index, candidate) in candidates.iter_mut().enumerate() {
             for which in 0..SIDES {
                 let parts = sums.iter().map(|sums| sums[index][which]);

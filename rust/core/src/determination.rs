@@ -9,7 +9,7 @@ use std::ops::Range;
 use crate::equations::Rows;
 use crate::error::Error;
 use crate::model::{Fit, Model, Predictor};
-use crate::parallel::Piece;
+use crate::parallel::ranges;
 use crate::run::Run;
 use crate::windows::Problem;
 
@@ -67,9 +67,7 @@ pub(crate) fn is_mostly_noise(
         }
         [left, noise]
     };
-    let pieces = (0..problem.rows()).step_by(PIECE).map(|first| first..problem.rows().min(first + PIECE));
-    let pieces = pieces.map(|rows| Piece { size: rows.len(), content: rows });
-    let sums = run.map(pieces.collect(), || (), of)?;
+    let sums = run.map(ranges(problem.rows(), PIECE), || (), of)?;
     let [left, noise] = sums.iter().fold([0.0, 0.0], |[a, b], [c, d]| [a + c, b + d]);
     Ok(left < MOSTLY_NOISE * variance * noise)
 }

@@ -5,6 +5,7 @@
 
 use std::cell::{Cell, RefCell};
 use std::num::NonZeroUsize;
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 use std::thread;
@@ -64,6 +65,12 @@ pub(crate) fn run_long<P: Send, S>(
         run_in_pool(pieces, total, workers, &scratch, &work, watch)?
     };
     if finished && watch(total, total) { Ok(()) } else { Err(Error::Cancelled) }
+}
+
+/// Ranges of at most so many of all, as pieces of work.
+pub(crate) fn ranges(all: usize, most: usize) -> Vec<Piece<Range<usize>>> {
+    let ranges = (0..all).step_by(most).map(|first| first..all.min(first + most));
+    ranges.map(|range| Piece { size: range.len(), content: range }).collect()
 }
 
 /// Does every piece once and returns what each gave, in their order.
