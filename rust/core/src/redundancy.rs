@@ -34,6 +34,11 @@ impl Stretched {
         }
     }
 
+    /// The covariance of rows that the first column shows, which holds residuals.
+    pub(crate) fn covariance(&self) -> RowCovariance {
+        RowCovariance::of_residuals(&self.columns[0], &self.usable, self.reach)
+    }
+
     /// By how much the standard error of each unknown exceeds that of ordinary least squares; nothing where they are not determined.
     ///
     /// The unknowns are taken as constant over all rows. It is never less than one.

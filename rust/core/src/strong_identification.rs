@@ -4,6 +4,7 @@
 //! correlated: those of constants by the covariance of the residuals, those of windows by how far windows scatter (see the module `scatter`).
 
 use std::num::NonZeroUsize;
+use std::ops::Range;
 
 use crate::delayed::Delayed;
 use crate::equations::{Regressor, Rows};
@@ -197,19 +198,14 @@ fn undetermined(model: &Model, samples: usize, step: usize, order: Vec<u8>) -> S
 
 /// The covariance of rows that residuals show, for residuals of some variance; of a long record, those of stretches.
 fn row_covariance(problem: &Problem<'_>, fit: &Fit, reach: usize, variance: f64) -> RowCovariance {
-    let (mut left, mut usable) = residuals(problem, fit);
+    let (left, usable) = residuals(problem, fit);
     let stretches = stretches_of_rows(left.len());
-    if let Some(stretches) = stretches.filter(|stretches| stretches.iter().all(|part| part.len() > 4 * reach)) {
-        let (all, all_usable) = (std::mem::take(&mut left), std::mem::take(&mut usable));
-        for stretch in stretches {
-            left.extend_from_slice(&all[stretch.clone()]);
-            usable.extend_from_slice(&all_usable[stretch]);
-            // Rows of different stretches have no product.
-            left.resize(left.len() + reach, 0.0);
-            usable.resize(left.len(), false);
-        }
+    let stretches = stretches.filter(|stretches| stretches.iter().all(|part| part.len() > 4 * reach));
+    let mut stretched = Stretched::new(1, reach);
+    for Range { start, end } in stretches.unwrap_or_else(|| std::iter::once(0..left.len()).collect()) {
+        stretched.push(&[left[start..end].to_vec()], |row| usable[start + row]);
     }
-    let mut covariance = RowCovariance::of_residuals(&left, &usable, reach);
+    let mut covariance = stretched.covariance();
     let shown = covariance.variance();
     if shown > 0.0 {
         covariance.lags.iter_mut().for_each(|lag| *lag *= variance / shown);
