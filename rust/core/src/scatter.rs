@@ -54,9 +54,8 @@ pub fn scatter(
 ) -> Result<Vec<Vec<f64>>, Error> {
     let mut all = Vec::new();
     for (motion, track) in records {
-        let compared = Compared::new(derivatives, least_squares.window(), motion.angle.len());
-        let taken = compared.stretches().into_iter().map(|around| Taken::of(*track, around, &compared));
-        all.push(factors_of(derivatives, least_squares, motion, taken)?);
+        let factors = scatter_of(derivatives, least_squares.window(), motion.angle.len(), *track);
+        all.push(or_redundancies(factors, derivatives, least_squares, motion)?);
     }
     Ok(all)
 }
@@ -87,19 +86,18 @@ pub fn identify_with_scatter(
     }
     identify_parts(derivatives, least_squares, parts, workers, watch)?;
     let each = motions.iter().zip(taken);
-    each.map(|(motion, taken)| factors_of(derivatives, least_squares, motion, taken)).collect()
+    each.map(|(motion, taken)| or_redundancies(factors(motion.unknowns(), taken), derivatives, least_squares, motion))
+        .collect()
 }
 
-/// The factors of one record.
-fn factors_of(
+/// The factors of one record, from the correlation of its residuals where windows give none.
+fn or_redundancies(
+    factors: Option<Vec<f64>>,
     derivatives: &LocalPolynomials,
     least_squares: &RollingLeastSquares,
     motion: &Motion<'_>,
-    taken: impl IntoIterator<Item = Taken>,
 ) -> Result<Vec<f64>, Error> {
-    let mut squares = vec![Vec::new(); motion.unknowns()];
-    taken.into_iter().for_each(|taken| taken.add(&mut squares));
-    match factors(&mut squares) {
+    match factors {
         Some(factors) => Ok(factors),
         None => redundancies(derivatives, motion, &mut Chunk::new(derivatives, least_squares.columns())),
     }
@@ -194,11 +192,7 @@ pub(crate) fn scatter_of(
     track: Track<'_>,
 ) -> Option<Vec<f64>> {
     let compared = Compared::new(derivatives, window, samples);
-    let mut squares = vec![Vec::new(); track.values.len()];
-    for around in compared.stretches() {
-        Taken::of(track, around, &compared).add(&mut squares);
-    }
-    factors(&mut squares)
+    factors(track.values.len(), compared.stretches().into_iter().map(|around| Taken::of(track, around, &compared)))
 }
 
 /// Columns as slices.
@@ -207,7 +201,9 @@ pub(crate) fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
 }
 
 /// The root of the mean of squared differences of every unknown, of which none counts too much; nothing where one has none.
-fn factors(squares: &mut [Vec<f64>]) -> Option<Vec<f64>> {
+fn factors(unknowns: usize, taken: impl IntoIterator<Item = Taken>) -> Option<Vec<f64>> {
+    let mut squares = vec![Vec::new(); unknowns];
+    taken.into_iter().for_each(|taken| taken.add(&mut squares));
     let factor = |squares: &mut Vec<f64>| {
         if squares.is_empty() {
             return None;
@@ -227,10 +223,10 @@ mod tests {
 
     /// The factor of one unknown with the same standard error everywhere.
     fn factor(values: &[f64], error: f64) -> f64 {
-        let (mut squares, errors) = (vec![Vec::new()], vec![error; values.len()]);
+        let errors = vec![error; values.len()];
         let (track, all) = (Track { values: &[values], errors: &[&errors] }, 0..values.len());
-        Taken::of(track, all.clone(), &Compared { distance: 24, inside: all }).add(&mut squares);
-        factors(&mut squares).expect("long enough")[0]
+        let taken = Taken::of(track, all.clone(), &Compared { distance: 24, inside: all });
+        factors(1, [taken]).expect("long enough")[0]
     }
 
     // 13 000 differences: the root of their mean square scatters by a hundredth.
