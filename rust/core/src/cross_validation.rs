@@ -29,11 +29,16 @@ pub(crate) fn validate(
     run: &mut Run<'_, '_>,
 ) -> Result<Vec<Validated>, Error> {
     let rows = problem.rows();
-    let (first, last) = usable(problem);
-    let many = last - first;
+    let inside = problem.inside();
     // The same rows for all lengths, so that they are compared on equal terms.
-    let start = scales.iter().map(|scale| scale.full_rows(rows).start).max().unwrap_or(0).min(first + many / 4);
-    let end = scales.iter().map(|scale| scale.full_rows(rows).end).min().unwrap_or(rows).max(first + 3 * many / 4);
+    let start =
+        scales.iter().map(|scale| scale.full_rows(rows).start).max().unwrap_or(0).min(inside.start + inside.len() / 4);
+    let end = scales
+        .iter()
+        .map(|scale| scale.full_rows(rows).end)
+        .min()
+        .unwrap_or(rows)
+        .max(inside.start + 3 * inside.len() / 4);
     let mut validated = Vec::new();
     for &scale in scales {
         if let Some(fit) = Fit::with_hollow(problem, scale, expected, instructions, run)? {
@@ -44,10 +49,9 @@ pub(crate) fn validate(
     Ok(validated)
 }
 
-/// The first row that can be used and the one after the last.
-fn usable(problem: &Problem<'_>) -> (usize, usize) {
-    let first = problem.usable.iter().position(|&usable| usable).unwrap_or(0);
-    (first, problem.usable.iter().rposition(|&usable| usable).map_or(first, |last| last + 1))
+/// The one that predicts best; nothing where none predicts any row.
+pub(crate) fn best(validated: &[Validated]) -> Option<&Validated> {
+    validated.iter().filter(|one| one.error.is_finite()).min_by(|a, b| a.error.total_cmp(&b.error))
 }
 
 /// Mean squared error, over the noise's variance, of predicting rows from the windows on both sides of them.

@@ -43,6 +43,15 @@ impl Rows {
         }
     }
 
+    /// Makes every column zero in the rows that are no equations.
+    pub(crate) fn clear_unusable(&mut self) {
+        for row in 0..self.len() {
+            if !self.usable[row] {
+                self.clear(row);
+            }
+        }
+    }
+
     /// Breaks off where other rows of the same record do.
     pub(crate) fn exclude_as(&mut self, other: &Self) {
         self.jumps.clone_from(&other.jumps);

@@ -69,12 +69,12 @@ pub(crate) fn every_window(
             found.sensitivities.push(solved.field(fields.solution(unknown, constant)).iter().map(|s| -s).collect());
         }
     }
-    let first = problem.usable.iter().position(|usable| *usable).unwrap_or(0);
-    let end = problem.usable.iter().rposition(|usable| *usable).map_or(first, |last| last + 1);
+    let record = problem.inside();
     let left = sums_of_squares(&solved, &(0..solved.len()), constants);
     for place in 0..solved.len() {
         let begin = solved.first + place.cast_signed();
-        let inside = (begin + window.cast_signed()).min(end.cast_signed()) - begin.max(first.cast_signed());
+        let inside =
+            (begin + window.cast_signed()).min(record.end.cast_signed()) - begin.max(record.start.cast_signed());
         let inside = usize::try_from(inside).unwrap_or(0);
         let status = status(&solved, fields, place, [window, inside], ill_conditioned);
         found.status.push(status.bits());

@@ -68,11 +68,7 @@ impl Session<'_, '_, '_> {
         if let Some(found) = &decided.found {
             rows.side = varying::without(&rows, &decided.slow, &found.varying);
         }
-        for row in 0..rows.len() {
-            if !rows.usable[row] {
-                rows.clear(row);
-            }
-        }
+        rows.clear_unusable();
         let model = &decided.model;
         let problem = model.problem(&rows, &rows.side, self.noise[0], Some(covariance));
         let left = model.windowed.is_empty().then(|| {

@@ -2,7 +2,7 @@
 
 use crate::channels::{Ones, Whole};
 use crate::constancy::{self, Test};
-use crate::cross_validation::{Validated, validate};
+use crate::cross_validation::{Validated, best, validate};
 use crate::equations::Rows;
 use crate::error::Error;
 use crate::jumps::{self, Jump, Search};
@@ -219,8 +219,7 @@ impl Session<'_, '_, '_> {
         let span = |one: &Validated| one.fit.scale.map_or(0, |scale| scale.span() * stride);
         decided.lengths = validated.iter().map(|one| (span(one), one.error)).collect();
         // Where no row can be predicted any length is as good, and the longest tells most.
-        let predicts = validated.iter().filter(|one| one.error.is_finite()).min_by(|a, b| a.error.total_cmp(&b.error));
-        let Some(best) = predicts.or(validated.last()) else { return Ok(()) };
+        let Some(best) = best(&validated).or(validated.last()) else { return Ok(()) };
         decided.error = if best.error.is_finite() { best.error } else { 1.0 };
         (decided.covariance, decided.expected) = self.covariance(weak, self.parameters(&model, &best.fit));
         let scale = best.fit.scale;
@@ -244,10 +243,8 @@ impl Session<'_, '_, '_> {
         };
         let short = scales.partition_point(|scale| holds(*scale));
         let found = validated(&thinned_rows(rows, &stretches), &scales[..short])?;
-        let finite = found.iter().filter(|one| one.error.is_finite());
-        let best = finite.min_by(|a, b| a.error.total_cmp(&b.error)).and_then(|best| best.fit.scale);
         let long = short.saturating_sub(OVERLAP);
-        match best {
+        match best(&found).and_then(|best| best.fit.scale) {
             Some(best) if !scales[long..].contains(&best) => Ok(found),
             Some(_) => validated(rows, &scales[long..]),
             // The stretches miss the few rows that there are.

@@ -419,11 +419,7 @@ impl Session<'_, '_, '_> {
         let more = self.run.stage(|watch| WeakRows::build(&record, function, delta, stretches, workers, watch))?;
         let first = weak.rows.regressors.len();
         weak.rows.regressors.extend(more.rows.regressors.into_iter().skip(3));
-        for row in 0..weak.rows.len() {
-            if !weak.rows.usable[row] {
-                weak.rows.clear(row);
-            }
-        }
+        weak.rows.clear_unusable();
         let mut suspects = Vec::new();
         for (place, (missing, _)) in terms.iter().enumerate() {
             let judged = Judged {

@@ -52,6 +52,12 @@ impl Problem<'_> {
         self.side.len()
     }
 
+    /// Rows from the first that can be used to the last.
+    pub(crate) fn inside(&self) -> Range<usize> {
+        let first = self.usable.iter().position(|&usable| usable).unwrap_or(0);
+        first..self.usable.iter().rposition(|&usable| usable).map_or(first, |last| last + 1)
+    }
+
     /// Whether there is a jump after the first of some rows and not after the end of them.
     pub(crate) fn jumps_within(&self, rows: &Range<isize>) -> bool {
         let next = self.jumps.partition_point(|&jump| jump.cast_signed() <= rows.start);
