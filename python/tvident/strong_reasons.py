@@ -93,16 +93,14 @@ class ExplainedStrong:
                 every += 1
             places = np.arange(0, status.size, every)
         else:
-            places = np.flatnonzero(np.broadcast_to(self.mask, self.status.shape))
-            places = places[:: max(1, places.size // _LOOKED_AT)]
+            places = _spread(np.flatnonzero(np.broadcast_to(self.mask, self.status.shape)))
         if np.count_nonzero(status[places] & Status.INVALID == 0) < _FEW:
-            places = np.flatnonzero(status & Status.INVALID == 0)
-            places = places[:: max(1, places.size // _LOOKED_AT)]
+            return _spread(np.flatnonzero(status & Status.INVALID == 0))
         return places
 
     @cached_property
     def _flags(self) -> npt.NDArray[np.uint16]:
-        return np.asarray(self._some(self.status))
+        return self._some(self.status)
 
     def _share(self, flag: Status) -> float:
         return float(np.mean(self._flags & flag != 0))
@@ -238,3 +236,8 @@ class ExplainedStrong:
                 "orders mean little there"
             )
         return words
+
+
+def _spread(places: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+    """Return about as many places as are looked at."""
+    return places[:: max(1, places.size // _LOOKED_AT)]
