@@ -57,6 +57,7 @@ pub(crate) struct Jump {
 
 /// What jumps are looked for in.
 pub(crate) struct Search<'a> {
+    /// Rows once the constants are known.
     pub(crate) problem: &'a Problem<'a>,
     /// All rows, also those over jumps that are known, and their right-hand side without constants.
     pub(crate) whole: &'a Problem<'a>,
@@ -71,7 +72,6 @@ pub(crate) struct Search<'a> {
     pub(crate) expected: Expected,
     /// What variances are multiplied by.
     pub(crate) inflation: f64,
-    pub(crate) constants: &'a [f64],
     /// All lengths of windows, and those that jumps are looked for with.
     pub(crate) scales: &'a [Scale],
     pub(crate) lengths: &'a [Scale],
@@ -163,7 +163,7 @@ impl Search<'_> {
     }
 
     fn windows<'a>(&self, solved: &'a [(Scale, Cells)]) -> Vec<Around<'a>> {
-        solved.iter().map(|(scale, cells)| Around::new(*scale, cells, self.constants)).collect()
+        solved.iter().map(|(scale, cells)| Around::new(*scale, cells, &[])).collect()
     }
 
     /// Rows that jumps must be apart, so that a window that serves alone fits between them.
@@ -324,7 +324,7 @@ impl Search<'_> {
             return None;
         }
         let cells = scale.solve_here(self.problem, &cells, self.instructions);
-        let windows = Around::new(scale, &cells, self.constants);
+        let windows = Around::new(scale, &cells, &[]);
         let error = |&row: &usize| {
             let seen = windows.seen(self.problem, row, 1)?;
             Some((self.side[row] - seen.predict(self.whole, row)).powi(2))

@@ -269,6 +269,8 @@ impl Session<'_, '_, '_> {
         let signals: Vec<&dyn Samples> = signals.iter().map(|signal| &**signal).collect();
         let (constants, noise) = (&fit.pooled.values, self.noise[0]);
         let problem = decided.model.problem(&weak.rows, decided.side(&weak.rows), noise, Some(&decided.covariance));
+        let rest_side = without_constants(&problem, constants);
+        let rest = decided.model.without_constants(&weak.rows, &problem, &rest_side, constants, noise);
         let whole = whole.unwrap_or(&weak.rows);
         let side = match &decided.found {
             Some(found) => varying::without(whole, &decided.slow, &found.varying),
@@ -279,7 +281,7 @@ impl Session<'_, '_, '_> {
         let alone = decided.scales[best..].iter().filter(|scale| scale.stands_alone());
         let lengths: Vec<Scale> = alone.step_by(2).take(JUMP_SCALES).copied().collect();
         let search = Search {
-            problem: &problem,
+            problem: &rest,
             whole: &whole,
             side: &without_constants(&whole, constants),
             signals: &signals,
@@ -288,7 +290,6 @@ impl Session<'_, '_, '_> {
             stride: weak.stride,
             expected: decided.expected,
             inflation: decided.error.max(1.0),
-            constants,
             scales: &decided.scales,
             lengths: &lengths,
             instructions: self.options.instructions,
