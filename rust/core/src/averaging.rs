@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::model::Predictor;
-use crate::parallel::{Piece, ranges};
+use crate::parallel::ranges;
 use crate::pooling::Expected;
 use crate::run::Run;
 use crate::scale::{Cells, Scale};
@@ -20,8 +20,6 @@ use crate::windows::Problem;
 const MOST: f64 = 16.0;
 /// Independent rows that the errors over the record count as, at least, and per length of the best window.
 const RECORD: [f64; 2] = [16.0, 5.0];
-/// Rows in a piece of work.
-const PIECE: usize = 8192;
 /// Cells of at least so many rows are solved once for all pieces.
 const COARSE: usize = 8;
 /// Of the lengths that thinned rows hold, so many of the longest must be hopeless for all longer ones to be so.
@@ -46,8 +44,9 @@ impl Averages {
         Self { values: columns(windowed), slopes: columns(windowed), errors: columns(windowed) }
     }
 
-    fn columns(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
-        self.values.iter_mut().chain(&mut self.slopes).chain(&mut self.errors)
+    fn columns(&mut self) -> impl Iterator<Item = &mut [f64]> {
+        let all = self.values.iter_mut().chain(&mut self.slopes).chain(&mut self.errors);
+        all.map(Vec::as_mut_slice)
     }
 }
 
@@ -109,22 +108,10 @@ pub(crate) fn average(
 
     let ready = ready(&candidates);
     let mut averages = Averages::new(problem.layout.windowed, rows);
-    let mut work = Vec::new();
-    {
-        let mut parts: Vec<_> = averages.columns().map(|column| column.chunks_mut(PIECE)).collect();
-        for Piece { size, content } in ranges(rows, PIECE) {
-            let columns: Vec<&mut [f64]> = parts.iter_mut().filter_map(Iterator::next).collect();
-            work.push(Piece { size, content: (content, columns) });
-        }
-    }
     let nearby = view.nearby(expected);
-    run.map(
-        work,
-        || (),
-        |(rows, mut columns): (Range<usize>, Vec<&mut [f64]>), (): &mut ()| {
-            view.average((&candidates, &ready), rows, nearby, record, hopeless, &mut columns);
-        },
-    )?;
+    run.fill(averages.columns(), |rows, columns| {
+        view.average((&candidates, &ready), rows, nearby, record, hopeless, columns);
+    })?;
     Ok(averages)
 }
 
@@ -233,7 +220,7 @@ impl View<'_, '_> {
             let both = solved.iter().zip(&ready);
             both.map(|(candidate, ready)| self.sums(candidate, ready.as_ref(), counted.clone())).collect::<Vec<_>>()
         };
-        let sums = run.map(ranges(self.problem.rows(), PIECE), || (), work)?;
+        let sums = run.map(ranges(self.problem.rows()), || (), work)?;
         for (index, candidate) in candidates.iter_mut().enumerate() {
             for which in 0..SIDES {
                 let parts = sums.iter().map(|sums| sums[index][which]);

@@ -16,9 +16,6 @@ use crate::windows::Problem;
 /// What is left, in units of what noise leaves, below which noise is all there is: twice itself would mean as much signal as noise.
 const MOSTLY_NOISE: f64 = 2.0;
 
-/// Rows in a piece of work.
-const PIECE: usize = 1 << 14;
-
 /// Whether the weakest combination of constants, given by their parts, each of a column of norm one, is mostly noise. `variance` is that
 /// of the angle's noise.
 pub(crate) fn is_mostly_noise(
@@ -67,7 +64,7 @@ pub(crate) fn is_mostly_noise(
         }
         [left, noise]
     };
-    let sums = run.map(ranges(problem.rows(), PIECE), || (), of)?;
+    let sums = run.map(ranges(problem.rows()), || (), of)?;
     let [left, noise] = sums.iter().fold([0.0, 0.0], |[a, b], [c, d]| [a + c, b + d]);
     Ok(left < MOSTLY_NOISE * variance * noise)
 }

@@ -105,7 +105,7 @@ impl Search<'_> {
     fn again(&self, jump: &Jump, room: usize) -> Jump {
         let row = (jump.sample - self.first).div_ceil(self.stride);
         let solved = self.solve(&(row..row + 1));
-        let windows = self.windows(&solved);
+        let windows = around(&solved);
         let placed = windows.iter().rev().find_map(|windows| self.placed(windows, jump.sample));
         let near = placed.map(|(placed, _)| placed).filter(|placed| 4 * placed.sample.abs_diff(jump.sample) < room);
         near.unwrap_or_else(|| jump.clone())
@@ -114,7 +114,7 @@ impl Search<'_> {
     /// The jumps in some rows, the most conspicuous first.
     fn within(&self, rows: &Range<usize>) -> Vec<Jump> {
         let solved = self.solve(rows);
-        let windows = self.windows(&solved);
+        let windows = around(&solved);
         let mut suspected = self.suspected(&windows, rows);
         suspected.sort_by(|a, b| b.0.total_cmp(&a.0));
         let (mut looked, mut jumps) = (BTreeSet::new(), Vec::new());
@@ -160,10 +160,6 @@ impl Search<'_> {
             (scale, scale.solve_here(self.problem, &(first..end), self.instructions))
         };
         self.lengths.iter().map(solve).collect()
-    }
-
-    fn windows<'a>(&self, solved: &'a [(Scale, Cells)]) -> Vec<Around<'a>> {
-        solved.iter().map(|(scale, cells)| Around::new(*scale, cells, &[])).collect()
     }
 
     /// Rows that jumps must be apart, so that a window that serves alone fits between them.
@@ -348,6 +344,10 @@ impl Search<'_> {
         });
         Jump { sample: first + best, first, happened: happened.collect() }
     }
+}
+
+fn around(solved: &[(Scale, Cells)]) -> Vec<Around<'_>> {
+    solved.iter().map(|(scale, cells)| Around::new(*scale, cells, &[])).collect()
 }
 
 /// Rows whose test function reaches over a jump, wherever it may be.

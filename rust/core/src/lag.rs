@@ -6,6 +6,8 @@
 //!
 //! The lag is told from the damping by the inertia: with motion at a single frequency it is not determined.
 
+use std::sync::Arc;
+
 use crate::error::Error;
 use crate::model::{Fit, Model};
 use crate::pooling::Expected;
@@ -14,6 +16,7 @@ use crate::suspects::Judged;
 use crate::weak_decision::Decided;
 use crate::weak_form::WeakRows;
 use crate::weak_identification::{Chosen, Session};
+use crate::windows::Correlated;
 
 /// Times that test function and windows are chosen again with the lag that was found.
 const CHOICES: usize = 4;
@@ -111,6 +114,7 @@ impl Session<'_, '_, '_> {
         let (before, without) = (&chosen.weak.rows.side, decided.side(&chosen.weak.rows));
         let slow = before.iter().zip(without).map(|(side, without)| side - without);
         let side: Vec<f64> = weak.rows.side.iter().zip(slow).map(|(side, slow)| side - slow).collect();
+        let correlated = decided.model.correlated(&weak.rows, &decided.covariance, &mut self.run)?;
         let judged = Judged {
             rows: &weak.rows,
             model: &decided.model,
@@ -118,6 +122,7 @@ impl Session<'_, '_, '_> {
             noise: self.noise[0],
             fit,
             covariance: &decided.covariance,
+            correlated: &correlated,
             expected: decided.expected,
             inflation: decided.error.max(1.0),
             instructions: self.options.instructions,
@@ -140,18 +145,18 @@ impl Session<'_, '_, '_> {
         side: &[f64],
         fit: &Fit,
         expected: Expected,
-        covariance: &RowCovariance,
+        (covariance, correlated): (&RowCovariance, &Arc<Correlated>),
     ) -> Result<Option<Vec<f64>>, Error> {
         if self.options.lag.is_some() {
             return Ok(None);
         }
         let mut model = model.clone();
         model.constant.push(self.rate());
-        let problem = model.problem(&weak.rows, side, self.noise[0], Some(covariance));
+        let problem = model.problem(&weak.rows, side, self.noise[0], Some(correlated));
         let Some(all) = fit.again(&problem, expected, self.options.instructions, &mut self.run)? else {
             return Ok(None);
         };
-        let both = all.covariance(&problem, covariance);
+        let both = all.covariance(&problem, covariance, &mut self.run)?;
         let count = problem.layout.constant;
         let rows = both.chunks_exact(count).take(count - 1);
         Ok(Some(rows.flat_map(|row| row[..count - 1].to_vec()).collect()))

@@ -2,16 +2,18 @@
 //! length say of both.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use crate::equations::{Regressor, Rows};
 use crate::error::Error;
 use crate::factor::{Layout, RowNoise};
-use crate::pooling::{Expected, Pooled, influence, is_determined, local, pool, sandwich};
+use crate::pooling::{Expected, Pooled, between, influence, is_determined, local, pool, products, sandwich};
+use crate::parallel::Piece;
 use crate::row_covariance::RowCovariance;
 use crate::run::Run;
 use crate::scale::Scale;
 use crate::simd::Instructions;
-use crate::windows::{Problem, Shape, Solved, solve_windows};
+use crate::windows::{Correlated, Problem, Shape, Solved, solve_windows};
 
 /// Blocks that a record without windowed unknowns is cut into.
 const BLOCKS: usize = 64;
@@ -42,30 +44,41 @@ impl Model {
         Layout { windowed: self.windowed.len(), linear: self.linear, constant: self.constant.len() }
     }
 
+    /// What the covariance of rows makes of the windowed regressors.
+    pub(crate) fn correlated(
+        &self,
+        rows: &Rows,
+        covariance: &RowCovariance,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Arc<Correlated>, Error> {
+        let of = |pick: fn(&Regressor) -> &Vec<f64>| -> Vec<&[f64]> {
+            self.windowed.iter().map(|&index| pick(&rows.regressors[index]).as_slice()).collect()
+        };
+        let (values, companions) = (of(|regressor| &regressor.value), of(|regressor| &regressor.companion));
+        covariance.correlated(&values, &companions, rows.period, run).map(Arc::new)
+    }
+
     /// The least-squares problem of some rows, with a right-hand side. `noise` is the variance of the angle's.
     pub(crate) fn problem<'a>(
         &self,
         rows: &'a Rows,
         side: &'a [f64],
         noise: f64,
-        covariance: Option<&RowCovariance>,
+        correlated: Option<&Arc<Correlated>>,
     ) -> Problem<'a> {
         let of = |regressors: &[usize], pick: fn(&Regressor) -> &Vec<f64>| -> Vec<&'a [f64]> {
             regressors.iter().map(|&index| pick(&rows.regressors[index]).as_slice()).collect()
         };
-        let values = of(&self.windowed, |regressor| &regressor.value);
-        let companions = of(&self.windowed, |regressor| &regressor.companion);
-        let period = rows.period;
         Problem {
             layout: self.layout(),
-            correlated: covariance.map(|covariance| covariance.correlated(&values, &companions, period)),
-            windowed: values,
-            companions,
+            correlated: correlated.cloned(),
+            windowed: of(&self.windowed, |regressor| &regressor.value),
+            companions: of(&self.windowed, |regressor| &regressor.companion),
             constants: of(&self.constant, |regressor| &regressor.value),
             side,
             usable: &rows.usable,
             jumps: &rows.jumps,
-            period,
+            period: rows.period,
             noise: self.row_noise(rows, &rows.side_noise, noise),
         }
     }
@@ -162,8 +175,19 @@ impl Fit {
     }
 
     /// The covariance of the constants of the problem that was solved, row by row.
-    pub(crate) fn covariance(&self, problem: &Problem<'_>, covariance: &RowCovariance) -> Vec<f64> {
-        self.covariance_of(problem, 0..self.full.len(), &self.pooled, covariance)
+    pub(crate) fn covariance(
+        &self,
+        problem: &Problem<'_>,
+        covariance: &RowCovariance,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Vec<f64>, Error> {
+        let each = || (0..problem.layout.constant).map(|constant| Piece { size: problem.rows(), content: constant });
+        let windows = 0..self.full.len();
+        let influence = |constant: usize, (): &mut ()| self.influence(problem, &windows, &self.pooled.weights, constant);
+        let columns = run.map(each().collect(), || (), influence)?;
+        let products = |constant: usize, (): &mut ()| products(&columns, constant, covariance);
+        let products = run.map(each().collect(), || (), products)?;
+        Ok(between(&products.concat(), &self.pooled.inverse, columns.len()))
     }
 
     /// The same for constants that were taken from some of the windows.
@@ -174,9 +198,22 @@ impl Fit {
         pooled: &Pooled,
         covariance: &RowCovariance,
     ) -> Vec<f64> {
-        let centre = |window| self.centre(window);
-        let columns = influence(problem, &self.full, windows, &pooled.weights, self.step, self.span, centre);
+        let constants = 0..problem.layout.constant;
+        let columns: Vec<_> =
+            constants.map(|constant| self.influence(problem, &windows, &pooled.weights, constant)).collect();
         sandwich(&columns, &pooled.inverse, covariance)
+    }
+
+    /// How every row within some windows moves a constant that was taken from them.
+    pub(crate) fn influence(
+        &self,
+        problem: &Problem<'_>,
+        windows: &Range<usize>,
+        weights: &[f64],
+        constant: usize,
+    ) -> Vec<f64> {
+        let centre = |window| self.centre(window);
+        influence(problem, (&self.full, windows.clone()), weights, [self.step, self.span], centre, constant)
     }
 
     /// Solves a problem in windows of so many rows, or in one piece if that is all of them.

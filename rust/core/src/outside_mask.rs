@@ -70,7 +70,8 @@ impl Session<'_, '_, '_> {
         }
         rows.clear_unusable();
         let model = &decided.model;
-        let problem = model.problem(&rows, &rows.side, self.noise[0], Some(covariance));
+        let correlated = model.correlated(&rows, covariance, &mut self.run)?;
+        let problem = model.problem(&rows, &rows.side, self.noise[0], Some(&correlated));
         let left = model.windowed.is_empty().then(|| {
             let inner = model.problem(&weak.rows, decided.side(&weak.rows), self.noise[0], None);
             let square = |problem: &crate::windows::Problem<'_>| {
@@ -82,7 +83,7 @@ impl Session<'_, '_, '_> {
         });
         let mut differing = Vec::new();
         if let Some(other) = fit.again(&problem, expected, self.options.instructions, &mut self.run)? {
-            let own = other.covariance(&problem, covariance);
+            let own = other.covariance(&problem, covariance, &mut self.run)?;
             let count = model.constant.len();
             for (place, &unknown) in model.constant.iter().enumerate() {
                 let value = other.pooled.values[place];

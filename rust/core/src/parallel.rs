@@ -28,6 +28,9 @@ pub fn workers(request: Option<NonZeroUsize>) -> NonZeroUsize {
     request.unwrap_or_else(|| thread::available_parallelism().unwrap_or(NonZeroUsize::MIN))
 }
 
+/// Rows in a piece of work.
+pub(crate) const ROWS: usize = 8192;
+
 /// A piece of work and how much of the whole it is.
 #[derive(Debug)]
 pub(crate) struct Piece<P> {
@@ -67,9 +70,9 @@ pub(crate) fn run_long<P: Send, S>(
     if finished && watch(total, total) { Ok(()) } else { Err(Error::Cancelled) }
 }
 
-/// Ranges of at most so many of all, as pieces of work.
-pub(crate) fn ranges(all: usize, most: usize) -> Vec<Piece<Range<usize>>> {
-    let ranges = (0..all).step_by(most).map(|first| first..all.min(first + most));
+/// Ranges of rows, as pieces of work.
+pub(crate) fn ranges(rows: usize) -> Vec<Piece<Range<usize>>> {
+    let ranges = (0..rows).step_by(ROWS).map(|first| first..rows.min(first + ROWS));
     ranges.map(|range| Piece { size: range.len(), content: range }).collect()
 }
 

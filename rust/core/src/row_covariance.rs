@@ -1,5 +1,9 @@
 //! The covariance of rows: known from the noise of both channels, or taken from the residuals.
 
+use std::ops::Range;
+
+use crate::error::Error;
+use crate::run::Run;
 use crate::test_function::Kernels;
 use crate::windows::Correlated;
 
@@ -67,37 +71,47 @@ impl RowCovariance {
 
     /// The covariance times a column.
     pub(crate) fn times(&self, column: &[f64]) -> Vec<f64> {
-        let mut result: Vec<f64> = column.iter().map(|value| self.lags[0] * value).collect();
-        for (lag, &covariance) in self.lags.iter().enumerate().skip(1) {
-            if lag >= column.len() {
-                break;
-            }
-            let (early, late) = (&column[..column.len() - lag], &column[lag..]);
-            result[..early.len()].iter_mut().zip(late).for_each(|(sum, value)| *sum += covariance * value);
-            result[lag..].iter_mut().zip(early).for_each(|(sum, value)| *sum += covariance * value);
-        }
+        let mut result = vec![0.0; column.len()];
+        self.add(column, 0..column.len(), |lag| [self.lags[lag]; 2], &mut result);
         result
     }
 
     /// The covariance times windowed regressors and their companions, whose times count from their own row.
-    pub(crate) fn correlated(&self, windowed: &[&[f64]], companions: &[&[f64]], period: f64) -> Correlated {
-        let slope = |value: &[f64], companion: &[f64]| {
-            let mut result = self.times(companion);
-            for (lag, &covariance) in self.lags.iter().enumerate().skip(1) {
-                if lag >= value.len() {
-                    break;
-                }
-                let weight = covariance * lag as f64 * period;
-                let (early, late) = (&value[..value.len() - lag], &value[lag..]);
-                result[..early.len()].iter_mut().zip(late).for_each(|(sum, value)| *sum += weight * value);
-                result[lag..].iter_mut().zip(early).for_each(|(sum, value)| *sum -= weight * value);
+    pub(crate) fn correlated(
+        &self,
+        windowed: &[&[f64]],
+        companions: &[&[f64]],
+        period: f64,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Correlated, Error> {
+        let columns = || windowed.iter().map(|column| vec![0.0; column.len()]).collect::<Vec<_>>();
+        let mut found = Correlated { variance: self.variance(), windowed: columns(), companions: columns() };
+        let all = found.windowed.iter_mut().chain(&mut found.companions);
+        run.fill(all.map(Vec::as_mut_slice), |rows, columns| {
+            let (values, slopes) = columns.split_at_mut(windowed.len());
+            for (regressor, (value, slope)) in values.iter_mut().zip(slopes).enumerate() {
+                self.add(windowed[regressor], rows.clone(), |lag| [self.lags[lag]; 2], value);
+                self.add(companions[regressor], rows.clone(), |lag| [self.lags[lag]; 2], slope);
+                let weight = |lag: usize| self.lags[lag] * lag as f64 * period;
+                self.add(windowed[regressor], rows.clone(), |lag| [weight(lag), -weight(lag)], slope);
             }
-            result
-        };
-        Correlated {
-            variance: self.variance(),
-            windowed: windowed.iter().map(|value| self.times(value)).collect(),
-            companions: windowed.iter().zip(companions).map(|(value, companion)| slope(value, companion)).collect(),
+        })?;
+        Ok(found)
+    }
+
+    /// Adds a column to some of its rows, each row's neighbours by their distance with one weight for those that come later and one for
+    /// those that came before.
+    fn add(&self, column: &[f64], rows: Range<usize>, weights: impl Fn(usize) -> [f64; 2], sums: &mut [f64]) {
+        for lag in 0..self.lags.len().min(column.len()) {
+            let [later, before] = weights(lag);
+            let end = rows.end.min(column.len() - lag).max(rows.start);
+            let late = &column[rows.start + lag..end + lag];
+            sums.iter_mut().zip(late).for_each(|(sum, value)| *sum += later * value);
+            if lag > 0 && rows.end > lag {
+                let first = rows.start.max(lag);
+                let early = &column[first - lag..rows.end - lag];
+                sums[first - rows.start..].iter_mut().zip(early).for_each(|(sum, value)| *sum += before * value);
+            }
         }
     }
 }

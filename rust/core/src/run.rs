@@ -1,9 +1,10 @@
 //! The stages of one long call: who works on them, and who watches.
 
 use std::num::NonZeroUsize;
+use std::ops::Range;
 
 use crate::error::Error;
-use crate::parallel::{self, Piece, Watch};
+use crate::parallel::{self, Piece, Watch, ranges};
 
 /// Workers and watch of a call that goes through a number of stages.
 pub(crate) struct Run<'a, 'b> {
@@ -30,6 +31,23 @@ impl<'a, 'b> Run<'a, 'b> {
     ) -> Result<Vec<R>, Error> {
         let workers = self.workers;
         self.stage(|watch| parallel::map(pieces, workers, scratch, work, watch))
+    }
+
+    /// Fills columns in pieces: `work` gets some rows and their part of every column.
+    pub(crate) fn fill<'c>(
+        &mut self,
+        columns: impl Iterator<Item = &'c mut [f64]>,
+        work: impl Fn(Range<usize>, &mut [&mut [f64]]) + Sync,
+    ) -> Result<(), Error> {
+        let mut columns: Vec<_> = columns.collect();
+        let rows = columns.first().map_or(0, |column| column.len());
+        let cut = |Piece { size, content }: Piece<Range<usize>>| {
+            let parts = columns.iter_mut().filter_map(|column| column.split_off_mut(..size)).collect();
+            Piece { size, content: (content, parts) }
+        };
+        let pieces = ranges(rows).into_iter().map(cut).collect();
+        self.map(pieces, || (), |(rows, mut parts): (Range<usize>, Vec<&mut [f64]>), (): &mut ()| work(rows, &mut parts))?;
+        Ok(())
     }
 
     /// Does one stage, of which the watch sees its share of the whole.

@@ -16,7 +16,7 @@ use crate::model::{Fit, Model, without_constants};
 use crate::motion::{Coefficient, Motion, Term, unknowns};
 use crate::output::Elements;
 use crate::parallel::Watch;
-use crate::pooling::{Expected, influence, joint_covariance, sandwich, sums_of_squares};
+use crate::pooling::{Expected, joint_covariance, sandwich, sums_of_squares};
 use crate::redundancy::{Stretched, at_least};
 use crate::row_covariance::RowCovariance;
 use crate::run::Run;
@@ -104,13 +104,13 @@ pub fn identify_strong(
 
     let windows = 0..fit.full.len();
     let ones = vec![1.0; fit.full.len()];
-    let centre = |window| fit.centre(window);
-    let columns = influence(&problem, &fit.full, windows, &ones, fit.step, fit.span, centre);
+    let columns: Vec<_> = (0..count).map(|constant| fit.influence(&problem, &windows, &ones, constant)).collect();
     let variance = variance(&problem, &fit);
     let reach = derivatives.options().window_length / 2;
     let sandwich = |rows: &RowCovariance| sandwich(&columns, &fit.pooled.inverse, rows);
     let ordinary = sandwich(&RowCovariance { lags: vec![variance] });
-    let covariance = at_least(sandwich(&row_covariance(&problem, &fit, reach, variance)), &ordinary, count);
+    let shown = row_covariance(&problem, &fit, reach, variance, &mut run)?;
+    let covariance = at_least(sandwich(&shown), &ordinary, count);
     problem.constants.truncate(count);
     let mut results = RowResults { stride: 1.0, ..RowResults::default() };
     let mut pairs = Vec::new();
@@ -197,8 +197,14 @@ fn undetermined(model: &Model, samples: usize, step: usize, order: Vec<u8>) -> S
 }
 
 /// The covariance of rows that residuals show, for residuals of some variance; of a long record, those of stretches.
-fn row_covariance(problem: &Problem<'_>, fit: &Fit, reach: usize, variance: f64) -> RowCovariance {
-    let (left, usable) = residuals(problem, fit);
+fn row_covariance(
+    problem: &Problem<'_>,
+    fit: &Fit,
+    reach: usize,
+    variance: f64,
+    run: &mut Run<'_, '_>,
+) -> Result<RowCovariance, Error> {
+    let (left, usable) = residuals(problem, fit, run)?;
     let stretches = stretches_of_rows(left.len());
     let stretches = stretches.filter(|stretches| stretches.iter().all(|part| part.len() > 4 * reach));
     let mut stretched = Stretched::new(1, reach);
@@ -210,7 +216,7 @@ fn row_covariance(problem: &Problem<'_>, fit: &Fit, reach: usize, variance: f64)
     if shown > 0.0 {
         covariance.lags.iter_mut().for_each(|lag| *lag *= variance / shown);
     }
-    covariance
+    Ok(covariance)
 }
 
 /// By how much standard errors of what is windowed exceed those of ordinary least squares, where all is taken as constant.

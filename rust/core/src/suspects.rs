@@ -2,6 +2,8 @@
 //!
 //! Each is added to the constants on its own and judged by its standard error (a score test, near enough).
 
+use std::sync::Arc;
+
 use crate::equations::Rows;
 use crate::error::Error;
 use crate::factor::Layout;
@@ -10,6 +12,7 @@ use crate::pooling::Expected;
 use crate::row_covariance::RowCovariance;
 use crate::run::Run;
 use crate::simd::Instructions;
+use crate::windows::Correlated;
 
 /// A term is suspected where its factor exceeds its standard error so many times.
 const CONSPICUOUS: f64 = 5.0;
@@ -55,6 +58,7 @@ pub(crate) struct Judged<'a> {
     pub(crate) noise: f64,
     pub(crate) fit: &'a Fit,
     pub(crate) covariance: &'a RowCovariance,
+    pub(crate) correlated: &'a Arc<Correlated>,
     pub(crate) expected: Expected,
     /// What variances are multiplied by.
     pub(crate) inflation: f64,
@@ -66,11 +70,11 @@ impl Judged<'_> {
     pub(crate) fn factor(&self, regressor: usize, run: &mut Run<'_, '_>) -> Result<Option<(f64, f64)>, Error> {
         let mut model = self.model.clone();
         model.constant.push(regressor);
-        let problem = model.problem(self.rows, self.side, self.noise, Some(self.covariance));
+        let problem = model.problem(self.rows, self.side, self.noise, Some(self.correlated));
         let fit = self.fit.again(&problem, self.expected, self.instructions, run)?;
         let Some(fit) = fit else { return Ok(None) };
         let Layout { constant, .. } = problem.layout;
-        let variances = fit.covariance(&problem, self.covariance);
+        let variances = fit.covariance(&problem, self.covariance, run)?;
         let variance = self.inflation * variances[constant * constant - 1];
         Ok(Some((fit.pooled.values[constant - 1], variance.sqrt())))
     }

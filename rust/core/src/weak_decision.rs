@@ -1,5 +1,7 @@
 //! What a record says of its unknowns: over which length windows should reach, and what is constant.
 
+use std::sync::Arc;
+
 use crate::channels::{Ones, Whole};
 use crate::constancy::{self, Test};
 use crate::cross_validation::{Validated, best, validate};
@@ -16,6 +18,7 @@ use crate::varying;
 use crate::weak_form::{Record, TermSamples, WeakRows};
 use crate::weak_identification::{Chosen, Kind, NOISE_MODEL_FAILS, Session};
 use crate::weak_report::residuals;
+use crate::windows::{Correlated, Problem};
 
 /// The mean squared error of predicting rows, over the noise's, from which on more is tried, and the part of it that must be left to be
 /// worth it.
@@ -51,6 +54,8 @@ pub(crate) struct Decided {
     pub(crate) lengths: Vec<(usize, f64)>,
     pub(crate) scales: Vec<Scale>,
     pub(crate) covariance: RowCovariance,
+    /// What it makes of the windowed regressors, once a fit was made with it.
+    pub(crate) correlated: Option<Arc<Correlated>>,
     pub(crate) expected: Expected,
     /// Where what is windowed jumps.
     pub(crate) jumps: Vec<Jump>,
@@ -67,6 +72,11 @@ impl Decided {
     /// The right-hand side without what changes slowly.
     pub(crate) fn side<'a>(&'a self, rows: &'a Rows) -> &'a [f64] {
         self.found.as_ref().map_or(&rows.side, |found| &found.side)
+    }
+
+    /// The equations for what does not change slowly. `noise` is the variance of the angle's.
+    fn problem<'a>(&'a self, rows: &'a Rows, noise: f64) -> Problem<'a> {
+        self.model.problem(rows, self.side(rows), noise, self.correlated.as_ref())
     }
 
     /// The model with what changes slowly before the other constants.
@@ -117,6 +127,7 @@ impl Session<'_, '_, '_> {
             lengths: Vec::new(),
             scales: Vec::new(),
             covariance,
+            correlated: None,
             expected,
             jumps: Vec::new(),
             whole: None,
@@ -140,7 +151,7 @@ impl Session<'_, '_, '_> {
     /// Tests every constant. Returns the one that differs most between the parts of the record, if it may be set free.
     fn test(&mut self, rows: &Rows, decided: &mut Decided) -> Result<Option<usize>, Error> {
         let Some(fit) = &decided.fit else { return Ok(None) };
-        let problem = decided.model.problem(rows, decided.side(rows), self.noise[0], Some(&decided.covariance));
+        let problem = decided.problem(rows, self.noise[0]);
         let (expected, inflation) = (decided.expected, decided.error.max(1.0));
         let instructions = self.options.instructions;
         let results =
@@ -190,7 +201,9 @@ impl Session<'_, '_, '_> {
         if model.windowed.is_empty() || !self.options.average {
             let window = wanted.unwrap_or(rows.len()).min(rows.len());
             for last in [false, true] {
-                let problem = model.problem(rows, &rows.side, self.noise[0], Some(&decided.covariance));
+                let correlated = model.correlated(rows, &decided.covariance, &mut self.run)?;
+                let problem = model.problem(rows, &rows.side, self.noise[0], Some(&correlated));
+                decided.correlated = Some(correlated);
                 decided.fit = if model.windowed.is_empty() {
                     Fit::new(&problem, None, decided.expected, instructions, &mut self.run)?
                 } else {
@@ -225,7 +238,9 @@ impl Session<'_, '_, '_> {
         let scale = best.fit.scale;
         decided.first = scale;
         drop(validated);
-        let problem = model.problem(rows, &rows.side, self.noise[0], Some(&decided.covariance));
+        let correlated = model.correlated(rows, &decided.covariance, &mut self.run)?;
+        let problem = model.problem(rows, &rows.side, self.noise[0], Some(&correlated));
+        decided.correlated = Some(correlated);
         decided.fit = Fit::new(&problem, scale, decided.expected, instructions, &mut self.run)?;
         Ok(())
     }
@@ -235,7 +250,8 @@ impl Session<'_, '_, '_> {
     fn validate(&mut self, rows: &Rows, decided: &Decided, scales: &[Scale]) -> Result<Vec<Validated>, Error> {
         let (instructions, expected) = (self.options.instructions, decided.expected);
         let mut validated = |rows: &Rows, scales: &[Scale]| {
-            let problem = decided.model.problem(rows, &rows.side, self.noise[0], Some(&decided.covariance));
+            let correlated = decided.model.correlated(rows, &decided.covariance, &mut self.run)?;
+            let problem = decided.model.problem(rows, &rows.side, self.noise[0], Some(&correlated));
             validate(&problem, scales, expected, instructions, &mut self.run)
         };
         let Some(stretches) = stretches_of_rows(rows.len()).filter(|_| scales.len() > 1) else {
@@ -268,7 +284,7 @@ impl Session<'_, '_, '_> {
         let (Some(signals), Some(fit)) = (signals, &decided.fit) else { return Ok(known.to_vec()) };
         let signals: Vec<&dyn Samples> = signals.iter().map(|signal| &**signal).collect();
         let (constants, noise) = (&fit.pooled.values, self.noise[0]);
-        let problem = decided.model.problem(&weak.rows, decided.side(&weak.rows), noise, Some(&decided.covariance));
+        let problem = decided.problem(&weak.rows, noise);
         let rest_side = without_constants(&problem, constants);
         let rest = decided.model.without_constants(&weak.rows, &problem, &rest_side, constants, noise);
         let whole = whole.unwrap_or(&weak.rows);
@@ -294,7 +310,7 @@ impl Session<'_, '_, '_> {
             lengths: &lengths,
             instructions: self.options.instructions,
         };
-        search.find(&residuals(&problem, fit).0, known, &mut self.run)
+        search.find(&residuals(&problem, fit, &mut self.run)?.0, known, &mut self.run)
     }
 
     /// Finds what changes slowly, and the other constants beside it.
@@ -317,10 +333,10 @@ impl Session<'_, '_, '_> {
         decided.found = varying::find(&search, first, &mut self.run)?;
         decided.fit = None;
         if let Some(found) = &decided.found {
-            let problem = decided.model.problem(rows, &found.side, self.noise[0], Some(&decided.covariance));
+            let problem = decided.problem(rows, self.noise[0]);
             let (scale, expected) = (Some(found.scale), decided.expected);
-            decided.error = found.error;
-            decided.fit = Fit::new(&problem, scale, expected, instructions, &mut self.run)?;
+            let (error, fit) = (found.error, Fit::new(&problem, scale, expected, instructions, &mut self.run)?);
+            (decided.error, decided.fit) = (error, fit);
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! What is said of a record once it is decided what changes: values at every sample, their errors, and what looks wrong.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use crate::averaging::average;
 use crate::channels::{Cubed, Direction};
@@ -13,6 +14,7 @@ use crate::model::{Fit, Predictor, without_constants};
 use crate::outside_mask::{Inside, Outside};
 use crate::pooling::{Expected, is_determined, joint_covariance, weakest};
 use crate::row_covariance::RowCovariance;
+use crate::run::Run;
 use crate::status::Status;
 use crate::suspects::{Judged, Missing, Suspect};
 use crate::thinned::{holds, stretches_of_rows, thinned_column, thinned_rows};
@@ -92,17 +94,21 @@ impl Session<'_, '_, '_> {
         let Some(fit) = &decided.fit else { return Ok(self.undetermined(found, decided)) };
         let given = self.options.equations.filter(|_| !self.options.average);
         found.equations = given.unwrap_or(fit.span * stride).min(self.record.angle.len());
-        let errors = self.errors(&weak, decided, fit);
+        let errors = self.errors(&weak, decided, fit)?;
         found.prediction_error = errors.error;
-        let problem = ordered.problem(&weak.rows, decided.side(&weak.rows), self.noise[0], Some(&errors.covariance));
+        let correlated = match &decided.correlated {
+            Some(correlated) if errors.covariance == decided.covariance => Arc::clone(correlated),
+            _ => ordered.correlated(&weak.rows, &errors.covariance, &mut self.run)?,
+        };
+        let problem = ordered.problem(&weak.rows, decided.side(&weak.rows), self.noise[0], Some(&correlated));
         let all = self.all_unknowns(&problem, decided, fit, &errors)?;
         let Some(all) = all.as_deref() else { return Ok(self.undetermined(found, decided)) };
         found.condition = all.pooled.condition;
         found.weakest = weakest(&all.full, &all.pooled.weights);
-        found.covariance = all.covariance(&problem, &errors.covariance);
+        found.covariance = all.covariance(&problem, &errors.covariance, &mut self.run)?;
         let (side, expected) = (decided.side(&weak.rows), errors.expected);
         if let Some(covariance) =
-            self.covariance_beside_lag(&weak, &ordered, side, fit, expected, &errors.covariance)?
+            self.covariance_beside_lag(&weak, &ordered, side, fit, expected, (&errors.covariance, &correlated))?
         {
             found.covariance = covariance;
         }
@@ -149,8 +155,8 @@ impl Session<'_, '_, '_> {
         let usable = &decided.whole.as_ref().unwrap_or(&weak.rows).usable;
         tracks.mark(usable, outside.as_ref());
         found.outside_mask = outside;
-        let results = Self::rows_results(&weak, &problem, decided, all, &errors, &tracks, &found, &values);
-        let (results, pairs) = results;
+        let (mut results, pairs) = Self::rows_results(&weak, &problem, decided, all, &errors, &tracks, &found);
+        results.deviation = deviation(&problem, &tracks, &values, all.span, &mut self.run)?;
         found.pairs = pairs;
         let side = decided.side(&weak.rows).to_vec();
         found.suspects = self.suspects(&mut weak, decided, fit, &side, &errors)?;
@@ -189,7 +195,7 @@ impl Session<'_, '_, '_> {
     }
 
     /// The covariance that errors are made from: that of the channels' noise, or where it fails to explain the residuals, theirs.
-    fn errors(&self, weak: &WeakRows, decided: &Decided, fit: &Fit) -> Errors {
+    fn errors(&mut self, weak: &WeakRows, decided: &Decided, fit: &Fit) -> Result<Errors, Error> {
         let mut errors = Errors {
             covariance: decided.covariance.clone(),
             expected: decided.expected,
@@ -199,7 +205,7 @@ impl Session<'_, '_, '_> {
         };
         let rows = &weak.rows;
         let problem = decided.model.problem(rows, decided.side(rows), self.noise[0], None);
-        let (residuals, usable) = residuals(&problem, fit);
+        let (residuals, usable) = residuals(&problem, fit, &mut self.run)?;
         let reach = 2 * weak.reach();
         let shown = RowCovariance::of_residuals(&residuals, &usable, 2 * reach);
         if shown.is_coloured(reach, COLOURED, usable.iter().filter(|usable| **usable).count()) {
@@ -216,7 +222,7 @@ impl Session<'_, '_, '_> {
             errors.expected = Expected::new(&shown, shown.variance());
             errors.covariance = shown;
         }
-        errors
+        Ok(errors)
     }
 
     /// What changes, at every row.
@@ -307,7 +313,7 @@ impl Session<'_, '_, '_> {
                 .map(|column| column.iter().map(|slope| slope * rows.period).collect())
                 .collect(),
             values: averages.values,
-            sensitivities: sensitivities(problem, all),
+            sensitivities: sensitivities(problem, all, &mut self.run)?,
             condition: (0..rows.len()).map(|row| condition[fit.nearest(row)]).collect(),
             status,
         })
@@ -323,7 +329,6 @@ impl Session<'_, '_, '_> {
         errors: &Errors,
         tracks: &Tracks,
         found: &WeakIdentified,
-        constants: &[f64],
     ) -> (RowResults, Vec<(usize, usize)>) {
         let count = problem.layout.constant;
         let (windowed, slow) = (problem.layout.windowed, decided.slow.len());
@@ -381,7 +386,6 @@ impl Session<'_, '_, '_> {
                 }
             }
         }
-        results.deviation = deviation(problem, tracks, constants, all.span);
         (results, pairs)
     }
 
@@ -420,6 +424,7 @@ impl Session<'_, '_, '_> {
         let first = weak.rows.regressors.len();
         weak.rows.regressors.extend(more.rows.regressors.into_iter().skip(3));
         weak.rows.clear_unusable();
+        let correlated = decided.model.correlated(&weak.rows, &errors.covariance, &mut self.run)?;
         let mut suspects = Vec::new();
         for (place, (missing, _)) in terms.iter().enumerate() {
             let judged = Judged {
@@ -429,6 +434,7 @@ impl Session<'_, '_, '_> {
                 noise: self.noise[0],
                 fit,
                 covariance: &errors.covariance,
+                correlated: &correlated,
                 expected: errors.expected,
                 inflation: errors.inflation,
                 instructions: self.options.instructions,
@@ -449,76 +455,96 @@ fn pairs_of(constants: &[usize], slow: usize, covariance: &[f64]) -> Vec<(usize,
 }
 
 /// How what is windowed changes with each constant, row by row: what the window nearest to a row says.
-fn sensitivities(problem: &Problem<'_>, all: &Fit) -> Vec<Vec<f64>> {
+fn sensitivities(problem: &Problem<'_>, all: &Fit, run: &mut Run<'_, '_>) -> Result<Vec<Vec<f64>>, Error> {
     let layout = problem.layout;
     let constants = vec![0.0; layout.constant];
     let predictor = Predictor::new(&all.full, &constants);
     let determined: Vec<usize> = (0..all.full.len()).filter(|&window| is_determined(&all.full, window)).collect();
-    let mut columns = vec![Vec::with_capacity(problem.rows()); layout.windowed * layout.constant];
-    for row in 0..problem.rows() {
-        let wanted = all.nearest(row);
+    let beside = |wanted: usize| {
         let next = determined.partition_point(|&window| window < wanted);
         let around = [next.checked_sub(1), Some(next)].into_iter().flatten();
-        let place =
-            around.filter_map(|place| determined.get(place).copied()).min_by_key(|place| place.abs_diff(wanted));
-        let place = place.unwrap_or(wanted);
-        let later = (row as f64 - all.centre(place)) * problem.period;
-        for unknown in 0..layout.windowed {
-            for constant in 0..layout.constant {
-                let value = predictor.sensitivity(place, unknown, constant, later);
-                columns[unknown * layout.constant + constant].push(value);
+        let around = around.filter_map(|place| determined.get(place).copied());
+        around.min_by_key(|place| place.abs_diff(wanted)).unwrap_or(wanted)
+    };
+    let mut columns = vec![vec![0.0; problem.rows()]; layout.windowed * layout.constant];
+    run.fill(columns.iter_mut().map(Vec::as_mut_slice), |rows, columns| {
+        for (index, row) in rows.enumerate() {
+            let wanted = all.nearest(row);
+            let place = if is_determined(&all.full, wanted) { wanted } else { beside(wanted) };
+            let later = (row as f64 - all.centre(place)) * problem.period;
+            for (number, column) in columns.iter_mut().enumerate() {
+                let (unknown, constant) = (number / layout.constant, number % layout.constant);
+                column[index] = predictor.sensitivity(place, unknown, constant, later);
             }
         }
-    }
-    columns
+    })?;
+    Ok(columns)
 }
 
-/// What a fit leaves of every row, and where it says anything.
-pub(crate) fn residuals(problem: &Problem<'_>, fit: &Fit) -> (Vec<f64>, Vec<bool>) {
-    let mut usable = problem.usable.to_vec();
+/// What a fit leaves of every row, and where it says anything; zero where it says nothing.
+pub(crate) fn residuals(
+    problem: &Problem<'_>,
+    fit: &Fit,
+    run: &mut Run<'_, '_>,
+) -> Result<(Vec<f64>, Vec<bool>), Error> {
     let mut left = without_constants(problem, &fit.pooled.values);
-    if problem.layout.windowed > 0 {
+    let windowed = problem.layout.windowed > 0;
+    if windowed {
         let predictor = Predictor::new(&fit.full, &fit.pooled.values);
-        for (row, left) in left.iter_mut().enumerate().filter(|(row, _)| problem.usable[*row]) {
-            let place = fit.nearest(row);
-            if !is_determined(&fit.full, place) {
-                (*left, usable[row]) = (0.0, false);
-                continue;
+        run.fill(std::iter::once(left.as_mut_slice()), |rows, columns| {
+            for (row, left) in rows.zip(&mut *columns[0]).filter(|(row, _)| problem.usable[*row]) {
+                let place = fit.nearest(row);
+                let later = (row as f64 - fit.centre(place)) * problem.period;
+                let determined = is_determined(&fit.full, place);
+                *left = if determined { *left - predictor.predict(problem, place, row, later) } else { 0.0 };
             }
-            let later = (row as f64 - fit.centre(place)) * problem.period;
-            *left -= predictor.predict(problem, place, row, later);
-        }
+        })?;
     }
-    (left, usable)
+    let says = |(row, usable): (usize, &bool)| *usable && (!windowed || is_determined(&fit.full, fit.nearest(row)));
+    let usable = problem.usable.iter().enumerate().map(says).collect();
+    Ok((left, usable))
 }
 
 /// Standard deviation of what is left, over windows of so many rows.
-fn deviation(problem: &Problem<'_>, tracks: &Tracks, constants: &[f64], span: usize) -> Vec<f64> {
-    let left = without_constants(problem, constants);
-    let mut sums = vec![[0.0, 0.0]];
-    let (mut sum, mut count) = (0.0, 0.0);
-    for (row, left) in left.iter().enumerate() {
-        let mut error = *left;
-        let place = (row.cast_signed() - tracks.first).unsigned_abs();
-        for unknown in 0..problem.layout.windowed {
-            error -= tracks.values[unknown][place] * problem.windowed[unknown][row];
-            if problem.layout.linear {
-                error -= tracks.slopes[unknown][place] / problem.period * problem.companions[unknown][row];
+fn deviation(
+    problem: &Problem<'_>,
+    tracks: &Tracks,
+    constants: &[f64],
+    span: usize,
+    run: &mut Run<'_, '_>,
+) -> Result<Vec<f64>, Error> {
+    let mut errors = without_constants(problem, constants);
+    run.fill(std::iter::once(errors.as_mut_slice()), |rows, columns| {
+        for (row, error) in rows.zip(&mut *columns[0]) {
+            let place = (row.cast_signed() - tracks.first).unsigned_abs();
+            for unknown in 0..problem.layout.windowed {
+                *error -= tracks.values[unknown][place] * problem.windowed[unknown][row];
+                if problem.layout.linear {
+                    *error -= tracks.slopes[unknown][place] / problem.period * problem.companions[unknown][row];
+                }
             }
         }
-        if problem.usable[row] && error.is_finite() {
+    })?;
+    let mut sums = vec![[0.0, 0.0]];
+    let (mut sum, mut count) = (0.0, 0.0);
+    sums.extend(errors.iter().zip(problem.usable).map(|(error, &usable)| {
+        if usable && error.is_finite() {
             sum += error * error;
             count += 1.0;
         }
-        sums.push([sum, count]);
-    }
-    let rows = left.len();
-    (0..tracks.status.len())
-        .map(|place| {
+        [sum, count]
+    }));
+    let mut deviation = vec![f64::NAN; tracks.status.len()];
+    run.fill(std::iter::once(deviation.as_mut_slice()), |places, columns| {
+        for (place, deviation) in places.zip(&mut *columns[0]) {
             let row = (tracks.first + place.cast_signed()).max(0).unsigned_abs();
+            let rows = errors.len();
             let (first, end) = (row.saturating_sub(span / 2).min(rows), (row + span.div_ceil(2)).min(rows));
             let (sum, count) = (sums[end][0] - sums[first][0], sums[end][1] - sums[first][1]);
-            if count > 0.0 { (sum / count).max(0.0).sqrt() } else { f64::NAN }
-        })
-        .collect()
+            if count > 0.0 {
+                *deviation = (sum / count).max(0.0).sqrt();
+            }
+        }
+    })?;
+    Ok(deviation)
 }

@@ -6,6 +6,7 @@
 
 use std::cell::RefCell;
 use std::ops::Range;
+use std::sync::Arc;
 
 use crate::factor::{Fields, Layout, RowNoise, Scratch, absorb, count, merge, recentre, solve, symmetric};
 use crate::packet::{Packet, WIDTH};
@@ -34,7 +35,7 @@ pub(crate) struct Problem<'a> {
     /// What the angle's noise does in a row.
     pub(crate) noise: RowNoise,
     /// What the covariance of the rows makes of the windowed regressors; without it errors are those of ordinary least squares.
-    pub(crate) correlated: Option<Correlated>,
+    pub(crate) correlated: Option<Arc<Correlated>>,
 }
 
 /// Windowed regressors and their companions, multiplied by the covariance of the rows.
