@@ -17,9 +17,10 @@ use std::ops::Range;
 use crate::averaging::Around;
 use crate::error::Error;
 use crate::parallel::Piece;
+use crate::placement::Place;
 use crate::pooling::Expected;
 use crate::run::Run;
-use crate::samples::{Samples, is_usable};
+use crate::samples::Samples;
 use crate::scale::{Cells, SHORTEST_ALONE, Scale};
 use crate::simd::Instructions;
 use crate::windows::Problem;
@@ -79,7 +80,7 @@ pub(crate) struct Search<'a> {
 }
 
 /// A line for every windowed coefficient: value at a row and growth per row.
-type Lines = Vec<[f64; 2]>;
+pub(crate) type Lines = Vec<[f64; 2]>;
 
 impl Search<'_> {
     /// The jumps of the record, in order: those that are known placed again, and new ones. `errors` are what is left of the rows.
@@ -217,7 +218,7 @@ impl Search<'_> {
             let sides = [self.lines(windows, row, 0)?, self.lines(windows, row - 1, 2)?];
             let candidates = tau.saturating_sub(half)..tau + half + 1;
             let over = row.saturating_sub(2 * reach)..(row + 2 * reach).min(rows);
-            let left = self.left(&sides, row, &over, &candidates)?;
+            let left = self.left(&Place { lines: &sides, row, over: &over, candidates: &candidates })?;
             let best = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]))?;
             let next = candidates.start + best;
             if next.abs_diff(tau) <= self.stride / 2 || round == ROUNDS {
@@ -233,67 +234,6 @@ impl Search<'_> {
         let seen = windows.seen(self.problem, row, which)?;
         let line = |unknown| [seen.value(unknown), seen.slope(unknown) * self.problem.period];
         Some((0..self.problem.layout.windowed).map(line).collect())
-    }
-
-    /// The sums of squares that jumps before each candidate sample leave in some rows. The line before a jump counts from a row, that after it
-    /// from the row before.
-    fn left(
-        &self,
-        [before, after]: &[Lines; 2],
-        row: usize,
-        over: &Range<usize>,
-        candidates: &Range<usize>,
-    ) -> Option<Vec<f64>> {
-        let (length, half) = (self.function.len(), self.function.len() / 2);
-        let mut left = vec![0.0; candidates.len()];
-        let mut samples = vec![0.0; length];
-        let mut products = vec![[0.0, 0.0]; length];
-        // What is left of a row where the line before the jump holds for so many of its samples.
-        let mut errors = vec![0.0; length + 1];
-        let mut count = 0;
-        for one in over.clone().filter(|&one| self.whole.usable[one]) {
-            let begin = self.first + one * self.stride - half;
-            products.fill([0.0, 0.0]);
-            for (unknown, signal) in self.signals.iter().enumerate() {
-                signal.read(begin, &mut samples);
-                if !samples.iter().all(|&value| is_usable(value)) {
-                    return None;
-                }
-                let ([from, rise], [to, growth]) = (before[unknown], after[unknown]);
-                let per_sample = 1.0 / self.stride as f64;
-                let first = (begin as f64 - (self.first + row * self.stride) as f64) * per_sample;
-                for (place, ((product, value), factor)) in
-                    products.iter_mut().zip(&samples).zip(self.function).enumerate()
-                {
-                    let (weight, later) = (factor * value, first + place as f64 * per_sample);
-                    product[0] += weight * (from + later * rise);
-                    product[1] += weight * (to + (later + 1.0) * growth);
-                }
-            }
-            let total: f64 = products.iter().map(|product| product[1]).sum();
-            errors[0] = self.side[one] - total;
-            for (place, product) in products.iter().enumerate() {
-                errors[place + 1] = errors[place] + (product[1] - product[0]);
-            }
-            // Candidates before the row's samples, within them and behind.
-            let within = |candidate: usize| (candidate.max(begin) - begin).min(length);
-            let (first, last) = (within(candidates.start), within(candidates.end));
-            let (before, rest) =
-                left.split_at_mut((begin + first).clamp(candidates.start, candidates.end) - candidates.start);
-            let (inside, behind) = rest.split_at_mut(last - first);
-            let squares = [errors[0] * errors[0], errors[length] * errors[length]];
-            for left in before {
-                *left += squares[0];
-            }
-            for (left, error) in inside.iter_mut().zip(&errors[first..]) {
-                *left += error * error;
-            }
-            for left in behind {
-                *left += squares[1];
-            }
-            count += 1;
-        }
-        (2 * count >= over.len()).then_some(left)
     }
 
     /// Whether a jump is more than chance: windows of no length may predict the rows around it nearly as well without one.

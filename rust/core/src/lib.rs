@@ -35,6 +35,7 @@ pub mod outside_mask;
 mod packet;
 mod pages;
 pub mod parallel;
+mod placement;
 mod pool;
 mod pooling;
 mod projection;

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use crate::equations::{Regressor, Rows};
 use crate::error::Error;
 use crate::factor::{Layout, RowNoise};
-use crate::pooling::{Expected, Pooled, between, influence, is_determined, local, pool, products, sandwich};
 use crate::parallel::Piece;
+use crate::pooling::{Expected, Pooled, between, influence, is_determined, local, pool, products, sandwich};
 use crate::row_covariance::RowCovariance;
 use crate::run::Run;
 use crate::scale::Scale;
@@ -183,7 +183,8 @@ impl Fit {
     ) -> Result<Vec<f64>, Error> {
         let each = || (0..problem.layout.constant).map(|constant| Piece { size: problem.rows(), content: constant });
         let windows = 0..self.full.len();
-        let influence = |constant: usize, (): &mut ()| self.influence(problem, &windows, &self.pooled.weights, constant);
+        let influence =
+            |constant: usize, (): &mut ()| self.influence(problem, &windows, &self.pooled.weights, constant);
         let columns = run.map(each().collect(), || (), influence)?;
         let products = |constant: usize, (): &mut ()| products(&columns, constant, covariance);
         let products = run.map(each().collect(), || (), products)?;

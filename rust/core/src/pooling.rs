@@ -217,11 +217,8 @@ pub(crate) fn influence(
         after[0] += weight;
         for regressor in 0..q {
             let value = weight * full.field(fields.solution(regressor, constant))[window];
-            let rate = if layout.linear {
-                weight * full.field(fields.solution(q + regressor, constant))[window]
-            } else {
-                0.0
-            };
+            let rate =
+                if layout.linear { weight * full.field(fields.solution(q + regressor, constant))[window] } else { 0.0 };
             let parts = [value, rate, rate * centre(window)];
             after[1 + 3 * regressor..][..3].iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
         }

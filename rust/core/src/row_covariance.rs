@@ -37,16 +37,17 @@ impl RowCovariance {
         Self { lags: lags.collect() }
     }
 
-    /// The covariance that residuals show up to some distance, tapered so that it stays one. Missing residuals are zero.
+    /// The covariance that residuals show up to some distance, tapered so that it stays one.
     pub(crate) fn of_residuals(residuals: &[f64], usable: &[bool], farthest: usize) -> Self {
+        let whole = usable.iter().all(|&usable| usable);
+        let missing = |(residual, usable): (&f64, &bool)| if *usable { *residual } else { 0.0 };
+        let residuals: Vec<f64> = residuals.iter().zip(usable).map(missing).collect();
         let lags = (0..=farthest).map(|lag| {
-            let (mut sum, mut count) = (0.0, 0.0_f64);
-            for row in lag..residuals.len() {
-                if usable[row] && usable[row - lag] {
-                    sum += residuals[row] * residuals[row - lag];
-                    count += 1.0;
-                }
-            }
+            let rows = residuals.len().saturating_sub(lag);
+            let later = residuals.len() - rows;
+            let pairs = || usable[..rows].iter().zip(&usable[later..]);
+            let count = if whole { rows } else { pairs().filter(|(early, late)| **early && **late).count() } as f64;
+            let sum = sum_of_products(&residuals[..rows], &residuals[later..]);
             (1.0 - lag as f64 / (farthest + 1) as f64) * sum / count.max(1.0)
         });
         Self { lags: lags.collect() }
@@ -116,7 +117,20 @@ impl RowCovariance {
     }
 }
 
+/// The dot product of two columns, in eight sums side by side: one alone waits for every addition.
+fn sum_of_products(one: &[f64], other: &[f64]) -> f64 {
+    let ((one, one_rest), (other, other_rest)) = (one.as_chunks::<8>(), other.as_chunks::<8>());
+    let mut sums = [0.0; 8];
+    for (one, other) in one.iter().zip(other) {
+        for lane in 0..8 {
+            sums[lane] += one[lane] * other[lane];
+        }
+    }
+    let rest: f64 = one_rest.iter().zip(other_rest).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f64>() + rest
+}
+
 /// `Σ_k a(k) a(k + lag)`.
 fn products(kernel: &[f64], lag: usize) -> f64 {
-    kernel.iter().zip(&kernel[lag..]).map(|(a, b)| a * b).sum()
+    sum_of_products(&kernel[..kernel.len() - lag], &kernel[lag..])
 }

@@ -46,7 +46,11 @@ impl<'a, 'b> Run<'a, 'b> {
             Piece { size, content: (content, parts) }
         };
         let pieces = ranges(rows).into_iter().map(cut).collect();
-        self.map(pieces, || (), |(rows, mut parts): (Range<usize>, Vec<&mut [f64]>), (): &mut ()| work(rows, &mut parts))?;
+        self.map(
+            pieces,
+            || (),
+            |(rows, mut parts): (Range<usize>, Vec<&mut [f64]>), (): &mut ()| work(rows, &mut parts),
+        )?;
         Ok(())
     }
 

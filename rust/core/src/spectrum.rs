@@ -1,16 +1,23 @@
 //! Power spectra: Fourier transforms, and the averaged spectrum of a record.
 
 use std::f64::consts::PI;
+use std::ops::Range;
 use std::sync::Arc;
 
 use realfft::{RealFftPlanner, RealToComplex};
 
+use crate::error::Error;
+use crate::parallel::Piece;
+use crate::run::Run;
 use crate::samples::{Samples, is_usable};
 
 /// Segments that are averaged at most, spread over the record: so many, or fewer long ones that hold so many samples together.
 const MOST_SEGMENTS: usize = 256;
 const MOST_SAMPLES: usize = 1 << 20;
 const FEWEST_SEGMENTS: usize = 32;
+
+/// Segments that a piece of work sums.
+const TOGETHER: usize = 16;
 
 /// The discrete Fourier transform of real sequences of one length.
 pub(crate) struct Transform(Arc<dyn RealToComplex<f64>>);
@@ -47,31 +54,74 @@ impl Transform {
 ///
 /// Only the changes are of interest, so the mean of each segment is taken off.
 pub(crate) fn power(record: &dyn Samples, length: usize) -> Vec<f64> {
-    let fade: Vec<f64> = (0..length).map(|k| (PI * (k as f64 + 0.5) / length as f64).sin().powi(2)).collect();
-    let energy: f64 = fade.iter().map(|value| value * value).sum();
-    let mut sum = vec![0.0; length / 2 + 1];
-    let mut count = 0.0_f64;
-    let last = record.len().saturating_sub(length);
-    let most = (MOST_SAMPLES / length).clamp(FEWEST_SEGMENTS, MOST_SEGMENTS);
-    let every = (length / 2).max(last / most).max(1);
-    let transform = Transform::new(length);
-    let mut samples = vec![0.0; length];
-    for first in (0..=last).step_by(every).take_while(|_| record.len() >= length) {
-        record.read(first, &mut samples);
-        if !bridge(&mut samples) {
-            continue;
-        }
-        let mean = samples.iter().sum::<f64>() / length as f64;
-        samples.iter_mut().zip(&fade).for_each(|(value, fade)| *value = (*value - mean) * fade);
-        for (sum, [real, imaginary]) in sum.iter_mut().zip(transform.of(&mut samples)) {
-            *sum += (real * real + imaginary * imaginary) / energy;
-        }
-        count += 1.0;
+    let segments = Segments::new(record, length);
+    segments.mean(segments.parts().map(|part| segments.sum(part)))
+}
+
+/// The same, in parallel.
+pub(crate) fn power_in_pieces(record: &dyn Samples, length: usize, run: &mut Run<'_, '_>) -> Result<Vec<f64>, Error> {
+    let segments = Segments::new(record, length);
+    let pieces = segments.parts().map(|part| Piece { size: part.len(), content: part });
+    let sums = run.map(pieces.collect(), || (), |part, (): &mut ()| segments.sum(part))?;
+    Ok(segments.mean(sums.into_iter()))
+}
+
+/// The segments of a record that a spectrum is the average of.
+struct Segments<'a> {
+    record: &'a dyn Samples,
+    length: usize,
+    /// How many there are, and samples from one to the next.
+    count: usize,
+    every: usize,
+    fade: Vec<f64>,
+    transform: Transform,
+}
+
+impl<'a> Segments<'a> {
+    fn new(record: &'a dyn Samples, length: usize) -> Self {
+        let fade = (0..length).map(|k| (PI * (k as f64 + 0.5) / length as f64).sin().powi(2)).collect();
+        let most = (MOST_SAMPLES / length).clamp(FEWEST_SEGMENTS, MOST_SEGMENTS);
+        let last = record.len().checked_sub(length);
+        let every = (length / 2).max(last.unwrap_or(0) / most).max(1);
+        let count = last.map_or(0, |last| last / every + 1);
+        Self { record, length, count, every, fade, transform: Transform::new(length) }
     }
-    for value in &mut sum {
-        *value /= count.max(1.0);
+
+    /// Segments that are summed together.
+    fn parts(&self) -> impl Iterator<Item = Range<usize>> {
+        let count = self.count;
+        (0..count).step_by(TOGETHER).map(move |first| first..count.min(first + TOGETHER))
     }
-    sum
+
+    /// The power of some segments together, and how many of them count.
+    fn sum(&self, segments: Range<usize>) -> (Vec<f64>, usize) {
+        let mut sum = vec![0.0; self.length / 2 + 1];
+        let mut count = 0;
+        let energy: f64 = self.fade.iter().map(|value| value * value).sum();
+        let mut samples = vec![0.0; self.length];
+        for segment in segments {
+            self.record.read(segment * self.every, &mut samples);
+            if !bridge(&mut samples) {
+                continue;
+            }
+            let mean = samples.iter().sum::<f64>() / self.length as f64;
+            samples.iter_mut().zip(&self.fade).for_each(|(value, fade)| *value = (*value - mean) * fade);
+            for (sum, [real, imaginary]) in sum.iter_mut().zip(self.transform.of(&mut samples)) {
+                *sum += (real * real + imaginary * imaginary) / energy;
+            }
+            count += 1;
+        }
+        (sum, count)
+    }
+
+    fn mean(&self, sums: impl Iterator<Item = (Vec<f64>, usize)>) -> Vec<f64> {
+        let (mut mean, mut all) = (vec![0.0; self.length / 2 + 1], 0);
+        for (sum, count) in sums {
+            mean.iter_mut().zip(sum).for_each(|(mean, sum)| *mean += sum);
+            all += count;
+        }
+        mean.into_iter().map(|value| value / all.max(1) as f64).collect()
+    }
 }
 
 /// Puts a line where samples cannot be used; whether at least half of them can.

@@ -9,6 +9,9 @@
 use faer::Mat;
 use faer::linalg::solvers::{DenseSolveCore, Llt, Solve};
 
+use crate::error::Error;
+use crate::parallel::Piece;
+use crate::run::Run;
 use crate::spectrum::Transform;
 use crate::test_function::{LEAST_HALF_WIDTH, TestFunction};
 
@@ -103,8 +106,9 @@ impl Candidates {
         evidence: Evidence,
         widths: &[usize],
         exponent: Option<usize>,
-        share: impl Fn(usize) -> f64,
-    ) -> Self {
+        share: impl Fn(usize) -> f64 + Sync,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Self, Error> {
         let exponents = exponent.map_or_else(|| EXPONENTS.to_vec(), |exponent| vec![exponent]);
         let length = 2 * (evidence.power.len() - 1);
         let functions = exponents.iter().flat_map(|&exponent| {
@@ -112,8 +116,10 @@ impl Candidates {
             widths.iter().filter_map(move |&width| TestFunction::new(width, exponent, delta).ok())
         });
         let transform = Transform::new(length);
-        let tried = functions.map(|function| Tried::new(function, &transform, share(function.half_width()))).collect();
-        Self { evidence, tried }
+        let pieces = functions.map(|function| Piece { size: 1, content: function });
+        let of = |function: TestFunction, (): &mut ()| Tried::new(function, &transform, share(function.half_width()));
+        let tried = run.map(pieces.collect(), || (), of)?;
+        Ok(Self { evidence, tried })
     }
 
     /// The test function that leaves the smallest error for given inertia, damping and stiffness, the narrowest among those that are as

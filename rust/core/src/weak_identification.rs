@@ -21,7 +21,7 @@ use crate::samples::Samples;
 use crate::scale::Scale;
 use crate::selection::Selection;
 use crate::simd::Instructions;
-use crate::spectrum::power;
+use crate::spectrum::{power, power_in_pieces};
 use crate::suspects::{Missing, Suspect};
 use crate::test_function::{LEAST_HALF_WIDTH, TestFunction};
 use crate::test_function_choice::{Candidates, Evidence, half_widths, spectrum_length};
@@ -345,6 +345,17 @@ impl Session<'_, '_, '_> {
         self.run.stage(|watch| WeakRows::build(record, function, delta, Some(&stretches), workers, watch)).map(Some)
     }
 
+    /// What the choice of a test function is made from, with spectra of some length.
+    fn evidence(&mut self, length: usize) -> Result<Evidence, Error> {
+        Ok(Evidence {
+            power: power_in_pieces(self.record.angle, length, &mut self.run)?,
+            samples: self.record.angle.len(),
+            noise: self.noise,
+            delta: self.options.delta,
+            unknown: std::array::from_fn(|index| matches!(self.record.coefficients[index], Coefficient::Unknown)),
+        })
+    }
+
     /// Chooses half-width and exponent where they are not given, and estimates the coefficients on the way.
     pub(crate) fn choose_test_function(&mut self, model: &Model) -> Result<Chosen, Error> {
         let (samples, delta) = (self.record.angle.len(), self.options.delta);
@@ -356,21 +367,15 @@ impl Session<'_, '_, '_> {
         }
         // So many rows are left that windows of several test functions fit in.
         let widest = samples / if model.windowed.is_empty() { 8 } else { 16 };
-        let evidence = |length: usize| Evidence {
-            power: power(self.record.angle, length),
-            samples,
-            noise: self.noise,
-            delta,
-            unknown: std::array::from_fn(|index| matches!(self.record.coefficients[index], Coefficient::Unknown)),
-        };
-        let typical = evidence(spectrum_length(samples, 200)).period().min(widest as f64);
+        let typical = self.evidence(spectrum_length(samples, 200))?.period().min(widest as f64);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the record's length")]
         let typical = (typical.round() as usize).max(1);
         let widths = width.map_or_else(|| half_widths((4 * typical).min(widest)), |width| vec![width]);
         let widest = *widths.last().ok_or(self.too_short())?;
         let usable = Usable::new(&self.record);
         let share = |half: usize| usable.share(half);
-        let candidates = Candidates::new(evidence(spectrum_length(samples, widest)), &widths, exponent, share);
+        let evidence = self.evidence(spectrum_length(samples, widest))?;
+        let candidates = Candidates::new(evidence, &widths, exponent, share, &mut self.run)?;
         let start = width.unwrap_or_else(|| usable.widest(typical.max(LEAST_HALF_WIDTH), &widths));
         let mut current = TestFunction::new(start, exponent.unwrap_or(9), delta)?;
         let mut seen = Vec::new();

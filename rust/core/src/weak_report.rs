@@ -155,8 +155,8 @@ impl Session<'_, '_, '_> {
         let usable = &decided.whole.as_ref().unwrap_or(&weak.rows).usable;
         tracks.mark(usable, outside.as_ref());
         found.outside_mask = outside;
-        let (mut results, pairs) = Self::rows_results(&weak, &problem, decided, all, &errors, &tracks, &found);
-        results.deviation = deviation(&problem, &tracks, &values, all.span, &mut self.run)?;
+        let results = self.rows_results(&weak, &problem, decided, all, &errors, tracks, &found.covariance, &values)?;
+        let (results, pairs) = results;
         found.pairs = pairs;
         let side = decided.side(&weak.rows).to_vec();
         found.suspects = self.suspects(&mut weak, decided, fit, &side, &errors)?;
@@ -322,18 +322,21 @@ impl Session<'_, '_, '_> {
     /// Puts together what changes and its errors.
     #[allow(clippy::too_many_arguments, reason = "all that was found")]
     fn rows_results(
+        &mut self,
         weak: &WeakRows,
         problem: &Problem<'_>,
         decided: &Decided,
         all: &Fit,
         errors: &Errors,
-        tracks: &Tracks,
-        found: &WeakIdentified,
-    ) -> (RowResults, Vec<(usize, usize)>) {
+        tracks: Tracks,
+        covariance: &[f64],
+        constants: &[f64],
+    ) -> Result<(RowResults, Vec<(usize, usize)>), Error> {
         let count = problem.layout.constant;
         let (windowed, slow) = (problem.layout.windowed, decided.slow.len());
-        let length = tracks.status.len();
+        let column = || vec![0.0; tracks.status.len()];
         let row_of = |place: usize| (tracks.first + place.cast_signed()) as f64;
+        let deviation = deviation(problem, &tracks, constants, all.span, &mut self.run)?;
         // A slow coefficient is taken from a part of the record only, so its error is larger.
         let share = |constant: usize, place: usize| match &decided.found {
             Some(found) if constant < slow => {
@@ -343,7 +346,7 @@ impl Session<'_, '_, '_> {
             _ => 1.0,
         };
         let between = |one: usize, other: usize, place: usize| {
-            share(one, place) * share(other, place) * found.covariance[one * count + other]
+            share(one, place) * share(other, place) * covariance[one * count + other]
         };
         let sensitive =
             |unknown: usize, constant: usize, place: usize| tracks.sensitivities[unknown * count + constant][place];
@@ -352,41 +355,56 @@ impl Session<'_, '_, '_> {
             let sensitive = |unknown, constant| sensitive(unknown, constant, place);
             joint_covariance([one, other], [windowed, count], own, sensitive, |i, j| between(i, j, place))
         };
+        let mut slowly = vec![column(); 2 * slow];
+        if let Some(found) = &decided.found {
+            self.run.fill(slowly.iter_mut().map(Vec::as_mut_slice), |places, columns| {
+                let (values, slopes) = columns.split_at_mut(slow);
+                for (coefficient, (values, slopes)) in values.iter_mut().zip(slopes).enumerate() {
+                    for (place, (value, slope)) in places.clone().zip(values.iter_mut().zip(slopes.iter_mut())) {
+                        (*value, *slope) = found.varying.at(coefficient, row_of(place));
+                    }
+                }
+            })?;
+        }
+        let slow_slopes = slowly.split_off(slow);
         let names: Vec<usize> =
             decided.model.windowed.iter().chain(&decided.slow).chain(&decided.model.constant).copied().collect();
         let changing = windowed + slow;
-        let mut results = RowResults {
-            first: weak.first as f64 + tracks.first as f64 * weak.stride as f64,
-            stride: weak.stride as f64,
-            values: tracks.values.clone(),
-            slopes: tracks.slopes.clone(),
-            condition: tracks.condition.clone(),
-            status: tracks.status.clone(),
-            jumps: decided.jumps.clone(),
-            ..RowResults::default()
-        };
-        if let Some(found) = &decided.found {
-            for coefficient in 0..slow {
-                let at = |place: usize| found.varying.at(coefficient, row_of(place));
-                results.values.push((0..length).map(|place| at(place).0).collect());
-                results.slopes.push((0..length).map(|place| at(place).1).collect());
-            }
-        }
-        for one in 0..changing {
-            // Rounding may leave less than nothing; what is NaN stays NaN.
-            let error = |variance: f64| if variance < 0.0 { 0.0 } else { variance.sqrt() };
-            results.errors.push((0..length).map(|place| error(covariance(one, one, place))).collect());
-        }
-        let mut pairs = Vec::new();
-        for one in 0..names.len() {
-            for other in 0..one {
-                if other < changing && names[one] < 3 && names[other] < 3 {
-                    pairs.push((names[one], names[other]));
-                    results.covariances.push((0..length).map(|place| covariance(one, other, place)).collect());
+        let all_pairs = (0..names.len()).flat_map(|one| (0..one).map(move |other| (one, other)));
+        let wanted = |&(one, other): &(usize, usize)| other < changing && names[one] < 3 && names[other] < 3;
+        let pairs: Vec<_> = all_pairs.filter(wanted).collect();
+        let (mut standard, mut covariances) = (vec![column(); changing], vec![column(); pairs.len()]);
+        let columns = standard.iter_mut().chain(&mut covariances).map(Vec::as_mut_slice);
+        self.run.fill(columns, |places, columns| {
+            let (errors, covariances) = columns.split_at_mut(changing);
+            for (one, errors) in errors.iter_mut().enumerate() {
+                for (place, error) in places.clone().zip(errors.iter_mut()) {
+                    let variance = covariance(one, one, place);
+                    // Rounding may leave less than nothing; what is NaN stays NaN.
+                    *error = if variance < 0.0 { 0.0 } else { variance.sqrt() };
                 }
             }
-        }
-        (results, pairs)
+            for (&(one, other), covariances) in pairs.iter().zip(covariances) {
+                places
+                    .clone()
+                    .zip(covariances.iter_mut())
+                    .for_each(|(place, entry)| *entry = covariance(one, other, place));
+            }
+        })?;
+        let Tracks { first, values, slopes, condition, status, .. } = tracks;
+        let results = RowResults {
+            first: weak.first as f64 + first as f64 * weak.stride as f64,
+            stride: weak.stride as f64,
+            values: values.into_iter().chain(slowly).collect(),
+            slopes: slopes.into_iter().chain(slow_slopes).collect(),
+            errors: standard,
+            covariances,
+            deviation,
+            condition,
+            status,
+            jumps: decided.jumps.clone(),
+        };
+        Ok((results, pairs.into_iter().map(|(one, other)| (names[one], names[other])).collect()))
     }
 
     /// Looks for what may have been left out.
