@@ -54,6 +54,11 @@ impl Transform {
 ///
 /// Only the changes are of interest, so the mean of each segment is taken off.
 pub(crate) fn power(record: &dyn Samples, length: usize) -> Vec<f64> {
+    power_and_segments(record, length).0
+}
+
+/// The same, and of how many segments it is the mean.
+pub(crate) fn power_and_segments(record: &dyn Samples, length: usize) -> (Vec<f64>, usize) {
     let segments = Segments::new(record, length);
     segments.mean(segments.parts().map(|part| segments.sum(part)))
 }
@@ -63,7 +68,7 @@ pub(crate) fn power_in_pieces(record: &dyn Samples, length: usize, run: &mut Run
     let segments = Segments::new(record, length);
     let pieces = segments.parts().map(|part| Piece { size: part.len(), content: part });
     let sums = run.map(pieces.collect(), || (), |part, (): &mut ()| segments.sum(part))?;
-    Ok(segments.mean(sums.into_iter()))
+    Ok(segments.mean(sums.into_iter()).0)
 }
 
 /// The segments of a record that a spectrum is the average of.
@@ -114,13 +119,14 @@ impl<'a> Segments<'a> {
         (sum, count)
     }
 
-    fn mean(&self, sums: impl Iterator<Item = (Vec<f64>, usize)>) -> Vec<f64> {
+    /// The mean of all segments that count, and how many these are.
+    fn mean(&self, sums: impl Iterator<Item = (Vec<f64>, usize)>) -> (Vec<f64>, usize) {
         let (mut mean, mut all) = (vec![0.0; self.length / 2 + 1], 0);
         for (sum, count) in sums {
             mean.iter_mut().zip(sum).for_each(|(mean, sum)| *mean += sum);
             all += count;
         }
-        mean.into_iter().map(|value| value / all.max(1) as f64).collect()
+        (mean.into_iter().map(|value| value / all.max(1) as f64).collect(), all)
     }
 }
 
