@@ -54,6 +54,11 @@ impl<'a, 'b> Run<'a, 'b> {
         Ok(())
     }
 
+    /// Tells the watch that all is done, however many stages there were.
+    pub(crate) fn finish(&mut self) -> Result<(), Error> {
+        if (self.watch)(self.total, self.total) { Ok(()) } else { Err(Error::Cancelled) }
+    }
+
     /// Does one stage, of which the watch sees its share of the whole.
     pub(crate) fn stage<R>(&mut self, work: impl FnOnce(&mut Watch<'_>) -> Result<R, Error>) -> Result<R, Error> {
         let (total, stages, done) = (self.total, self.stages, self.done);

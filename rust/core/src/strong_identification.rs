@@ -161,6 +161,7 @@ pub fn identify_strong(
     for (one, other) in results.status.iter_mut().zip(&differentiated.status) {
         *one |= other & !Status::INVALID.bits() | ill.bits();
     }
+    run.finish()?;
     Ok(StrongIdentified {
         constants: listed(&model, &constants, &covariance),
         condition: fit.pooled.condition,
