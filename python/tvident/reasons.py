@@ -78,7 +78,15 @@ class Explained:
                 "term out, or give what is known"
             )
             return Words((self._noise(),), (undetermined,))
-        reasons = (self._noise(), self._test_function(), *self._lag(), *self._windows(), *self._kinds(), *self._jumps())
+        reasons = (
+            self._noise(),
+            self._test_function(),
+            *self._lag(),
+            *self._windows(),
+            *self._weights(),
+            *self._kinds(),
+            *self._jumps(),
+        )
         advice = (*self._misfit(common), *self._outside(), *self._suspects(), *self._contradictions())
         advice = (*advice, *self._told_apart(common))
         return Words(reasons, (*advice, *self._limits(common)))
@@ -136,6 +144,10 @@ class Explained:
             f"{words}: {why}; {left}",
             "longer, shorter and one-sided windows are averaged with them wherever they predict better",
         ]
+
+    def _weights(self) -> list[str]:
+        weighted = "nothing changes, so equations are weighted by the inverse of their noise's covariance, as maximum likelihood does"
+        return [weighted] if self.found["weighted"] else []
 
     def _kinds(self) -> list[str]:
         tests = {self.names[number]: test for number, _, _, test in self.found["constants"] if test is not None}

@@ -8,6 +8,7 @@
 
 use std::sync::Arc;
 
+use crate::equations::Rows;
 use crate::error::Error;
 use crate::model::{Fit, Model};
 use crate::pooling::Expected;
@@ -113,12 +114,13 @@ impl Session<'_, '_, '_> {
         // What changes slowly depends on the angle only, so what it took off the right-hand side is the same for every lag.
         let (before, without) = (&chosen.weak.rows.side, decided.side(&chosen.weak.rows));
         let slow = before.iter().zip(without).map(|(side, without)| side - without);
-        let side: Vec<f64> = weak.rows.side.iter().zip(slow).map(|(side, slow)| side - slow).collect();
-        let correlated = decided.model.correlated(&weak.rows, &decided.covariance, &mut self.run)?;
+        let side = weak.rows.side.iter().zip(slow).map(|(side, slow)| side - slow).collect();
+        let rows = decided.as_white(Rows { side, ..weak.rows.clone() }, &mut self.run)?;
+        let correlated = decided.model.correlated(&rows, &decided.covariance, &mut self.run)?;
         let judged = Judged {
-            rows: &weak.rows,
+            rows: &rows,
             model: &decided.model,
-            side: &side,
+            side: &rows.side,
             noise: self.noise[0],
             fit,
             covariance: &decided.covariance,
@@ -140,7 +142,7 @@ impl Session<'_, '_, '_> {
     /// The covariance of the constants of a model where the lag was estimated beside them; nothing where it was not.
     pub(crate) fn covariance_beside_lag(
         &mut self,
-        weak: &WeakRows,
+        rows: &Rows,
         model: &Model,
         side: &[f64],
         fit: &Fit,
@@ -152,7 +154,7 @@ impl Session<'_, '_, '_> {
         }
         let mut model = model.clone();
         model.constant.push(self.rate());
-        let problem = model.problem(&weak.rows, side, self.noise[0], Some(correlated));
+        let problem = model.problem(rows, side, self.noise[0], Some(correlated));
         let Some(all) = fit.again(&problem, expected, self.options.instructions, &mut self.run)? else {
             return Ok(None);
         };

@@ -72,6 +72,7 @@ mod weak_form;
 pub mod weak_identification;
 mod weak_report;
 pub mod weak_results;
+mod whitening;
 mod window;
 mod windows;
 mod write;

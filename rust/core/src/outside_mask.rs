@@ -69,11 +69,13 @@ impl Session<'_, '_, '_> {
             rows.side = varying::without(&rows, &decided.slow, &found.varying);
         }
         rows.clear_unusable();
+        let rows = decided.as_white(rows, &mut self.run)?;
         let model = &decided.model;
         let correlated = model.correlated(&rows, covariance, &mut self.run)?;
         let problem = model.problem(&rows, &rows.side, self.noise[0], Some(&correlated));
         let left = model.windowed.is_empty().then(|| {
-            let inner = model.problem(&weak.rows, decided.side(&weak.rows), self.noise[0], None);
+            let inner = decided.rows(&weak.rows);
+            let inner = model.problem(inner, decided.side(inner), self.noise[0], None);
             let square = |problem: &crate::windows::Problem<'_>| {
                 let count = problem.usable.iter().filter(|usable| **usable).count() as f64;
                 let left = crate::model::without_constants(problem, constants);

@@ -37,6 +37,11 @@ impl RowCovariance {
         Self { lags: lags.collect() }
     }
 
+    /// That of rows with independent noise of variance one.
+    pub(crate) fn white() -> Self {
+        Self { lags: vec![1.0] }
+    }
+
     /// The covariance that residuals show up to some distance, tapered so that it stays one.
     pub(crate) fn of_residuals(residuals: &[f64], usable: &[bool], farthest: usize) -> Self {
         let whole = usable.iter().all(|&usable| usable);
@@ -118,7 +123,7 @@ impl RowCovariance {
 }
 
 /// The dot product of two columns, in eight sums side by side: one alone waits for every addition.
-fn sum_of_products(one: &[f64], other: &[f64]) -> f64 {
+pub(crate) fn sum_of_products(one: &[f64], other: &[f64]) -> f64 {
     let ((one, one_rest), (other, other_rest)) = (one.as_chunks::<8>(), other.as_chunks::<8>());
     let mut sums = [0.0; 8];
     for (one, other) in one.iter().zip(other) {

@@ -11,6 +11,7 @@ use crate::jumps::{self, Jump, Search};
 use crate::model::{Fit, Model, without_constants};
 use crate::pooling::{Expected, misfits};
 use crate::row_covariance::RowCovariance;
+use crate::run::Run;
 use crate::samples::Samples;
 use crate::scale::Scale;
 use crate::thinned::{holds, stretches_of_rows, thinned_rows};
@@ -18,6 +19,7 @@ use crate::varying;
 use crate::weak_form::{Record, TermSamples, WeakRows};
 use crate::weak_identification::{Chosen, Kind, NOISE_MODEL_FAILS, Session};
 use crate::weak_report::residuals;
+use crate::whitening::Whitening;
 use crate::windows::{Correlated, Problem};
 
 /// The mean squared error of predicting rows, over the noise's, from which on more is tried, and the part of it that must be left to be
@@ -27,6 +29,9 @@ const BETTER: f64 = 0.8;
 
 /// So many of the longest windows that stretches of a long record hold are tried again on all of it, where one of them is best.
 const OVERLAP: usize = 2;
+
+/// Rounds of making rows white with the parameters that the last one gave.
+const WHITENINGS: usize = 2;
 
 /// Rounds of looking for jumps and fitting again with windows that end there.
 const JUMP_ROUNDS: usize = 4;
@@ -61,6 +66,8 @@ pub(crate) struct Decided {
     pub(crate) jumps: Vec<Jump>,
     /// All rows, also those over jumps; nothing without jumps.
     pub(crate) whole: Option<Rows>,
+    /// Rows whose noise is white, and how they were made so, where the constants were taken from them.
+    pub(crate) white: Option<(Rows, Whitening)>,
 }
 
 /// How many rows lie in so many samples.
@@ -69,6 +76,19 @@ pub(crate) fn rows_of(samples: usize, stride: usize) -> usize {
 }
 
 impl Decided {
+    /// The rows that the fit was made with.
+    pub(crate) fn rows<'a>(&'a self, rows: &'a Rows) -> &'a Rows {
+        self.white.as_ref().map_or(rows, |(white, _)| white)
+    }
+
+    /// Other rows of the record, made as white as those that the fit was made with.
+    pub(crate) fn as_white(&self, rows: Rows, run: &mut Run<'_, '_>) -> Result<Rows, Error> {
+        match &self.white {
+            Some((_, whitening)) => whitening.apply(&rows, run),
+            None => Ok(rows),
+        }
+    }
+
     /// The right-hand side without what changes slowly.
     pub(crate) fn side<'a>(&'a self, rows: &'a Rows) -> &'a [f64] {
         self.found.as_ref().map_or(&rows.side, |found| &found.side)
@@ -131,6 +151,7 @@ impl Session<'_, '_, '_> {
             expected,
             jumps: Vec::new(),
             whole: None,
+            white: None,
         };
         if self.options.average {
             decided.scales = Scale::all(rows.len(), chosen.weak.reach());
@@ -151,7 +172,7 @@ impl Session<'_, '_, '_> {
     /// Tests every constant. Returns the one that differs most between the parts of the record, if it may be set free.
     fn test(&mut self, rows: &Rows, decided: &mut Decided) -> Result<Option<usize>, Error> {
         let Some(fit) = &decided.fit else { return Ok(None) };
-        let problem = decided.problem(rows, self.noise[0]);
+        let problem = decided.problem(decided.rows(rows), self.noise[0]);
         let (expected, inflation) = (decided.expected, decided.error.max(1.0));
         let instructions = self.options.instructions;
         let results =
@@ -218,7 +239,8 @@ impl Session<'_, '_, '_> {
                     (decided.covariance, decided.expected) = self.covariance(weak, self.parameters(&model, fit));
                 }
             }
-            return Ok(());
+            let weighted = self.options.average && self.of_kind(Kind::Varying).is_empty();
+            return if weighted { self.whiten(weak, decided) } else { Ok(()) };
         }
         let scales = &decided.scales;
         let tried = match wanted {
@@ -242,6 +264,29 @@ impl Session<'_, '_, '_> {
         let problem = model.problem(rows, &rows.side, self.noise[0], Some(&correlated));
         decided.correlated = Some(correlated);
         decided.fit = Fit::new(&problem, scale, decided.expected, instructions, &mut self.run)?;
+        Ok(())
+    }
+
+    /// Takes constants from rows whose noise is white, where the noise of the channels explains what is left of the rows as they are: if
+    /// something else does, its frequencies are not those that tell least.
+    fn whiten(&mut self, weak: &WeakRows, decided: &mut Decided) -> Result<(), Error> {
+        let (rows, instructions) = (&weak.rows, self.options.instructions);
+        let Some(fit) = &decided.fit else { return Ok(()) };
+        let (shown, coloured) = self.shown(weak, rows, decided, fit)?;
+        if coloured || shown.variance() > NOISE_MODEL_FAILS * decided.expected.variance {
+            return Ok(());
+        }
+        for _ in 0..WHITENINGS {
+            let Some(fit) = &decided.fit else { return Ok(()) };
+            let (covariance, _) = self.covariance(weak, self.parameters(&decided.model, fit));
+            let Some(whitening) = Whitening::new(&covariance, rows, weak.stride) else { return Ok(()) };
+            let white = whitening.apply(rows, &mut self.run)?;
+            let problem = decided.model.problem(&white, &white.side, self.noise[0], None);
+            let expected = Expected { variance: 1.0, torque: 1.0, redundancy: 1.0 };
+            let Some(fit) = Fit::new(&problem, None, expected, instructions, &mut self.run)? else { return Ok(()) };
+            (decided.covariance, decided.expected, decided.correlated) = (RowCovariance::white(), expected, None);
+            (decided.fit, decided.white) = (Some(fit), Some((white, whitening)));
+        }
         Ok(())
     }
 

@@ -40,7 +40,7 @@ const PILOT_WIDTHS: usize = 64;
 /// Rounds of choosing the test function and estimating what the choice depends on.
 const ROUNDS: usize = 6;
 /// Stages of a call, about: only for showing progress.
-const STAGES: usize = 60;
+const STAGES: usize = 50;
 /// A cross-validation error beyond which the rows hold more than the noise of the channels explains.
 pub const NOISE_MODEL_FAILS: f64 = 4.0;
 
@@ -68,7 +68,8 @@ pub struct WeakOptions {
     pub exponent: Option<usize>,
     /// Samples that a window spans; chosen by cross-validation.
     pub equations: Option<usize>,
-    /// Whether windows of many lengths, before, around and after a sample are averaged, instead of one of the given length.
+    /// Whether windows of many lengths, before, around and after a sample are averaged and, where nothing is windowed, equations are weighted by
+    /// their noise; otherwise ordinary least squares in windows of one length.
     pub average: bool,
     /// Whether what is windowed may grow linearly within a window.
     pub linear: bool,
@@ -116,6 +117,8 @@ pub struct WeakIdentified {
     pub lengths: Vec<(usize, f64)>,
     /// Mean squared error of predicting a row from others, over the noise's.
     pub prediction_error: f64,
+    /// Whether equations were weighted by the inverse of their covariance: where nothing changes and the noise explains what is left.
+    pub weighted: bool,
     /// Samples that coefficients which change slowly are taken from.
     pub pooling: Option<f64>,
     /// What turned out to be constant.
@@ -256,6 +259,7 @@ fn identify(
     let model = session.model();
     let (chosen, decided, lag) = session.choose_and_decide(&model)?;
     let mut found = session.report(chosen, &decided)?;
+    session.run.finish()?;
     found.lag = lag;
     Ok(found)
 }

@@ -7,6 +7,7 @@ use crate::averaging::average;
 use crate::channels::{Cubed, Direction};
 use crate::constancy::NO_CHANCE;
 use crate::determination::is_mostly_noise;
+use crate::equations::Rows;
 use crate::error::Error;
 use crate::every_window::every_window;
 use crate::identification::HARDLY_TOLD_APART;
@@ -76,6 +77,7 @@ impl Session<'_, '_, '_> {
             equations: 0,
             lengths: decided.lengths.clone(),
             prediction_error: decided.error,
+            weighted: decided.white.is_some(),
             pooling: decided.found.as_ref().map(|found| 2.0 * found.reach * stride as f64),
             constants: Vec::new(),
             covariance: Vec::new(),
@@ -96,19 +98,20 @@ impl Session<'_, '_, '_> {
         found.equations = given.unwrap_or(fit.span * stride).min(self.record.angle.len());
         let errors = self.errors(&weak, decided, fit)?;
         found.prediction_error = errors.error;
+        let rows = decided.rows(&weak.rows);
         let correlated = match &decided.correlated {
             Some(correlated) if errors.covariance == decided.covariance => Arc::clone(correlated),
-            _ => ordered.correlated(&weak.rows, &errors.covariance, &mut self.run)?,
+            _ => ordered.correlated(rows, &errors.covariance, &mut self.run)?,
         };
-        let problem = ordered.problem(&weak.rows, decided.side(&weak.rows), self.noise[0], Some(&correlated));
+        let problem = ordered.problem(rows, decided.side(rows), self.noise[0], Some(&correlated));
         let all = self.all_unknowns(&problem, decided, fit, &errors)?;
         let Some(all) = all.as_deref() else { return Ok(self.undetermined(found, decided)) };
         found.condition = all.pooled.condition;
         found.weakest = weakest(&all.full, &all.pooled.weights);
         found.covariance = all.covariance(&problem, &errors.covariance, &mut self.run)?;
-        let (side, expected) = (decided.side(&weak.rows), errors.expected);
+        let (side, expected) = (decided.side(rows), errors.expected);
         if let Some(covariance) =
-            self.covariance_beside_lag(&weak, &ordered, side, fit, expected, (&errors.covariance, &correlated))?
+            self.covariance_beside_lag(rows, &ordered, side, fit, expected, (&errors.covariance, &correlated))?
         {
             found.covariance = covariance;
         }
@@ -134,7 +137,7 @@ impl Session<'_, '_, '_> {
         }
         let weakest = &found.weakest;
         let noise = self.noise[0];
-        found.mostly_noise = is_mostly_noise(&problem, &weak.rows, &ordered, all, weakest, noise, &mut self.run)?;
+        found.mostly_noise = is_mostly_noise(&problem, rows, &ordered, all, weakest, noise, &mut self.run)?;
         if found.condition > HARDLY_TOLD_APART || found.mostly_noise {
             status |= Status::ILL_CONDITIONED;
         }
@@ -203,12 +206,8 @@ impl Session<'_, '_, '_> {
             error: decided.error,
             status: Status::GOOD,
         };
-        let rows = &weak.rows;
-        let problem = decided.model.problem(rows, decided.side(rows), self.noise[0], None);
-        let (residuals, usable) = residuals(&problem, fit, &mut self.run)?;
-        let reach = 2 * weak.reach();
-        let shown = RowCovariance::of_residuals(&residuals, &usable, 2 * reach);
-        if shown.is_coloured(reach, COLOURED, usable.iter().filter(|usable| **usable).count()) {
+        let (shown, coloured) = self.shown(weak, decided.rows(&weak.rows), decided, fit)?;
+        if coloured {
             errors.status |= Status::COLOURED;
         }
         let whole = decided.model.windowed.is_empty();
@@ -223,6 +222,22 @@ impl Session<'_, '_, '_> {
             errors.covariance = shown;
         }
         Ok(errors)
+    }
+
+    /// The covariance that the residuals of a fit show, and whether they are correlated where rows share no sample.
+    pub(crate) fn shown(
+        &mut self,
+        weak: &WeakRows,
+        rows: &Rows,
+        decided: &Decided,
+        fit: &Fit,
+    ) -> Result<(RowCovariance, bool), Error> {
+        let problem = decided.model.problem(rows, decided.side(rows), self.noise[0], None);
+        let (residuals, usable) = residuals(&problem, fit, &mut self.run)?;
+        let reach = 2 * weak.reach();
+        let shown = RowCovariance::of_residuals(&residuals, &usable, 2 * reach);
+        let coloured = shown.is_coloured(reach, COLOURED, usable.iter().filter(|usable| **usable).count());
+        Ok((shown, coloured))
     }
 
     /// What changes, at every row.
@@ -442,6 +457,10 @@ impl Session<'_, '_, '_> {
         let first = weak.rows.regressors.len();
         weak.rows.regressors.extend(more.rows.regressors.into_iter().skip(3));
         weak.rows.clear_unusable();
+        if decided.white.is_some() {
+            weak.rows = decided.as_white(std::mem::take(&mut weak.rows), &mut self.run)?;
+            side.clone_from(&weak.rows.side);
+        }
         let correlated = decided.model.correlated(&weak.rows, &errors.covariance, &mut self.run)?;
         let mut suspects = Vec::new();
         for (place, (missing, _)) in terms.iter().enumerate() {

@@ -81,6 +81,7 @@ fn dictionary(py: Python<'_>, found: WeakIdentified) -> PyResult<Bound<'_, PyDic
     dict.set_item("equations", found.equations)?;
     dict.set_item("lengths", found.lengths)?;
     dict.set_item("prediction_error", found.prediction_error)?;
+    dict.set_item("weighted", found.weighted)?;
     dict.set_item("pooling", found.pooling)?;
     dict.set_item("constants", constants(&found.constants))?;
     dict.set_item("covariance", found.covariance)?;
