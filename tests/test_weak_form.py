@@ -289,3 +289,43 @@ def test_equations_count_alike_where_the_noise_model_fails() -> None:
     ]
     assert (both[0].status & Status.NOISE_MODEL != 0).all()
     assert both[0].constants == both[1].constants
+
+
+@pytest.mark.parametrize("samples", [16_393, 16_425, 16_440])
+def test_records_that_end_just_behind_a_piece_of_work_are_like_others(samples: int) -> None:
+    # Rows are worked on by the 8192, of every second sample with this test function.
+    rig = tvident.simulate_torsional_rig(17.0, seed=1)
+    found = tvident.identify(rig.angle[:samples], rig.torque[:samples], sample_rate=1000, window_length=31)
+    assert abs(found.constants["inertia"][0] / rig.inertia[0] - 1) < 0.05
+
+
+def test_a_disturbance_where_the_noise_is_least_is_not_given_weight() -> None:
+    # At 5 Hz, near the resonance, the angle's noise hides nothing of it; equations that count alike hardly notice.
+    rig = tvident.simulate_torsional_rig(12.0, seed=0, pattern="constant", angle_noise=0.1)
+    hum = 0.05 * rig.torque.std() * np.sin(2 * np.pi * 5.0 * rig.time + 1)
+    found = tvident.identify(rig.angle, rig.torque + hum, sample_rate=1000, **CONSTANT)
+    alike = tvident.identify(rig.angle, rig.torque + hum, sample_rate=1000, selection="window", **CONSTANT)
+    assert found.constants == alike.constants
+
+
+def test_residuals_of_weighted_equations_are_those_of_the_torque() -> None:
+    rig = tvident.simulate_torsional_rig(12.0, seed=3, pattern="constant", angle_noise=1e-2)
+    left = [
+        np.median(
+            tvident.identify(
+                rig.angle, scale * rig.torque, sample_rate=1000, selection=selection, **CONSTANT
+            ).residual_std
+        )
+        for selection in ("average", "window")
+        for scale in (1.0, 1000.0)
+    ]
+    # The constants differ by a part of their standard errors, so what they leave does by far less than a hundredth.
+    np.testing.assert_allclose(left, [left[0], 1000 * left[0]] * 2, rtol=0.01)
+
+
+def test_rows_outside_a_mask_of_short_runs_are_made_as_white_as_those_inside() -> None:
+    rig = tvident.simulate_torsional_rig(12.0, seed=3, pattern="constant", angle_noise=1e-2)
+    mask = np.arange(rig.angle.size) % 400 < 60
+    found = tvident.identify(rig.angle, rig.torque, sample_rate=1000, mask=mask, **CONSTANT)
+    assert "outside the mask" not in found.summary()
+    assert (found.status & Status.NOISE_MODEL == 0).all()

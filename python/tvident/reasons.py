@@ -146,7 +146,10 @@ class Explained:
         ]
 
     def _weights(self) -> list[str]:
-        weighted = "nothing changes, so equations are weighted by the inverse of their noise's covariance, as maximum likelihood does"
+        weighted = (
+            "all unknowns are constant, so equations are weighted by the inverse of their noise's covariance, as maximum likelihood "
+            "does"
+        )
         return [weighted] if self.found["weighted"] else []
 
     def _kinds(self) -> list[str]:

@@ -16,7 +16,7 @@ use crate::coefficients::{Coefficients, Projected};
 use crate::error::Error;
 use crate::samples::{Samples, is_usable};
 use crate::simd::Instructions;
-use crate::spectrum::power_and_segments;
+use crate::spectrum::power_of_whole_segments;
 use crate::thinned::stretches;
 
 /// Half-widths of the windows that the noise is read from.
@@ -51,7 +51,7 @@ const BANDS: usize = 16;
 const SEGMENT: usize = 512;
 const FEWEST_SEGMENTS: usize = 8;
 
-/// The quietest of so many bands of white noise is two standard deviations too quiet, by chance; it counts where it is quieter than that.
+/// So many standard deviations are added to the power of the quietest band: of sixteen bands of white noise one is two of them too quiet by chance.
 const CHANCE: f64 = 3.0;
 
 /// What a channel's noise is.
@@ -100,7 +100,10 @@ fn quietest_band(record: &dyn Samples) -> f64 {
     if record.len() < FEWEST_SEGMENTS * SEGMENT {
         return f64::INFINITY;
     }
-    let (power, segments) = power_and_segments(record, SEGMENT);
+    let (power, segments) = power_of_whole_segments(record, SEGMENT);
+    if segments == 0 {
+        return f64::INFINITY;
+    }
     let width = SEGMENT / 2 / BANDS;
     let bands = power[1..].chunks_exact(width);
     let quietest = bands.map(|band| band.iter().sum::<f64>() / band.len() as f64).fold(f64::INFINITY, f64::min);

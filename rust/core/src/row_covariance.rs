@@ -64,6 +64,12 @@ impl RowCovariance {
         self.lags.iter().skip(reach + 1).any(|lag| lag.abs() > part.max(chance) * self.lags[0])
     }
 
+    /// The squares of the correlations that residuals show, without the taper, together.
+    pub(crate) fn squared_correlations(&self) -> f64 {
+        let taper = |lag: usize| 1.0 - lag as f64 / self.lags.len() as f64;
+        (1..self.lags.len()).map(|lag| (self.lags[lag] / taper(lag) / self.lags[0]).powi(2)).sum()
+    }
+
     /// Variance of a row.
     pub(crate) fn variance(&self) -> f64 {
         self.lags[0]
@@ -110,8 +116,8 @@ impl RowCovariance {
     fn add(&self, column: &[f64], rows: Range<usize>, weights: impl Fn(usize) -> [f64; 2], sums: &mut [f64]) {
         for lag in 0..self.lags.len().min(column.len()) {
             let [later, before] = weights(lag);
-            let end = rows.end.min(column.len() - lag).max(rows.start);
-            let late = &column[rows.start + lag..end + lag];
+            // The last rows have no neighbours so far behind them.
+            let late = column.get(rows.start + lag..).unwrap_or_default();
             sums.iter_mut().zip(late).for_each(|(sum, value)| *sum += later * value);
             if lag > 0 && rows.end > lag {
                 let first = rows.start.max(lag);
@@ -138,4 +144,40 @@ pub(crate) fn sum_of_products(one: &[f64], other: &[f64]) -> f64 {
 /// `Σ_k a(k) a(k + lag)`.
 fn products(kernel: &[f64], lag: usize) -> f64 {
     sum_of_products(&kernel[..kernel.len() - lag], &kernel[lag..])
+}
+
+#[cfg(test)]
+mod tests {
+    use std::num::NonZeroUsize;
+
+    use super::*;
+    use crate::parallel::ROWS;
+
+    /// The same sums in the same order, however few rows the last piece has.
+    #[test]
+    fn the_last_rows_of_a_long_column_have_fewer_neighbours() {
+        let covariance = RowCovariance { lags: vec![1.0, -0.5, 0.25, 0.125, 3.0] };
+        for count in (1..8).map(|more| ROWS + more).chain([1, 2, 3, 7, ROWS]) {
+            let column: Vec<f64> = (0..count).map(|row| (row as f64 * 0.7).sin()).collect();
+            let mut watch = |_: usize, _: usize| true;
+            let mut run = Run::new(NonZeroUsize::MIN, 1, 1, &mut watch);
+            let found = covariance.correlated(&[&column], &[&column], 0.5, &mut run).expect("not cancelled");
+            let at = |row: isize| usize::try_from(row).ok().and_then(|row| column.get(row)).copied().unwrap_or(0.0);
+            for row in (0..count).rev().take(12) {
+                let lags = covariance.lags.iter().enumerate().skip(1);
+                let sides = lags.clone().map(|(lag, weight)| {
+                    let (row, lag) = (row.cast_signed(), lag.cast_signed());
+                    [weight * at(row + lag), weight * at(row - lag)]
+                });
+                let value = column[row] + sides.clone().map(|[late, early]| late + early).sum::<f64>();
+                let slope =
+                    lags.zip(sides).map(|((lag, _), [late, early])| lag as f64 * 0.5 * (late - early)).sum::<f64>();
+                let near = |a: f64, b: f64| (a - b).abs() < 20.0 * f64::EPSILON * 10.0;
+                assert!(
+                    near(found.windowed[0][row], value) && near(found.companions[0][row], value + slope),
+                    "{row} of {count}"
+                );
+            }
+        }
+    }
 }

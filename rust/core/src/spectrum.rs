@@ -9,7 +9,7 @@ use realfft::{RealFftPlanner, RealToComplex};
 use crate::error::Error;
 use crate::parallel::Piece;
 use crate::run::Run;
-use crate::samples::{Samples, is_usable};
+use crate::samples::{Samples, all_usable, is_usable};
 
 /// Segments that are averaged at most, spread over the record: so many, or fewer long ones that hold so many samples together.
 const MOST_SEGMENTS: usize = 256;
@@ -54,12 +54,13 @@ impl Transform {
 ///
 /// Only the changes are of interest, so the mean of each segment is taken off.
 pub(crate) fn power(record: &dyn Samples, length: usize) -> Vec<f64> {
-    power_and_segments(record, length).0
+    let segments = Segments::new(record, length);
+    segments.mean(segments.parts().map(|part| segments.sum(part))).0
 }
 
-/// The same, and of how many segments it is the mean.
-pub(crate) fn power_and_segments(record: &dyn Samples, length: usize) -> (Vec<f64>, usize) {
-    let segments = Segments::new(record, length);
+/// The same of segments without a sample that cannot be used only, and how many these are: a line in place of samples has no noise.
+pub(crate) fn power_of_whole_segments(record: &dyn Samples, length: usize) -> (Vec<f64>, usize) {
+    let segments = Segments { whole: true, ..Segments::new(record, length) };
     segments.mean(segments.parts().map(|part| segments.sum(part)))
 }
 
@@ -80,6 +81,8 @@ struct Segments<'a> {
     every: usize,
     fade: Vec<f64>,
     transform: Transform,
+    /// Whether segments with a sample that cannot be used are left out.
+    whole: bool,
 }
 
 impl<'a> Segments<'a> {
@@ -89,7 +92,7 @@ impl<'a> Segments<'a> {
         let last = record.len().checked_sub(length);
         let every = (length / 2).max(last.unwrap_or(0) / most).max(1);
         let count = last.map_or(0, |last| last / every + 1);
-        Self { record, length, count, every, fade, transform: Transform::new(length) }
+        Self { record, length, count, every, fade, transform: Transform::new(length), whole: false }
     }
 
     /// Segments that are summed together.
@@ -106,7 +109,7 @@ impl<'a> Segments<'a> {
         let mut samples = vec![0.0; self.length];
         for segment in segments {
             self.record.read(segment * self.every, &mut samples);
-            if !bridge(&mut samples) {
+            if (self.whole && !all_usable(&samples)) || !bridge(&mut samples) {
                 continue;
             }
             let mean = samples.iter().sum::<f64>() / self.length as f64;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::channels::{Ones, Whole};
-use crate::constancy::{self, Test};
+use crate::constancy::{self, Test, chi_squared_beyond};
 use crate::cross_validation::{Validated, best, validate};
 use crate::equations::Rows;
 use crate::error::Error;
@@ -32,6 +32,15 @@ const OVERLAP: usize = 2;
 
 /// Rounds of making rows white with the parameters that the last one gave.
 const WHITENINGS: usize = 2;
+
+/// Correlations of white rows that chance gives so rarely are none, where their squares add up to more than this part.
+const NOT_WHITE: f64 = 1e-4;
+const NEARLY_WHITE: f64 = 0.01;
+
+/// Constants of weighted equations and of those that count alike differ by more than chance beyond so many standard deviations, whose square
+/// is at least this part of the variance.
+const DIFFERENT: f64 = 3.5;
+const LEAST_DIFFERENCE: f64 = 0.05;
 
 /// Rounds of looking for jumps and fitting again with windows that end there.
 const JUMP_ROUNDS: usize = 4;
@@ -267,27 +276,59 @@ impl Session<'_, '_, '_> {
         Ok(())
     }
 
-    /// Takes constants from rows whose noise is white, where the noise of the channels explains what is left of the rows as they are: if
-    /// something else does, its frequencies are not those that tell least.
+    /// Takes constants from rows whose noise is white, as long as the noise of the channels explains what is left: if something else does, it
+    /// need not be where that noise is.
     fn whiten(&mut self, weak: &WeakRows, decided: &mut Decided) -> Result<(), Error> {
         let (rows, instructions) = (&weak.rows, self.options.instructions);
-        let Some(fit) = &decided.fit else { return Ok(()) };
-        let (shown, coloured) = self.shown(weak, rows, decided, fit)?;
+        let Some(alike) = &decided.fit else { return Ok(()) };
+        let (shown, coloured) = self.shown(weak, rows, decided, alike)?;
         if coloured || shown.variance() > NOISE_MODEL_FAILS * decided.expected.variance {
             return Ok(());
         }
+        let expected = Expected { variance: 1.0, torque: 1.0, redundancy: 1.0 };
+        let mut white = Decided { covariance: RowCovariance::white(), expected, correlated: None, ..decided.clone() };
         for _ in 0..WHITENINGS {
-            let Some(fit) = &decided.fit else { return Ok(()) };
-            let (covariance, _) = self.covariance(weak, self.parameters(&decided.model, fit));
+            let Some(fit) = &white.fit else { return Ok(()) };
+            let (covariance, _) = self.covariance(weak, self.parameters(&white.model, fit));
             let Some(whitening) = Whitening::new(&covariance, rows, weak.stride) else { return Ok(()) };
-            let white = whitening.apply(rows, &mut self.run)?;
-            let problem = decided.model.problem(&white, &white.side, self.noise[0], None);
-            let expected = Expected { variance: 1.0, torque: 1.0, redundancy: 1.0 };
-            let Some(fit) = Fit::new(&problem, None, expected, instructions, &mut self.run)? else { return Ok(()) };
-            (decided.covariance, decided.expected, decided.correlated) = (RowCovariance::white(), expected, None);
-            (decided.fit, decided.white) = (Some(fit), Some((white, whitening)));
+            let made = whitening.apply(rows, &mut self.run)?;
+            let problem = white.model.problem(&made, &made.side, self.noise[0], None);
+            white.fit = Fit::new(&problem, None, expected, instructions, &mut self.run)?;
+            white.white = Some((made, whitening));
+        }
+        if self.is_white(weak, &white)? && self.agree(rows, decided, &white)? {
+            *decided = white;
         }
         Ok(())
+    }
+
+    /// Whether what is left of white rows is white, as far as it matters and chance allows (Box and Pierce 1970).
+    fn is_white(&mut self, weak: &WeakRows, white: &Decided) -> Result<bool, Error> {
+        let Some(fit) = &white.fit else { return Ok(false) };
+        let rows = white.rows(&weak.rows);
+        let (shown, coloured) = self.shown(weak, rows, white, fit)?;
+        let usable = rows.usable.iter().filter(|usable| **usable).count() as f64;
+        let (squares, lags) = (usable * shown.squared_correlations(), shown.lags.len() - 1);
+        let chance = chi_squared_beyond(squares, lags) > NOT_WHITE || squares - (lags as f64) < NEARLY_WHITE * usable;
+        Ok(chance && !coloured && shown.variance() < NOISE_MODEL_FAILS)
+    }
+
+    /// Whether constants from rows as they are and from white ones differ by no more than chance (Hausman 1978).
+    fn agree(&mut self, rows: &Rows, alike: &Decided, white: &Decided) -> Result<bool, Error> {
+        let mut variances = Vec::new();
+        for one in [alike, white] {
+            let Some(fit) = &one.fit else { return Ok(false) };
+            let problem = one.problem(one.rows(rows), self.noise[0]);
+            variances.push((fit.covariance(&problem, &one.covariance, &mut self.run)?, &fit.pooled.values));
+        }
+        let count = alike.model.constant.len();
+        let [(all, values), (least, others)] = &variances[..] else { return Ok(false) };
+        Ok((0..count).all(|constant| {
+            let (all, least) = (all[constant * (count + 1)], least[constant * (count + 1)]);
+            // What is efficient is not correlated with its difference from what is not.
+            let variance = (all - least).max(LEAST_DIFFERENCE * all);
+            (values[constant] - others[constant]).powi(2) <= DIFFERENT * DIFFERENT * variance
+        }))
     }
 
     /// How well windows of some lengths predict what they have not seen: on stretches of a long record as far as they hold windows so

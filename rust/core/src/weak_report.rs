@@ -351,7 +351,11 @@ impl Session<'_, '_, '_> {
         let (windowed, slow) = (problem.layout.windowed, decided.slow.len());
         let column = || vec![0.0; tracks.status.len()];
         let row_of = |place: usize| (tracks.first + place.cast_signed()) as f64;
-        let deviation = deviation(problem, &tracks, constants, all.span, &mut self.run)?;
+        // Residuals are those of the rows as they are, whose unit is the torque's.
+        let (ordered, rows) = (decided.ordered(), &weak.rows);
+        let plain = decided.white.as_ref().map(|_| ordered.problem(rows, &rows.side, self.noise[0], None));
+        let plain = plain.as_ref().unwrap_or(problem);
+        let deviation = deviation(plain, &tracks, constants, all.span, &mut self.run)?;
         // A slow coefficient is taken from a part of the record only, so its error is larger.
         let share = |constant: usize, place: usize| match &decided.found {
             Some(found) if constant < slow => {

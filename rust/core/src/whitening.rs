@@ -49,10 +49,9 @@ impl Whitening {
         let kernels = kernels(rows);
         let directions: Vec<Vec<f64>> =
             pairs(kernels.len()).map(|(i, j)| both(kernels[i], kernels[j], lags.len(), stride)).collect();
-        let longest = longest(rows).min(MOST);
         let (mut factor, mut grams) = (Vec::<Vec<f64>>::new(), Vec::new());
         let mut before: VecDeque<Factored> = VecDeque::new();
-        while factor.len() < longest {
+        while factor.len() < rows.len().min(MOST) {
             let next = Factored::after(&before, &lags, &directions)?;
             let gram = next.changes.iter().map(|change| 2.0 * change[0] / next.entries[0]);
             grams.push(gram.collect());
@@ -87,7 +86,8 @@ impl Whitening {
         });
         let regressors = regressors.collect();
         let side_noise = root(&rows.side_noise);
-        Ok(Rows { regressors, side, side_noise, ..rows.clone() })
+        let (usable, jumps) = (rows.usable.clone(), rows.jumps.clone());
+        Ok(Rows { regressors, side, side_noise, usable, jumps, period: rows.period })
     }
 
     fn column(&self, rows: &Rows, column: &[f64]) -> Vec<f64> {
@@ -181,10 +181,6 @@ fn since_gaps(rows: &Rows) -> impl Iterator<Item = Option<usize>> {
         since = if usable { place + 1 } else { 0 };
         usable.then_some(place)
     })
-}
-
-fn longest(rows: &Rows) -> usize {
-    since_gaps(rows).flatten().max().map_or(0, |since| since + 1)
 }
 
 /// Vectors with given products, the lower half row by row.
