@@ -44,9 +44,8 @@ impl Averages {
         Self { values: columns(windowed), slopes: columns(windowed), errors: columns(windowed) }
     }
 
-    fn columns(&mut self) -> impl Iterator<Item = &mut [f64]> {
-        let all = self.values.iter_mut().chain(&mut self.slopes).chain(&mut self.errors);
-        all.map(Vec::as_mut_slice)
+    fn columns(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
+        self.values.iter_mut().chain(&mut self.slopes).chain(&mut self.errors)
     }
 }
 

@@ -8,8 +8,9 @@ use std::ops::Range;
 
 use crate::equations::Rows;
 use crate::error::Error;
-use crate::model::{Fit, Model, Predictor};
+use crate::model::{Fit, Model};
 use crate::parallel::ranges;
+use crate::pooling::sensitivity;
 use crate::run::Run;
 use crate::windows::Problem;
 
@@ -37,7 +38,6 @@ pub(crate) fn is_mostly_noise(
     let product = |i: usize, j: usize| -> f64 { kernel(i).iter().zip(kernel(j)).map(|(a, b)| a * b).sum() };
     let size = regressors.len();
     let gram: Vec<f64> = (0..size * size).map(|index| product(index / size, index % size)).collect();
-    let predictor = Predictor::new(&fit.full, &fit.pooled.values);
     let windowed = model.windowed.len();
     let of = |rows: Range<usize>, (): &mut ()| {
         let (mut left, mut noise) = (0.0, 0.0);
@@ -51,7 +51,7 @@ pub(crate) fn is_mostly_noise(
                     *factor = parts
                         .iter()
                         .enumerate()
-                        .map(|(c, part)| part * predictor.sensitivity(place, unknown, c, later))
+                        .map(|(c, part)| part * sensitivity(&fit.full, place, unknown, c, later))
                         .sum();
                 }
             }

@@ -321,16 +321,6 @@ impl<'a> Predictor<'a> {
         variance
     }
 
-    /// How it changes with a constant.
-    pub(crate) fn sensitivity(&self, place: usize, windowed: usize, constant: usize, later: f64) -> f64 {
-        let (fields, layout) = (self.solved.fields, self.solved.fields.layout);
-        let mut value = self.solved.field(fields.solution(windowed, constant))[place];
-        if layout.linear {
-            value += later * self.solved.field(fields.solution(layout.windowed + windowed, constant))[place];
-        }
-        -value
-    }
-
     /// What the windowed unknowns add to a row's right-hand side.
     pub(crate) fn predict(&self, problem: &Problem<'_>, place: usize, row: usize, later: f64) -> f64 {
         let layout = problem.layout;

@@ -305,6 +305,16 @@ pub(crate) fn local(full: &Solved, window: usize, values: &[f64], local: usize) 
     value
 }
 
+/// How a window's own unknown changes with a constant at a time, in seconds after the window's centre.
+pub(crate) fn sensitivity(full: &Solved, window: usize, local: usize, constant: usize, later: f64) -> f64 {
+    let (fields, layout) = (full.fields, full.fields.layout);
+    let mut value = full.field(fields.solution(local, constant))[window];
+    if layout.linear {
+        value += later * full.field(fields.solution(layout.windowed + local, constant))[window];
+    }
+    -value
+}
+
 /// Whether a window has more rows than unknowns.
 pub(crate) fn is_determined(solved: &Solved, window: usize) -> bool {
     let Fields { layout } = solved.fields;

@@ -33,7 +33,7 @@ impl RowCovariance {
             .collect();
         let lags = (0..inertia.len())
             .step_by(stride)
-            .map(|lag| noise[0] * products(&mixed, lag) + noise[1] * products(torque, lag));
+            .map(|lag| noise[0] * products(&mixed, &mixed, lag) + noise[1] * products(torque, torque, lag));
         Self { lags: lags.collect() }
     }
 
@@ -98,8 +98,7 @@ impl RowCovariance {
     ) -> Result<Correlated, Error> {
         let columns = || windowed.iter().map(|column| vec![0.0; column.len()]).collect::<Vec<_>>();
         let mut found = Correlated { variance: self.variance(), windowed: columns(), companions: columns() };
-        let all = found.windowed.iter_mut().chain(&mut found.companions);
-        run.fill(all.map(Vec::as_mut_slice), |rows, columns| {
+        run.fill(found.windowed.iter_mut().chain(&mut found.companions), |rows, columns| {
             let (values, slopes) = columns.split_at_mut(windowed.len());
             for (regressor, (value, slope)) in values.iter_mut().zip(slopes).enumerate() {
                 self.add(windowed[regressor], rows.clone(), |lag| [self.lags[lag]; 2], value);
@@ -129,7 +128,7 @@ impl RowCovariance {
 }
 
 /// The dot product of two columns, in eight sums side by side: one alone waits for every addition.
-pub(crate) fn sum_of_products(one: &[f64], other: &[f64]) -> f64 {
+fn sum_of_products(one: &[f64], other: &[f64]) -> f64 {
     let ((one, one_rest), (other, other_rest)) = (one.as_chunks::<8>(), other.as_chunks::<8>());
     let mut sums = [0.0; 8];
     for (one, other) in one.iter().zip(other) {
@@ -141,9 +140,9 @@ pub(crate) fn sum_of_products(one: &[f64], other: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest
 }
 
-/// `Σ_k a(k) a(k + lag)`.
-fn products(kernel: &[f64], lag: usize) -> f64 {
-    sum_of_products(&kernel[..kernel.len() - lag], &kernel[lag..])
+/// `Σ_k a(k) b(k + lag)` for two kernels of one length.
+pub(crate) fn products(one: &[f64], other: &[f64], lag: usize) -> f64 {
+    sum_of_products(&one[..one.len() - lag], &other[lag..])
 }
 
 #[cfg(test)]

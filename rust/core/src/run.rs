@@ -36,10 +36,10 @@ impl<'a, 'b> Run<'a, 'b> {
     /// Fills columns in pieces: `work` gets some rows and their part of every column.
     pub(crate) fn fill<'c>(
         &mut self,
-        columns: impl Iterator<Item = &'c mut [f64]>,
+        columns: impl IntoIterator<Item = &'c mut Vec<f64>>,
         work: impl Fn(Range<usize>, &mut [&mut [f64]]) + Sync,
     ) -> Result<(), Error> {
-        let mut columns: Vec<_> = columns.collect();
+        let mut columns: Vec<_> = columns.into_iter().map(Vec::as_mut_slice).collect();
         let rows = columns.first().map_or(0, |column| column.len());
         let cut = |Piece { size, content }: Piece<Range<usize>>| {
             let parts = columns.iter_mut().filter_map(|column| column.split_off_mut(..size)).collect();

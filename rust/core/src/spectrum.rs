@@ -54,14 +54,12 @@ impl Transform {
 ///
 /// Only the changes are of interest, so the mean of each segment is taken off.
 pub(crate) fn power(record: &dyn Samples, length: usize) -> Vec<f64> {
-    let segments = Segments::new(record, length);
-    segments.mean(segments.parts().map(|part| segments.sum(part))).0
+    Segments::new(record, length).power().0
 }
 
 /// The same of segments without a sample that cannot be used only, and how many these are: a line in place of samples has no noise.
 pub(crate) fn power_of_whole_segments(record: &dyn Samples, length: usize) -> (Vec<f64>, usize) {
-    let segments = Segments { whole: true, ..Segments::new(record, length) };
-    segments.mean(segments.parts().map(|part| segments.sum(part)))
+    Segments { whole: true, ..Segments::new(record, length) }.power()
 }
 
 /// The same, in parallel.
@@ -80,6 +78,8 @@ struct Segments<'a> {
     count: usize,
     every: usize,
     fade: Vec<f64>,
+    /// The sum of the squares of what they fade with.
+    energy: f64,
     transform: Transform,
     /// Whether segments with a sample that cannot be used are left out.
     whole: bool,
@@ -87,12 +87,13 @@ struct Segments<'a> {
 
 impl<'a> Segments<'a> {
     fn new(record: &'a dyn Samples, length: usize) -> Self {
-        let fade = (0..length).map(|k| (PI * (k as f64 + 0.5) / length as f64).sin().powi(2)).collect();
+        let fade: Vec<f64> = (0..length).map(|k| (PI * (k as f64 + 0.5) / length as f64).sin().powi(2)).collect();
+        let energy = fade.iter().map(|value| value * value).sum();
         let most = (MOST_SAMPLES / length).clamp(FEWEST_SEGMENTS, MOST_SEGMENTS);
         let last = record.len().checked_sub(length);
         let every = (length / 2).max(last.unwrap_or(0) / most).max(1);
         let count = last.map_or(0, |last| last / every + 1);
-        Self { record, length, count, every, fade, transform: Transform::new(length), whole: false }
+        Self { record, length, count, every, fade, energy, transform: Transform::new(length), whole: false }
     }
 
     /// Segments that are summed together.
@@ -101,11 +102,15 @@ impl<'a> Segments<'a> {
         (0..count).step_by(TOGETHER).map(move |first| first..count.min(first + TOGETHER))
     }
 
+    /// The mean power of all segments that count, and how many these are.
+    fn power(&self) -> (Vec<f64>, usize) {
+        self.mean(self.parts().map(|part| self.sum(part)))
+    }
+
     /// The power of some segments together, and how many of them count.
     fn sum(&self, segments: Range<usize>) -> (Vec<f64>, usize) {
         let mut sum = vec![0.0; self.length / 2 + 1];
         let mut count = 0;
-        let energy: f64 = self.fade.iter().map(|value| value * value).sum();
         let mut samples = vec![0.0; self.length];
         for segment in segments {
             self.record.read(segment * self.every, &mut samples);
@@ -115,7 +120,7 @@ impl<'a> Segments<'a> {
             let mean = samples.iter().sum::<f64>() / self.length as f64;
             samples.iter_mut().zip(&self.fade).for_each(|(value, fade)| *value = (*value - mean) * fade);
             for (sum, [real, imaginary]) in sum.iter_mut().zip(self.transform.of(&mut samples)) {
-                *sum += (real * real + imaginary * imaginary) / energy;
+                *sum += (real * real + imaginary * imaginary) / self.energy;
             }
             count += 1;
         }

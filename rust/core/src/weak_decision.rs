@@ -280,9 +280,7 @@ impl Session<'_, '_, '_> {
     /// need not be where that noise is.
     fn whiten(&mut self, weak: &WeakRows, decided: &mut Decided) -> Result<(), Error> {
         let (rows, instructions) = (&weak.rows, self.options.instructions);
-        let Some(alike) = &decided.fit else { return Ok(()) };
-        let (shown, coloured) = self.shown(weak, rows, decided, alike)?;
-        if coloured || shown.variance() > NOISE_MODEL_FAILS * decided.expected.variance {
+        if self.explained(weak, decided)?.is_none() {
             return Ok(());
         }
         let expected = Expected { variance: 1.0, torque: 1.0, redundancy: 1.0 };
@@ -304,13 +302,18 @@ impl Session<'_, '_, '_> {
 
     /// Whether what is left of white rows is white, as far as it matters and chance allows (Box and Pierce 1970).
     fn is_white(&mut self, weak: &WeakRows, white: &Decided) -> Result<bool, Error> {
-        let Some(fit) = &white.fit else { return Ok(false) };
-        let rows = white.rows(&weak.rows);
-        let (shown, coloured) = self.shown(weak, rows, white, fit)?;
-        let usable = rows.usable.iter().filter(|usable| **usable).count() as f64;
+        let Some(shown) = self.explained(weak, white)? else { return Ok(false) };
+        let usable = weak.rows.usable.iter().filter(|usable| **usable).count() as f64;
         let (squares, lags) = (usable * shown.squared_correlations(), shown.lags.len() - 1);
-        let chance = chi_squared_beyond(squares, lags) > NOT_WHITE || squares - (lags as f64) < NEARLY_WHITE * usable;
-        Ok(chance && !coloured && shown.variance() < NOISE_MODEL_FAILS)
+        Ok(chi_squared_beyond(squares, lags) > NOT_WHITE || squares - (lags as f64) < NEARLY_WHITE * usable)
+    }
+
+    /// The covariance of what a fit leaves, where the noise of the channels explains it.
+    fn explained(&mut self, weak: &WeakRows, decided: &Decided) -> Result<Option<RowCovariance>, Error> {
+        let Some(fit) = &decided.fit else { return Ok(None) };
+        let (shown, coloured) = self.shown(weak, decided, fit)?;
+        let explained = !coloured && shown.variance() <= NOISE_MODEL_FAILS * decided.expected.variance;
+        Ok(explained.then_some(shown))
     }
 
     /// Whether constants from rows as they are and from white ones differ by no more than chance (Hausman 1978).
@@ -421,8 +424,8 @@ impl Session<'_, '_, '_> {
         if let Some(found) = &decided.found {
             let problem = decided.problem(rows, self.noise[0]);
             let (scale, expected) = (Some(found.scale), decided.expected);
-            let (error, fit) = (found.error, Fit::new(&problem, scale, expected, instructions, &mut self.run)?);
-            (decided.error, decided.fit) = (error, fit);
+            let fit = Fit::new(&problem, scale, expected, instructions, &mut self.run)?;
+            (decided.error, decided.fit) = (found.error, fit);
         }
         Ok(())
     }

@@ -7,13 +7,12 @@ use crate::averaging::average;
 use crate::channels::{Cubed, Direction};
 use crate::constancy::NO_CHANCE;
 use crate::determination::is_mostly_noise;
-use crate::equations::Rows;
 use crate::error::Error;
 use crate::every_window::every_window;
 use crate::identification::HARDLY_TOLD_APART;
 use crate::model::{Fit, Predictor, without_constants};
 use crate::outside_mask::{Inside, Outside};
-use crate::pooling::{Expected, is_determined, joint_covariance, weakest};
+use crate::pooling::{Expected, is_determined, joint_covariance, sensitivity, weakest};
 use crate::row_covariance::RowCovariance;
 use crate::run::Run;
 use crate::status::Status;
@@ -206,7 +205,7 @@ impl Session<'_, '_, '_> {
             error: decided.error,
             status: Status::GOOD,
         };
-        let (shown, coloured) = self.shown(weak, decided.rows(&weak.rows), decided, fit)?;
+        let (shown, coloured) = self.shown(weak, decided, fit)?;
         if coloured {
             errors.status |= Status::COLOURED;
         }
@@ -228,10 +227,10 @@ impl Session<'_, '_, '_> {
     pub(crate) fn shown(
         &mut self,
         weak: &WeakRows,
-        rows: &Rows,
         decided: &Decided,
         fit: &Fit,
     ) -> Result<(RowCovariance, bool), Error> {
+        let rows = decided.rows(&weak.rows);
         let problem = decided.model.problem(rows, decided.side(rows), self.noise[0], None);
         let (residuals, usable) = residuals(&problem, fit, &mut self.run)?;
         let reach = 2 * weak.reach();
@@ -376,7 +375,7 @@ impl Session<'_, '_, '_> {
         };
         let mut slowly = vec![column(); 2 * slow];
         if let Some(found) = &decided.found {
-            self.run.fill(slowly.iter_mut().map(Vec::as_mut_slice), |places, columns| {
+            self.run.fill(&mut slowly, |places, columns| {
                 let (values, slopes) = columns.split_at_mut(slow);
                 for (coefficient, (values, slopes)) in values.iter_mut().zip(slopes).enumerate() {
                     for (place, (value, slope)) in places.clone().zip(values.iter_mut().zip(slopes.iter_mut())) {
@@ -393,8 +392,7 @@ impl Session<'_, '_, '_> {
         let wanted = |&(one, other): &(usize, usize)| other < changing && names[one] < 3 && names[other] < 3;
         let pairs: Vec<_> = all_pairs.filter(wanted).collect();
         let (mut standard, mut covariances) = (vec![column(); changing], vec![column(); pairs.len()]);
-        let columns = standard.iter_mut().chain(&mut covariances).map(Vec::as_mut_slice);
-        self.run.fill(columns, |places, columns| {
+        self.run.fill(standard.iter_mut().chain(&mut covariances), |places, columns| {
             let (errors, covariances) = columns.split_at_mut(changing);
             for (one, errors) in errors.iter_mut().enumerate() {
                 for (place, error) in places.clone().zip(errors.iter_mut()) {
@@ -498,8 +496,6 @@ fn pairs_of(constants: &[usize], slow: usize, covariance: &[f64]) -> Vec<(usize,
 /// How what is windowed changes with each constant, row by row: what the window nearest to a row says.
 fn sensitivities(problem: &Problem<'_>, all: &Fit, run: &mut Run<'_, '_>) -> Result<Vec<Vec<f64>>, Error> {
     let layout = problem.layout;
-    let constants = vec![0.0; layout.constant];
-    let predictor = Predictor::new(&all.full, &constants);
     let determined: Vec<usize> = (0..all.full.len()).filter(|&window| is_determined(&all.full, window)).collect();
     let beside = |wanted: usize| {
         let next = determined.partition_point(|&window| window < wanted);
@@ -508,14 +504,14 @@ fn sensitivities(problem: &Problem<'_>, all: &Fit, run: &mut Run<'_, '_>) -> Res
         around.min_by_key(|place| place.abs_diff(wanted)).unwrap_or(wanted)
     };
     let mut columns = vec![vec![0.0; problem.rows()]; layout.windowed * layout.constant];
-    run.fill(columns.iter_mut().map(Vec::as_mut_slice), |rows, columns| {
+    run.fill(&mut columns, |rows, columns| {
         for (index, row) in rows.enumerate() {
             let wanted = all.nearest(row);
             let place = if is_determined(&all.full, wanted) { wanted } else { beside(wanted) };
             let later = (row as f64 - all.centre(place)) * problem.period;
             for (number, column) in columns.iter_mut().enumerate() {
                 let (unknown, constant) = (number / layout.constant, number % layout.constant);
-                column[index] = predictor.sensitivity(place, unknown, constant, later);
+                column[index] = sensitivity(&all.full, place, unknown, constant, later);
             }
         }
     })?;
@@ -532,7 +528,7 @@ pub(crate) fn residuals(
     let windowed = problem.layout.windowed > 0;
     if windowed {
         let predictor = Predictor::new(&fit.full, &fit.pooled.values);
-        run.fill(std::iter::once(left.as_mut_slice()), |rows, columns| {
+        run.fill([&mut left], |rows, columns| {
             for (row, left) in rows.zip(&mut *columns[0]).filter(|(row, _)| problem.usable[*row]) {
                 let place = fit.nearest(row);
                 let later = (row as f64 - fit.centre(place)) * problem.period;
@@ -555,7 +551,7 @@ fn deviation(
     run: &mut Run<'_, '_>,
 ) -> Result<Vec<f64>, Error> {
     let mut errors = without_constants(problem, constants);
-    run.fill(std::iter::once(errors.as_mut_slice()), |rows, columns| {
+    run.fill([&mut errors], |rows, columns| {
         for (row, error) in rows.zip(&mut *columns[0]) {
             let place = (row.cast_signed() - tracks.first).unsigned_abs();
             for unknown in 0..problem.layout.windowed {
@@ -576,7 +572,7 @@ fn deviation(
         [sum, count]
     }));
     let mut deviation = vec![f64::NAN; tracks.status.len()];
-    run.fill(std::iter::once(deviation.as_mut_slice()), |places, columns| {
+    run.fill([&mut deviation], |places, columns| {
         for (place, deviation) in places.zip(&mut *columns[0]) {
             let row = (tracks.first + place.cast_signed()).max(0).unsigned_abs();
             let rows = errors.len();

@@ -14,7 +14,7 @@ use std::collections::VecDeque;
 use crate::equations::{Regressor, Rows};
 use crate::error::Error;
 use crate::parallel::Piece;
-use crate::row_covariance::{RowCovariance, sum_of_products};
+use crate::row_covariance::{RowCovariance, products};
 use crate::run::Run;
 
 /// What is added to the variance of a row, so that frequencies that a test function lets next to nothing of through do not count.
@@ -162,22 +162,15 @@ fn pairs(size: usize) -> impl Iterator<Item = (usize, usize)> {
 
 /// The covariance that noise of variance one gives two columns, by the distance of the rows, either before the other.
 fn both(one: &[f64], other: &[f64], lags: usize, stride: usize) -> Vec<f64> {
-    let product = |one: &[f64], other: &[f64], samples: usize| {
-        let late = other.get(samples..).unwrap_or_default();
-        let shared = one.len().min(late.len());
-        sum_of_products(&one[..shared], &late[..shared])
-    };
-    let either = |lag: usize| f64::midpoint(product(one, other, lag * stride), product(other, one, lag * stride));
+    let either = |lag: usize| f64::midpoint(products(one, other, lag * stride), products(other, one, lag * stride));
     (0..lags).map(either).collect()
 }
 
 /// For every row that can be used, how many have come before it since the last gap.
 fn since_gaps(rows: &Rows) -> impl Iterator<Item = Option<usize>> {
     let mut since = 0;
-    let mut jumps = rows.jumps.iter().peekable();
-    rows.usable.iter().enumerate().map(move |(row, &usable)| {
-        let jumped = jumps.next_if_eq(&&row).is_some();
-        let place = if jumped { 0 } else { since };
+    rows.usable.iter().map(move |&usable| {
+        let place = since;
         since = if usable { place + 1 } else { 0 };
         usable.then_some(place)
     })
