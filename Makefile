@@ -93,7 +93,7 @@ $(BENCH)/.ready: requirements-bench.txt
 	@touch $@
 
 # A wheel as users install it, in an environment of its own: the checked build of the tests stays where it is.
-$(BENCH_BUILT): $(BENCH)/.ready $(RUST) pyproject.toml $(wildcard python/tvident/*.py)
+$(BENCH_BUILT): $(BENCH)/.ready $(RUST) pyproject.toml $(shell find python/tvident -name "*.py")
 	rm -rf target/bench-wheel
 	$(BENCH)/bin/maturin build --release --locked --quiet --out target/bench-wheel
 	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bench-wheel/*.whl

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 from click.testing import CliRunner
 
-from tvident.command_line import main
+from tvident._command_line import main
 
 WIDTH = 110
 INTRODUCTION = """\

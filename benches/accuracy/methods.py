@@ -19,7 +19,7 @@ import numpy as np
 import tvident
 from accuracy import bound, cases, derivatives, errors, ours, peers
 from accuracy.cases import Case
-from tvident import rig
+from tvident import _simulate
 
 Values = dict[str, Any]
 
@@ -60,7 +60,7 @@ class Method:
     def fingerprint(self) -> str:
         """Return what changes when its results may."""
         versions = [_version(package) for package in ("numpy", *self.packages)]
-        return " ".join([*versions, *(_digest(source) for source in (cases, rig, errors, *self.sources))])
+        return " ".join([*versions, *(_digest(source) for source in (cases, _simulate, errors, *self.sources))])
 
     def timed(self, case: Case, recording: tvident.Recording) -> Values:
         """Run, and add the seconds that it took."""

@@ -1,13 +1,12 @@
 """Identification of inertia, damping and stiffness that change while they are measured, and derivatives of noisy recordings."""
 
-from tvident.derivatives import LocalPolynomialFit, fit_local_polynomials
-from tvident.identification import identify
-from tvident.regression import RollingRegression, rolling_least_squares
-from tvident.result import Identification
-from tvident.rig import Recording, simulate_torsional_rig
-from tvident.savitzky_golay import savgol_filter
-from tvident.status import Status
-from tvident.terms import Term
+from tvident._derivatives import LocalPolynomialFit, fit_local_polynomials, savgol_filter
+from tvident._equation import Term
+from tvident._identify import identify
+from tvident._regression import RollingRegression, rolling_least_squares
+from tvident._results import Identification
+from tvident._simulate import Recording, simulate_torsional_rig
+from tvident._status import Status
 
 __all__ = [
     "Identification",

@@ -1,0 +1,11 @@
+"""Says in words what was chosen and why, and what to do next."""
+
+from tvident._advice.strong import ExplainedStrong
+from tvident._advice.weak import Explained
+from tvident._advice.words import Words
+
+__all__ = [
+    "Explained",
+    "ExplainedStrong",
+    "Words",
+]

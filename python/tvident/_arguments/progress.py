@@ -1,0 +1,33 @@
+"""Progress bars for long work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TypeAlias
+
+Progress: TypeAlias = bool | Callable[[int, int], object] | None
+"""``True`` shows a bar; a callable is given the work done and all of it."""
+
+
+@contextmanager
+def reporter(progress: Progress, description: str) -> Iterator[Callable[[int, int], object] | None]:
+    """Give what the core calls with the work done and all of it: a bar, the user's own callable, or nothing."""
+    if progress is None or progress is False:
+        yield None
+    elif progress is True:
+        from tqdm.auto import tqdm  # noqa: PLC0415 - imported where it is used
+
+        with tqdm(desc=description, unit="sample", unit_scale=True) as bar:
+
+            def update(done: int, total: int) -> None:
+                bar.total = total
+                bar.update(done - bar.n)
+
+            yield update
+    elif callable(progress):
+        yield progress
+    else:
+        raise TypeError(
+            f"progress must be True, False or a function of (done, total); got {progress!r}; pass one of these"
+        )

@@ -1,0 +1,100 @@
+"""Time: the sample period, durations and lengths of windows."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._arguments.arrays import real_array
+from tvident._arguments.numbers import positive_number, whole_number
+
+_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0}
+
+
+# How far a time stamp may lie from a uniform grid, as a fraction of the sample period: what printing with a few digits does.
+_JITTER = 1e-3
+
+
+def sample_period(
+    samples: int, *, delta: float | None = None, sample_rate: float | None = None, t: npt.ArrayLike | None = None
+) -> float:
+    """Return the sample period in seconds from whichever way it was given, 1 where it was not."""
+    given = [name for name, value in (("delta", delta), ("sample_rate", sample_rate), ("t", t)) if value is not None]
+    if len(given) > 1:
+        raise TypeError(f"give only one of delta, sample_rate and t; got {' and '.join(given)}; drop all but one")
+    if sample_rate is not None:
+        return 1.0 / positive_number("sample_rate", sample_rate)
+    if t is not None:
+        return _period_of_times(t, samples)
+    return 1.0 if delta is None else positive_number("delta", delta)
+
+
+def _period_of_times(t: npt.ArrayLike, samples: int) -> float:
+    """Return the period of times that are uniform within rounding."""
+    times = real_array("t", t)
+    if times.shape != (samples,):
+        raise ValueError(
+            f"t must hold one time for each of the {samples} samples; got shape {times.shape}; check its length"
+        )
+    if samples == 1:
+        return 1.0
+    rounding = 4 * float(np.spacing(np.ones(1, times.dtype if times.dtype.kind == "f" else np.float64))[0])
+    seconds = times.astype(np.float64, copy=False)
+    if not np.isfinite(seconds).all():
+        place = int(np.flatnonzero(~np.isfinite(seconds))[0])
+        raise ValueError(f"t must hold finite times; t[{place}] is {seconds[place]}; repair it")
+    period = float(seconds[-1] - seconds[0]) / (samples - 1)
+    if not period > 0:
+        raise ValueError(f"t must increase; it goes from {seconds[0]} to {seconds[-1]}; sort the samples by time")
+    distance = np.abs(seconds - (seconds[0] + period * np.arange(samples)))
+    allowed = max(_JITTER * period, rounding * float(np.max(np.abs(seconds))))
+    if float(distance.max()) > allowed:
+        # The widest step tells where; the farthest sample may be an innocent one.
+        steps = np.abs(np.diff(seconds) - np.median(np.diff(seconds)))
+        place = int(steps.argmax()) + 1
+        raise ValueError(
+            f"t must be uniform; the step to t[{place}] = {seconds[place]:g} is {seconds[place] - seconds[place - 1]:g} s "
+            f"where the others are {float(np.median(np.diff(seconds))):g} s; resample the record onto a uniform grid"
+        )
+    return period
+
+
+def seconds(name: str, value: str) -> float:
+    """Return the seconds of a duration such as ``"0.2 s"``."""
+    match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*([a-zµ]+)\s*", value)
+    try:
+        duration = float(match[1]) * _SECONDS[match[2]] if match else math.nan
+    except (KeyError, ValueError):
+        duration = math.nan
+    if not (math.isfinite(duration) and duration > 0):
+        units = ", ".join(_SECONDS)
+        raise ValueError(f"{name} must be samples or a duration such as '0.2 s'; got {value!r}; units are {units}")
+    return duration
+
+
+def window_length(name: str, value: int | str, period: float, *, odd: bool) -> int:
+    """Return a length in samples from a number of samples or a duration such as ``"0.2 s"``."""
+    if isinstance(value, str):
+        samples = seconds(name, value) / period
+        return max(1, 2 * round((samples - 1) / 2) + 1) if odd else max(1, round(samples))
+    length = whole_number(name, value, least=1)
+    if odd and length % 2 == 0:
+        raise ValueError(
+            f"{name} must be odd, so that every window has a sample at its centre; got {length}; "
+            f"use {length - 1} or {length + 1}"
+        )
+    return length
+
+
+def check_window(name: str, length: int, samples: int, *, least: int = 1) -> None:
+    """Check that a window is long enough to be one and fits into the record."""
+    if length < least:
+        raise ValueError(f"{name} must be at least {least} samples; got {length}; use {least} or more")
+    if length > samples:
+        raise ValueError(
+            f"{name} must be less than or equal to the length of the record; got {length} samples for a record of {samples}; "
+            f"use at most {samples} samples or a longer record"
+        )

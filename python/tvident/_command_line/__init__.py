@@ -1,0 +1,6 @@
+"""Is the command ``tvident``: one file a command."""
+
+from tvident._command_line import demo, derivatives, identify, info, simulate  # noqa: F401 - each adds its command
+from tvident._command_line.group import main
+
+__all__ = ["main"]

@@ -1,0 +1,68 @@
+"""The command ``tvident demo``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+import tvident
+from tvident._command_line.group import main
+from tvident._command_line.output import figures_on_file, save_figure
+from tvident._equation import UNITS
+from tvident._files import aligned
+
+
+@main.command()
+@click.option(
+    "--folder",
+    type=click.Path(file_okay=False, path_type=Path),
+    default="tvident-demo",
+    show_default=True,
+    help="Where pictures and data are written.",
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the simulated recording.")
+def demo(folder: Path, seed: int) -> None:
+    """Identify a simulated recording, compare with the truth and draw the paper's figures."""
+    folder.mkdir(parents=True, exist_ok=True)
+    recording = tvident.simulate_torsional_rig(seed=seed)
+    call: dict[str, Any] = {"sample_rate": recording.sample_rate}
+    result = tvident.identify(recording.angle, recording.torque, **call)
+    paper = tvident.identify(recording.angle, recording.torque, preset="paper", **call)
+    click.echo(
+        f"Simulated rig: {recording.time.size} samples at {recording.sample_rate:g} Hz, a slider changes the stiffness.\n"
+    )
+    click.echo(result.summary() + "\n")
+    rows: list[tuple[str, ...]] = [
+        ("parameter", "unit", "true (median)", "identified (median)", "rms error", "with --preset paper")
+    ]
+    for name in ("inertia", "damping", "stiffness"):
+        medians = [f"{np.nanmedian(getattr(one, name)):.5g}" for one in (recording, result)]
+        errors = [f"{_rms_error(one, recording, name):.2%}" for one in (result, paper)]
+        rows.append((name, UNITS[name], *medians, *errors))
+    click.echo("\n".join([*aligned(rows), ""]))
+
+    recording.save(folder / "recording.csv")
+    result.save(folder / "result.csv")
+    click.echo(f"Written to {folder}: recording.csv, result.csv")
+    noise = 0.05 * recording.angle.std() * np.random.default_rng(seed + 1).standard_normal(recording.angle.size)
+    middle_sample = recording.time.size // 2
+    figures = figures_on_file()
+    pictures = {
+        "recording.png": figures.plot_recording(recording),
+        "window.png": figures.plot_window(recording.angle, middle_sample, **call),
+        "window-with-noise.png": figures.plot_window(recording.angle + noise, middle_sample, **call),
+        "parameters.png": figures.plot_identification(result, recording),
+        "parameters-paper.png": figures.plot_identification(paper, recording),
+    }
+    for name, picture in pictures.items():
+        save_figure(picture, folder / name)
+    click.echo(f"Drawn in {folder}: {', '.join(pictures)}")
+
+
+def _rms_error(result: tvident.Identification, truth: tvident.Recording, name: str) -> float:
+    """Return the rms error of a parameter over its mean."""
+    true = getattr(truth, name)
+    return float(np.sqrt(np.nanmean((getattr(result, name) - true) ** 2)) / np.mean(true))

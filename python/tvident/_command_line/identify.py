@@ -1,0 +1,183 @@
+"""The command ``tvident identify``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import click
+
+import tvident
+from tvident import _arguments as arguments
+from tvident import recordings
+from tvident._command_line.channels import channel_of, mask_of, scaled, source_of
+from tvident._command_line.group import main
+from tvident._command_line.options import CRITERION, RUN, TIME, check_output, check_time, given, length, wanted_progress
+from tvident._command_line.output import give, save_figure
+from tvident._equation import COEFFICIENTS, UNITS, Kind
+from tvident._files import check_folder, replaced
+from tvident._identify import Form, Preset, Variation
+from tvident._identify import Selection as HowToSelect
+
+
+@main.command(epilog="Example: tvident identify rig.csv --angle angle --torque torque --time time -o result.csv")
+@click.argument("file", type=click.Path(), required=False)
+@click.option("--angle", required=True, metavar="NAME", help="Channel of the angle, or a file that holds it alone.")
+@click.option("--torque", required=True, metavar="NAME", help="Channel of the torque, or a file that holds it alone.")
+@click.option("--angle-scale", metavar="SCALE", help="Number or variable to multiply the angle by.")
+@click.option("--torque-scale", metavar="SCALE", help="Number or variable to multiply the torque by.")
+@TIME
+@click.option(
+    "--preset",
+    type=click.Choice(get_args(Preset)),
+    help="Where what is not given comes from: the recording (auto, the default), or the paper.",
+)
+@click.option("--inertia", metavar="KIND", help="auto, constant, windowed, varying, a known number, or a channel.")
+@click.option("--damping", metavar="KIND", help="The same for damping; 0 leaves it out.")
+@click.option("--stiffness", metavar="KIND", help="The same for stiffness.")
+@click.option(
+    "--term",
+    "terms",
+    multiple=True,
+    metavar="TERM[:KIND]",
+    help="offset, coulomb or cubic; may be repeated; none leaves out the offset of --preset auto.",
+)
+@click.option("--lag", metavar="TIME", help="By how much the torque was recorded late: seconds, '2 ms', or auto.")
+@click.option(
+    "--quantisation", type=float, help="Step that the angle was rounded to; looked for if not given; 0: none."
+)
+@click.option("--mask", metavar="NAME", help="Channel, or file, that is not zero where a sample may be used.")
+@click.option("--form", type=click.Choice(get_args(Form)), help="Test functions (weak) or derivatives (strong).")
+@click.option(
+    "--window-length", metavar="LENGTH", help="Test function, or window of the polynomials: samples, odd, or '0.2 s'."
+)
+@click.option("--exponent", metavar="NUMBER", help="Of the test function: 3 to 20, or auto.")
+@click.option("--equations", metavar="LENGTH", help="Samples solved together: a number, '0.2 s', or auto.")
+@click.option("--variation", type=click.Choice(get_args(Variation)), help="Of parameters within a window.")
+@click.option(
+    "--selection",
+    type=click.Choice(get_args(HowToSelect)),
+    help="Strong form: of orders. Weak form: one window around a sample, or an average of many.",
+)
+@click.option("--max-order", type=int, help="Strong form: highest candidate order.")
+@CRITERION
+@click.option(
+    "--filter-torque/--no-filter-torque", default=None, help="Strong form: smooth the torque as the angle is."
+)
+@click.option(
+    "--settings", type=click.Path(), help="What an earlier run chose: a JSON file that --settings-output wrote."
+)
+@click.option("--settings-output", type=click.Path(dir_okay=False), help="JSON file for what this run chose.")
+@click.option(
+    "--nan-policy",
+    type=click.Choice(get_args(arguments.RowPolicy)),
+    default="omit",
+    show_default=True,
+    help="Missing values: omit their equations, propagate them to all windows that hold one, or raise.",
+)
+@RUN
+def identify(
+    file: str | None,
+    angle: str,
+    torque: str,
+    angle_scale: str | None,
+    torque_scale: str | None,
+    time_channel: str | None,
+    terms: tuple[str, ...],
+    lag: str | None,
+    mask: str | None,
+    settings: str | None,
+    settings_output: str | None,
+    output: str | None,
+    plot: str | None,
+    progress: bool | None,  # noqa: FBT001 - click passes options by name
+    **options: Any,
+) -> None:
+    """Identify inertia, damping and stiffness from the angle and torque in FILE.
+
+    What is not given is chosen from the recording, and the summary says what and why.
+    """
+    check_output(output, plot, file, angle, torque)
+    if settings_output is not None:
+        check_folder(Path(settings_output))
+    if not check_time(options["sample_rate"], options["delta"], time_channel):
+        raise click.UsageError("identify needs the sample period; got none; give --sample-rate, --delta or --time")
+    if settings is not None and options["preset"] is not None:
+        raise click.UsageError("--settings hold a preset; got --preset too; drop one of them")
+    channels = {} if file is None else recordings.read(file)
+    result = tvident.identify(
+        scaled(source_of(channels, angle, file), angle_scale, channels, file),
+        scaled(source_of(channels, torque, file), torque_scale, channels, file),
+        t=None if time_channel is None else channel_of(channels, time_channel, file),
+        lag=None if lag is None else _lag(lag),
+        mask=None if mask is None else mask_of(source_of(channels, mask, file)),
+        settings=None if settings is None else _read_settings(settings),
+        terms=_terms(terms),
+        progress=wanted_progress(progress),
+        **{name: _understood(name, value, channels, file) for name, value in given(options).items()},
+    )
+    if settings_output is not None:
+        with replaced(Path(settings_output)) as written:
+            written.write((json.dumps(result.settings, indent=1) + "\n").encode())
+    words = [result.summary()]
+    for name, (value, error) in result.constants.items():
+        words.append(f"{name} = {value:.8g} ± {error:.2g} {UNITS.get(name, '')}".rstrip())
+    give(result.columns(), UNITS, "\n".join(words), output)
+    if plot is not None:
+        save_figure(result.plot(), Path(plot))
+
+
+def _understood(name: str, value: Any, channels: recordings.Channels, file: str | None) -> Any:
+    """Return the argument that an option stands for."""
+    if name in COEFFICIENTS:
+        return _parameter(value, channels, file)
+    return length(value) if name in {"window_length", "equations", "exponent"} else value
+
+
+def _parameter(value: str, channels: recordings.Channels, file: str | None) -> Any:
+    """Return a kind, a number, or a channel."""
+    if value in get_args(Kind):
+        return value
+    try:
+        return float(value)
+    except ValueError:
+        return recordings.channel(channels, value, file or "the command line")
+
+
+def _terms(texts: tuple[str, ...]) -> list[Any] | None:
+    """Return terms from ``name`` or ``name:kind``; nothing where none are given, none where ``none`` is."""
+    if texts == ("none",):
+        return []
+    parts = [text.partition(":") for text in texts]
+    return [(name, kind) if kind else name for name, _, kind in parts] or None
+
+
+def _lag(text: str) -> float | Literal["auto"]:
+    """Return a time in seconds from a number, or from one with a unit; ``auto`` as it is."""
+    if text == "auto":
+        return "auto"
+    try:
+        return float(text)
+    except ValueError:
+        pass
+    sign, magnitude = (-1.0, text.strip()[1:]) if text.strip().startswith("-") else (1.0, text)
+    try:
+        return sign * arguments.seconds("lag", magnitude)
+    except ValueError:
+        raise click.UsageError(
+            f"lag must be seconds, a time such as '2 ms', or 'auto'; got {text!r}; repair it"
+        ) from None
+
+
+def _read_settings(path: str) -> dict[str, Any]:
+    """Return what an earlier run chose."""
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (ValueError, UnicodeDecodeError) as error:
+        raise recordings.FileError(
+            f"{path}: holds no settings ({error}); give a file that --settings-output wrote"
+        ) from None
+    if not isinstance(content, dict):
+        raise recordings.FileError(f"{path}: holds no settings; give a file that --settings-output wrote")
+    return content

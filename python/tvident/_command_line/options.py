@@ -1,0 +1,83 @@
+"""Options that several commands have, and what their values mean."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+import click
+
+from tvident._command_line.output import figures_on_file
+from tvident._derivatives import Criterion
+from tvident._files import check_folder, check_place
+
+Decorated = TypeVar("Decorated", bound=Callable[..., Any])
+
+
+def _options(*options: Callable[[Decorated], Decorated]) -> Callable[[Decorated], Decorated]:
+    def decorate(function: Decorated) -> Decorated:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return decorate
+
+
+TIME = _options(
+    click.option("--sample-rate", type=float, help="Samples per second."),
+    click.option("--delta", type=float, help="Sample period in seconds."),
+    click.option("--time", "time_channel", metavar="NAME", help="Channel that holds the time in seconds."),
+)
+
+RUN = _options(
+    click.option("--step", type=int, default=1, show_default=True, help="Every how many samples a result is wanted."),
+    click.option("--workers", type=int, help="Threads; by default all processors."),
+    click.option("--progress/--no-progress", default=None, help="Show progress; by default on a terminal."),
+    click.option(
+        "-o", "--output", type=click.Path(dir_okay=False), help="CSV or NPZ file for the results, or - for CSV here."
+    ),
+    click.option("--plot", type=click.Path(dir_okay=False), help="Picture of the results: PNG, PDF or SVG."),
+)
+
+CRITERION = click.option("--criterion", type=click.Choice(get_args(Criterion)), help="What chooses the order.")
+
+
+def length(text: str) -> int | str:
+    """Return a number of samples, or a duration as it is."""
+    return int(text) if text.strip().lstrip("+-").isdigit() else text
+
+
+def given(options: dict[str, Any]) -> dict[str, Any]:
+    """Return the options that were given."""
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def wanted_progress(wanted: bool | None) -> bool:  # noqa: FBT001 - an option's value
+    """Return whether to show progress: on a terminal, unless told otherwise."""
+    return sys.stderr.isatty() if wanted is None else wanted
+
+
+def check_time(sample_rate: float | None, delta: float | None, time_channel: str | None) -> bool:
+    """Return whether the sample period was given; refuse several."""
+    ways = {"--sample-rate": sample_rate, "--delta": delta, "--time": time_channel}
+    given = [name for name, value in ways.items() if value is not None]
+    if len(given) > 1:
+        raise click.UsageError(f"give only one of {', '.join(ways)}; got {' and '.join(given)}; drop all but one")
+    return bool(given)
+
+
+def check_output(output: str | None, plot: str | None, *sources: str | None) -> None:
+    """Refuse what cannot be written, or would write over a recording, before any work is done."""
+    if output is not None and output != "-":
+        place = Path(output)
+        check_place(place)
+        recorded = [Path(source) for source in sources if source is not None and Path(source).is_file()]
+        if place.exists() and any(place.samefile(source) for source in recorded):
+            raise click.UsageError(f"results must not replace the recording; got {output!r}; give another file")
+    if plot is not None:
+        figures_on_file()
+        if Path(plot).suffix.lower() not in {".png", ".pdf", ".svg"}:
+            raise click.UsageError(f"--plot must end in .png, .pdf or .svg; got {plot!r}; rename it")
+        check_folder(Path(plot))

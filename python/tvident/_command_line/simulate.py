@@ -1,0 +1,37 @@
+"""The command ``tvident simulate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, get_args
+
+import click
+
+import tvident
+from tvident._command_line.group import main
+from tvident._files import check_place
+from tvident._simulate import Excitation, Pattern
+
+
+@main.command()
+@click.argument("output", type=click.Path(dir_okay=False))
+@click.option("--duration", type=float, default=20.0, show_default=True, help="Seconds.")
+@click.option("--sample-rate", type=float, default=1000.0, show_default=True, help="Samples per second.")
+@click.option("--seed", type=int, default=0, show_default=True, help="The same seed gives the same recording.")
+@click.option(
+    "--pattern", type=click.Choice(get_args(Pattern)), default="slider", show_default=True, help="How stiffness moves."
+)
+@click.option(
+    "--excitation", type=click.Choice(get_args(Excitation)), default="multisine", show_default=True, help="Torque."
+)
+@click.option("--torque-snr-db", type=float, default=20.0, show_default=True, help="Torque over its noise, dB.")
+@click.option(
+    "--angle-noise", type=float, default=1e-4, show_default=True, help="Noise over the angle's standard deviation."
+)
+@click.option("--encoder-counts", type=int, help="Counts a turn, instead of noise.")
+def simulate(output: str, **options: Any) -> None:
+    """Write a simulated recording of the paper's rig, with its truth, to OUTPUT (CSV or NPZ)."""
+    check_place(Path(output))
+    recording = tvident.simulate_torsional_rig(**options)
+    recording.save(output)
+    click.echo(f"{recording.time.size} samples written to {output}", err=True)

@@ -1,0 +1,16 @@
+"""Differentiates noisy samples: local polynomials whose order or window is chosen, and the Savitzky–Golay filter."""
+
+from tvident._derivatives.fit import LocalPolynomialFit
+from tvident._derivatives.local_polynomials import fit_local_polynomials
+from tvident._derivatives.plans import Criterion, Selection, plan, quantisation_step
+from tvident._derivatives.savitzky_golay import savgol_filter
+
+__all__ = [
+    "Criterion",
+    "LocalPolynomialFit",
+    "Selection",
+    "fit_local_polynomials",
+    "plan",
+    "quantisation_step",
+    "savgol_filter",
+]

@@ -1,0 +1,149 @@
+"""What was found by fitting local polynomials."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident._derivatives.found import Found
+
+
+class LocalPolynomialFit:
+    r"""What :func:`fit_local_polynomials` found.
+
+    Attributes
+    ----------
+    derivatives : ndarray of float64, shape (max_deriv + 1, \*y.shape)
+        Value, first, second, … derivative, in the unit of ``y`` per second to the power of the derivative.
+    order : ndarray of uint8, shape y.shape
+        Order chosen in the window around each sample; that with the largest weight where orders were averaged; that of the highest
+        derivative where windows were chosen. Near the ends each derivative may take a lower one (see Notes of
+        :func:`fit_local_polynomials`).
+    sigma : ndarray of float64, shape y.shape
+        Standard deviation of the noise in each window, in the unit of ``y``: the root of RSS/(M - n - 1). Where windows were chosen, that
+        of the record.
+    status : ndarray of uint16, shape y.shape
+        Flags of :class:`tvident.Status`, 0 where all is well.
+    window_length : int or ndarray of int
+        Samples in a window. Where they were chosen, those that suit each record best, one number a derivative: shape
+        (max_deriv + 1, \*y.shape without the axis).
+    settings : dict
+        What was used and what was chosen: ``window_length``, ``order``, ``max_order``, ``quantisation``, and either ``criterion`` and
+        ``selection`` or ``noise``, the standard deviation of each record's noise.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tvident
+    >>> t = np.arange(1000) / 1000
+    >>> fit = tvident.fit_local_polynomials(np.sin(20 * t), 101, sample_rate=1000)
+    >>> value, velocity, acceleration = fit.derivatives
+    >>> bool(abs(velocity[500] - 20 * np.cos(20 * t[500])) < 1e-6)
+    True
+    """
+
+    def __init__(
+        self,
+        samples: npt.NDArray[Any],
+        axis: int,
+        step: int,
+        found: Found,
+    ) -> None:
+        self._samples = samples
+        self._axis = axis % samples.ndim
+        self._step = step
+        self._found = found
+        self.derivatives: npt.NDArray[np.float64] = self._in_place(found.derivatives)
+        self.order: npt.NDArray[np.uint8] = self._in_place(found.order)
+        self.status: npt.NDArray[np.uint16] = self._in_place(found.status)
+        self.sigma: npt.NDArray[np.float64] = self._in_place(found.sigma)
+        self.window_length: int | npt.NDArray[np.intp] = found.window_length
+        self.settings: dict[str, Any] = found.settings
+
+    def _in_place(self, array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Put the axis of the samples, last so far, where the user has it."""
+        return np.moveaxis(array, -1, self._axis - self._samples.ndim)
+
+    @cached_property
+    def stderr(self) -> npt.NDArray[np.float64]:
+        r"""Standard errors: ndarray of float64 in the shape and units of ``derivatives``; computed when first asked for.
+
+        Where the order is fixed they are ``sigma`` times the gain of the filter, :math:`g_n = \sqrt{\sum_{j \le n} q_j^{(d)}(x)^2}/Δ^d`;
+        what the polynomial could not follow is not in them. Where it was chosen, or averaged, another recording would have led to
+        another one, so the orders' disagreement is in them: :math:`\sum_n w_n \sqrt{σ_n^2 g_n^2 + (d_n - \hat d)^2}` around the estimate
+        (Burnham and Anderson 2002, section 4.3.2), with Akaike's weights of the window's criterion; for ``selection="pooled"`` of
+        the neighbours' mean, which is worth 2.4 windows. On the simulated rig intervals of 95 % hold the truth in 92 to 97 %, where
+        ``sigma`` times gain alone would do in 70 to 95 %. Where windows were chosen they hold the disagreement of all candidates and
+        the bias
+        found around each sample. Within half a window of the ends they are those of the order that was taken there.
+
+        The cost is some 300 ns a sample; that of the fit where the order is fixed; nothing where windows were chosen.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import tvident
+        >>> noise = np.random.default_rng(0).standard_normal(1000)
+        >>> fit = tvident.fit_local_polynomials(noise, 101, order=0, max_deriv=0)
+        >>> np.round(fit.stderr[0, 500] * np.sqrt(101) / fit.sigma[500], 6)
+        np.float64(1.0)
+        """
+        return self._in_place(self._found.errors())
+
+    def scores(self, i: int) -> npt.NDArray[np.float64]:
+        r"""Return the criterion of every candidate order in the window around sample ``i``: equation (8) of the paper.
+
+        Parameters
+        ----------
+        i : int
+            Sample number along the axis of time; negative numbers count from the end. Near an end this is the first or last full
+            window.
+
+        Returns
+        -------
+        ndarray of float64, shape (orders, \*y.shape without the axis)
+            Infinite for orders that are no candidates; NaN where the window holds a value that is no number.
+
+        Raises
+        ------
+        IndexError
+            If there is no such sample.
+        TypeError
+            If `i` is not a whole number.
+
+        Notes
+        -----
+        The cost is that of projecting one window: O(window · orders).
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import tvident
+        >>> t = np.arange(1000) / 1000
+        >>> y = t**3 + 1e-3 * np.random.default_rng(0).standard_normal(t.size)
+        >>> scores = tvident.fit_local_polynomials(y, 601, sample_rate=1000).scores(500)
+        >>> scores.shape, int(scores.argmin())
+        ((16,), 3)
+        """
+        samples = self._samples.shape[-1]
+        place = arguments.whole_number("i", i)
+        if not -samples <= place < samples:
+            raise IndexError(f"i must be a sample number below {samples}; got {place}; count from 0")
+        leading = self._samples.shape[:-1]
+        columns = [
+            self._found.plan_of(index).scores(self._samples[index], place % samples) for index in np.ndindex(leading)
+        ]
+        # Windows of different lengths may have different numbers of candidates.
+        scores = np.full((max(map(len, columns), default=0), len(columns)), np.inf)
+        for column, values in enumerate(columns):
+            scores[: len(values), column] = values
+        return scores.reshape(-1, *leading)
+
+    def __repr__(self) -> str:
+        orders = f"orders {self.order.min()}…{self.order.max()}" if self.order.size else "no samples"
+        windows = ", ".join(str(length) for length in np.unique(self.window_length))
+        return f"<LocalPolynomialFit of {self._samples.shape[-1]} samples, windows of {windows}, {orders}>"

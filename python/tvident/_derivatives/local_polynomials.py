@@ -1,0 +1,226 @@
+"""Derivatives of noisy samples: local polynomials of an order chosen in every window."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident import _core
+from tvident._derivatives.automatic import choose
+from tvident._derivatives.fit import LocalPolynomialFit
+from tvident._derivatives.found import Found
+from tvident._derivatives.plans import HIGHEST_ORDER, Criterion, Selection, plan, quantisation_step
+
+_SHORTEST_WINDOW = 5
+
+
+def fit_local_polynomials(
+    y: npt.ArrayLike,
+    window_length: int | str,
+    *,
+    delta: float | None = None,
+    sample_rate: float | None = None,
+    t: npt.ArrayLike | None = None,
+    max_order: int = HIGHEST_ORDER,
+    order: int | None = None,
+    criterion: Criterion = "aicc",
+    selection: Selection = "window",
+    max_deriv: int = 2,
+    axis: int = -1,
+    step: int = 1,
+    nan_policy: arguments.NanPolicy = "propagate",
+    quantisation: float | None = None,
+    workers: int | None = None,
+    progress: arguments.Progress = None,
+) -> LocalPolynomialFit:
+    r"""Differentiate noisy samples with a polynomial order chosen in every window.
+
+    Around every sample :math:`t_i` a polynomial :math:`\sum_{j \le n} \alpha_j (t - t_i)^j` is fitted to the window of ``M`` samples by
+    least squares (equation (2) of the paper) for every order ``n``, and the order that minimises Akaike's criterion
+
+    .. math:: AICc_n = M \ln σ_n^2 + 2K + \frac{2K(K+1)}{M-K-1}, \quad K = n + 1, \quad σ_n^2 = RSS_n / (M - 1)
+
+    (equations (8) and (9)) gives the value and its derivatives.
+
+    Parameters
+    ----------
+    y : array_like
+        Samples: real numbers of any type, any shape.
+    window_length : int or str
+        Samples in a window, ``M = 2N + 1``: odd, at least 5; or a duration such as ``"0.2 s"``, of which the nearest odd number of
+        samples is taken; or ``"auto"``: window and order are chosen together, for every derivative on its own (see Notes).
+    delta : float, optional
+        Sample period in seconds, 1 by default. Give at most one of `delta`, `sample_rate` and `t`.
+    sample_rate : float, optional
+        Samples per second.
+    t : array_like, optional
+        Time of every sample in seconds, shape (n,), uniform to a thousandth of the sample period.
+    max_order : int, optional
+        Highest candidate order, at most 15. Orders that a short window cannot judge are left out.
+    order : int, optional
+        Fixes the order: the classic Savitzky–Golay filter, with noise and errors.
+    criterion : {"aicc", "aicc-textbook", "aic", "bic"}, optional
+        What is minimised. ``"aicc"`` counts parameters as the paper does; ``"aicc-textbook"`` counts the noise variance too.
+    selection : {"window", "pooled", "average"}, optional
+        ``"window"``: every window has the order that is best in it, as in the paper. ``"pooled"``: the criterion is summed over the
+        neighbouring windows, those that share a sample with the window, and the order chosen by the sum. ``"average"``: the estimates of
+        all orders are averaged with Akaike's weights :math:`w_n ∝ \exp(-AICc_n/2)`.
+    max_deriv : int, optional
+        Highest derivative wanted.
+    axis : int, optional
+        Axis of time.
+    step : int, optional
+        Every how many samples an estimate is wanted: the same numbers as ``[::step]`` of all of them.
+    nan_policy : {"propagate", "raise"}, optional
+        Windows that hold a value that is not a finite number are NaN, and no others; or raise.
+    quantisation : float, optional
+        Step to which `y` was rounded, in its unit: an encoder's count, a converter's last bit. By default it is looked for in the
+        samples: the step that all differences of neighbours are multiples of, the smallest one of all records. 0 means none.
+    workers : int, optional
+        Threads; by default ``TVIDENT_WORKERS`` or all processors that this process may use. The numbers do not depend on it.
+    progress : bool or callable, optional
+        Show a bar, or call a function with the samples done and all of them. What it raises cancels the work.
+
+    Returns
+    -------
+    LocalPolynomialFit
+        ``derivatives`` of shape (max_deriv + 1, \*y.shape) in the unit of `y` per second to the power of the derivative, ``order``,
+        ``sigma``, ``status``, ``stderr``, ``window_length``, ``settings`` and ``scores(i)``.
+
+    Raises
+    ------
+    ValueError
+        If the window is even, shorter than 5 samples or longer than the record, if an order is too high, if `t` is not uniform, or
+        if a name is unknown. With ``"auto"``, if the record has fewer than 64 samples, if no order reaches `max_deriv`, or if
+        `criterion` or `selection` is given.
+    TypeError
+        If `y` is complex or holds no numbers, or a number is not whole.
+
+    Notes
+    -----
+    No residual is taken to be smaller than what rounding to a step ``q`` leaves on average, :math:`RSS_n \ge M q^2/12`, nor than the
+    rounding of the arithmetic. So a resting encoder has order 0, and its status says EXACT.
+
+    The first and last ``N`` samples are evaluated off the centre of the first and last full window, where noise is amplified more. Each
+    derivative takes there the order with the least estimated squared bias plus variance, at most ``order``; the status says EDGE.
+
+    The order that is best in one window follows the noise in it. On the simulated rig at 40 and 20 dB the second derivative with
+    windows of 101 samples is 1.9 and 3.2 times as wrong as with the one order that is best for all windows, the average 1.6 and 2.7,
+    pooled 1.0 and 1.1 times.
+
+    With ``window_length="auto"`` every derivative has a window and an order of its own: those with the least estimated mean squared
+    error :math:`b^2 + σ^2 \|k\|^2` over the record, ``b`` the bias and ``k`` the weights of the samples. Around them the candidates are
+    weighed again in every neighbourhood of five half-widths, so that estimates follow a signal that changes. Near the ends
+    coefficients are shrunk by what other windows say of them. The error of θ̈ of the simulated rig is within 3 % of that of the best
+    window and order known afterwards, and 20 to 30 % below it where the signal is a chirp. Windows that hold a value that is no number
+    are left out; what no candidate's window reaches is NaN.
+
+    The cost is some 15 ns a sample and thread at any window length on a processor with AVX-512, about twice that with AVX2; pooled or
+    averaged some 300 ns, since every window's orders need their logarithms; ``"auto"`` some 0.2 s a derivative for the first 65 000
+    samples and 500 ns a sample and derivative beyond.
+
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: identification of a time-varying mechanical system using the Akaike information criterion.
+    K. P. Burnham, D. R. Anderson: Model Selection and Multimodel Inference, 2002.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tvident
+    >>> t = np.arange(2000) / 1000
+    >>> y = np.sin(2 * np.pi * 3 * t) + 1e-3 * np.random.default_rng(0).standard_normal(t.size)
+    >>> fit = tvident.fit_local_polynomials(y, 201, sample_rate=1000)
+    >>> fit.derivatives.shape
+    (3, 2000)
+    >>> error = fit.derivatives[2] + (2 * np.pi * 3) ** 2 * np.sin(2 * np.pi * 3 * t)
+    >>> bool(np.sqrt(np.mean(error[100:-100] ** 2)) < 0.01 * (2 * np.pi * 3) ** 2)
+    True
+    >>> automatic = tvident.fit_local_polynomials(y, "auto", sample_rate=1000)
+    >>> automatic.window_length.shape
+    (3,)
+    >>> error = automatic.derivatives[2] + (2 * np.pi * 3) ** 2 * np.sin(2 * np.pi * 3 * t)
+    >>> bool(np.sqrt(np.mean(error**2)) < 0.001 * (2 * np.pi * 3) ** 2)
+    True
+    """
+    array = arguments.real_array("y", y)
+    samples = arguments.along_axis("y", array, axis)
+    count = samples.shape[-1]
+    period = arguments.sample_period(count, delta=delta, sample_rate=sample_rate, t=t)
+    arguments.one_of("criterion", criterion, get_args(Criterion))
+    arguments.one_of("selection", selection, get_args(Selection))
+    arguments.check_nan("y", array, nan_policy)
+    max_order = arguments.whole_number("max_order", max_order, least=0)
+    order = None if order is None else arguments.whole_number("order", order, least=0)
+    max_deriv = arguments.whole_number("max_deriv", max_deriv, least=0)
+    every = arguments.whole_number("step", step, least=1)
+    threads = arguments.worker_count(workers)
+    automatic = isinstance(window_length, str) and window_length.strip() == "auto"
+    length = 0
+    if automatic:
+        _check_left_to_the_rule(criterion, selection)
+    else:
+        length = arguments.window_length("window_length", window_length, period, odd=True)
+        arguments.check_window("window_length", length, count, least=_SHORTEST_WINDOW)
+    step_of_rounding = quantisation_step(samples, quantisation)
+
+    def plan_of_window(length: int) -> _core.LocalPolynomials:
+        return plan(
+            length,
+            order=order,
+            max_order=max_order,
+            criterion=criterion,
+            selection=selection,
+            derivatives=tuple(range(max_deriv + 1)),
+            delta=period,
+            noise=True,
+            quantisation=step_of_rounding,
+        )
+
+    with arguments.reporter(progress, "local polynomials") as report:
+        if automatic:
+            found = choose(
+                samples,
+                plan_of_window,
+                max_deriv=max_deriv,
+                max_order=max_order,
+                order=order,
+                delta=period,
+                quantisation=None if quantisation is None else step_of_rounding,
+                step=every,
+                workers=threads,
+                progress=report,
+            )
+            return LocalPolynomialFit(samples, axis, every, found)
+        core_plan = plan_of_window(length)
+        derivatives, orders, status, sigma = core_plan.estimate(samples, step=every, workers=threads, progress=report)
+    found = Found(
+        derivatives=derivatives,
+        order=orders,
+        status=status,
+        sigma=sigma,
+        window_length=length,
+        settings={
+            "window_length": length,
+            "order": order,
+            "max_order": max_order,
+            "criterion": criterion,
+            "selection": selection,
+            "quantisation": step_of_rounding,
+        },
+        errors=lambda: core_plan.errors(samples, step=every, workers=threads),
+        plan_of=lambda _: core_plan,
+    )
+    return LocalPolynomialFit(samples, axis, every, found)
+
+
+def _check_left_to_the_rule(criterion: str, selection: str) -> None:
+    """Check that nothing is asked for that belongs to a window of given length."""
+    for name, value, default in (("criterion", criterion, "aicc"), ("selection", selection, "window")):
+        if value != default:
+            raise ValueError(
+                f"{name} chooses the order in a window that is given; got {value!r} with window_length='auto', which "
+                f"chooses the order too; leave {name} out or give a window"
+            )

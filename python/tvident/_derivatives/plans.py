@@ -1,0 +1,70 @@
+"""Tables for windows of one length, made once, and the step to which samples were rounded."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, Literal, TypeAlias
+
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident import _core
+
+Criterion: TypeAlias = Literal["aicc", "aicc-textbook", "aic", "bic"]
+
+Selection: TypeAlias = Literal["window", "pooled", "average"]
+
+HIGHEST_ORDER = 15
+"""No polynomial order above this is offered."""
+
+
+@lru_cache(maxsize=8)
+def _plan(
+    window_length: int,
+    order: int | None,
+    max_order: int,
+    criterion: str,
+    selection: str,
+    derivatives: tuple[int, ...],
+    delta: float,
+    noise: bool,  # noqa: FBT001 - the key of the cache
+    quantisation: float,
+    instructions: str,  # noqa: ARG001 - likewise: a plan is made for the instructions in force
+) -> _core.LocalPolynomials:
+    return _core.LocalPolynomials(
+        window_length, order, max_order, criterion, selection, list(derivatives), delta, noise, quantisation
+    )
+
+
+def plan(
+    window_length: int,
+    *,
+    order: int | None,
+    max_order: int = HIGHEST_ORDER,
+    criterion: str = "aicc",
+    selection: str = "window",
+    derivatives: tuple[int, ...],
+    delta: float,
+    noise: bool,
+    quantisation: float = 0.0,
+) -> _core.LocalPolynomials:
+    """Return the tables for windows of one length, made once and kept for the next call."""
+    return _plan(
+        window_length,
+        order,
+        max_order,
+        criterion,
+        selection,
+        derivatives,
+        delta,
+        noise,
+        quantisation,
+        _core.instructions(),
+    )
+
+
+def quantisation_step(samples: npt.NDArray[Any], given: float | None) -> float:
+    """Return the step to which samples were rounded: what was given, or what is found in them; 0 for none."""
+    if given is None:
+        return _core.quantisation_step(samples)
+    return 0.0 if given == 0 else arguments.positive_number("quantisation", given)

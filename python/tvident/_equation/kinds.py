@@ -1,0 +1,49 @@
+"""Inertia, damping and stiffness: known, or unknown and of a kind."""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+
+Kind: TypeAlias = Literal["windowed", "constant", "auto", "varying"]
+
+Parameter: TypeAlias = Kind | float | npt.ArrayLike
+
+
+COEFFICIENTS = ("inertia", "damping", "stiffness")
+"""Coefficients of the equation of motion, in the order of its derivatives from the second down."""
+
+
+def parameter(name: str, value: object, shape: tuple[int, ...]) -> Kind | float | npt.NDArray[np.number]:
+    """Return how a coefficient comes about: a kind of unknown, a number, or an array of the angle's shape."""
+    if isinstance(value, str):
+        kinds = get_args(Kind)
+        if value not in kinds:
+            raise ValueError(
+                f"{name} must be 'windowed', 'constant', 'auto', 'varying', a number or an array; got {value!r}; use one of these"
+            )
+        kind: Kind = next(kind for kind in kinds if kind == value)
+        return kind
+    array = np.asarray(value)
+    if array.ndim == 0 and array.dtype.kind in "iuf":
+        number = float(array)
+        if not np.isfinite(number):
+            raise ValueError(f"{name} must be finite; got {number}; give a number, or 'windowed' where it is unknown")
+        return number
+    known = arguments.real_array(name, array)
+    if not np.isfinite(known).all():
+        raise ValueError(
+            f"a known {name} must be finite at every sample; got {np.count_nonzero(~np.isfinite(known))} values that are not; "
+            "interpolate them, or leave these samples out with mask="
+        )
+    try:
+        return np.broadcast_to(known, shape)
+    except ValueError:
+        raise ValueError(
+            f"a known {name} must have one value for every sample; got shape {known.shape} for an angle of shape {shape}; "
+            "resample it"
+        ) from None

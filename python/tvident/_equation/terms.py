@@ -1,0 +1,87 @@
+"""What else stands in the equation of motion: terms by name, and terms of one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident._equation.kinds import COEFFICIENTS, Kind
+
+TermName: TypeAlias = Literal["offset", "coulomb", "cubic"]
+
+
+@dataclass(frozen=True)
+class Term:
+    """A term of one's own on the left-hand side of the equation of motion, with an unknown factor.
+
+    Parameters
+    ----------
+    name : str
+        What the factor is called in results.
+    function : callable
+        Function of ``(t, angle, velocity)``: times in s of shape (n,), smoothed angle in rad and velocity in rad/s of the angle's shape.
+        Returns an array of that shape. The unit of the factor is N m over that of the function.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tvident
+    >>> drag = tvident.Term("drag", lambda t, angle, velocity: velocity * np.abs(velocity))
+    >>> rig = tvident.simulate_torsional_rig(duration=3.0)
+    >>> result = tvident.identify(rig.angle, rig.torque, sample_rate=1000, inertia=0.0123, terms=[drag])
+    >>> result.terms["drag"].shape
+    (3000,)
+    """
+
+    name: str
+    function: Callable[[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]], npt.ArrayLike]
+
+    def values(
+        self, t: npt.NDArray[Any], angle: npt.NDArray[Any], velocity: npt.NDArray[Any]
+    ) -> npt.NDArray[np.number]:
+        """Return the term at every sample, in the angle's shape.
+
+        Raises
+        ------
+        ValueError
+            If the function returns another shape.
+        TypeError
+            If it returns no real numbers.
+        """
+        values = np.asarray(self.function(t, angle, velocity))
+        if values.shape != angle.shape:
+            raise ValueError(
+                f"the function of term {self.name!r} must return an array of shape {angle.shape}; got {values.shape}; "
+                "return one value for every sample"
+            )
+        return arguments.real_array(f"term {self.name!r}", values)
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A column of the equations: its name, its kind and, for a term of the user's own, the term."""
+
+    name: str
+    kind: Kind
+    own: Term | None = None
+
+
+def all_terms(terms: Sequence[object], default: Kind) -> list[Unknown]:
+    """Return every further term with its name and kind."""
+    if isinstance(terms, str | Term):
+        raise TypeError(f"terms must be a sequence of terms; got {terms!r}; write ({terms!r},)")
+    found: list[Unknown] = []
+    for given in terms:
+        term, kind = given if isinstance(given, tuple) and len(given) == 2 else (given, default)  # noqa: PLR2004 - a pair
+        arguments.one_of("the kind of a term", kind, ("windowed", "constant"))
+        own = term if isinstance(term, Term) else None
+        name = arguments.one_of("a term", term, get_args(TermName)) if own is None else own.name
+        if any(name == other.name for other in found) or name in COEFFICIENTS:
+            raise ValueError(f"every term must have a name of its own; {name!r} comes twice; drop or rename one")
+        found.append(Unknown(name, kind, own))
+    return found

@@ -1,0 +1,56 @@
+"""What a file of recordings holds: channels by name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy.typing as npt
+
+Channels = dict[str, npt.NDArray[Any]]
+
+
+class FileError(Exception):
+    """A file that cannot be used. The message says why and what to do."""
+
+
+def channel(channels: Mapping[str, npt.NDArray[Any]], name: str, source: str) -> npt.NDArray[Any]:
+    """Return a channel by its name, without its unit where it has one, or by its number.
+
+    Parameters
+    ----------
+    channels : mapping of str to ndarray
+        What :func:`read` returned.
+    name : str
+        Name with or without the unit in brackets, or number from 0.
+    source : str
+        What the file is called in the message.
+
+    Returns
+    -------
+    ndarray, shape (n,) or ()
+        In the unit of the file.
+
+    Raises
+    ------
+    KeyError
+        If there is no such channel: the message lists what there is.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tvident import recordings
+    >>> channels = {"time [s]": np.arange(3.0), "angle [rad]": np.ones(3)}
+    >>> recordings.channel(channels, "angle", "rig.npz")
+    array([1., 1., 1.])
+    """
+    without_units = {re.sub(r"\s*[\[(][^\])]*[\])]\s*$", "", key): key for key in channels}
+    for key in (name, without_units.get(name)):
+        if key is not None and key in channels:
+            return channels[key]
+    if name.isdigit() and int(name) < len(channels):
+        return list(channels.values())[int(name)]
+    raise KeyError(
+        f"{source} has no channel {name!r}; it has {', '.join(channels)}; use one of these or a number from 0"
+    )

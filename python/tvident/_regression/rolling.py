@@ -1,0 +1,143 @@
+"""Least squares in every window of rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident import _core
+
+MOST_REGRESSORS = 16
+"""No problem may have more regressors than this."""
+
+
+@dataclass(frozen=True, eq=False)
+class RollingRegression:
+    """What :func:`rolling_least_squares` found; NaN where the status says INVALID.
+
+    Attributes
+    ----------
+    params : ndarray of float64, shape (n, p) or (n, p, q)
+        Parameters of the window around each row, in the unit of ``b`` over that of the regressor.
+    stderr : ndarray of float64, same shape
+        Their standard errors, for residuals that are independent and of one variance.
+    rss : ndarray of float64, shape (n,) or (n, q)
+        Residual sum of squares.
+    condition : ndarray of float64, shape (n,)
+        Condition number of the regressors in the window, each scaled to the same norm: √p·‖S⁻¹‖ in the Frobenius norm.
+    status : ndarray of uint16, shape (n,)
+        Flags of :class:`tvident.Status`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tvident import Status, rolling_least_squares
+    >>> regression = rolling_least_squares(np.ones(100), np.arange(100.0), 11)
+    >>> float(np.round(regression.params[50, 0], 6)), float(np.round(regression.rss[50], 6))
+    (50.0, 110.0)
+    >>> Status(int(regression.status[2]))
+    <Status.EDGE: 2>
+    """
+
+    params: npt.NDArray[np.float64]
+    stderr: npt.NDArray[np.float64]
+    rss: npt.NDArray[np.float64]
+    condition: npt.NDArray[np.float64]
+    status: npt.NDArray[np.uint16]
+
+
+def rolling_least_squares(
+    A: npt.ArrayLike,
+    b: npt.ArrayLike,
+    window: int,
+    *,
+    step: int = 1,
+    workers: int | None = None,
+    progress: arguments.Progress = None,
+) -> RollingRegression:
+    """Solve ``A x ≈ b`` by least squares in a window around every row.
+
+    The window around row ``i`` holds the rows ``i - w//2 … i - w//2 + w - 1``. Each window's factor is merged from factors that rows were
+    only ever added to, so a glitch leaves with its row, and no digits are lost however long the record is.
+
+    Parameters
+    ----------
+    A : array_like, shape (n, p)
+        Regressors, at most 16; a single one may be given as shape (n,).
+    b : array_like, shape (n,) or (n, q)
+        Right-hand sides.
+    window : int
+        Rows in a window, more than ``p``.
+    step : int, optional
+        Every how many rows a result is wanted.
+    workers : int, optional
+        Threads; by default ``TVIDENT_WORKERS`` or all processors that this process may use. The numbers do not depend on it.
+    progress : bool or callable, optional
+        Show a bar, or call a function with the rows done and all of them.
+
+    Returns
+    -------
+    RollingRegression
+        ``params``, ``stderr``, ``rss``, ``condition`` and ``status``. Near the ends windows hold fewer rows (status EDGE), at least half
+        of them. Windows with a value that is no finite number, or whose regressors are dependent, are NaN.
+
+    Raises
+    ------
+    ValueError
+        If lengths differ, the window is not longer than the number of regressors or longer than the record, or there are too many
+        regressors.
+    TypeError
+        If an array is complex or holds no numbers.
+
+    Notes
+    -----
+    Equations (3) and (4) of the paper are of this kind. Factors are updated by rotations without square roots. The cost for three
+    regressors is some 30 ns a row and thread, whatever the window; it grows with the square of their number.
+
+    References
+    ----------
+    W. M. Gentleman: Least squares computations by Givens transformations without square roots, Journal of the Institute of Mathematics
+    and its Applications 12 (1973).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tvident import rolling_least_squares
+    >>> t = np.linspace(0, 1, 1000)
+    >>> A = np.stack([np.sin(40 * t), np.cos(60 * t)], axis=1)
+    >>> b = A @ [2.0, 3.0]
+    >>> np.round(rolling_least_squares(A, b, 200).params[500], 6)
+    array([2., 3.])
+    """
+    regressors = arguments.real_array("A", A)
+    if regressors.ndim == 1:
+        regressors = regressors[:, None]
+    sides = arguments.real_array("b", b)
+    if regressors.ndim != 2 or sides.ndim > 2:  # noqa: PLR2004 - a matrix has two axes
+        raise ValueError(
+            f"A must have shape (n, p) and b shape (n,) or (n, q); got {regressors.shape} and {sides.shape}; reshape them"
+        )
+    rows, count = regressors.shape
+    if sides.shape[0] != rows:
+        raise ValueError(
+            f"A and b must have as many rows as each other; got {rows} and {sides.shape[0]}; cut one of them"
+        )
+    if count > MOST_REGRESSORS:
+        raise ValueError(f"A must have at most {MOST_REGRESSORS} columns; got {count}; drop or combine some")
+    length = arguments.whole_number("window", window, least=1)
+    arguments.check_window("window", length, rows, least=count + 1)
+    with arguments.reporter(progress, "least squares") as report:
+        params, stderr, rss, condition, status = _core.rolling_least_squares(
+            regressors.T,
+            sides.reshape(rows, -1).T,
+            length,
+            step=arguments.whole_number("step", step, least=1),
+            workers=arguments.worker_count(workers),
+            progress=report,
+        )
+    if sides.ndim == 1:
+        return RollingRegression(params[:, 0].T, stderr[:, 0].T, rss[0], condition, status)
+    return RollingRegression(np.moveaxis(params, -1, 0), np.moveaxis(stderr, -1, 0), rss.T, condition, status)

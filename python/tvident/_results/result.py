@@ -1,0 +1,245 @@
+"""What an identification found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._equation import UNITS
+from tvident._files import aligned, write_table
+from tvident._results.oscillator import Oscillator
+from tvident._results.standard_errors import StandardErrors
+from tvident._status import Status, describe
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array: TypeAlias = npt.NDArray[np.float64]
+
+_MOST_SENTENCES = 20
+"""A summary of many records shows the advice for some."""
+
+
+def _range(value: Any) -> str:
+    """Return one number, or those of several records."""
+    if not isinstance(value, tuple):
+        return str(value)
+    least, most = min(value, default=0), max(value, default=0)
+    return str(least) if least == most else f"{least} to {most}"
+
+
+def _product(factor: Array, error: Array) -> Array:
+    """Return standard errors times what they are too small by."""
+    return np.asarray(factor * error)
+
+
+class Identification:
+    r"""What :func:`tvident.identify` found. ``n`` is the number of samples, or of every ``step``-th of them.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+        Seconds.
+    inertia, damping, stiffness : ndarray of float64, shape (\*, n)
+        Identified, constant or known values. NaN only where the status has INVALID.
+    terms : dict of str to ndarray, shape (\*, n)
+        Factors of further terms.
+    constants : dict of str to (value, stderr)
+        Parameters that are constant over the record.
+    stderr : mapping of str to ndarray, shape (\*, n)
+        Standard errors of all of these, ``"natural_frequency"`` and ``"damping_ratio"`` (by the delta method, with all covariances). In
+        weak form they hold the correlation of overlapping equations and what windows cannot follow. In strong form they are those of
+        ordinary least squares times one factor a record and parameter: how far windows scatter that share no equation, or for
+        constants the covariance of the residuals. They cannot hold what all windows are wrong by alike: angle noise of 3 % and more
+        pulls inertia and stiffness down, and constants taken from derivatives may be off by two or three of their standard errors.
+    condition : ndarray, shape (\*, n)
+        Condition number of the equations, their columns scaled to the same norm: how hard the parameters are to tell apart.
+    residual_std : ndarray, shape (\*, n)
+        Standard deviation of what is left of the torque.
+    order : ndarray of uint8, shape (\*, n)
+        Order of the polynomial around each sample; 0 in weak form, which has none.
+    status : ndarray of uint16, shape (\*, n)
+        Flags of :class:`tvident.Status`.
+    jumps : tuple of float
+        Times in seconds at which what is windowed jumps, where windows of all lengths are averaged; one such tuple a record in a batch.
+    settings : dict
+        What was used, what was chosen, in words why (``"reasons"``) and what to do (``"advice"``). ``identify(…, settings=…)`` uses it
+        again.
+
+    Examples
+    --------
+    >>> import tvident
+    >>> rig = tvident.simulate_torsional_rig(duration=3.0)
+    >>> result = tvident.identify(rig.angle, rig.torque, sample_rate=rig.sample_rate, inertia=0.0123)
+    >>> bool(abs(result.stiffness[1500] / rig.stiffness[1500] - 1) < 0.02)
+    True
+    >>> sorted(result.stderr)
+    ['damping', 'damping_ratio', 'inertia', 'natural_frequency', 'offset', 'stiffness']
+    """
+
+    def __init__(
+        self,
+        *,
+        time: Array,
+        values: dict[str, Array],
+        errors: dict[str, Array],
+        covariances: dict[frozenset[str], Array],
+        factors: dict[str, Array],
+        constants: dict[str, tuple[Any, Any]],
+        terms: list[str],
+        condition: Array,
+        residual_std: Array,
+        order: npt.NDArray[np.uint8],
+        status: npt.NDArray[np.uint16],
+        jumps: tuple[Any, ...],
+        settings: dict[str, Any],
+    ) -> None:
+        self.time = time
+        self.inertia = values["inertia"]
+        self.damping = values["damping"]
+        self.stiffness = values["stiffness"]
+        self.terms = {name: values[name] for name in terms}
+        self.constants = constants
+        self.condition = condition
+        self.residual_std = residual_std
+        self.order = order
+        self.status = status
+        self.jumps = jumps
+        self.settings = settings
+        known = {name: error for name, error in errors.items() if name not in factors}
+        computed: dict[str, Callable[[], Array]] = {
+            name: partial(_product, factor, errors[name]) for name, factor in factors.items()
+        }
+        enlarged = StandardErrors(known, computed)
+        self._oscillator = Oscillator(self.inertia, self.damping, self.stiffness, enlarged, covariances, factors)
+        derived = {
+            "natural_frequency": self._oscillator.natural_frequency_error,
+            "damping_ratio": self._oscillator.damping_ratio_error,
+        }
+        self.stderr = StandardErrors(known, computed | derived)
+
+    @property
+    def natural_frequency(self) -> Array:
+        r"""Undamped natural frequency √(K/I)/2π in Hz, shape (\*, n); NaN where K/I is negative."""
+        return self._oscillator.natural_frequency
+
+    @property
+    def damping_ratio(self) -> Array:
+        r"""Damping ratio C/(2√(KI)), shape (\*, n), without unit; NaN where KI is negative."""
+        return self._oscillator.damping_ratio
+
+    def columns(self) -> dict[str, npt.NDArray[Any]]:
+        """Return everything that has one value a sample, by name: what :meth:`save` writes.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (n,)
+            Time, parameters and terms with their standard errors, and what is known of the equations. Units stand in
+            ``tvident.result.UNITS``.
+
+        Raises
+        ------
+        ValueError
+            If there are several records.
+        """
+        if self.inertia.ndim != 1:
+            raise ValueError(
+                f"only a single record has columns; this one has shape {self.inertia.shape}; take one record"
+            )
+        columns: dict[str, npt.NDArray[Any]] = {"time": self.time}
+        values = {"inertia": self.inertia, "damping": self.damping, "stiffness": self.stiffness, **self.terms}
+        values |= {"natural_frequency": self.natural_frequency, "damping_ratio": self.damping_ratio}
+        for name, value in values.items():
+            columns[name] = value
+            columns[f"{name}_stderr"] = self.stderr[name]
+        columns |= {"condition": self.condition, "residual_std": self.residual_std}
+        return columns | {"order": self.order, "status": self.status}
+
+    def save(self, path: str | Path) -> None:
+        """Write every column to a CSV or NPZ file, with units in the header.
+
+        Parameters
+        ----------
+        path : str or Path
+            A name that ends in ``.csv`` or ``.npz``. The file appears whole or not at all.
+
+        Raises
+        ------
+        ValueError
+            If the ending is another one, or there are several records.
+        OSError
+            If there is no such folder, or the file cannot be written.
+        """
+        write_table(path, self.columns(), UNITS)
+
+    def summary(self) -> str:
+        """Return a table of what was found, and what the statuses advise, in words.
+
+        Returns
+        -------
+        str
+            Median, range and median standard error of every parameter; what was chosen and why; what to do about what looks wrong;
+            how often each flag of the status occurs.
+        """
+        s = self.settings
+        n, seconds = self.time.size, float(self.time[-1] - self.time[0]) if self.time.size else 0.0
+        lines = [f"{n} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz, preset {s['preset']}"]
+        if s["form"] == "strong":
+            order = s["max_order"] if s["order"] is None else s["order"]
+            equations = f"{s['equations']} equations"
+            lines.append(
+                f"windows of {s['window_length']} samples, orders up to {order} by {s['criterion']}, {equations}"
+            )
+        else:
+            length, exponent, equations = (_range(s[name]) for name in ("window_length", "exponent", "equations"))
+            lines.append(
+                f"weak form: test functions of {length} samples, exponent {exponent}; windows of {equations} samples"
+            )
+        lines.append("")
+        rows = [("parameter", "kind", "median", "5 %", "95 %", "std. error", "unit")]
+        values = {"inertia": self.inertia, "damping": self.damping, "stiffness": self.stiffness, **self.terms}
+        for name, value in values.items():
+            kind = s["kinds"][name]
+            finite, error = value[np.isfinite(value)], self.stderr[name]
+            numbers = np.percentile(finite, [50, 5, 95]) if finite.size else [np.nan] * 3
+            error = error[np.isfinite(error)]
+            shown = [f"{number:.5g}" for number in numbers] + [f"{np.median(error):.2g}" if error.size else "nan"]
+            if kind not in {"windowed", "varying"}:
+                shown[1] = shown[2] = ""
+            rows.append((name, kind, *shown, UNITS.get(name, "")))
+        lines += aligned(rows)
+        for name, title in (("reasons", "what was chosen, and why"), ("advice", "what to do")):
+            if s[name]:
+                lines += ["", title, *(f"  {sentence}" for sentence in s[name][:_MOST_SENTENCES])]
+            if len(s[name]) > _MOST_SENTENCES:
+                lines.append(f"  and {len(s[name]) - _MOST_SENTENCES} more in settings[{name!r}]")
+        lines += ["", *describe(self.status)]
+        return "\n".join(lines)
+
+    def plot(self) -> Figure:
+        """Draw inertia, damping and stiffness over time with bands of two standard errors.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is missing: install ``tvident[plot]``.
+        ValueError
+            If there are several records.
+        """
+        from tvident import _figures  # noqa: PLC0415 - matplotlib is optional
+
+        return _figures.plot_identification(self)
+
+    def __repr__(self) -> str:
+        kinds = ", ".join(f"{name} {kind}" for name, kind in self.settings["kinds"].items())
+        invalid = float(np.mean(self.status & Status.INVALID != 0)) if self.status.size else 0.0
+        return f"<Identification of {self.time.size} samples: {kinds}; {invalid:.1%} invalid>"

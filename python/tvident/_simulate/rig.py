@@ -1,0 +1,163 @@
+"""A torsional rig to try identification on: a beam with a disk at its end and a slider that shortens the beam."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident._simulate.drive import Drive
+from tvident._simulate.motion import integrate
+from tvident._simulate.recording import Recording
+
+Array: TypeAlias = npt.NDArray[np.float64]
+Pattern: TypeAlias = Literal["slider", "ramp", "square", "constant"]
+
+Excitation: TypeAlias = Literal["multisine", "chirp", "random"]
+
+Function: TypeAlias = Callable[[Array], npt.ArrayLike]
+
+
+def simulate_torsional_rig(
+    duration: float = 20.0,
+    sample_rate: float = 1000.0,
+    seed: int = 0,
+    pattern: Pattern | Function = "slider",
+    excitation: Excitation = "multisine",
+    *,
+    torque_snr_db: float = 20.0,
+    angle_noise: float = 1e-4,
+    encoder_counts: int | None = None,
+    inertia: float | Function = 0.0123,
+    damping: float | Function = 0.00825,
+    torsional_rigidity: float = 6.0,
+) -> Recording:
+    """Simulate the paper's rig: I θ̈ + C θ̇ + K(t) θ = T with K(t) = GJ/L(t), L the free length that a slider leaves.
+
+    Parameters
+    ----------
+    duration : float, optional
+        Seconds.
+    sample_rate : float, optional
+        Samples per second.
+    seed : int, optional
+        Of the phases and the noise: the same seed gives the same recording.
+    pattern : {"slider", "ramp", "square", "constant"} or callable, optional
+        How the slider moves: two sines, a ramp between two rests, a jump every 4 s, not at all; or a function of time in seconds that
+        returns the free length in m.
+    excitation : {"multisine", "chirp", "random"}, optional
+        Torque between 0.5 and 12 Hz: 47 sines of random phase, a sweep every 10 s, or 200 sines of random frequency.
+    torque_snr_db : float, optional
+        Power of the torque over that of its noise, dB.
+    angle_noise : float, optional
+        Noise of the angle over its standard deviation.
+    encoder_counts : int, optional
+        Counts a turn: the angle is rounded to whole counts instead of getting noise.
+    inertia : float or callable, optional
+        kg m²; or a function of time.
+    damping : float or callable, optional
+        N m s/rad; or a function of time.
+    torsional_rigidity : float, optional
+        GJ in N m².
+
+    Returns
+    -------
+    Recording
+        ``time``, ``angle``, ``torque``, ``slider_position`` and the truth, each of shape (n,).
+
+    Raises
+    ------
+    ValueError
+        If a number is not positive, or a name is unknown.
+    TypeError
+        If a number is none, or a count or the seed is not whole.
+
+    Notes
+    -----
+    Equation (1) of the paper is integrated by the Magnus expansion of fourth order, in steps so short that the angle is good to 1e-10.
+    It costs some 5 µs a sample.
+
+    Examples
+    --------
+    >>> import tvident
+    >>> recording = tvident.simulate_torsional_rig(duration=2.0, pattern=lambda t: 0.4 + 0.1 * t)
+    >>> recording.angle.shape
+    (2000,)
+    >>> float(recording.stiffness[1000])  # 6 N m² / 0.5 m
+    12.0
+    """
+    for name, number in (
+        ("duration", duration),
+        ("sample_rate", sample_rate),
+        ("torsional_rigidity", torsional_rigidity),
+    ):
+        arguments.positive_number(name, number)
+    samples = round(duration * sample_rate)
+    if samples < 1:
+        raise ValueError(f"duration must hold at least one sample; got {duration} s at {sample_rate} Hz; lengthen it")
+    generator = np.random.default_rng(arguments.whole_number("seed", seed, least=0))
+    drive = Drive(arguments.one_of("excitation", excitation, get_args(Excitation)), sample_rate, generator)
+    length = pattern if callable(pattern) else _pattern(pattern, duration)
+    inertia_of, damping_of = _function("inertia", inertia), _function("damping", damping)
+
+    def coefficients(t: Array) -> tuple[Array, Array, Array]:
+        i = inertia_of(t)
+        stiffness = torsional_rigidity / np.broadcast_to(np.asarray(length(t), dtype=np.float64), t.shape)
+        return stiffness / i, damping_of(t) / i, 1 / i
+
+    time = np.arange(samples) / sample_rate
+    angle, velocity = integrate(samples, sample_rate, coefficients, drive)
+    position = np.array(np.broadcast_to(np.asarray(length(time), dtype=np.float64), time.shape))
+    torque = drive.at_samples(samples)
+    truth = {"inertia": inertia_of(time), "damping": damping_of(time), "stiffness": torsional_rigidity / position}
+    acceleration = (torque - truth["damping"] * velocity - truth["stiffness"] * angle) / truth["inertia"]
+    recorded_torque = torque + generator.standard_normal(samples) * torque.std() * 10 ** (-torque_snr_db / 20)
+    if encoder_counts is None:
+        recorded_angle = angle + generator.standard_normal(samples) * angle_noise * angle.std()
+    else:
+        count = 2 * np.pi / arguments.whole_number("encoder_counts", encoder_counts, least=1)
+        recorded_angle = np.round(angle / count) * count
+    return Recording(
+        time=time,
+        angle=recorded_angle,
+        torque=recorded_torque,
+        slider_position=position,
+        **truth,
+        true_angle=angle,
+        true_velocity=velocity,
+        true_acceleration=acceleration,
+        true_torque=torque,
+        sample_rate=float(sample_rate),
+    )
+
+
+def _function(name: str, value: float | Function) -> Callable[[Array], Array]:
+    """Return a function of time from a number or a function."""
+    if callable(value):
+        return lambda t: np.array(np.broadcast_to(np.asarray(value(t), dtype=np.float64), t.shape))
+    number = float(value)
+    if name == "inertia":
+        arguments.positive_number(name, number)
+    return lambda t: np.full(t.shape, number)
+
+
+def _pattern(name: str, duration: float) -> Function:
+    """Return the free length over time of a pattern by name."""
+    arguments.one_of("pattern", name, get_args(Pattern))
+
+    def slider(t: Array) -> Array:
+        return np.asarray(0.45 + 0.12 * np.sin(2 * np.pi * 0.15 * t) + 0.03 * np.sin(2 * np.pi * 0.4 * t + 1))
+
+    def ramp(t: Array) -> Array:
+        return np.interp(t, [0.35 * duration, 0.55 * duration], [0.33, 0.57])
+
+    def square(t: Array) -> Array:
+        return np.where(np.floor(t / 4) % 2 == 0, 0.6, 0.3)
+
+    def constant(t: Array) -> Array:
+        return np.full(t.shape, 0.45)
+
+    return {"slider": slider, "ramp": ramp, "square": square, "constant": constant}[name]

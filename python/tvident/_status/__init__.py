@@ -1,0 +1,9 @@
+"""Says what is known of a number beside its value: flags, what they mean, how often they occur."""
+
+from tvident._status.counts import describe
+from tvident._status.flags import Status
+
+__all__ = [
+    "Status",
+    "describe",
+]

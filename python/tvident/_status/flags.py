@@ -1,0 +1,110 @@
+"""What a flag says of a sample, and what to do about it."""
+
+from __future__ import annotations
+
+import enum
+
+
+class Status(enum.IntFlag):
+    """Flags of one window; 0 is good.
+
+    Data never raises: a window that something is wrong with gets a status, and the rest of the record goes on. Arrays hold the flags
+    as ``uint16``, so ``fit.status & Status.EDGE`` works on whole arrays.
+
+    Examples
+    --------
+    >>> from tvident import Status
+    >>> Status(9)
+    <Status.INVALID|LOWEST_ORDER: 9>
+    >>> print(Status.LOWEST_ORDER.advice)
+    the lowest order was chosen: the signal hardly changes within the window, a longer one would be less noisy
+    """
+
+    INVALID = 1
+    """There is no number: it is NaN. The only flag that goes with NaN. Look for missing values, or for what the other flags say."""
+
+    EDGE = 2
+    """Near an end of the record: evaluated off the centre of its window, or with fewer equations. Errors are larger there."""
+
+    GAP = 4
+    """Samples are missing or masked out here: the number is taken from what lies around. Look at its standard error."""
+
+    LOWEST_ORDER = 8
+    """The lowest candidate order was chosen. The signal hardly changes within the window: a longer window would be less noisy."""
+
+    HIGHEST_ORDER = 16
+    """The highest candidate order was chosen. The signal may change more than a polynomial can follow: shorten the window."""
+
+    EXACT = 32
+    """The residual is at the floor set by rounding or quantisation, so there was no noise to weigh orders against."""
+
+    RANK_DEFICIENT = 64
+    """The equations do not determine the parameters (goes with INVALID). Excite the system, or leave a parameter out."""
+
+    ILL_CONDITIONED = 128
+    """The equations hardly tell the parameters apart. Look at the condition number, and at the standard errors before any value."""
+
+    NOISE_MODEL = 256
+    """Equations are predicted much worse than the noise of the channels explains: it is coloured, the torque is late, or a term is
+    missing. Standard errors are taken from the residuals. Look at what the summary suspects."""
+
+    COLOURED = 512
+    """What is left of the torque is correlated over more than a test function. Look for a term that is missing, or a slow disturbance."""
+
+    KIND_CONTRADICTED = 1024
+    """A parameter that was taken to be constant differs between the parts of the record. Let it be ``"auto"`` or ``"varying"``."""
+
+    WINDOW_LIMIT = 2048
+    """The best test function or length of windows is the first or last that was tried. The record may change faster than it can be
+    followed, or be too short: then neither values nor their errors can be trusted."""
+
+    LAG_SUSPECTED = 4096
+    """The torque seems to have been recorded late. Give ``lag=`` as the summary suggests."""
+
+    TERM_SUSPECTED = 8192
+    """Friction, an offset or a hardening spring seems to be missing. Add the term that the summary names."""
+
+    @property
+    def advice(self) -> str:
+        """What the flags mean and what to do, in words."""
+        return "; ".join(_ADVICE[flag] for flag in Status if flag in self) or "all is well"
+
+
+_ADVICE = {
+    Status.INVALID: "no number: values are missing in the window, too few equations near an end, or see the other flags",
+    Status.EDGE: "near an end of the record: errors are larger there",
+    Status.GAP: "samples are missing or masked out here: the number is taken from what lies around",
+    Status.LOWEST_ORDER: (
+        "the lowest order was chosen: the signal hardly changes within the window, a longer one would be less noisy"
+    ),
+    Status.HIGHEST_ORDER: (
+        "the highest order was chosen: the signal may change more than a polynomial can follow, shorten the window"
+    ),
+    Status.EXACT: "the residual is rounding or quantisation: there was no noise to weigh orders against",
+    Status.RANK_DEFICIENT: "the equations do not determine the parameters: excite the system, or leave a parameter out",
+    Status.NOISE_MODEL: (
+        "the noise of the channels does not explain what is left: coloured noise, a lag, or a term that is missing; "
+        "errors are taken from the residuals"
+    ),
+    Status.COLOURED: "what is left is correlated for longer than a test function: a term is missing, or a slow disturbance acts",
+    Status.KIND_CONTRADICTED: (
+        "what was taken to be constant differs between parts of the record: let it be 'auto' or 'varying'"
+    ),
+    Status.WINDOW_LIMIT: (
+        "the best test function or window is the first or last that was tried: too fast a change, or too short a record, whose numbers "
+        "cannot be trusted"
+    ),
+    Status.LAG_SUSPECTED: "the torque seems to come late: give lag= as the summary suggests",
+    Status.TERM_SUSPECTED: "a term seems to be missing: add the one that the summary names",
+    Status.ILL_CONDITIONED: "the equations hardly tell the parameters apart: look at the standard errors first",
+}
+
+_OF_THE_RECORD = (
+    Status.NOISE_MODEL,
+    Status.COLOURED,
+    Status.KIND_CONTRADICTED,
+    Status.WINDOW_LIMIT,
+    Status.LAG_SUSPECTED,
+    Status.TERM_SUSPECTED,
+)
+"""Flags that every sample of a record has, or none."""

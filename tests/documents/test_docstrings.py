@@ -1,0 +1,97 @@
+"""Examples in docstrings run, and the public ones say all that is needed."""
+
+from __future__ import annotations
+
+import doctest
+import inspect
+import pkgutil
+import re
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import matplotlib as mpl
+import pytest
+from matplotlib import pyplot as plt
+
+import tvident
+from tvident import figures, recordings
+
+MODULES = [import_module(module.name) for module in pkgutil.walk_packages(tvident.__path__, "tvident.")]
+
+# What users call beside the names in `tvident` itself.
+MORE = [recordings.read, recordings.channel]
+DRAWING = [function for name, function in vars(figures).items() if name.startswith("plot_")]
+PUBLIC = [getattr(tvident, name) for name in tvident.__all__] + MORE + DRAWING
+FUNCTIONS = [one for one in PUBLIC if inspect.isfunction(one)]
+CLASSES = [one for one in PUBLIC if inspect.isclass(one)]
+
+
+def examples() -> Iterator[doctest.DocTest]:
+    for module in MODULES:
+        yield from (test for test in doctest.DocTestFinder(exclude_empty=True).find(module) if test.examples)
+
+
+def section(documented: Any, name: str) -> str:
+    """Give a section of a docstring, or nothing."""
+    text = inspect.getdoc(documented) or ""
+    found = re.search(rf"^{name}\n-+\n(.*?)(?=^\w+\n-+\n|\Z)", text, re.MULTILINE | re.DOTALL)
+    return found[1] if found else ""
+
+
+def named(things: list[Any]) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize("documented", things, ids=[thing.__qualname__ for thing in things])
+
+
+@pytest.mark.parametrize("example", list(examples()), ids=lambda example: example.name)
+def test_examples_run(example: doctest.DocTest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mpl.use("agg")
+    monkeypatch.chdir(tmp_path)
+    report: list[str] = []
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
+    outcome = runner.run(example, out=report.append, clear_globs=False)
+    plt.close("all")
+    assert outcome.failed == 0, "".join(report)
+    assert outcome.attempted > 0
+
+
+@named(PUBLIC)
+def test_everything_public_has_an_example(documented: Any) -> None:
+    assert ">>> " in section(documented, "Examples")
+
+
+@named(FUNCTIONS)
+def test_functions_say_what_goes_in_and_comes_out(documented: Callable[..., Any]) -> None:
+    parameters = section(documented, "Parameters")
+    described = {name for line in re.findall(r"^(\w[\w, ]*) : ", parameters, re.MULTILINE) for name in line.split(", ")}
+    assert described == set(inspect.signature(documented).parameters)
+    assert section(documented, "Returns")
+    assert "shape" in parameters + section(documented, "Returns") or documented in (*DRAWING, recordings.read)
+    assert section(documented, "Raises") or documented is figures.plot_recording
+
+
+@named([one for one in FUNCTIONS if one not in {*MORE, *DRAWING}])
+def test_functions_that_compute_say_their_equation_and_cost(documented: Callable[..., Any]) -> None:
+    text = inspect.getdoc(documented) or ""
+    assert re.search(r"[Ee]quations? \(", text)
+    assert re.search(r"\bcosts?\b.* (ns|µs) a (sample|row)", section(documented, "Notes"), re.DOTALL)
+
+
+@named(CLASSES)
+def test_classes_describe_every_attribute_and_method(documented: type) -> None:
+    for name, member in vars(documented).items():
+        if not name.startswith("_") and (callable(member) or hasattr(member, "__doc__")):
+            text = inspect.getdoc(inspect.getattr_static(documented, name)) or ""
+            field = re.search(rf"^[\w, ]*\b{name}\b[\w, ]* : ", inspect.getdoc(documented) or "", re.MULTILINE)
+            assert text or field, name
+    for name, method in inspect.getmembers(documented, inspect.isfunction):
+        if not name.startswith("_") and method.__module__.startswith("tvident"):
+            parameters = set(inspect.signature(method).parameters) - {"self"}
+            assert not parameters or section(method, "Parameters") or section(method, "Raises"), name
+
+
+def test_every_module_says_what_it_is() -> None:
+    modules: list[ModuleType] = [tvident, *MODULES]
+    assert all(module.__doc__ for module in modules if module.__name__ != "tvident._core")

@@ -1,0 +1,88 @@
+"""The package is a house of rooms: imports run one way, from later rooms to earlier ones, and no file leads back to itself."""
+
+from __future__ import annotations
+
+import ast
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+HOUSE = Path(__file__).parents[2] / "python" / "tvident"
+
+CORE = "tvident._core"
+"""Everything may call it, and it calls nothing of the package."""
+
+ROOMS = (
+    "_arguments",
+    "_equation",
+    "_status",
+    "_files",
+    "_derivatives",
+    "_regression",
+    "_simulate",
+    "_figures",
+    "_results",
+    "_advice",
+    "_identify",
+    "recordings",  # doors: what users import by the room's name
+    "figures",
+    "tvident",  # the front door
+    "_command_line",
+)
+"""Every room may import from those above it."""
+
+FILES = {
+    ".".join(("tvident", *path.relative_to(HOUSE).with_suffix("").parts)).removesuffix(".__init__"): path
+    for path in sorted(HOUSE.rglob("*.py"))
+}
+
+
+def room(module: str) -> str:
+    """Give the room that a module is in."""
+    return module.split(".")[1] if "." in module else module
+
+
+def imported(module: str) -> set[str]:
+    """Give the modules of the package that a module imports, wherever in the file, under TYPE_CHECKING too."""
+    found = set()
+    for node in ast.walk(ast.parse(FILES[module].read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{module}: imports are absolute"
+            names = {f"{node.module}.{alias.name}" for alias in node.names} - {CORE}
+            found |= {name if name in FILES else str(node.module) for name in names}
+        elif isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+    return {name for name in found if name in FILES}
+
+
+def test_every_file_is_in_a_room() -> None:
+    assert {room(module) for module in FILES} == set(ROOMS)
+
+
+@pytest.mark.parametrize("module", FILES)
+def test_imports_run_one_way(module: str) -> None:
+    backwards = {name for name in imported(module) if ROOMS.index(room(name)) > ROOMS.index(room(module))}
+    assert not backwards, f"{module} imports from rooms behind it"
+
+
+@pytest.mark.parametrize("module", [module for module in FILES if module.count(".") > 1])
+def test_files_of_a_room_import_other_rooms_by_their_face(module: str) -> None:
+    inside = {name for name in imported(module) if name.count(".") > 1 and room(name) != room(module)}
+    assert not inside, "import what a room's __init__ offers"
+
+
+def test_no_file_leads_back_to_itself() -> None:
+    graph = {module: imported(module) for module in FILES}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail(f"imports in a circle: {' -> '.join(error.args[1])}")
+
+
+@pytest.mark.parametrize("name", [name for name in ROOMS if name.startswith("_")])
+def test_every_room_begins_with_its_purpose(name: str) -> None:
+    purpose = ast.get_docstring(ast.parse(FILES[f"tvident.{name}"].read_text(encoding="utf-8"))) or ""
+    first = purpose.splitlines()[0]
+    assert first.endswith(".")
+    assert len(first) > 20
