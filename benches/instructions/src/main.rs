@@ -7,7 +7,7 @@ mod workloads;
 
 use std::process::ExitCode;
 
-use tvident::Instructions;
+use tvident::simd::Instructions;
 
 /// A counting machine knows no AVX-512, so this path is counted wherever the program runs.
 const COUNTED: Instructions = if cfg!(target_arch = "x86_64") { Instructions::Avx2 } else { Instructions::Neon };

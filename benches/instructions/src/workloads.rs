@@ -2,12 +2,16 @@
 
 use std::num::NonZeroUsize;
 
-use tvident::identification::HARDLY_TOLD_APART;
-use tvident::rolling::HALF_OF_THE_DIGITS;
-use tvident::{
-    Coefficient, Criterion, Elements, Equations, Error, Estimates, Identified, Instructions, LocalPolynomials, Motion,
-    Options, Order, Regressions, RollingLeastSquares, Samples, Selection, identify_windowed,
-};
+use tvident::Error;
+use tvident::equation::{Coefficient, Motion};
+use tvident::identify::{Identified, identify_windowed};
+use tvident::lanes::Elements;
+use tvident::least_squares::HALF_OF_THE_DIGITS;
+use tvident::least_squares::{Equations, Regressions, RollingLeastSquares};
+use tvident::local_polynomials::{Criterion, Estimates, LocalPolynomials, Options, Order, Selection};
+use tvident::record::Samples;
+use tvident::regression::HARDLY_TOLD_APART;
+use tvident::simd::Instructions;
 
 /// Runs on a record of one or two lengths and returns the number of windows.
 pub(crate) type Workload = fn(usize) -> Result<usize, Error>;

@@ -2,7 +2,7 @@
 
 use faer::Mat;
 use proptest::prelude::*;
-use tvident::Basis;
+use tvident::local_polynomials::Basis;
 
 /// Orthogonality to degree 15, and above it: two hundred roundings of numbers below one, far from the accuracy that
 /// derivatives need (1e-9 of scale).

@@ -4,11 +4,12 @@
 use std::num::NonZeroUsize;
 
 use proptest::prelude::*;
-use tvident::rolling::HALF_OF_THE_DIGITS;
-use tvident::{
-    Criterion, Elements, Equations, Estimates, Instructions, LocalPolynomials, Options, Order, Regressions,
-    RollingLeastSquares, Samples, Selection,
-};
+use tvident::lanes::Elements;
+use tvident::least_squares::HALF_OF_THE_DIGITS;
+use tvident::least_squares::{Equations, Regressions, RollingLeastSquares};
+use tvident::local_polynomials::{Criterion, Estimates, LocalPolynomials, Options, Order, Selection};
+use tvident::record::Samples;
+use tvident::simd::Instructions;
 
 /// Outputs of one kind each, element for element.
 #[derive(Clone, Debug)]

@@ -1,9 +1,10 @@
 //! Properties of the walk: it agrees with every window projected on its own, however the record is cut and whatever the instructions.
 
 use proptest::prelude::*;
-use tvident::{
-    Basis, Criterion, Elements, Estimates, Instructions, LocalPolynomials, Options, Order, Selection, Status,
-};
+use tvident::Status;
+use tvident::lanes::Elements;
+use tvident::local_polynomials::{Basis, Criterion, Estimates, LocalPolynomials, Options, Order, Selection};
+use tvident::simd::Instructions;
 
 /// Everything a plan estimates, for all samples of a record.
 #[derive(Clone, Debug, PartialEq)]

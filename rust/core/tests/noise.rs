@@ -1,7 +1,7 @@
 //! The noise of a channel is found whatever its signal, and never below quantisation and rounding.
 
-use tvident::Instructions;
 use tvident::noise::{FEWEST_SAMPLES, noise};
+use tvident::simd::Instructions;
 
 /// Sums of twelve uniform numbers: nearly normal, of variance one.
 fn normal(seed: u64, count: usize) -> Vec<f64> {

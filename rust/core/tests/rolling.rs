@@ -3,8 +3,12 @@
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
 use proptest::prelude::*;
-use tvident::rolling::HALF_OF_THE_DIGITS;
-use tvident::{Elements, Equations, Instructions, Regressions, RollingLeastSquares, Samples, Status};
+use tvident::Status;
+use tvident::lanes::Elements;
+use tvident::least_squares::HALF_OF_THE_DIGITS;
+use tvident::least_squares::{Equations, Regressions, RollingLeastSquares};
+use tvident::record::Samples;
+use tvident::simd::Instructions;
 
 #[derive(Clone, Debug, PartialEq)]
 struct Everything {

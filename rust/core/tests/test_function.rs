@@ -1,7 +1,7 @@
 //! Properties of test functions: their kernels are derivatives, and the weak equation of motion holds to rounding.
 
 use proptest::prelude::*;
-use tvident::TestFunction;
+use tvident::weak_form::TestFunction;
 
 /// Of sums of up to 79 numbers below 800, twice the square of the highest exponent.
 const ROUNDING: f64 = 79.0 * 800.0 * f64::EPSILON;

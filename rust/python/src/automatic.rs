@@ -4,9 +4,11 @@ use std::num::NonZeroUsize;
 
 use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use tvident::Error;
+use tvident::auto_derivatives::{AutomaticEstimates, AutomaticOptions, estimate_automatically as core_estimate};
+use tvident::exec::{Watch, workers as threads};
 use tvident::noise::noise;
-use tvident::parallel::{Watch, workers as threads};
-use tvident::{AutomaticEstimates, AutomaticOptions, Error, Instructions, estimate_automatically as core_estimate};
+use tvident::simd::Instructions;
 
 use crate::records::records;
 use crate::watch::watched;

@@ -5,12 +5,16 @@ use std::num::NonZeroUsize;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use tvident::identification::HARDLY_TOLD_APART;
-use tvident::parallel::workers as threads;
-use tvident::{
-    Coefficient, Elements, Identified, Instructions, Motion, Regressions, RollingLeastSquares, Samples, Term, Track,
-    identify_constant as constant, identify_windowed as windowed, identify_with_scatter, scatter,
+use tvident::equation::{Coefficient, Motion, Term};
+use tvident::exec::workers as threads;
+use tvident::identify::{
+    Identified, Track, identify_constant as constant, identify_windowed as windowed, identify_with_scatter, scatter,
 };
+use tvident::lanes::Elements;
+use tvident::least_squares::{Regressions, RollingLeastSquares};
+use tvident::record::Samples;
+use tvident::regression::HARDLY_TOLD_APART;
+use tvident::simd::Instructions;
 
 use crate::local_polynomials::LocalPolynomials;
 use crate::records::{StridedSamples, records};

@@ -23,7 +23,8 @@ use pyo3::prelude::*;
 mod _core {
     use pyo3::exceptions::PyValueError;
     use pyo3::prelude::*;
-    use tvident::{Instructions, Status};
+    use tvident::Status;
+    use tvident::simd::Instructions;
 
     #[pymodule_export]
     use crate::automatic::estimate_automatically;
@@ -42,16 +43,16 @@ mod _core {
 
     /// Probability below which parts of a record differ by more than chance.
     #[pymodule_export]
-    const NO_CHANCE: f64 = tvident::constancy::NO_CHANCE;
+    const NO_CHANCE: f64 = tvident::inference::NO_CHANCE;
     /// Error of prediction, over the noise's, above which the noise of the channels does not explain it.
     #[pymodule_export]
-    const NOISE_MODEL_FAILS: f64 = tvident::weak_identification::NOISE_MODEL_FAILS;
+    const NOISE_MODEL_FAILS: f64 = tvident::regression::NOISE_MODEL_FAILS;
     /// Condition number from which on equations hardly tell parameters apart.
     #[pymodule_export]
-    const HARDLY_TOLD_APART: f64 = tvident::identification::HARDLY_TOLD_APART;
+    const HARDLY_TOLD_APART: f64 = tvident::regression::HARDLY_TOLD_APART;
     /// The shortest record that a window is chosen for.
     #[pymodule_export]
-    const FEWEST_SAMPLES: usize = tvident::automatic::FEWEST_SAMPLES;
+    const FEWEST_SAMPLES: usize = tvident::auto_derivatives::FEWEST_SAMPLES;
 
     /// Every flag of a status: name and bits.
     #[pyfunction]

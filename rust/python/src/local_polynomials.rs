@@ -5,10 +5,12 @@ use std::num::NonZeroUsize;
 use numpy::{IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use tvident::parallel::{Watch, workers as threads};
-use tvident::{
-    Criterion, Elements, Error, Estimates, Instructions, LocalPolynomials as Plan, Options, Order, Samples, Selection,
-};
+use tvident::Error;
+use tvident::exec::{Watch, workers as threads};
+use tvident::lanes::Elements;
+use tvident::local_polynomials::{Criterion, Estimates, LocalPolynomials as Plan, Options, Order, Selection};
+use tvident::record::Samples;
+use tvident::simd::Instructions;
 
 use crate::records::records;
 use crate::watch::{exception, watched};

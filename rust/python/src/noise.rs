@@ -2,8 +2,9 @@
 
 use numpy::PyUntypedArray;
 use pyo3::prelude::*;
+use tvident::Error;
 use tvident::noise::{noise as core_noise, quantisation_step as core_step};
-use tvident::{Error, Instructions};
+use tvident::simd::Instructions;
 
 use crate::records::records;
 use crate::watch::watched;

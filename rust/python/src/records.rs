@@ -3,7 +3,7 @@
 use numpy::{PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods, dtype};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use tvident::Samples;
+use tvident::record::Samples;
 
 /// A number type that arrays may hold.
 #[derive(Clone, Copy, Debug)]

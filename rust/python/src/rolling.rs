@@ -4,9 +4,12 @@ use std::num::NonZeroUsize;
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArray};
 use pyo3::prelude::*;
-use tvident::parallel::workers as threads;
-use tvident::rolling::HALF_OF_THE_DIGITS;
-use tvident::{Elements, Equations, Instructions, Regressions, RollingLeastSquares, Samples};
+use tvident::exec::workers as threads;
+use tvident::lanes::Elements;
+use tvident::least_squares::HALF_OF_THE_DIGITS;
+use tvident::least_squares::{Equations, Regressions, RollingLeastSquares};
+use tvident::record::Samples;
+use tvident::simd::Instructions;
 
 use crate::records::records;
 use crate::watch::{exception, watched};

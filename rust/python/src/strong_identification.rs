@@ -6,8 +6,8 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tvident::parallel::workers as threads;
-use tvident::{StrongOptions, identify_strong as strong};
+use tvident::exec::workers as threads;
+use tvident::identify::{StrongOptions, identify_strong as strong};
 
 use crate::identification::Motions;
 use crate::local_polynomials::LocalPolynomials;

@@ -3,7 +3,7 @@
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use tvident::Error;
-use tvident::parallel::Watch;
+use tvident::exec::Watch;
 
 /// Runs `work` with the interpreter's lock released. The watch that it must call takes the lock back for a moment, lets signals such
 /// as Ctrl-C in, and calls `progress(done, total)`; whatever either of them raises cancels the work and is raised here.

@@ -6,10 +6,10 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tvident::parallel::workers as threads;
-use tvident::{
-    Constant, Instructions, Kind, Missing, Outside, SampleResults, WeakIdentified, WeakOptions, identify_weak as weak,
-};
+use tvident::exec::workers as threads;
+use tvident::identify::{Constant, Kind, Outside, SampleResults, WeakIdentified, WeakOptions, identify_weak as weak};
+use tvident::inference::Missing;
+use tvident::simd::Instructions;
 
 use crate::identification::Motions;
 use crate::watch::watched;

@@ -1,0 +1,263 @@
+//! The ends of a record where window and order are chosen: coefficients shrunk by what the record says of them.
+//!
+//! Towards the end of a window the noise of a derivative rises steeply with the order, and one window cannot tell by itself which of its
+//! coefficients are worth their noise. But the others can: over many windows of the same length near that end the coefficients have the
+//! covariance `C + σ²`, `C` that of the signal. So the coefficients `c` of the first or last window are replaced by
+//!
+//! ```text
+//! ĉ = U diag(λ/(λ + σ²)) Uᵀ c,   C = U diag(λ) Uᵀ,
+//! ```
+//!
+//! the estimate of least mean squared error that is linear in them (Wiener), with `λ` taken to be zero where the signal is below the noise. The
+//! constant is kept as it is, and coefficients of even and of odd degree are taken apart, as they are uncorrelated in windows of a signal that
+//! looks the same forwards and backwards. All derivatives at all places of the window follow from `ĉ`.
+//!
+//! What this is worth at a place is measured: the same is done in all these windows, forwards and backwards, and compared there with an
+//! estimate from the centre of a window half as long as the record's best. In a record of a few windows the best one is chosen with
+//! little to go by and may smooth too much; what is half as long sees that, and is noisier, which is taken off. From windows of several
+//! lengths the estimates are averaged with weights that fall with the square of the risk so measured.
+
+use std::ops::Range;
+
+use crate::auto_derivatives::candidates::{Target, product};
+use crate::auto_derivatives::eigen;
+use crate::auto_derivatives::global_choice::{LookUp, Pair, rounded};
+use crate::auto_derivatives::local_average::Reference;
+use crate::error::Error;
+use crate::local_polynomials::basis::Basis;
+use crate::local_polynomials::boundary::End;
+use crate::local_polynomials::coefficients::{Coefficients, Projected};
+use crate::record::samples::Samples;
+
+/// The windows over the record's best, in half steps of a doubling.
+const LADDER: Range<i32> = -4..5;
+
+/// What is compared with has a window so much shorter than the record's best.
+const REFERENCE: f64 = 2.0;
+
+/// Half-width of the shortest window.
+const SHORTEST: usize = 8;
+
+/// Samples near an end that are looked at, in half-widths of the record's best window, and at least.
+const NEAR: usize = 64;
+const LEAST_NEAR: usize = 4096;
+
+/// Windows that are looked at, at most, and the fewest from which a risk is believed.
+const MOST_WINDOWS: usize = 1024;
+const FEWEST_WINDOWS: usize = 20;
+
+/// Estimates near an end, from the outermost sample inwards.
+#[derive(Debug)]
+pub(crate) struct AtEnd {
+    pub(crate) values: Vec<f64>,
+    pub(crate) errors: Vec<f64>,
+    pub(crate) order: usize,
+}
+
+/// What one window length gives, by place from the end.
+struct Shrunk {
+    values: Vec<f64>,
+    risks: Vec<f64>,
+    order: usize,
+}
+
+/// Samples near an end.
+struct Near<'a> {
+    record: &'a dyn Samples,
+    end: End,
+    samples: Range<usize>,
+    /// The estimate to compare with at every one of them, NaN where there is none.
+    compare: Vec<f64>,
+    kernel: Vec<f64>,
+    /// Variance of the estimate that is compared with.
+    gain: f64,
+}
+
+/// Estimates the samples within half of a record's best window of one end; NaN where nothing is known. `look_up` is called now and then.
+///
+/// # Errors
+/// Those of `look_up`, at once.
+pub(crate) fn estimate(
+    record: &dyn Samples,
+    end: End,
+    pair: Pair,
+    target: &Target,
+    variance: f64,
+    look_up: &mut LookUp<'_>,
+) -> Result<AtEnd, Error> {
+    let samples = record.len();
+    let Some(reference) = Reference::new(pair, REFERENCE, target) else { return Ok(average(&[], pair.half)) };
+    let length = (NEAR * pair.half).max(LEAST_NEAR).min(samples);
+    let near = match end {
+        End::First => 0..length,
+        End::Last => samples - length..samples,
+    };
+    let near = Near::new(record, end, near, &reference);
+    let mut found = Vec::new();
+    for step in LADDER {
+        let half = rounded(pair.half as f64 * (0.5 * f64::from(step)).exp2());
+        if (SHORTEST..samples.div_ceil(4)).contains(&half) && 2 * half < samples / 2 {
+            found.extend(near.shrink(half, pair.half, target, variance));
+        }
+        look_up()?;
+    }
+    Ok(average(&found, pair.half))
+}
+
+/// Averages what windows of several lengths give.
+fn average(found: &[Shrunk], count: usize) -> AtEnd {
+    let mut at_end = AtEnd { values: vec![f64::NAN; count], errors: vec![f64::NAN; count], order: 0 };
+    let mut largest = 0.0;
+    for place in 0..count {
+        let known = || found.iter().filter(|one| one.risks.get(place).is_some_and(|risk| risk.is_finite()));
+        let least = known().map(|one| one.risks[place]).fold(f64::INFINITY, f64::min);
+        let (mut total, mut value, mut risk) = (0.0, 0.0, 0.0);
+        for one in known() {
+            // Risks of zero are those of a record without noise.
+            let weight = if one.risks[place] > 0.0 { (least / one.risks[place]).powi(2) } else { 1.0 };
+            total += weight;
+            value += weight * one.values[place];
+            risk += weight * one.risks[place];
+            if place == 0 && weight > largest {
+                (largest, at_end.order) = (weight, one.order);
+            }
+        }
+        if total > 0.0 {
+            (at_end.values[place], at_end.errors[place]) = (value / total, (risk / total).sqrt());
+        }
+    }
+    at_end
+}
+
+impl<'a> Near<'a> {
+    fn new(record: &'a dyn Samples, end: End, samples: Range<usize>, reference: &Reference) -> Self {
+        let Reference { bank, candidate } = reference;
+        let all = bank.centres(record.len());
+        let centres = samples.start.max(all.start)..samples.end.min(all.end);
+        let mut compare = vec![f64::NAN; samples.len()];
+        if !centres.is_empty() {
+            let mut scratch = bank.scratch();
+            let estimates = bank.estimates(record, centres.clone(), 1, &mut scratch);
+            compare[centres.start - samples.start..centres.end - samples.start].copy_from_slice(&estimates[*candidate]);
+        }
+        Self { record, end, samples, compare, kernel: bank.kernel(*candidate), gain: bank.gains[*candidate] }
+    }
+
+    /// What windows of one length give at the first `count` places, or nothing where the outermost window cannot be used.
+    fn shrink(&self, half: usize, count: usize, target: &Target, variance: f64) -> Option<Shrunk> {
+        let length = 2 * half + 1;
+        let (highest, count) = (target.highest(half), count.min(length));
+        let windows = self.samples.start..(self.samples.end + 1).checked_sub(length)?;
+        if highest < target.derivative || windows.is_empty() {
+            return None;
+        }
+        let basis = Basis::new(length, highest + 1);
+        let degrees: Vec<usize> = (0..=highest).collect();
+        let plan = Coefficients::new(&basis, &degrees, false, target.instructions);
+        let (mut scratch, mut projected) = (plan.scratch(), Projected::default());
+        // The outermost window is one of them, whichever end this is.
+        let step = windows.len().div_ceil(MOST_WINDOWS);
+        let first = match self.end {
+            End::First => windows.start,
+            End::Last => windows.start + (windows.len() - 1) % step,
+        };
+        plan.project(self.record, first..windows.end, step, &mut projected, &mut scratch);
+        let outermost = match self.end {
+            End::First => 0,
+            End::Last => projected.level.len() - 1,
+        };
+        if projected.level[outermost].is_nan() {
+            return None;
+        }
+        let shrinkage = shrinkage(&projected, variance);
+        let scale = target.scale();
+        let constant = f64::from(u8::from(target.derivative == 0));
+        let mut shrunk = Shrunk { values: Vec::with_capacity(count), risks: Vec::with_capacity(count), order: highest };
+        for place in 0..count {
+            let at_place = basis.evaluate(basis.position(place), target.derivative);
+            let weights: Vec<f64> = shrinkage
+                .iter()
+                .map(|row| scale * row.iter().zip(&at_place).map(|(a, q)| a * q).sum::<f64>())
+                .collect();
+            let estimates = Estimates::new(&projected, &weights, constant, target.derivative);
+            shrunk.values.push(match self.end {
+                End::First => estimates.forwards[outermost],
+                End::Last => estimates.backwards[outermost],
+            });
+            let difference = |window: usize| {
+                let start = first + window * step - self.samples.start;
+                [
+                    estimates.forwards[window] - self.compare[start + place],
+                    estimates.backwards[window] - self.compare[start + length - 1 - place],
+                ]
+            };
+            let differences = (0..projected.level.len()).flat_map(difference).filter(|difference| !difference.is_nan());
+            let (sum, compared) =
+                differences.fold((0.0, 0_usize), |(sum, count), difference| (sum + difference * difference, count + 1));
+            let kernel = |index: usize| weights.iter().enumerate().map(|(j, w)| w * basis.value(j, index)).sum();
+            let kernel: Vec<f64> = (0..length).map(kernel).collect();
+            let own: f64 = weights.iter().map(|weight| weight * weight).sum();
+            let shared = product(&kernel, &self.kernel, place);
+            let risk = sum / compared as f64 + variance * (2.0 * shared - self.gain);
+            shrunk.risks.push(if compared < FEWEST_WINDOWS { f64::INFINITY } else { risk.max(variance * own) });
+        }
+        Some(shrunk)
+    }
+}
+
+/// Estimates at one place of every window, and at its mirror image.
+struct Estimates {
+    forwards: Vec<f64>,
+    backwards: Vec<f64>,
+}
+
+impl Estimates {
+    fn new(projected: &Projected, weights: &[f64], constant: f64, derivative: usize) -> Self {
+        let mut parts = [projected.level.iter().map(|level| level * constant).collect::<Vec<f64>>(), Vec::new()];
+        parts[1].resize(projected.level.len(), 0.0);
+        for (degree, (row, weight)) in projected.coefficients.iter().zip(weights).enumerate() {
+            for (sum, c) in parts[degree % 2].iter_mut().zip(row) {
+                *sum += weight * c;
+            }
+        }
+        let [even, odd] = parts;
+        // In reversed time odd coefficients change their sign, and so do odd derivatives.
+        let sign = if derivative % 2 == 0 { 1.0 } else { -1.0 };
+        let forwards = even.iter().zip(&odd).map(|(even, odd)| even + odd).collect();
+        let backwards = even.iter().zip(&odd).map(|(even, odd)| sign * (even - odd)).collect();
+        Self { forwards, backwards }
+    }
+}
+
+/// The matrix that shrinks coefficients, row by row; symmetric.
+fn shrinkage(projected: &Projected, variance: f64) -> Vec<Vec<f64>> {
+    let rows = &projected.coefficients;
+    let usable: Vec<usize> = (0..projected.level.len()).filter(|&window| !projected.level[window].is_nan()).collect();
+    let mut matrix = vec![vec![0.0; rows.len()]; rows.len()];
+    matrix[0][0] = 1.0;
+    for first in [1, 2] {
+        let degrees: Vec<usize> = (first..rows.len()).step_by(2).collect();
+        let size = degrees.len();
+        let moment = |i: usize, j: usize| {
+            let sum: f64 = usable.iter().map(|&window| rows[degrees[i]][window] * rows[degrees[j]][window]).sum();
+            sum / usable.len() as f64 - if i == j { variance } else { 0.0 }
+        };
+        let mut moments = vec![0.0; size * size];
+        for i in 0..size {
+            for j in 0..=i {
+                moments[i * size + j] = moment(i, j);
+                moments[j * size + i] = moments[i * size + j];
+            }
+        }
+        let (values, vectors) = eigen::symmetric(moments, size);
+        for (k, &value) in values.iter().enumerate().filter(|(_, value)| **value > variance) {
+            let factor = value / (value + variance);
+            for i in 0..size {
+                for j in 0..size {
+                    matrix[degrees[i]][degrees[j]] += factor * vectors[i * size + k] * vectors[j * size + k];
+                }
+            }
+        }
+    }
+    matrix
+}

@@ -1,0 +1,152 @@
+//! What windows of one length offer for a derivative: one estimate an order, all from the same coefficients.
+//!
+//! At a window's centre the `d`-th derivative is the same for orders `d + 2i` and `d + 2i + 1`, so the candidates are `d, d + 2, …`, and each
+//! of them has one more coefficient than the one before:
+//!
+//! ```text
+//! d_i = Σ_{l≤i} w_l c_{d+2l},   w_l = q_{d+2l}^(d)(0) / Δ^d,   variance σ² g_i,   g_i = Σ_{l≤i} w_l².
+//! ```
+
+use std::ops::Range;
+
+use crate::local_polynomials::basis::Basis;
+use crate::local_polynomials::coefficients::{self, Coefficients, Projected};
+use crate::record::samples::Samples;
+use crate::simd::vectors::Instructions;
+
+/// What is to be estimated, and by which orders.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Target {
+    pub(crate) derivative: usize,
+    /// The highest order, which is the only one where it is fixed.
+    pub(crate) highest: usize,
+    pub(crate) fixed: bool,
+    /// Half-width of the shortest window.
+    pub(crate) shortest: usize,
+    pub(crate) delta: f64,
+    pub(crate) instructions: Instructions,
+}
+
+impl Target {
+    /// `1/Δ^d`.
+    pub(crate) fn scale(&self) -> f64 {
+        self.delta.powi(i32::try_from(self.derivative).unwrap_or(i32::MAX)).recip()
+    }
+
+    /// The highest order in a window: at least two samples are left to judge it by.
+    pub(crate) fn highest(&self, half: usize) -> usize {
+        self.highest.min(2 * half - 2)
+    }
+
+    /// The candidates in a window, lowest first.
+    fn orders(&self, half: usize) -> Vec<usize> {
+        let all: Vec<usize> = (self.derivative..=self.highest(half)).step_by(2).collect();
+        if !self.fixed {
+            return all;
+        }
+        let one = all.last().filter(|_| self.highest(half) == self.highest);
+        one.into_iter().copied().collect()
+    }
+}
+
+/// The candidates of windows of `2 half + 1` samples.
+#[derive(Debug)]
+pub(crate) struct Bank {
+    pub(crate) half: usize,
+    /// By candidate: order, variance over that of the noise, and weight of a sample in the value at its own place.
+    pub(crate) orders: Vec<usize>,
+    pub(crate) gains: Vec<f64>,
+    pub(crate) leverages: Vec<f64>,
+    basis: Basis,
+    coefficients: Coefficients,
+    /// `w_l`, and how many coefficients the first candidate has.
+    weights: Vec<f64>,
+    first: usize,
+    /// What a constant signal of one gives.
+    constant: f64,
+}
+
+/// Memory of one thread for one bank.
+#[derive(Debug)]
+pub(crate) struct Scratch {
+    coefficients: coefficients::Scratch,
+    projected: Projected,
+}
+
+impl Bank {
+    /// Prepares the tables, or nothing where windows of this length have no candidate.
+    pub(crate) fn new(half: usize, target: &Target) -> Option<Self> {
+        let orders = target.orders(half);
+        let (derivative, highest) = (target.derivative, *orders.last()?);
+        let basis = Basis::new(2 * half + 1, highest + 1);
+        let degrees: Vec<usize> = (derivative..=highest).step_by(2).collect();
+        let first = degrees.len() - orders.len();
+        let (at_centre, scale) = (basis.evaluate(0.0, derivative), target.scale());
+        let weights: Vec<f64> = degrees.iter().map(|&degree| at_centre[degree] * scale).collect();
+        let gains: Vec<f64> = running_sums(weights.iter().map(|weight| weight * weight)).skip(first).collect();
+        let values = basis.evaluate(0.0, 0);
+        let leverages: Vec<f64> = running_sums(values.iter().map(|value| value * value)).collect();
+        let leverages = orders.iter().map(|&order| leverages[order]).collect();
+        let coefficients = Coefficients::new(&basis, &degrees, false, target.instructions);
+        let constant = f64::from(u8::from(derivative == 0));
+        Some(Self { half, orders, gains, leverages, basis, coefficients, weights, first, constant })
+    }
+
+    pub(crate) fn scratch(&self) -> Scratch {
+        Scratch { coefficients: self.coefficients.scratch(), projected: Projected::default() }
+    }
+
+    /// The samples of a record that can be centres of windows.
+    pub(crate) fn centres(&self, samples: usize) -> Range<usize> {
+        self.half..samples.saturating_sub(self.half).max(self.half)
+    }
+
+    /// Estimates of every candidate at every `step`-th of some centres, a row each; NaN where a window holds what cannot be used.
+    pub(crate) fn estimates<'a>(
+        &self,
+        record: &dyn Samples,
+        centres: Range<usize>,
+        step: usize,
+        scratch: &'a mut Scratch,
+    ) -> &'a [Vec<f64>] {
+        let Scratch { coefficients, projected } = scratch;
+        let windows = centres.start - self.half..centres.end - self.half;
+        self.coefficients.project(record, windows, step, projected, coefficients);
+        let Projected { level: sums, coefficients: rows, .. } = projected;
+        for sum in sums.iter_mut() {
+            // What is no number stays so.
+            *sum *= self.constant;
+        }
+        for (row, weight) in rows.iter_mut().zip(&self.weights) {
+            for (sum, value) in sums.iter_mut().zip(row) {
+                *sum += weight * *value;
+                *value = *sum;
+            }
+        }
+        &rows[self.first..]
+    }
+
+    /// The weights of a window's samples in a candidate.
+    pub(crate) fn kernel(&self, candidate: usize) -> Vec<f64> {
+        let degree = |l: usize| self.basis.degrees() - 1 - 2 * (self.weights.len() - 1 - l);
+        let weights = &self.weights[..=self.first + candidate];
+        let weight =
+            |index| weights.iter().enumerate().map(|(l, weight)| weight * self.basis.value(degree(l), index)).sum();
+        (0..self.basis.length()).map(weight).collect()
+    }
+}
+
+/// The sum of all numbers up to each.
+fn running_sums(numbers: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
+    numbers.scan(0.0, |sum, number| {
+        *sum += number;
+        Some(*sum)
+    })
+}
+
+/// The product of two kernels of which the second is centred at a sample of the first.
+pub(crate) fn product(kernel: &[f64], other: &[f64], centre: usize) -> f64 {
+    let half = other.len() / 2;
+    let (skipped, first) = (half.saturating_sub(centre), centre.saturating_sub(half));
+    kernel[first.min(kernel.len())..].iter().zip(&other[skipped.min(other.len())..]).map(|(a, b)| a * b).sum()
+}

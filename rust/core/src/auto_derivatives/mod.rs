@@ -1,0 +1,11 @@
+//! Window and order of a derivative chosen together from the record.
+
+pub(crate) mod automatic;
+pub(crate) mod boundary;
+pub(crate) mod candidates;
+pub(crate) mod eigen;
+pub(crate) mod global_choice;
+pub(crate) mod local_average;
+pub(crate) mod symmetric_grid;
+
+pub use automatic::{AutomaticEstimates, AutomaticOptions, Chosen, FEWEST_SAMPLES, estimate_automatically};

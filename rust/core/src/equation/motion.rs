@@ -1,0 +1,124 @@
+//! Rows of the equation of motion `I θ̈ + C θ̇ + K θ + terms = T`, from derivatives of the angle.
+//!
+//! What is unknown becomes a column of regressors; what is known moves to the right-hand side.
+
+use crate::record::derived::sign;
+use crate::record::samples::Samples;
+
+/// What is known of inertia, damping or stiffness beforehand.
+#[derive(Clone, Copy)]
+pub enum Coefficient<'a> {
+    /// Unknown.
+    Unknown,
+    /// The same all the time. Zero leaves it out.
+    Number(f64),
+    /// Known at every sample.
+    Record(&'a dyn Samples),
+}
+
+/// A term on the left-hand side beside inertia, damping and stiffness, with an unknown factor.
+#[derive(Clone, Copy)]
+pub enum Term<'a> {
+    /// A constant: 1.
+    Offset,
+    /// Dry friction: the sign of the velocity.
+    Coulomb,
+    /// A hardening or softening spring: the cube of the angle.
+    Cubic,
+    /// Anything else, given at every sample.
+    Record(&'a dyn Samples),
+}
+
+/// The equation of motion of one record.
+#[derive(Clone)]
+pub struct Motion<'a> {
+    /// Samples of the angle.
+    pub angle: &'a dyn Samples,
+    /// Samples of the torque.
+    pub torque: &'a dyn Samples,
+    /// Inertia, damping and stiffness.
+    pub coefficients: [Coefficient<'a>; 3],
+    /// Further terms.
+    pub terms: Vec<Term<'a>>,
+}
+
+impl Motion<'_> {
+    /// Number of unknowns: columns of a row.
+    #[must_use]
+    pub fn unknowns(&self) -> usize {
+        self.coefficients.iter().filter(|one| matches!(one, Coefficient::Unknown)).count() + self.terms.len()
+    }
+
+    /// Builds the rows of the samples from `first` on: one column an unknown, in the order of inertia, damping, stiffness and terms,
+    /// then the right-hand side. `derivatives` are the angle and its first and second derivative at these samples; those that are
+    /// columns as they are change places with them and are not copied.
+    pub(crate) fn rows(
+        &self,
+        first: usize,
+        derivatives: &mut [Vec<f64>; 3],
+        known: &mut Vec<f64>,
+        columns: &mut [Vec<f64>],
+    ) {
+        let [angle, velocity, acceleration] = derivatives;
+        let count = angle.len();
+        let Some((side, unknowns)) = columns.split_last_mut() else { return };
+        side.resize(count, 0.0);
+        self.torque.read(first, side);
+        for (coefficient, factor) in self.coefficients.iter().zip([&*acceleration, velocity, angle]) {
+            match *coefficient {
+                Coefficient::Unknown => {}
+                Coefficient::Number(number) => {
+                    if number != 0.0 {
+                        side.iter_mut().zip(factor).for_each(|(side, factor)| *side -= number * factor);
+                    }
+                }
+                Coefficient::Record(record) => {
+                    known.resize(count, 0.0);
+                    record.read(first, known);
+                    for ((side, factor), known) in side.iter_mut().zip(factor).zip(&*known) {
+                        *side -= known * factor;
+                    }
+                }
+            }
+        }
+        let (coefficients, terms) = unknowns.split_at_mut(unknowns.len() - self.terms.len());
+        for (term, column) in self.terms.iter().zip(terms) {
+            column.resize(count, 0.0);
+            match *term {
+                Term::Offset => column.fill(1.0),
+                Term::Coulomb => {
+                    for (value, &velocity) in column.iter_mut().zip(&*velocity) {
+                        *value = sign(velocity);
+                    }
+                }
+                Term::Cubic => {
+                    for (value, &angle) in column.iter_mut().zip(&*angle) {
+                        *value = angle * angle * angle;
+                    }
+                }
+                Term::Record(record) => record.read(first, column),
+            }
+        }
+        self.exchange(derivatives, coefficients);
+    }
+
+    /// Gives derivatives that became columns their places back, so that there is memory for each only once.
+    pub(crate) fn take_back(&self, derivatives: &mut [Vec<f64>; 3], columns: &mut [Vec<f64>]) {
+        if derivatives.iter().any(Vec::is_empty) {
+            self.exchange(derivatives, columns);
+        }
+    }
+
+    /// Lets the derivatives that are multiplied by unknowns change places with their columns.
+    fn exchange(&self, [angle, velocity, acceleration]: &mut [Vec<f64>; 3], columns: &mut [Vec<f64>]) {
+        let factors = self.coefficients.iter().zip([acceleration, velocity, angle]);
+        let unknown = factors.filter(|(coefficient, _)| matches!(coefficient, Coefficient::Unknown));
+        unknown.zip(columns).for_each(|((_, factor), column)| std::mem::swap(factor, column));
+    }
+}
+
+/// Which columns of the equations have unknown factors: coefficients, then that many terms.
+pub(crate) fn unknowns(coefficients: &[Coefficient<'_>; 3], terms: usize) -> Vec<usize> {
+    let unknown = (0..3).filter(|&index| matches!(coefficients[index], Coefficient::Unknown));
+    unknown.chain(3..3 + terms).collect()
+}

@@ -1,0 +1,83 @@
+//! Rows of the equation of motion of one record, whatever form they were made in.
+
+use std::ops::Range;
+
+/// Rows of a block.
+pub(crate) const BLOCK: usize = 128;
+
+/// One regressor in every row.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Regressor {
+    /// For a factor that is constant around the row.
+    pub(crate) value: Vec<f64>,
+    /// For a factor that grows by one a second and is zero at the row's centre.
+    pub(crate) companion: Vec<f64>,
+    /// The kernels that the angle's noise enters by, of both; empty where it does not or nothing is known of it.
+    pub(crate) noise: [Vec<f64>; 2],
+}
+
+/// All rows of a record. Those that are no equations are zero in every column.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Rows {
+    /// Inertia, damping, stiffness and terms, known or not.
+    pub(crate) regressors: Vec<Regressor>,
+    /// The torque, with what is known taken off.
+    pub(crate) side: Vec<f64>,
+    /// The kernel that the angle's noise enters the right-hand side by; empty where it does not.
+    pub(crate) side_noise: Vec<f64>,
+    pub(crate) usable: Vec<bool>,
+    /// The first rows after jumps of what is windowed, in order.
+    pub(crate) jumps: Vec<usize>,
+    /// Seconds from one row to the next.
+    pub(crate) period: f64,
+}
+
+impl Rows {
+    /// Number of rows.
+    pub(crate) fn len(&self) -> usize {
+        self.side.len()
+    }
+
+    /// Makes rows no equations.
+    pub(crate) fn exclude(&mut self, rows: impl Iterator<Item = usize>) {
+        for row in rows {
+            self.usable[row] = false;
+            self.clear(row);
+        }
+    }
+
+    /// Makes every column zero in the rows that are no equations.
+    pub(crate) fn clear_unusable(&mut self) {
+        for row in 0..self.len() {
+            if !self.usable[row] {
+                self.clear(row);
+            }
+        }
+    }
+
+    /// Breaks off where other rows of the same record do.
+    pub(crate) fn exclude_as(&mut self, other: &Self) {
+        self.jumps.clone_from(&other.jumps);
+        self.exclude((0..other.len()).filter(|&row| !other.usable[row]));
+    }
+
+    /// Makes every column zero in a row.
+    pub(crate) fn clear(&mut self, row: usize) {
+        self.side[row] = 0.0;
+        for Regressor { value, companion, .. } in &mut self.regressors {
+            value[row] = 0.0;
+            if let Some(value) = companion.get_mut(row) {
+                *value = 0.0;
+            }
+        }
+    }
+}
+
+/// Where one stretch ends and the next begins, counted along them.
+pub(crate) fn joints(stretches: &[Range<usize>]) -> Vec<usize> {
+    let ends = stretches.iter().scan(0, |end, stretch| {
+        *end += stretch.len();
+        Some(*end)
+    });
+    ends.take(stretches.len().saturating_sub(1)).collect()
+}

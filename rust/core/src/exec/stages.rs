@@ -1,0 +1,72 @@
+//! The stages of one long call: who works on them, and who watches.
+
+use std::num::NonZeroUsize;
+use std::ops::Range;
+
+use crate::error::Error;
+use crate::exec::pool::{self, Piece, Watch, ranges};
+
+/// Workers and watch of a call that goes through a number of stages.
+pub(crate) struct Run<'a, 'b> {
+    pub(crate) workers: NonZeroUsize,
+    watch: &'a mut Watch<'b>,
+    /// What the watch is told at the end.
+    total: usize,
+    /// Stages done, and about how many there will be.
+    done: usize,
+    stages: usize,
+}
+
+impl<'a, 'b> Run<'a, 'b> {
+    pub(crate) fn new(workers: NonZeroUsize, total: usize, stages: usize, watch: &'a mut Watch<'b>) -> Self {
+        Self { workers, watch, total, done: 0, stages }
+    }
+
+    /// Does every piece once and returns what each gave, in their order.
+    pub(crate) fn map<P: Send, S, R: Send>(
+        &mut self,
+        pieces: Vec<Piece<P>>,
+        scratch: impl Fn() -> S + Sync,
+        work: impl Fn(P, &mut S) -> R + Sync,
+    ) -> Result<Vec<R>, Error> {
+        let workers = self.workers;
+        self.stage(|watch| pool::map(pieces, workers, scratch, work, watch))
+    }
+
+    /// Fills columns in pieces: `work` gets some rows and their part of every column.
+    pub(crate) fn fill<'c>(
+        &mut self,
+        columns: impl IntoIterator<Item = &'c mut Vec<f64>>,
+        work: impl Fn(Range<usize>, &mut [&mut [f64]]) + Sync,
+    ) -> Result<(), Error> {
+        let mut columns: Vec<_> = columns.into_iter().map(Vec::as_mut_slice).collect();
+        let rows = columns.first().map_or(0, |column| column.len());
+        let cut = |Piece { size, content }: Piece<Range<usize>>| {
+            let parts = columns.iter_mut().filter_map(|column| column.split_off_mut(..size)).collect();
+            Piece { size, content: (content, parts) }
+        };
+        let pieces = ranges(rows).into_iter().map(cut).collect();
+        self.map(
+            pieces,
+            || (),
+            |(rows, mut parts): (Range<usize>, Vec<&mut [f64]>), (): &mut ()| work(rows, &mut parts),
+        )?;
+        Ok(())
+    }
+
+    /// Tells the watch that all is done, however many stages there were.
+    pub(crate) fn finish(&mut self) -> Result<(), Error> {
+        if (self.watch)(self.total, self.total) { Ok(()) } else { Err(Error::Cancelled) }
+    }
+
+    /// Does one stage, of which the watch sees its share of the whole.
+    pub(crate) fn stage<R>(&mut self, work: impl FnOnce(&mut Watch<'_>) -> Result<R, Error>) -> Result<R, Error> {
+        let (total, stages, done) = (self.total, self.stages, self.done);
+        let watch = &mut *self.watch;
+        let share = |part: f64| (total as f64 * ((done as f64 + part) / stages as f64).min(1.0)).floor();
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between zero and the total")]
+        let result = work(&mut |now, all| watch(share(now as f64 / all.max(1) as f64) as usize, total));
+        self.done += 1;
+        result
+    }
+}

@@ -1,0 +1,261 @@
+//! How far windows scatter, over what their standard errors say.
+//!
+//! Ordinary least squares take equations as independent and unknowns as constant within a window. Neither holds: derivatives at
+//! neighbouring samples come from nearly the same samples, and what changes within a window pulls its unknowns. Windows that share no
+//! equation tell what both amount to. The second difference of three of them, `x₀ − (x₋ + x₊)/2`, has the variance `v₀ + (v₋ + v₊)/4` if
+//! their variances are right, and a steady drift adds nothing to it. What every window is wrong by alike is not seen.
+
+use std::num::NonZeroUsize;
+use std::ops::Range;
+
+use crate::equation::motion::Motion;
+use crate::error::Error;
+use crate::exec::pool::Watch;
+use crate::identify::strong::streaming::{Chunk, Identified, equations, identify_parts, redundancies};
+use crate::lanes::output::Elements;
+use crate::least_squares::rolling::{Regressions, RollingLeastSquares};
+use crate::local_polynomials::plan::LocalPolynomials;
+use crate::record::subsample::stretches;
+
+/// Windows that are looked at in a long record, and in how many stretches at most.
+const MOST_WINDOWS: usize = 1 << 15;
+const STRETCHES: usize = 8;
+
+/// Differences that begin within the distance of two windows, which is a multiple of it.
+const DENSITY: usize = 8;
+
+/// A squared difference counts at most so many times what the median says of its mean: a jump is no error of the windows around it.
+const MOST: f64 = 25.0;
+
+/// The median of a χ² variable with one degree of freedom.
+const MEDIAN: f64 = 0.454_936;
+
+/// What windows around samples say: unknowns and their standard errors, one slice an unknown.
+#[derive(Clone, Copy, Debug)]
+pub struct Track<'a> {
+    /// Values by unknown.
+    pub values: &'a [&'a [f64]],
+    /// Standard errors by unknown.
+    pub errors: &'a [&'a [f64]],
+}
+
+/// By how much standard errors of windowed unknowns exceed those of ordinary least squares: one factor an unknown, in every record.
+///
+/// The tracks hold what [`identify_windowed`](crate::identify_windowed) found at every sample. The factors are never less than one. Where
+/// a record is too short for windows that share no equation they come from the correlation of the residuals. They cost well below a
+/// millisecond.
+///
+/// # Errors
+/// If a record is shorter than the window of the polynomials.
+pub fn scatter(
+    derivatives: &LocalPolynomials,
+    least_squares: &RollingLeastSquares,
+    records: &[(Motion<'_>, Track<'_>)],
+) -> Result<Vec<Vec<f64>>, Error> {
+    let mut all = Vec::new();
+    for (motion, track) in records {
+        let factors = scatter_of(derivatives, least_squares.window(), motion.angle.len(), *track);
+        all.push(or_redundancies(factors, derivatives, least_squares, motion)?);
+    }
+    Ok(all)
+}
+
+/// Identifies as [`identify_windowed`](crate::identify_windowed) does, for outputs of which not every sample has an element, and returns
+/// the factors of [`scatter`] as well: the windows that they need, 32 768 or so, are solved in the same go.
+///
+/// # Errors
+/// If a record is shorter than the window of the polynomials, or the watch cancels.
+pub fn identify_with_scatter(
+    derivatives: &LocalPolynomials,
+    least_squares: &RollingLeastSquares,
+    records: Vec<(Motion<'_>, Identified<'_>)>,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<Vec<f64>>, Error> {
+    let (motions, outputs): (Vec<Motion<'_>>, Vec<Identified<'_>>) = records.into_iter().unzip();
+    let taken = |motion: &Motion<'_>| -> Vec<Taken> {
+        let compared = Compared::new(derivatives, least_squares.window(), motion.angle.len());
+        let stretches = compared.stretches().into_iter();
+        stretches.map(|around| Taken::empty(motion.unknowns(), around, &compared)).collect()
+    };
+    let mut taken: Vec<Vec<Taken>> = motions.iter().map(taken).collect();
+    let mut parts = Vec::new();
+    for ((motion, identified), taken) in motions.iter().zip(outputs).zip(&mut taken) {
+        parts.push((motion, (0..motion.angle.len(), identified)));
+        parts.extend(taken.iter_mut().map(|taken| (motion, (taken.around.clone(), taken.outputs()))));
+    }
+    identify_parts(derivatives, least_squares, parts, workers, watch)?;
+    let each = motions.iter().zip(taken);
+    each.map(|(motion, taken)| or_redundancies(factors(motion.unknowns(), taken), derivatives, least_squares, motion))
+        .collect()
+}
+
+/// The factors of one record, from the correlation of its residuals where windows give none.
+fn or_redundancies(
+    factors: Option<Vec<f64>>,
+    derivatives: &LocalPolynomials,
+    least_squares: &RollingLeastSquares,
+    motion: &Motion<'_>,
+) -> Result<Vec<f64>, Error> {
+    match factors {
+        Some(factors) => Ok(factors),
+        None => redundancies(derivatives, motion, &mut Chunk::new(derivatives, least_squares.columns())),
+    }
+}
+
+/// Which windows are compared.
+struct Compared {
+    /// Samples from one window of a difference to the next: they share no equation, nor nearly any of the polynomials' windows.
+    distance: usize,
+    /// Samples around which a full window of equations lies.
+    inside: Range<usize>,
+}
+
+impl Compared {
+    fn new(derivatives: &LocalPolynomials, window: usize, samples: usize) -> Self {
+        let rows = equations(derivatives, samples);
+        Self {
+            distance: (window + derivatives.options().window_length / 2).next_multiple_of(DENSITY),
+            inside: rows.start + window / 2..(rows.end + window / 2 + 1).saturating_sub(window),
+        }
+    }
+
+    /// Parts of the record that are looked at: none where it is too short for one difference that is independent of another.
+    fn stretches(&self) -> Vec<Range<usize>> {
+        if self.inside.len() < 3 * self.distance {
+            return Vec::new();
+        }
+        let most = MOST_WINDOWS.max(12 * self.distance);
+        let count = (most / (4 * self.distance)).min(STRETCHES);
+        let first = self.inside.start;
+        stretches(self.inside.len(), most, count).map(|part| first + part.start..first + part.end).collect()
+    }
+}
+
+/// What windows of a stretch say, one in every eighth of a distance: by unknown.
+struct Taken {
+    around: Range<usize>,
+    step: usize,
+    values: Vec<Vec<f64>>,
+    errors: Vec<Vec<f64>>,
+}
+
+impl Taken {
+    fn empty(unknowns: usize, around: Range<usize>, compared: &Compared) -> Self {
+        let step = compared.distance / DENSITY;
+        let values = vec![vec![0.0; around.len().div_ceil(step)]; unknowns];
+        Self { around, step, errors: values.clone(), values }
+    }
+
+    /// Picked from the windows around every sample of a record.
+    fn of(track: Track<'_>, around: Range<usize>, compared: &Compared) -> Self {
+        let step = compared.distance / DENSITY;
+        let pick = |columns: &[&[f64]]| {
+            let some = columns.iter().map(|column| column[around.clone()].iter().copied().step_by(step).collect());
+            some.collect()
+        };
+        Self { step, values: pick(track.values), errors: pick(track.errors), around }
+    }
+
+    /// Where windows that are solved for it go.
+    fn outputs(&mut self) -> Identified<'_> {
+        let regressions = Regressions {
+            elements: Elements { first: self.around.start, step: self.step },
+            parameters: self.values.iter_mut().map(Vec::as_mut_slice).collect(),
+            errors: self.errors.iter_mut().map(Vec::as_mut_slice).collect(),
+            ..Regressions::default()
+        };
+        Identified { regressions, order: &mut [] }
+    }
+
+    /// Adds squared differences over the variances that standard errors give them, by unknown.
+    fn add(&self, squares: &mut [Vec<f64>]) {
+        for ((squares, values), errors) in squares.iter_mut().zip(&self.values).zip(&self.errors) {
+            for centre in DENSITY..values.len().saturating_sub(DENSITY) {
+                let (before, after) = (centre - DENSITY, centre + DENSITY);
+                let difference = values[centre] - f64::midpoint(values[before], values[after]);
+                let variance = errors[centre].powi(2) + (errors[before].powi(2) + errors[after].powi(2)) / 4.0;
+                let square = difference * difference / variance;
+                if square.is_finite() {
+                    squares.push(square);
+                }
+            }
+        }
+    }
+}
+
+/// The factors for what windows say that were solved around every sample of a record; nothing where it is too short.
+pub(crate) fn scatter_of(
+    derivatives: &LocalPolynomials,
+    window: usize,
+    samples: usize,
+    track: Track<'_>,
+) -> Option<Vec<f64>> {
+    let compared = Compared::new(derivatives, window, samples);
+    factors(track.values.len(), compared.stretches().into_iter().map(|around| Taken::of(track, around, &compared)))
+}
+
+/// Columns as slices.
+pub(crate) fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
+    columns.iter().map(Vec::as_slice).collect()
+}
+
+/// The root of the mean of squared differences of every unknown, of which none counts too much; nothing where one has none.
+fn factors(unknowns: usize, taken: impl IntoIterator<Item = Taken>) -> Option<Vec<f64>> {
+    let mut squares = vec![Vec::new(); unknowns];
+    taken.into_iter().for_each(|taken| taken.add(&mut squares));
+    let factor = |squares: &mut Vec<f64>| {
+        if squares.is_empty() {
+            return None;
+        }
+        let middle = squares.len() / 2;
+        let most = MOST / MEDIAN * *squares.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let mean = squares.iter().map(|square| square.min(most)).sum::<f64>() / squares.len() as f64;
+        Some(mean.sqrt().max(1.0))
+    };
+    squares.iter_mut().map(factor).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::newey_west::tests::white;
+
+    /// The factor of one unknown with the same standard error everywhere.
+    fn factor(values: &[f64], error: f64) -> f64 {
+        let errors = vec![error; values.len()];
+        let (track, all) = (Track { values: &[values], errors: &[&errors] }, 0..values.len());
+        let taken = Taken::of(track, all.clone(), &Compared { distance: 24, inside: all });
+        factors(1, [taken]).expect("long enough")[0]
+    }
+
+    // 13 000 differences: the root of their mean square scatters by a hundredth.
+    const CHANCE: f64 = 0.05;
+
+    #[test]
+    fn errors_that_are_right_keep_their_size_and_others_get_it() {
+        let values = white(40_000, 3);
+        for (stated, expected) in [(1.0, 1.0), (0.25, 4.0), (4.0, 1.0)] {
+            assert!((factor(&values, stated) / expected - 1.0).abs() < CHANCE);
+        }
+    }
+
+    #[test]
+    fn a_drift_and_a_jump_are_no_errors() {
+        let noise = white(40_000, 5);
+        let drifting: Vec<f64> = (0..40_000).map(|row| noise[row] + 0.01 * row as f64).collect();
+        // Of 13 000 differences 16 reach over the jump, each of which counts 25 times at most.
+        let jumping: Vec<f64> = (0..40_000).map(|row| noise[row] + if row < 20_000 { 0.0 } else { 1e6 }).collect();
+        for values in [drifting, jumping] {
+            assert!((factor(&values, 1.0) - 1.0).abs() < CHANCE);
+        }
+    }
+
+    #[test]
+    fn a_record_too_short_for_differences_has_no_stretches() {
+        let compared = Compared { distance: 100, inside: 50..349 };
+        assert!(compared.stretches().is_empty());
+        let stretches = Compared { inside: 50..350, ..compared }.stretches();
+        assert_eq!((stretches.len(), stretches.first()), (1, Some(&(50..350))));
+    }
+}

@@ -1,0 +1,291 @@
+//! Identification of one or many records: local polynomials, rows of the equation of motion, least squares, in one pass over pieces.
+
+use std::num::NonZeroUsize;
+use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
+
+use crate::equation::motion::Motion;
+use crate::error::Error;
+use crate::exec::pool::{self, GoOn, Piece, Watch};
+use crate::lanes::output::{Elements, split_off};
+use crate::least_squares::rolling::{Equations, Regressions, RollingLeastSquares};
+use crate::least_squares::stacked_qr::{SharedParameters, Summary};
+use crate::local_polynomials::estimates::Estimates;
+use crate::local_polynomials::plan::LocalPolynomials;
+use crate::record::samples::{Samples, is_usable};
+use crate::record::subsample::stretches;
+use crate::regression::newey_west::{Stretched, enlarge};
+use crate::status::Status;
+
+/// Rows in a piece of work, about.
+const PIECE: usize = 1 << 14;
+
+/// Rows that the correlation of residuals is read off in a long record, and in how many stretches.
+const MOST_ROWS: usize = 1 << 14;
+const STRETCHES: usize = 8;
+
+/// Where results of one record are written. An empty slice stands for what is not wanted.
+#[derive(Debug, Default)]
+pub struct Identified<'a> {
+    /// Parameters of every window; their elements say which samples all outputs belong to.
+    pub regressions: Regressions<'a>,
+    /// Order of the polynomial around each sample.
+    pub order: &'a mut [u8],
+}
+
+impl Identified<'_> {
+    fn split_off_before(&mut self, sample: usize) -> Self {
+        let count = self.regressions.elements.of(0..sample).len();
+        Identified { order: split_off(&mut self.order, count), regressions: self.regressions.split_off_before(sample) }
+    }
+}
+
+/// Rows of a record between two samples.
+pub(crate) struct Chunk {
+    first: usize,
+    /// Angle and its derivatives.
+    derivatives: [Vec<f64>; 3],
+    order: Vec<u8>,
+    status: Vec<u16>,
+    known: Vec<f64>,
+    /// Unknowns, then the right-hand side.
+    pub(crate) columns: Vec<Vec<f64>>,
+    polynomials: crate::local_polynomials::plan::Scratch,
+}
+
+/// One column of a chunk, known by absolute sample numbers. Beyond the chunk, where no window that is wanted reaches, it is zero.
+pub(crate) struct Column<'a> {
+    first: usize,
+    values: &'a [f64],
+    samples: usize,
+}
+
+impl Samples for Column<'_> {
+    fn len(&self) -> usize {
+        self.samples
+    }
+
+    fn read(&self, first: usize, into: &mut [f64]) {
+        let (start, end) = (first.max(self.first), (first + into.len()).min(self.first + self.values.len()));
+        into.fill(0.0);
+        if start < end {
+            into[start - first..end - first].copy_from_slice(&self.values[start - self.first..end - self.first]);
+        }
+    }
+}
+
+impl Chunk {
+    pub(crate) fn new(plan: &LocalPolynomials, columns: usize) -> Self {
+        Self {
+            first: 0,
+            derivatives: Default::default(),
+            order: Vec::new(),
+            status: Vec::new(),
+            known: Vec::new(),
+            columns: vec![Vec::new(); columns],
+            polynomials: plan.scratch(),
+        }
+    }
+
+    /// Differentiates the angle at some samples and builds their rows.
+    pub(crate) fn fill(
+        &mut self,
+        plan: &LocalPolynomials,
+        motion: &Motion<'_>,
+        samples: Range<usize>,
+    ) -> Result<(), Error> {
+        self.first = samples.start;
+        motion.take_back(&mut self.derivatives, &mut self.columns);
+        for derivative in &mut self.derivatives {
+            derivative.resize(samples.len(), 0.0);
+        }
+        self.order.resize(samples.len(), 0);
+        self.status.resize(samples.len(), 0);
+        let mut estimates = Estimates {
+            elements: Elements { first: samples.start, step: 1 },
+            derivatives: self.derivatives.iter_mut().map(Vec::as_mut_slice).collect(),
+            order: &mut self.order,
+            status: &mut self.status,
+            sigma: &mut [],
+        };
+        plan.estimate(motion.angle, samples, &mut estimates, &mut self.polynomials)?;
+        motion.rows(self.first, &mut self.derivatives, &mut self.known, &mut self.columns);
+        Ok(())
+    }
+
+    /// The columns by the sample numbers of their record.
+    pub(crate) fn columns(&self, samples: usize) -> Vec<Column<'_>> {
+        self.columns.iter().map(|values| Column { first: self.first, values, samples }).collect()
+    }
+
+    /// Whether a row of the chunk is an equation, of those of the record, and can be used.
+    pub(crate) fn is_equation(&self, row: usize, rows: &Range<usize>) -> bool {
+        rows.contains(&(self.first + row)) && self.columns.iter().all(|column| is_usable(column[row]))
+    }
+}
+
+/// The samples that are equations: those around which a full window of the angle lies.
+pub(crate) fn equations(plan: &LocalPolynomials, samples: usize) -> Range<usize> {
+    let before = plan.before_centre();
+    before..(samples + before + 1).saturating_sub(plan.options().window_length).max(before)
+}
+
+/// Identifies parameters in a window of equations around every sample: (3) and (4) of the paper, in parallel over all records.
+///
+/// `derivatives` must be a plan for the value and the first two derivatives, `least_squares` one with the unknowns of the motions.
+/// Standard errors are those of ordinary least squares; [`scatter`](crate::scatter()) says by what they are too small.
+///
+/// # Errors
+/// If a record is shorter than the window of the polynomials, or the watch cancels.
+pub fn identify_windowed(
+    derivatives: &LocalPolynomials,
+    least_squares: &RollingLeastSquares,
+    records: Vec<(Motion<'_>, Identified<'_>)>,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<(), Error> {
+    let whole = |(motion, identified): (Motion<'_>, _)| (0..motion.angle.len(), identified);
+    let motions: Vec<Motion<'_>> = records.iter().map(|(motion, _)| motion.clone()).collect();
+    let parts = motions.iter().zip(records).map(|(motion, record)| (motion, whole(record))).collect();
+    identify_parts(derivatives, least_squares, parts, workers, watch)
+}
+
+/// The same for some samples of each record, which all outputs belong to.
+pub(crate) fn identify_parts(
+    derivatives: &LocalPolynomials,
+    least_squares: &RollingLeastSquares,
+    parts: Vec<(&Motion<'_>, (Range<usize>, Identified<'_>))>,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<(), Error> {
+    let mut pieces = Vec::new();
+    for (motion, (wanted, mut identified)) in parts {
+        derivatives.windows(motion.angle.len())?;
+        for samples in least_squares.pieces(motion.angle.len(), PIECE) {
+            let samples = samples.start.max(wanted.start)..samples.end.min(wanted.end);
+            if samples.is_empty() {
+                continue;
+            }
+            let part = identified.split_off_before(samples.end);
+            pieces.push(Piece { size: samples.len(), content: (motion, samples, part) });
+        }
+    }
+    let scratch = || (Chunk::new(derivatives, least_squares.columns()), least_squares.scratch());
+    let failed = Mutex::new(None);
+    let work = |(motion, samples, mut part): (&Motion<'_>, Range<usize>, Identified<'_>),
+                (chunk, scratch): &mut (Chunk, crate::least_squares::rolling::Scratch),
+                go_on: &GoOn<'_>| {
+        let needed = least_squares.rows_needed(samples.clone(), motion.angle.len());
+        if let Err(error) = chunk.fill(derivatives, motion, needed) {
+            *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+            return;
+        }
+        let total = motion.angle.len();
+        let columns = chunk.columns(total);
+        let equations = Equations {
+            columns: columns.iter().map(|column| column as &dyn Samples).collect(),
+            rows: equations(derivatives, total),
+        };
+        least_squares.solve_while(&equations, samples.clone(), &mut part.regressions, scratch, go_on);
+        finish(chunk, samples, &mut part);
+    };
+    pool::run_long(pieces, workers, scratch, work, watch)?;
+    failed.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
+}
+
+/// Adds what is known of the polynomials to a piece of the results.
+fn finish(chunk: &Chunk, samples: Range<usize>, part: &mut Identified<'_>) {
+    let elements = part.regressions.elements;
+    for element in elements.of(samples) {
+        let place = elements.sample(element) - chunk.first;
+        if let Some(order) = part.order.get_mut(element) {
+            *order = chunk.order[place];
+        }
+        if let Some(status) = part.regressions.status.get_mut(element) {
+            *status |= chunk.status[place] & !Status::INVALID.bits();
+        }
+    }
+}
+
+/// Identifies parameters that are the same over the whole record, one result a record; nothing where they are not determined.
+///
+/// `derivatives` must be a plan for the value and the first two derivatives. Equations that hold a value that is no number are left
+/// out. Of the outputs only orders and statuses are written. Standard errors hold the correlation of neighbouring rows, as residuals of
+/// at most 16 384 rows show it.
+///
+/// # Errors
+/// If a record is shorter than the window of the polynomials, or the watch cancels.
+pub fn identify_constant(
+    derivatives: &LocalPolynomials,
+    records: Vec<(Motion<'_>, Identified<'_>)>,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<Option<SharedParameters>>, Error> {
+    let motions: Vec<Motion<'_>> = records.iter().map(|(motion, _)| motion.clone()).collect();
+    let unknowns = motions.first().map_or(0, Motion::unknowns);
+    let mut pieces = Vec::new();
+    let mut owners = Vec::new();
+    for (index, (motion, (_, mut identified))) in motions.iter().zip(records).enumerate() {
+        derivatives.windows(motion.angle.len())?;
+        for first in (0..motion.angle.len()).step_by(PIECE) {
+            let samples = first..motion.angle.len().min(first + PIECE);
+            let part = identified.split_off_before(samples.end);
+            pieces.push(Piece { size: samples.len(), content: (pieces.len(), motion, samples, part) });
+            owners.push(index);
+        }
+    }
+    let summaries = Mutex::new(vec![None; pieces.len()]);
+    let failed = Mutex::new(None);
+    let work = |(place, motion, samples, mut part): (usize, &Motion<'_>, Range<usize>, Identified<'_>),
+                chunk: &mut Chunk| {
+        if let Err(error) = chunk.fill(derivatives, motion, samples.clone()) {
+            *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+            return;
+        }
+        let rows = equations(derivatives, motion.angle.len());
+        let summary = Summary::of(&chunk.columns, |row| chunk.is_equation(row, &rows));
+        finish(chunk, samples, &mut part);
+        summaries.lock().unwrap_or_else(PoisonError::into_inner)[place] = Some(summary);
+    };
+    pool::run(pieces, workers, || Chunk::new(derivatives, unknowns + 1), work, watch)?;
+    if let Some(error) = failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        return Err(error);
+    }
+    let mut totals = vec![Summary::empty(unknowns + 1); motions.len()];
+    for (summary, owner) in summaries.into_inner().unwrap_or_else(PoisonError::into_inner).iter().zip(owners) {
+        if let Some(summary) = summary {
+            totals[owner].add(summary);
+        }
+    }
+    let mut solved: Vec<_> = totals.iter().map(Summary::solve).collect();
+    let pieces = solved.iter_mut().zip(&motions).map(|content| Piece { size: 1, content }).collect();
+    let work = |(solved, motion): (&mut Option<SharedParameters>, &Motion<'_>), chunk: &mut Chunk| {
+        if let Some(solved) = solved {
+            enlarge(&mut solved.covariance, &redundancies(derivatives, motion, chunk)?);
+        }
+        Ok(())
+    };
+    let samples = motions.iter().map(|motion| motion.angle.len()).sum();
+    let chunk = || Chunk::new(derivatives, unknowns + 1);
+    let done: Result<(), Error> =
+        pool::map(pieces, workers, chunk, work, &mut |_, _| watch(samples, samples))?.into_iter().collect();
+    done.map(|()| solved)
+}
+
+/// By how much the standard errors of constants exceed those of ordinary least squares, from stretches of a long record.
+pub(crate) fn redundancies(
+    derivatives: &LocalPolynomials,
+    motion: &Motion<'_>,
+    chunk: &mut Chunk,
+) -> Result<Vec<f64>, Error> {
+    let rows = equations(derivatives, motion.angle.len());
+    // Polynomials weigh the middle half of their windows: beyond that derivatives hardly share noise.
+    let reach = derivatives.options().window_length / 2;
+    let most = MOST_ROWS.max(4 * STRETCHES * reach);
+    let mut stretched = Stretched::new(motion.unknowns() + 1, reach);
+    for stretch in stretches(rows.len(), most, STRETCHES) {
+        chunk.fill(derivatives, motion, rows.start + stretch.start..rows.start + stretch.end)?;
+        stretched.push(&chunk.columns, |row| chunk.is_equation(row, &rows));
+    }
+    Ok(stretched.factors().unwrap_or_else(|| vec![1.0; motion.unknowns()]))
+}

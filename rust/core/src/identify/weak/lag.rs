@@ -1,0 +1,166 @@
+//! By how much the torque comes late, as the record itself says.
+//!
+//! What was recorded too late by `τ` is `T(t) = T_recorded(t + τ) ≈ T_recorded(t) + τ Ṫ_recorded(t)` on time, so the factor of the torque's
+//! rate beside everything else is what is left of the lag. The rows are made anew with what was found until nothing is left: there
+//! the expansion is exact, and the noise of the rate, which is uncorrelated with that of the torque, no longer matters.
+//!
+//! The lag is told from the damping by the inertia: with motion at a single frequency it is not determined.
+
+use std::sync::Arc;
+
+use crate::equation::rows::Rows;
+use crate::error::Error;
+use crate::identify::weak::decide::Decided;
+use crate::identify::weak::session::{Chosen, Session};
+use crate::inference::missing_terms::Judged;
+use crate::regression::constants::Expected;
+use crate::regression::dyadic_windows::Correlated;
+use crate::regression::model::{Fit, Model};
+use crate::regression::row_covariance::RowCovariance;
+use crate::weak_form::weak_rows::WeakRows;
+
+/// Times that test function and windows are chosen again with the lag that was found.
+const CHOICES: usize = 4;
+/// Steps towards the lag with one choice.
+const STEPS: usize = 16;
+/// A step so small, in standard errors, ends the search: a tenth of a percent of the width of an interval.
+const SETTLED: f64 = 4e-3;
+/// A choice that moves the lag by no more, in standard errors, is the last.
+const CHOSEN: f64 = 0.1;
+/// The least part of the lag that a step may be taken to cover, where noise of the rate hides the rest.
+const LEAST_RESPONSE: f64 = 0.05;
+/// A lag that is not known to this part of the test function's half-width is not determined: beyond it the rate is no line.
+const UNKNOWN: f64 = 0.5;
+
+/// By how many samples the torque comes late.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lag {
+    /// Samples.
+    pub value: f64,
+    /// Its standard error.
+    pub error: f64,
+}
+
+impl Session<'_, '_, '_> {
+    /// Chooses the test function and what is constant, and finds the lag where it is not given.
+    pub(crate) fn choose_and_decide(&mut self, model: &Model) -> Result<(Chosen, Decided, Option<Lag>), Error> {
+        let mut lag = None;
+        for choice in 1..=CHOICES {
+            let mut chosen = self.choose_test_function(model)?;
+            let decided = self.decide(&mut chosen, model)?;
+            if self.options.lag.is_some() {
+                return Ok((chosen, decided, None));
+            }
+            let before = self.record.lag;
+            lag = self.find_lag(&chosen, &decided)?;
+            let Some(found) = lag else { break };
+            let settled = (found.value - before).abs() <= CHOSEN * found.error;
+            if settled || choice == CHOICES {
+                // The rows at hand stand: they differ from those of the last step by less than can be told.
+                self.record.lag = before;
+                return Ok((chosen, decided, Some(Lag { value: before, ..found })));
+            }
+            self.record.lag = found.value;
+        }
+        self.record.lag = 0.0;
+        let mut chosen = self.choose_test_function(model)?;
+        let decided = self.decide(&mut chosen, model)?;
+        Ok((chosen, decided, lag))
+    }
+
+    /// The lag with which nothing is left of it; nothing where the rows do not determine it.
+    fn find_lag(&mut self, chosen: &Chosen, decided: &Decided) -> Result<Option<Lag>, Error> {
+        let Some(fit) = &decided.fit else { return Ok(None) };
+        let start = self.record.lag;
+        let widest = chosen.weak.function.half_width() as f64;
+        let (mut lag, mut response) = (start, 1.0);
+        let mut last: Option<(f64, f64)> = None;
+        for _ in 0..STEPS {
+            self.record.lag = lag;
+            let mut weak = self.rows(chosen.weak.function)?;
+            weak.rows.exclude_as(&chosen.weak.rows);
+            let left = self.left(&weak, chosen, decided, fit)?;
+            self.record.lag = start;
+            let Some((left, error)) = left.filter(|(left, error)| left.is_finite() && error.is_finite()) else {
+                return Ok(None);
+            };
+            if let Some((lag_before, left_before)) = last {
+                // Noise of the rate hides a part of what is left; two steps tell which.
+                let seen = (left_before - left) / (lag - lag_before);
+                response = if seen.is_finite() { seen.clamp(LEAST_RESPONSE, 1.0) } else { response };
+            }
+            let (step, error) = (left / response, error / response);
+            if error > UNKNOWN * widest {
+                return Ok(None);
+            }
+            let rounding = f64::EPSILON * self.record.torque.len() as f64;
+            if last.is_some() && step.abs() <= (SETTLED * error).max(rounding) {
+                return Ok(Some(Lag { value: lag, error }));
+            }
+            last = Some((lag, left));
+            lag += step.clamp(-UNKNOWN * widest, UNKNOWN * widest);
+        }
+        Ok(None)
+    }
+
+    /// The factor of the torque's rate beside everything else, in samples, and its standard error.
+    fn left(
+        &mut self,
+        weak: &WeakRows,
+        chosen: &Chosen,
+        decided: &Decided,
+        fit: &Fit,
+    ) -> Result<Option<(f64, f64)>, Error> {
+        // What changes slowly depends on the angle only, so what it took off the right-hand side is the same for every lag.
+        let (before, without) = (&chosen.weak.rows.side, decided.side(&chosen.weak.rows));
+        let slow = before.iter().zip(without).map(|(side, without)| side - without);
+        let side = weak.rows.side.iter().zip(slow).map(|(side, slow)| side - slow).collect();
+        let rows = decided.as_white(Rows { side, ..weak.rows.clone() }, &mut self.run)?;
+        let correlated = decided.model.correlated(&rows, &decided.covariance, &mut self.run)?;
+        let judged = Judged {
+            rows: &rows,
+            model: &decided.model,
+            side: &rows.side,
+            noise: self.noise[0],
+            fit,
+            covariance: &decided.covariance,
+            correlated: &correlated,
+            expected: decided.expected,
+            inflation: decided.error.max(1.0),
+            instructions: self.options.instructions,
+        };
+        let found = judged.factor(self.rate(), &mut self.run)?;
+        let period = self.options.delta;
+        Ok(found.map(|(value, error)| (-value / period, error / period)))
+    }
+
+    /// Which regressor the torque's rate is.
+    fn rate(&self) -> usize {
+        3 + self.record.terms.len()
+    }
+
+    /// The covariance of the constants of a model where the lag was estimated beside them; nothing where it was not.
+    pub(crate) fn covariance_beside_lag(
+        &mut self,
+        rows: &Rows,
+        model: &Model,
+        side: &[f64],
+        fit: &Fit,
+        expected: Expected,
+        (covariance, correlated): (&RowCovariance, &Arc<Correlated>),
+    ) -> Result<Option<Vec<f64>>, Error> {
+        if self.options.lag.is_some() {
+            return Ok(None);
+        }
+        let mut model = model.clone();
+        model.constant.push(self.rate());
+        let problem = model.problem(rows, side, self.noise[0], Some(correlated));
+        let Some(all) = fit.again(&problem, expected, self.options.instructions, &mut self.run)? else {
+            return Ok(None);
+        };
+        let both = all.covariance(&problem, covariance, &mut self.run)?;
+        let count = problem.layout.constant;
+        let rows = both.chunks_exact(count).take(count - 1);
+        Ok(Some(rows.flat_map(|row| row[..count - 1].to_vec()).collect()))
+    }
+}

@@ -1,0 +1,70 @@
+//! Whether anything but noise tells the constants apart.
+//!
+//! A motion at a single frequency makes the regressors of inertia and stiffness proportional; only the angle's noise is not, and the
+//! equations look well conditioned the noisier it is. So what is left of the weakest combination of regressors, once what is windowed has
+//! been eliminated, is compared with what noise of the known variance would leave.
+
+use std::ops::Range;
+
+use crate::equation::rows::Rows;
+use crate::error::Error;
+use crate::exec::pool::ranges;
+use crate::exec::stages::Run;
+use crate::regression::constants::sensitivity;
+use crate::regression::dyadic_windows::Problem;
+use crate::regression::model::{Fit, Model};
+
+/// What is left, in units of what noise leaves, below which noise is all there is: twice itself would mean as much signal as noise.
+const MOSTLY_NOISE: f64 = 2.0;
+
+/// Whether the weakest combination of constants, given by their parts, each of a column of norm one, is mostly noise. `variance` is that
+/// of the angle's noise.
+pub(crate) fn is_mostly_noise(
+    problem: &Problem<'_>,
+    rows: &Rows,
+    model: &Model,
+    fit: &Fit,
+    weakest: &[f64],
+    variance: f64,
+    run: &mut Run<'_, '_>,
+) -> Result<bool, Error> {
+    if variance == 0.0 || weakest.is_empty() {
+        return Ok(false);
+    }
+    let norm = |column: &[f64]| column.iter().map(|value| value * value).sum::<f64>().sqrt();
+    let parts: Vec<f64> = weakest.iter().zip(&problem.constants).map(|(part, column)| part / norm(column)).collect();
+    let regressors: Vec<usize> = model.constant.iter().chain(&model.windowed).copied().collect();
+    let kernel = |index: usize| &rows.regressors[regressors[index]].noise[0];
+    let product = |i: usize, j: usize| -> f64 { kernel(i).iter().zip(kernel(j)).map(|(a, b)| a * b).sum() };
+    let size = regressors.len();
+    let gram: Vec<f64> = (0..size * size).map(|index| product(index / size, index % size)).collect();
+    let windowed = model.windowed.len();
+    let of = |rows: Range<usize>, (): &mut ()| {
+        let (mut left, mut noise) = (0.0, 0.0);
+        let mut factors = vec![0.0; size];
+        factors[..parts.len()].copy_from_slice(&parts);
+        for row in rows.filter(|&row| problem.usable[row]) {
+            if windowed > 0 {
+                let place = fit.nearest(row);
+                let later = (row as f64 - fit.centre(place)) * problem.period;
+                for (unknown, factor) in factors[parts.len()..].iter_mut().enumerate() {
+                    *factor = parts
+                        .iter()
+                        .enumerate()
+                        .map(|(c, part)| part * sensitivity(&fit.full, place, unknown, c, later))
+                        .sum();
+                }
+            }
+            let constants = parts.iter().zip(&problem.constants).map(|(part, column)| part * column[row]);
+            let others =
+                factors[parts.len()..].iter().zip(&problem.windowed).map(|(factor, column)| factor * column[row]);
+            left += constants.chain(others).sum::<f64>().powi(2);
+            noise +=
+                (0..size * size).map(|index| factors[index / size] * factors[index % size] * gram[index]).sum::<f64>();
+        }
+        [left, noise]
+    };
+    let sums = run.map(ranges(problem.rows()), || (), of)?;
+    let [left, noise] = sums.iter().fold([0.0, 0.0], |[a, b], [c, d]| [a + c, b + d]);
+    Ok(left < MOSTLY_NOISE * variance * noise)
+}

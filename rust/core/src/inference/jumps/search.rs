@@ -1,0 +1,275 @@
+//! Where a windowed coefficient jumps.
+//!
+//! A window over a jump says nothing of either side, so windows should end there. A jump is suspected at rows where the window before and
+//! the window after say different things. It is placed between two samples by the rows that reach over it: with `k₋` and `k₊` the lines
+//! on both sides, they are predicted by
+//!
+//! ```text
+//! Σ_{t<τ} φ(t - c) θ(t) k₋(t) + Σ_{t≥τ} φ(t - c) θ(t) k₊(t),
+//! ```
+//!
+//! and `τ` leaves the smallest sum of squares. It is believed where that is smaller than what the same windows leave when they predict
+//! the rows between them without a jump, by more than chance.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+use crate::error::Error;
+use crate::exec::pool::Piece;
+use crate::exec::stages::Run;
+use crate::inference::jumps::jump::{Jump, Lines, Search, UNLIKELY};
+use crate::inference::jumps::placement::Place;
+use crate::inference::window_averaging::Around;
+use crate::regression::window_length::{Cells, SHORTEST_ALONE, Scale};
+
+/// Squared differences between the windows before and after a row, over their variance, from which on a jump is looked for.
+const SUSPECTED: f64 = 36.0;
+
+/// By how much a jump must lessen the sum of squares, over the noise of one independent row.
+const BELIEVED: f64 = 40.0;
+
+/// The most that a jump may leave of the sum of squares: a steep slope is no jump.
+const LEFT: f64 = 0.5;
+
+/// Windows that hold a jump follow it in part: so much more is left of the rows without them.
+const CONSPICUOUS: f64 = 2.0;
+
+/// Rounds of placing a jump and taking the windows beside it again.
+const ROUNDS: usize = 4;
+
+/// The part of a test function that may reach over a jump unnoticed.
+const UNNOTICED: f64 = 1e-4;
+
+impl Search<'_> {
+    /// The jumps of the record, in order: those that are known placed again, and new ones. `errors` are what is left of the rows.
+    pub(crate) fn find(&self, errors: &[f64], known: &[Jump], run: &mut Run<'_, '_>) -> Result<Vec<Jump>, Error> {
+        let room = self.apart() * self.stride;
+        let samples = self.first * 2 + (self.problem.rows() - 1) * self.stride;
+        let pieces = known.iter().map(|jump| Piece { size: room, content: jump });
+        let again = run.map(pieces.collect(), || (), |jump: &Jump, (): &mut ()| self.again(jump, room))?;
+        let mut jumps: BTreeMap<usize, Jump> = again.into_iter().map(|jump| (jump.sample, jump)).collect();
+        let conspicuous = self.conspicuous(errors).into_iter();
+        let pieces = conspicuous.map(|rows| Piece { size: rows.len() * self.stride, content: rows });
+        let new = run.map(pieces.collect(), || (), |rows: Range<usize>, (): &mut ()| self.within(&rows))?;
+        for jump in new.into_iter().flatten() {
+            let near = jump.sample.saturating_sub(room)..jump.sample + room;
+            if jumps.range(near).next().is_none() && jump.sample >= room && jump.sample + room <= samples {
+                jumps.insert(jump.sample, jump);
+            }
+        }
+        Ok(jumps.into_values().collect())
+    }
+
+    /// Places a jump that is known again. What is known to be there moves a little at most: by less than a quarter of the room between jumps.
+    fn again(&self, jump: &Jump, room: usize) -> Jump {
+        let row = (jump.sample - self.first).div_ceil(self.stride);
+        let solved = self.solve(&(row..row + 1));
+        let windows = around(&solved);
+        let placed = windows.iter().rev().find_map(|windows| self.placed(windows, jump.sample));
+        let near = placed.map(|(placed, _)| placed).filter(|placed| 4 * placed.sample.abs_diff(jump.sample) < room);
+        near.unwrap_or_else(|| jump.clone())
+    }
+
+    /// The jumps in some rows, the most conspicuous first.
+    fn within(&self, rows: &Range<usize>) -> Vec<Jump> {
+        let solved = self.solve(rows);
+        let windows = around(&solved);
+        let mut suspected = self.suspected(&windows, rows);
+        suspected.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let (mut looked, mut jumps) = (BTreeSet::new(), Vec::new());
+        for (_, row, scale) in suspected {
+            let near = row.saturating_sub(self.apart() / 2)..=row + self.apart() / 2;
+            if looked.range(near).next().is_some() {
+                continue;
+            }
+            looked.insert(row);
+            jumps.extend(self.place(&windows[scale], row));
+        }
+        jumps
+    }
+
+    /// Stretches of rows around which so much is left that a jump could be believed to make it less.
+    fn conspicuous(&self, errors: &[f64]) -> Vec<Range<usize>> {
+        let reach = 2 * (self.function.len() / 2).div_ceil(self.stride);
+        let least = BELIEVED * self.noise(0.0, 1.0) / CONSPICUOUS;
+        let mut found: Vec<Range<usize>> = Vec::new();
+        let mut sum = 0.0;
+        for row in 0..errors.len() + reach {
+            sum += errors.get(row).map_or(0.0, |error| error * error);
+            sum -= row.checked_sub(2 * reach + 1).map_or(0.0, |row| errors[row] * errors[row]);
+            let Some(middle) = row.checked_sub(reach) else { continue };
+            if sum < least {
+                continue;
+            }
+            match found.last_mut() {
+                Some(last) if last.end + self.apart() >= middle => last.end = middle + 1,
+                _ => found.push(middle..middle + 1),
+            }
+        }
+        found
+    }
+
+    /// Windows of every length around some rows.
+    fn solve(&self, rows: &Range<usize>) -> Vec<(Scale, Cells)> {
+        let solve = |&scale: &Scale| {
+            let all = scale.side_cells(self.problem.rows());
+            let reach = self.function.len() / self.stride;
+            let first = scale.cell(rows.start.saturating_sub(reach)).max(all.start).min(all.end);
+            let end = (scale.cell(rows.end + reach) + 1).min(all.end).max(first);
+            (scale, scale.solve_here(self.problem, &(first..end), self.instructions))
+        };
+        self.lengths.iter().map(solve).collect()
+    }
+
+    /// Rows that jumps must be apart, so that a window that serves alone fits between them.
+    fn apart(&self) -> usize {
+        SHORTEST_ALONE + 4 * self.function.len() / 2 / self.stride
+    }
+
+    /// Rows where the windows before and after differ most, by how much, and the scale that says so.
+    fn suspected(&self, windows: &[Around<'_>], rows: &Range<usize>) -> Vec<(f64, usize, usize)> {
+        let mut found = Vec::new();
+        for (scale, windows) in windows.iter().enumerate() {
+            let mut best: Option<(f64, usize)> = None;
+            for row in rows.clone() {
+                let differs = self.differs(windows, row).unwrap_or(0.0);
+                if differs > SUSPECTED {
+                    if best.is_none_or(|best| differs > best.0) {
+                        best = Some((differs, row));
+                    }
+                } else if let Some((differs, row)) = best.take() {
+                    found.push((differs, row, scale));
+                }
+            }
+            found.extend(best.map(|(differs, row)| (differs, row, scale)));
+        }
+        found
+    }
+
+    /// The squared difference between what the windows before and after a row say of it, over its variance: that of the coefficient that
+    /// differs most.
+    fn differs(&self, windows: &Around<'_>, row: usize) -> Option<f64> {
+        let before = windows.seen(self.problem, row, 0)?;
+        let after = windows.seen(self.problem, row, 2)?;
+        let squared = (0..self.problem.layout.windowed).map(|unknown| {
+            let difference = after.value(unknown) - before.value(unknown);
+            difference * difference / (self.inflation * (after.variance(unknown) + before.variance(unknown)))
+        });
+        Some(squared.fold(0.0, f64::max))
+    }
+
+    /// Places a jump near a row, if there is one.
+    fn place(&self, windows: &Around<'_>, row: usize) -> Option<Jump> {
+        let (jump, (over, left)) = self.placed(windows, self.first + row * self.stride)?;
+        self.is_believed(&over, left).then_some(jump)
+    }
+
+    /// Places a jump near a sample. Returns it with the rows that it was judged by and the sum of squares that it leaves there.
+    fn placed(&self, windows: &Around<'_>, sample: usize) -> Option<(Jump, (Range<usize>, f64))> {
+        let rows = self.problem.rows();
+        let half = self.function.len() / 2;
+        let reach = half.div_ceil(self.stride);
+        let (mut tau, mut round) = (sample, 0);
+        loop {
+            // The first row after the jump.
+            let row = tau.saturating_sub(self.first).div_ceil(self.stride).clamp(1, rows - 1);
+            let sides = [self.lines(windows, row, 0)?, self.lines(windows, row - 1, 2)?];
+            let candidates = tau.saturating_sub(half)..tau + half + 1;
+            let over = row.saturating_sub(2 * reach)..(row + 2 * reach).min(rows);
+            let left = self.left(&Place { lines: &sides, row, over: &over, candidates: &candidates })?;
+            let best = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]))?;
+            let next = candidates.start + best;
+            if next.abs_diff(tau) <= self.stride / 2 || round == ROUNDS {
+                let jump = self.jump(&left, best, candidates.start, over.len() as f64);
+                return Some((jump, (over, left[best])));
+            }
+            (tau, round) = (next, round + 1);
+        }
+    }
+
+    /// What the windows on one side say at a row.
+    fn lines(&self, windows: &Around<'_>, row: usize, which: usize) -> Option<Lines> {
+        let seen = windows.seen(self.problem, row, which)?;
+        let line = |unknown| [seen.value(unknown), seen.slope(unknown) * self.problem.period];
+        Some((0..self.problem.layout.windowed).map(line).collect())
+    }
+
+    /// Whether a jump is more than chance: windows of no length may predict the rows around it nearly as well without one.
+    fn is_believed(&self, over: &Range<usize>, left: f64) -> bool {
+        let rows: Vec<usize> = over.clone().filter(|&row| self.whole.usable[row]).collect();
+        let noise = self.noise(left, rows.len() as f64);
+        // Short windows follow what is steep but no jump, so they end most suspicions.
+        let mut tried = false;
+        let beaten = |without: f64| (without - left) / noise < BELIEVED || left > LEFT * without;
+        for without in self.scales.iter().filter_map(|scale| self.without(*scale, over, &rows)) {
+            if beaten(without) {
+                return false;
+            }
+            tried = true;
+        }
+        tried
+    }
+
+    /// The sum of squares that windows of one length leave in rows between them; nothing where they do not reach all of them.
+    fn without(&self, scale: Scale, over: &Range<usize>, rows: &[usize]) -> Option<f64> {
+        let all = scale.side_cells(self.problem.rows());
+        let cells = scale.cell(over.start).max(all.start)..(scale.cell(over.end) + 1).min(all.end);
+        if cells.is_empty() {
+            return None;
+        }
+        let cells = scale.solve_here(self.problem, &cells, self.instructions);
+        let windows = Around::new(scale, &cells, &[]);
+        let error = |&row: &usize| {
+            let seen = windows.seen(self.problem, row, 1)?;
+            Some((self.side[row] - seen.predict(self.whole, row)).powi(2))
+        };
+        rows.iter().map(error).sum()
+    }
+
+    /// The variance of the sum of squares of rows that stand for one independent row, at least that of the noise.
+    fn noise(&self, left: f64, count: f64) -> f64 {
+        self.expected.redundancy * (self.inflation * self.expected.variance).max(left / count)
+    }
+
+    /// A jump with the probability of every place of it.
+    fn jump(&self, left: &[f64], best: usize, first: usize, count: f64) -> Jump {
+        let noise = self.noise(left[best], count);
+        let weights: Vec<f64> = left.iter().map(|one| (-(one - left[best]) / (2.0 * noise)).exp()).collect();
+        let total: f64 = weights.iter().sum();
+        let happened = weights.iter().scan(0.0, |sum, weight| {
+            *sum += weight / total;
+            Some(*sum)
+        });
+        Jump { sample: first + best, first, happened: happened.collect() }
+    }
+}
+
+fn around(solved: &[(Scale, Cells)]) -> Vec<Around<'_>> {
+    solved.iter().map(|(scale, cells)| Around::new(*scale, cells, &[])).collect()
+}
+
+/// Rows whose test function reaches over a jump, wherever it may be.
+pub(crate) fn rows_over(
+    jumps: &[Jump],
+    function: &[f64],
+    first: usize,
+    stride: usize,
+    rows: usize,
+) -> impl Iterator<Item = usize> {
+    let mut beyond = 0.0;
+    let unnoticed = function.iter().take_while(|&&value| {
+        beyond += value;
+        beyond < UNNOTICED
+    });
+    let reach = function.len() / 2 - unnoticed.count();
+    let over: Vec<Range<usize>> = jumps
+        .iter()
+        .map(|jump| {
+            let place = |part: f64| jump.first + jump.happened.partition_point(|&happened| happened < part);
+            let (early, late) = (place(UNLIKELY).min(jump.sample), place(1.0 - UNLIKELY).max(jump.sample));
+            let row = |sample: usize| sample.saturating_sub(first).div_ceil(stride).min(rows);
+            row((early + 1).saturating_sub(reach))..row(late + reach)
+        })
+        .collect();
+    over.into_iter().flatten()
+}

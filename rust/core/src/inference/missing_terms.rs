@@ -1,0 +1,81 @@
+//! What may have been left out of the equation of motion: friction, an offset, a hardening spring, a lag of the torque.
+//!
+//! Each is added to the constants on its own and judged by its standard error (a score test, near enough).
+
+use std::sync::Arc;
+
+use crate::equation::rows::Rows;
+use crate::error::Error;
+use crate::exec::stages::Run;
+use crate::regression::constants::Expected;
+use crate::regression::dyadic_windows::Correlated;
+use crate::regression::factor::Layout;
+use crate::regression::model::{Fit, Model};
+use crate::regression::row_covariance::RowCovariance;
+use crate::simd::vectors::Instructions;
+
+/// A term is suspected where its factor exceeds its standard error so many times.
+const CONSPICUOUS: f64 = 5.0;
+
+/// Something that may have been left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Missing {
+    /// A constant torque.
+    Offset,
+    /// Dry friction.
+    Coulomb,
+    /// A hardening or softening spring.
+    Cubic,
+    /// The torque comes late.
+    Lag,
+}
+
+/// What was left out and its factor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Suspect {
+    /// What it is.
+    pub missing: Missing,
+    /// Its factor: N·m, N·m, N·m/rad³, or samples.
+    pub value: f64,
+    /// Its standard error.
+    pub error: f64,
+}
+
+impl Suspect {
+    /// Whether it is more than chance.
+    #[must_use]
+    pub fn is_conspicuous(&self) -> bool {
+        self.value.abs() > CONSPICUOUS * self.error
+    }
+}
+
+/// What a fit was made with.
+pub(crate) struct Judged<'a> {
+    pub(crate) rows: &'a Rows,
+    pub(crate) model: &'a Model,
+    pub(crate) side: &'a [f64],
+    /// Variance of the angle's noise.
+    pub(crate) noise: f64,
+    pub(crate) fit: &'a Fit,
+    pub(crate) covariance: &'a RowCovariance,
+    pub(crate) correlated: &'a Arc<Correlated>,
+    pub(crate) expected: Expected,
+    /// What variances are multiplied by.
+    pub(crate) inflation: f64,
+    pub(crate) instructions: Instructions,
+}
+
+impl Judged<'_> {
+    /// Adds one regressor to the constants and returns its factor with its standard error; nothing where it is not determined.
+    pub(crate) fn factor(&self, regressor: usize, run: &mut Run<'_, '_>) -> Result<Option<(f64, f64)>, Error> {
+        let mut model = self.model.clone();
+        model.constant.push(regressor);
+        let problem = model.problem(self.rows, self.side, self.noise, Some(self.correlated));
+        let fit = self.fit.again(&problem, self.expected, self.instructions, run)?;
+        let Some(fit) = fit else { return Ok(None) };
+        let Layout { constant, .. } = problem.layout;
+        let variances = fit.covariance(&problem, self.covariance, run)?;
+        let variance = self.inflation * variances[constant * constant - 1];
+        Ok(Some((fit.pooled.values[constant - 1], variance.sqrt())))
+    }
+}

@@ -1,0 +1,12 @@
+//! What changes, and how surely: prediction of rows not seen, constancy, jumps, what is not determined, what is missing.
+
+pub(crate) mod constancy;
+pub(crate) mod cross_validation;
+pub(crate) mod identifiability;
+pub(crate) mod jumps;
+pub(crate) mod missing_terms;
+pub(crate) mod slowly_varying;
+pub(crate) mod window_averaging;
+
+pub use constancy::{NO_CHANCE, Test};
+pub use missing_terms::{Missing, Suspect};

@@ -1,0 +1,336 @@
+//! Coefficients that change more slowly than what is windowed: local polynomials in time of what the windows left for them.
+//!
+//! What the windows of one length leave once their own unknowns are eliminated are equations for the slow coefficients, around each
+//! window's centre. A quadratic in time is fitted to those within reach of a point, the nearer the more; how far the reach is says
+//! cross-validation. A point's own neighbourhood can be left out, to predict what happens there.
+
+use crate::equation::rows::Rows;
+use crate::error::Error;
+use crate::exec::stages::Run;
+use crate::inference::cross_validation::validate;
+use crate::regression::constants::{Expected, is_determined, pool};
+use crate::regression::dyadic_windows::{Problem, Solved};
+use crate::regression::factor::{Fields, Layout, RowNoise, Scratch, absorb, solve};
+use crate::regression::model::{Fit, Model};
+use crate::regression::window_length::Scale;
+use crate::simd::f64x8::{Packet, WIDTH};
+use crate::simd::vectors::{Instructions, Kernel, Lanes, dispatch};
+
+/// Coefficients of the polynomials in time.
+const TERMS: usize = 3;
+
+/// Points within one reach.
+const DENSITY: usize = 8;
+
+/// Slow coefficients over time.
+#[derive(Clone, Debug)]
+pub(crate) struct Varying {
+    /// Row of the first point, and rows from one to the next.
+    first: f64,
+    spacing: f64,
+    /// By coefficient, by point.
+    values: Vec<Vec<f64>>,
+    /// Their variances over that of a row's noise, as if all equations were independent.
+    pub(crate) variances: Vec<Vec<f64>>,
+    /// What is constant beside them.
+    pub(crate) constants: Vec<f64>,
+}
+
+impl Varying {
+    /// A coefficient at a row and how much it grows from there to the next row.
+    pub(crate) fn at(&self, coefficient: usize, row: f64) -> (f64, f64) {
+        interpolate(&self.values[coefficient], (row - self.first) / self.spacing, self.spacing)
+    }
+
+    /// Its variance over that of a row's noise.
+    pub(crate) fn variance(&self, coefficient: usize, row: f64) -> f64 {
+        let (points, place) = (&self.variances[coefficient], (row - self.first) / self.spacing);
+        let last = points.len() - 1;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the points")]
+        let index = (place.clamp(0.0, last as f64).floor() as usize).min(last.saturating_sub(1));
+        // Where the variance falls steeply the cubic overshoots, below zero too.
+        let least = points[index].min(points[(index + 1).min(last)]);
+        interpolate(points, place, 1.0).0.max(least)
+    }
+}
+
+/// Interpolates between points a distance of `spacing` apart by the cubic through the nearest four; constant beyond the ends. Returns
+/// the value and its slope.
+fn interpolate(values: &[f64], place: f64, spacing: f64) -> (f64, f64) {
+    let last = values.len() - 1;
+    let clamped = place.clamp(0.0, last as f64);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the points")]
+    let index = (clamped.floor() as usize).min(last.saturating_sub(1));
+    let part = clamped - index as f64;
+    let at = |offset: isize| values[index.saturating_add_signed(offset).min(last)];
+    let (before, here, next, after) = (at(-1), at(0), at(1), at(2));
+    let (begin, end) = ((next - before) / 2.0, (after - here) / 2.0);
+    let (second, third) = (3.0 * (next - here) - 2.0 * begin - end, 2.0 * (here - next) + begin + end);
+    let value = here + part * (begin + part * (second + part * third));
+    let slope = if clamped == place { begin + part * (2.0 * second + 3.0 * part * third) } else { 0.0 };
+    (value, slope / spacing)
+}
+
+/// The equations that windows left for slow coefficients, which come first among their constants.
+pub(crate) struct Slow<'a> {
+    pub(crate) fit: &'a Fit,
+    /// Number of slow coefficients.
+    pub(crate) coefficients: usize,
+    /// What their growth multiplies, by coefficient.
+    pub(crate) companions: Vec<&'a [f64]>,
+    /// Slow coefficients so far, which were taken off the right-hand side.
+    pub(crate) current: Option<&'a Varying>,
+    /// Weight of every window.
+    pub(crate) weights: &'a [f64],
+    /// Rows of the record.
+    pub(crate) rows: usize,
+}
+
+impl Slow<'_> {
+    /// Fits the slow coefficients with equations up to `reach` rows away, those nearer than `hole` rows left out; nothing where they
+    /// do not determine them.
+    pub(crate) fn fit(&self, reach: f64, hole: f64, instructions: Instructions) -> Option<Varying> {
+        let spacing = reach / DENSITY as f64;
+        let last = self.rows as f64 - 1.0;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "points of a record")]
+        let points = (last / spacing).ceil() as usize + 1;
+        let solved = dispatch(instructions, Points { slow: self, reach, hole, spacing, count: points });
+        let fields = solved.fields;
+        let constants = if fields.layout.constant == 0 {
+            Vec::new()
+        } else {
+            pool(&solved, 0..points, Expected::UNKNOWN, instructions)?.values
+        };
+        let value = |coefficient: usize, point: usize| {
+            is_determined(&solved, point)
+                .then(|| crate::regression::constants::local(&solved, point, &constants, coefficient))
+        };
+        let mut values = Vec::new();
+        let mut variances = Vec::new();
+        for coefficient in 0..self.coefficients {
+            values.push(fill(&(0..points).map(|point| value(coefficient * TERMS, point)).collect::<Vec<_>>())?);
+            let variance = solved.field(fields.covariance(coefficient * TERMS, coefficient * TERMS));
+            let variance = (0..points).map(|point| is_determined(&solved, point).then(|| variance[point]));
+            variances.push(fill(&variance.collect::<Vec<_>>())?);
+        }
+        Some(Varying { first: 0.0, spacing, values, variances, constants })
+    }
+}
+
+/// Fills gaps from the nearest number; nothing where there is none.
+fn fill(values: &[Option<f64>]) -> Option<Vec<f64>> {
+    let known: Vec<(usize, f64)> =
+        values.iter().enumerate().filter_map(|(place, value)| value.map(|value| (place, value))).collect();
+    let nearest = |place: usize| known.iter().min_by_key(|(other, _)| other.abs_diff(place)).map(|(_, value)| *value);
+    (0..values.len()).map(|place| values[place].or_else(|| nearest(place))).collect()
+}
+
+/// The kernel: eight points at a time.
+struct Points<'a, 'b> {
+    slow: &'a Slow<'b>,
+    reach: f64,
+    hole: f64,
+    spacing: f64,
+    count: usize,
+}
+
+impl Kernel for Points<'_, '_> {
+    type Output = Solved;
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _simd: S) -> Solved {
+        let Self { slow, reach, hole, spacing, count: points } = self;
+        let full = &slow.fit.full;
+        let from = full.fields;
+        let (all, slow_ones) = (from.layout.constant, slow.coefficients);
+        let layout = Layout { windowed: TERMS * slow_ones, linear: false, constant: all - slow_ones };
+        let columns = layout.columns();
+        let noise = RowNoise::new(&vec![[].as_slice(); 2 * layout.windowed + layout.constant + 1], 0.0);
+        let mut solved = Solved::new(layout, 0, points);
+        let mut scratch = Scratch::new(layout);
+        let mut summary = vec![Packet::ZERO; layout.size()];
+        let mut rows = vec![Packet::ZERO; all * columns];
+        let mut fields = vec![Packet::ZERO; Fields { layout }.size()];
+        let usable: Vec<(usize, f64)> = (0..full.len())
+            .filter(|&window| is_determined(full, window))
+            .map(|window| (window, slow.fit.centre(window)))
+            .collect();
+        for first in (0..points).step_by(WIDTH) {
+            summary.fill(Packet::ZERO);
+            let point = |lane: usize| (first + lane) as f64 * spacing;
+            let near = usable.partition_point(|(_, row)| *row < point(0) - reach)
+                ..usable.partition_point(|(_, row)| *row <= point(WIDTH - 1) + reach);
+            for &(window, row) in &usable[near] {
+                let distance: [f64; WIDTH] = std::array::from_fn(|lane| (row - point(lane)) / reach);
+                let weight = Packet(distance.map(|distance| {
+                    let seen = distance.abs() < 1.0 && distance.abs() * reach >= hole;
+                    if seen { slow.weights[window] * (1.0 - distance * distance) } else { 0.0 }
+                }));
+                let root = weight.sqrt();
+                let distance = Packet(distance);
+                for i in 0..all {
+                    let row_of = &mut rows[i * columns..(i + 1) * columns];
+                    row_of.fill(Packet::ZERO);
+                    let mut side = full.field(from.left(i, all))[window];
+                    for j in i..all {
+                        let entry = full.field(from.left(i, j))[window];
+                        if j < slow_ones {
+                            side += entry * slow.current.map_or(0.0, |current| current.at(j, row).0);
+                            let mut value = root * Packet::splat(entry);
+                            for term in 0..TERMS {
+                                row_of[j * TERMS + term] = value;
+                                value = value * distance;
+                            }
+                        } else {
+                            row_of[layout.windowed + j - slow_ones] = root * Packet::splat(entry);
+                        }
+                    }
+                    row_of[columns - 1] = root * Packet::splat(side);
+                }
+                absorb(layout, &mut summary, &mut rows, all, false);
+                let sums = layout.noise() - 3;
+                for (count, weight) in summary[sums].0.iter_mut().zip(weight.0) {
+                    *count += if weight > 0.0 { all as f64 } else { 0.0 };
+                }
+            }
+            solve(layout, &summary, &noise, Some(1.0), &mut scratch, &mut fields);
+            solved.put(first, &fields);
+        }
+        solved
+    }
+}
+
+/// Multiples of what a prediction leaves out that are tried as reach.
+const REACHES: [f64; 10] = [1.6, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 23.0, 32.0];
+
+/// Rounds of estimating the slow coefficients, each with what the last one found taken off.
+const ROUNDS: usize = 3;
+
+/// The largest squared error, over the noise's, that a single row counts with.
+const MOST: f64 = 25.0;
+
+/// A model whose first constants are slow coefficients, and what was found of them.
+#[derive(Clone, Debug)]
+pub(crate) struct Found {
+    pub(crate) varying: Varying,
+    /// The right-hand side without them.
+    pub(crate) side: Vec<f64>,
+    /// The length of windows that predicts best.
+    pub(crate) scale: Scale,
+    /// Mean squared error of predicting rows, over the noise's variance.
+    pub(crate) error: f64,
+    /// Rows on either side that they are taken from.
+    pub(crate) reach: f64,
+}
+
+/// Where slow coefficients are looked for.
+pub(crate) struct Search<'a> {
+    pub(crate) rows: &'a Rows,
+    /// The slow coefficients come first among its constants.
+    pub(crate) model: &'a Model,
+    pub(crate) coefficients: usize,
+    /// Variance of the angle's noise.
+    pub(crate) noise: f64,
+    pub(crate) expected: Expected,
+    /// Lengths of windows for what is windowed.
+    pub(crate) scales: &'a [Scale],
+    pub(crate) instructions: Instructions,
+}
+
+/// Finds slow coefficients; nothing where they are not determined. `first` is the length of windows to begin with.
+pub(crate) fn find(search: &Search<'_>, first: Scale, run: &mut Run<'_, '_>) -> Result<Option<Found>, Error> {
+    let &Search { rows, model, coefficients, noise, expected, scales, instructions } = search;
+    let slow = &model.constant[..coefficients];
+    let rest = Model { constant: model.constant[coefficients..].to_vec(), ..model.clone() };
+    let mut scale = first;
+    let mut found: Option<Found> = None;
+    for _ in 0..ROUNDS {
+        let current = found.as_ref().map(|found| &found.varying);
+        let side = found.as_ref().map_or_else(|| rows.side.clone(), |found| found.side.clone());
+        let problem = model.problem(rows, &side, noise, None);
+        let Some(fit) = Fit::with_hollow(&problem, scale, expected, instructions, run)? else { return Ok(None) };
+        let ones = vec![1.0; fit.full.len()];
+        let weights = if current.is_some() { &fit.pooled.weights } else { &ones };
+        let companions = slow.iter().map(|&one| rows.regressors[one].companion.as_slice()).collect();
+        let equations = Slow { fit: &fit, coefficients, companions, current, weights, rows: rows.len() };
+        let hole = (scale.span() / 2 + scale.reach) as f64;
+        let mut best: Option<(f64, Varying, f64)> = None;
+        for reach in REACHES.map(|multiple| multiple * hole) {
+            if 2.0 * reach > rows.len() as f64 {
+                break;
+            }
+            let Some(hollow) = equations.fit(reach, hole, instructions) else { continue };
+            let Some(full) = equations.fit(reach, 0.0, instructions) else { continue };
+            let error = equations.error(&problem, &hollow, &full, scale, expected.variance);
+            if best.as_ref().is_none_or(|best| error < best.0) {
+                best = Some((error, full, reach));
+            }
+        }
+        let Some((_, varying, reach)) = best else { return Ok(None) };
+        let side = without(rows, slow, &varying);
+        let problem = rest.problem(rows, &side, noise, None);
+        let validated = validate(&problem, scales, expected, instructions, run)?;
+        let Some(next) = validated.iter().min_by(|a, b| a.error.total_cmp(&b.error)) else { return Ok(None) };
+        let error = next.error;
+        scale = next.fit.scale.unwrap_or(scale);
+        found = Some(Found { varying, side, scale, error, reach });
+    }
+    Ok(found)
+}
+
+/// The right-hand side without slow coefficients.
+pub(crate) fn without(rows: &Rows, slow: &[usize], varying: &Varying) -> Vec<f64> {
+    let mut side = rows.side.clone();
+    for (coefficient, &regressor) in slow.iter().enumerate() {
+        let regressor = &rows.regressors[regressor];
+        for (row, side) in side.iter_mut().enumerate() {
+            let (value, slope) = varying.at(coefficient, row as f64);
+            *side -= value * regressor.value[row] + slope / rows.period * regressor.companion[row];
+        }
+    }
+    side
+}
+
+impl Slow<'_> {
+    /// Mean squared error of predicting rows, over the noise's variance: slow coefficients from equations that the row had no part in,
+    /// what is windowed from windows on both sides of it.
+    fn error(&self, problem: &Problem<'_>, hollow: &Varying, full: &Varying, scale: Scale, variance: f64) -> f64 {
+        let Some(solved) = &self.fit.hollow else { return f64::INFINITY };
+        let (fields, layout) = (solved.fields, problem.layout);
+        let (mut sum, mut count) = (0.0, 0.0);
+        let mut constants = vec![0.0; layout.constant];
+        constants[self.coefficients..].copy_from_slice(&hollow.constants);
+        for row in (0..self.rows).filter(|&row| problem.usable[row]) {
+            let cell = scale.cell(row);
+            let Some(place) = solved.place(cell).filter(|&place| is_determined(solved, place)) else { continue };
+            let mut error = problem.side[row];
+            for (coefficient, companion) in self.companions.iter().enumerate() {
+                let (mut value, mut slope) = (hollow.at(coefficient, row as f64).0, full.at(coefficient, row as f64).1);
+                if let Some(current) = self.current {
+                    let (taken, rate) = current.at(coefficient, row as f64);
+                    (value, slope) = (value - taken, slope - rate);
+                }
+                constants[coefficient] = value;
+                error -= slope / problem.period * companion[row];
+            }
+            for (constant, column) in constants.iter().zip(&problem.constants) {
+                error -= constant * column[row];
+            }
+            let later = (row as f64 - scale.centres(cell)[1]) * problem.period;
+            for unknown in 0..layout.local() {
+                let mut value = solved.field(fields.solution(unknown, layout.constant))[place];
+                for (constant, factor) in constants.iter().enumerate() {
+                    value -= solved.field(fields.solution(unknown, constant))[place] * factor;
+                }
+                error -= value
+                    * match unknown.checked_sub(layout.windowed) {
+                        None => problem.windowed[unknown][row],
+                        Some(slope) => problem.companions[slope][row] + later * problem.windowed[slope][row],
+                    };
+            }
+            sum += (error * error / variance).min(MOST);
+            count += 1.0;
+        }
+        if count > 0.0 { sum / count } else { f64::INFINITY }
+    }
+}

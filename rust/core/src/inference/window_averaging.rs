@@ -1,0 +1,369 @@
+//! What changes, at every row: windows of many lengths before, around and after it, averaged by how well each predicts nearby.
+//!
+//! A window predicts the rows that it has not seen. The weight of one at a row is `exp(-½ (n e + n₀ ē))`, where `e` is its mean squared
+//! error around the row over the noise's variance, `n` the number of independent rows in that mean, and `ē` and `n₀` the same over the
+//! record. So a jump is followed from both sides, and where nothing happens long windows rule.
+
+use std::ops::Range;
+
+use crate::error::Error;
+use crate::exec::pool::ranges;
+use crate::exec::stages::Run;
+use crate::regression::constants::Expected;
+use crate::regression::dyadic_windows::Problem;
+use crate::regression::model::Predictor;
+use crate::regression::subsample::holds;
+use crate::regression::window_length::{Cells, Scale};
+use crate::simd::vectors::Instructions;
+
+/// The largest squared error, over the noise's, that a single row counts with.
+const MOST: f64 = 16.0;
+/// Independent rows that the errors over the record count as, at least, and per length of the best window.
+const RECORD: [f64; 2] = [16.0, 5.0];
+/// Cells of at least so many rows are solved once for all pieces.
+const COARSE: usize = 8;
+/// Of the lengths that thinned rows hold, so many of the longest must be hopeless for all longer ones to be so.
+const OVERLAP: usize = 2;
+/// A window that predicts so much worse over the record than the best one weighs nothing anywhere.
+const HOPELESS: f64 = 24.0;
+
+/// What changes, at every row.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Averages {
+    /// Windowed unknowns, by row; NaN where no window says anything.
+    pub(crate) values: Vec<Vec<f64>>,
+    /// What they grow by in a second.
+    pub(crate) slopes: Vec<Vec<f64>>,
+    /// Their standard errors for the constants that were taken off.
+    pub(crate) errors: Vec<Vec<f64>>,
+}
+
+impl Averages {
+    fn new(windowed: usize, rows: usize) -> Self {
+        let columns = |count: usize| vec![vec![f64::NAN; rows]; count];
+        Self { values: columns(windowed), slopes: columns(windowed), errors: columns(windowed) }
+    }
+
+    fn columns(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
+        self.values.iter_mut().chain(&mut self.slopes).chain(&mut self.errors)
+    }
+}
+
+/// Which windows of a scale: before a row, around it, after it.
+const SIDES: usize = 3;
+
+/// A scale and what is known of it beforehand.
+struct Candidate {
+    scale: Scale,
+    /// All cells, where they are few.
+    cells: Option<Cells>,
+    /// Mean squared error over the record, by side; infinite where it takes no part.
+    record: [f64; SIDES],
+}
+
+/// Averages windows of several lengths at every row of a problem without constants. `best` is the length of the windows that predict best, in
+/// rows. Where `thinned` rows stand for a long record, how well windows predict over the record is learnt from them, as far as they
+/// hold windows so long.
+pub(crate) fn average(
+    problem: &Problem<'_>,
+    thinned: Option<&Problem<'_>>,
+    scales: &[Scale],
+    (expected, best): (Expected, usize),
+    instructions: Instructions,
+    run: &mut Run<'_, '_>,
+) -> Result<Averages, Error> {
+    let rows = problem.rows();
+    let reach = scales.first().map_or(1, |scale| scale.reach);
+    let view = View { problem, variance: expected.variance, reach, instructions };
+    let mut candidates: Vec<_> =
+        scales.iter().map(|&scale| Candidate { scale, cells: None, record: [f64::INFINITY; SIDES] }).collect();
+    let record = RECORD[0].max(RECORD[1] * best as f64 / expected.redundancy);
+    let hope = HOPELESS / record;
+    let middle = rows / 5..(4 * rows / 5).max(rows / 5 + 1).min(rows);
+    let short = match thinned {
+        None => 0,
+        Some(thinned) => {
+            let short = scales.partition_point(|scale| holds(*scale));
+            let view = View { problem: thinned, ..view };
+            view.judge(&mut candidates[..short], &(0..thinned.rows()), run)?;
+            short
+        }
+    };
+    let errors = |candidates: &[Candidate]| {
+        candidates.iter().flat_map(|candidate| candidate.record).fold(f64::INFINITY, f64::min)
+    };
+    let long = short.saturating_sub(OVERLAP);
+    if thinned.is_none() || errors(&candidates[long..short]) <= errors(&candidates[..short]) + hope {
+        view.judge(&mut candidates[short..], &middle, run)?;
+    }
+    let hopeless = errors(&candidates) + hope;
+    for candidate in &mut candidates {
+        let chosen = candidate.record.iter().any(|&error| error <= hopeless);
+        if chosen && candidate.scale.step >= COARSE && candidate.cells.is_none() {
+            let all = candidate.scale.side_cells(rows);
+            candidate.cells = Some(candidate.scale.solve(problem, &all, instructions, run)?);
+        }
+    }
+
+    let ready = ready(&candidates);
+    let mut averages = Averages::new(problem.layout.windowed, rows);
+    let nearby = view.nearby(expected);
+    run.fill(averages.columns(), |rows, columns| {
+        view.average((&candidates, &ready), rows, nearby, record, hopeless, columns);
+    })?;
+    Ok(averages)
+}
+
+/// Windows of the candidates whose cells are all there, ready to predict in every piece.
+fn ready(candidates: &[Candidate]) -> Vec<Option<Around<'_>>> {
+    let all = candidates.iter();
+    all.map(|candidate| Some(Around::new(candidate.scale, candidate.cells.as_ref()?, &[]))).collect()
+}
+
+/// Rows around a row that its errors are averaged over, to either side, and how many independent ones that makes.
+#[derive(Clone, Copy)]
+struct Nearby {
+    rows: usize,
+    independent: f64,
+}
+
+#[derive(Clone, Copy)]
+struct View<'a, 'b> {
+    problem: &'a Problem<'b>,
+    variance: f64,
+    /// Rows that a test function reaches to either side.
+    reach: usize,
+    instructions: Instructions,
+}
+
+/// The windows of one scale around some rows, ready to predict.
+pub(crate) struct Around<'a> {
+    scale: Scale,
+    sides: Predictor<'a>,
+    hollow: Predictor<'a>,
+    full: Predictor<'a>,
+}
+
+/// One window as seen from a row: what predicts the row, what is believed there, and how much later the row is than either's centre.
+pub(crate) struct Seen<'a, 'b> {
+    predictor: &'b Predictor<'a>,
+    believed: &'b Predictor<'a>,
+    place: usize,
+    believed_place: usize,
+    later: f64,
+}
+
+impl<'a> Around<'a> {
+    pub(crate) fn new(scale: Scale, cells: &'a Cells, constants: &[f64]) -> Self {
+        let of = |solved| Predictor::new(solved, constants);
+        Self { scale, sides: of(&cells.sides), hollow: of(&cells.hollow), full: of(&cells.full) }
+    }
+
+    /// The window of one scale before (0), around (1) or after (2) a row, if there is one and no jump lies between.
+    pub(crate) fn seen(&self, problem: &Problem<'_>, row: usize, which: usize) -> Option<Seen<'a, '_>> {
+        let cell = self.scale.cell(row);
+        let later = |centre: f64| (row as f64 - centre) * problem.period;
+        if which == 1 {
+            let (place, believed_place) = (self.hollow.place(cell)?, self.full.place(cell)?);
+            let later = later(self.scale.centres(cell)[1]);
+            return Some(Seen { predictor: &self.hollow, believed: &self.full, place, believed_place, later });
+        }
+        if !self.scale.stands_alone() {
+            return None;
+        }
+        let cell = if which == 0 { cell } else { self.scale.after(cell) };
+        let place = self.sides.place(cell)?;
+        let rows = self.scale.side_rows(cell);
+        let between = if which == 0 { rows.end - 1..row.cast_signed() } else { row.cast_signed()..rows.start };
+        if problem.jumps_within(&between) {
+            return None;
+        }
+        let later = later(self.scale.centres(cell)[0]);
+        Some(Seen { predictor: &self.sides, believed: &self.sides, place, believed_place: place, later })
+    }
+}
+
+impl Seen<'_, '_> {
+    /// What is believed of a windowed unknown at the row, per second and how uncertain it is.
+    pub(crate) fn value(&self, unknown: usize) -> f64 {
+        self.believed.value(self.believed_place, unknown, self.later)
+    }
+
+    pub(crate) fn slope(&self, unknown: usize) -> f64 {
+        self.believed.value(self.believed_place, unknown, 1.0) - self.believed.value(self.believed_place, unknown, 0.0)
+    }
+
+    pub(crate) fn variance(&self, unknown: usize) -> f64 {
+        self.believed.variance(self.believed_place, unknown, self.later)
+    }
+
+    /// What the windowed unknowns add to the row's right-hand side, from windows that have not seen it.
+    pub(crate) fn predict(&self, problem: &Problem<'_>, row: usize) -> f64 {
+        self.predictor.predict(problem, self.place, row, self.later)
+    }
+}
+
+impl View<'_, '_> {
+    /// Finds how well candidates predict some rows of the record.
+    fn judge(&self, candidates: &mut [Candidate], rows: &Range<usize>, run: &mut Run<'_, '_>) -> Result<(), Error> {
+        let mut solved = Vec::new();
+        for candidate in &*candidates {
+            let (scale, all) = (candidate.scale, candidate.scale.side_cells(self.problem.rows()));
+            let coarse = scale.step >= COARSE;
+            let cells = if coarse { Some(scale.solve(self.problem, &all, self.instructions, run)?) } else { None };
+            solved.push(Candidate { scale, cells, record: candidate.record });
+        }
+        let ready = ready(&solved);
+        let work = |piece: Range<usize>, (): &mut ()| {
+            let counted = piece.start.max(rows.start)..piece.end.min(rows.end);
+            let both = solved.iter().zip(&ready);
+            both.map(|(candidate, ready)| self.sums(candidate, ready.as_ref(), counted.clone())).collect::<Vec<_>>()
+        };
+        let sums = run.map(ranges(self.problem.rows()), || (), work)?;
+        for (index, candidate) in candidates.iter_mut().enumerate() {
+            for which in 0..SIDES {
+                let parts = sums.iter().map(|sums| sums[index][which]);
+                let (sum, count) = parts.fold((0.0, 0.0), |all, part| (all.0 + part.0, all.1 + part.1));
+                if count > 0.0 {
+                    candidate.record[which] = sum / count;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn nearby(&self, expected: Expected) -> Nearby {
+        let rows = self.reach;
+        Nearby { rows, independent: (2 * rows + 1) as f64 / expected.redundancy }
+    }
+
+    /// The cells of a candidate around some rows.
+    fn cells(&self, candidate: &Candidate, rows: &Range<usize>) -> Cells {
+        let scale = candidate.scale;
+        let all = scale.side_cells(self.problem.rows());
+        let wanted = scale.cell(rows.start).max(all.start)..(scale.cell(rows.end.max(1) - 1) + 1).min(all.end);
+        let wanted = wanted.start..wanted.end.max(wanted.start);
+        scale.solve_here(self.problem, &wanted, self.instructions)
+    }
+
+    /// Squared error of a row, over the noise's variance.
+    fn error(&self, seen: &Seen<'_, '_>, row: usize) -> f64 {
+        let error = self.problem.side[row] - seen.predict(self.problem, row);
+        (error * error / self.variance).min(MOST)
+    }
+
+    /// Sums of squared errors and their number, by side.
+    fn sums(&self, candidate: &Candidate, ready: Option<&Around<'_>>, rows: Range<usize>) -> [(f64, f64); SIDES] {
+        let mut sums = [(0.0, 0.0); SIDES];
+        if rows.start >= rows.end {
+            return sums;
+        }
+        let (cells, here);
+        let around = if let Some(ready) = ready {
+            ready
+        } else {
+            cells = self.cells(candidate, &rows);
+            here = Around::new(candidate.scale, &cells, &[]);
+            &here
+        };
+        for row in rows.filter(|&row| self.problem.usable[row]) {
+            for (which, (sum, count)) in sums.iter_mut().enumerate() {
+                if let Some(seen) = around.seen(self.problem, row, which) {
+                    *sum += self.error(&seen, row);
+                    *count += 1.0;
+                }
+            }
+        }
+        sums
+    }
+
+    /// Averages all candidates at some rows.
+    fn average(
+        &self,
+        (candidates, ready): (&[Candidate], &[Option<Around<'_>>]),
+        rows: Range<usize>,
+        nearby: Nearby,
+        record: f64,
+        hopeless: f64,
+        columns: &mut [&mut [f64]],
+    ) {
+        let windowed = self.problem.layout.windowed;
+        let total = self.problem.rows();
+        let wide = rows.start.saturating_sub(nearby.rows)..(rows.end + nearby.rows).min(total);
+        let width = rows.len();
+        let numbers = 3 * windowed;
+        // By row: sums of weights and of weighted numbers, and the least exponent so far, which all are relative to.
+        let mut weights = vec![0.0; width];
+        let mut least = vec![f64::INFINITY; width];
+        let mut sums = vec![0.0; width * numbers];
+        let mut numbers_here = vec![0.0; numbers];
+        // Where no window with hope reaches, near an end or a gap, the others serve.
+        for hope in [true, false] {
+            let wanted: Vec<bool> = weights.iter().map(|&weight| hope || weight == 0.0).collect();
+            if !wanted.contains(&true) {
+                break;
+            }
+            let chosen = |candidate: &Candidate| candidate.record.iter().any(|&error| (error <= hopeless) == hope);
+            for (candidate, ready) in candidates.iter().zip(ready).filter(|(candidate, _)| chosen(candidate)) {
+                let (cells, here);
+                let around = if let Some(ready) = ready {
+                    ready
+                } else {
+                    cells = self.cells(candidate, &wide);
+                    here = Around::new(candidate.scale, &cells, &[]);
+                    &here
+                };
+                for which in (0..SIDES).filter(|&which| (candidate.record[which] <= hopeless) == hope) {
+                    // Running sums of the errors, so that every mean costs two differences; they restart with every piece.
+                    let mut errors = vec![[0.0, 0.0]; wide.len() + 1];
+                    for (place, row) in wide.clone().enumerate() {
+                        let mut next = errors[place];
+                        if self.problem.usable[row]
+                            && let Some(seen) = around.seen(self.problem, row, which)
+                        {
+                            next = [next[0] + self.error(&seen, row), next[1] + 1.0];
+                        }
+                        errors[place + 1] = next;
+                    }
+                    for (place, row) in rows.clone().enumerate().filter(|(place, _)| wanted[*place]) {
+                        let Some(seen) = around.seen(self.problem, row, which) else { continue };
+                        let first = row.saturating_sub(nearby.rows).max(wide.start) - wide.start;
+                        let last = (row + nearby.rows + 1).min(wide.end) - wide.start;
+                        let (sum, count) = (errors[last][0] - errors[first][0], errors[last][1] - errors[first][1]);
+                        // Within a gap nothing is known nearby, and the record decides.
+                        let here = if count == 0.0 { 0.0 } else { nearby.independent * sum / count };
+                        let exponent = 0.5 * (here + record * candidate.record[which].min(MOST));
+                        self.believe(&seen, &mut numbers_here);
+                        let sums = &mut sums[place * numbers..(place + 1) * numbers];
+                        if exponent < least[place] {
+                            let shrink = (exponent - least[place]).exp();
+                            weights[place] *= shrink;
+                            for sum in sums.iter_mut() {
+                                *sum *= shrink;
+                            }
+                            least[place] = exponent;
+                        }
+                        let weight = (least[place] - exponent).exp();
+                        weights[place] += weight;
+                        sums.iter_mut().zip(&numbers_here).for_each(|(sum, number)| *sum += weight * number);
+                    }
+                }
+            }
+        }
+        for (place, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+            for (number, column) in columns.iter_mut().enumerate() {
+                column[place] = sums[place * numbers + number] / weight;
+            }
+        }
+    }
+
+    /// What a window says at a row: values, slopes and standard errors.
+    fn believe(&self, seen: &Seen<'_, '_>, numbers: &mut [f64]) {
+        let windowed = self.problem.layout.windowed;
+        for unknown in 0..windowed {
+            numbers[unknown] = seen.value(unknown);
+            numbers[windowed + unknown] = seen.slope(unknown);
+            numbers[2 * windowed + unknown] = seen.variance(unknown).max(0.0).sqrt();
+        }
+    }
+}

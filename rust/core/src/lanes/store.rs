@@ -1,0 +1,122 @@
+//! The kernel that writes finished windows out.
+
+use std::ops::Range;
+
+use crate::lanes::output::Outputs;
+use crate::lanes::tile::{TILE, Tile};
+use crate::simd::vectors::{Kernel, Lanes, MOST_LANES};
+
+/// Writes out some windows of every lane, which the tile holds.
+pub(crate) struct Write<'a, 'b> {
+    pub(crate) tile: &'a Tile,
+    /// The windows of each lane's block.
+    pub(crate) rows: Range<usize>,
+    /// The window in row 0 of lane 0, and the windows from one lane to the next.
+    pub(crate) base: isize,
+    pub(crate) block: usize,
+    /// Windows that are wanted.
+    pub(crate) windows: Range<usize>,
+    /// The sample of window `w` is `w + ahead`.
+    pub(crate) ahead: isize,
+    /// The order of every window, where the tile holds no codes.
+    pub(crate) fixed_order: Option<u8>,
+    pub(crate) outputs: &'a mut Outputs<'b>,
+}
+
+impl Kernel for Write<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(mut self, simd: S) {
+        let lanes = S::F64_LANES;
+        let first = self.base + self.rows.start.cast_signed();
+        let end = self.base + (self.rows.end + (lanes - 1) * self.block).cast_signed();
+        let wanted = self.windows.start.cast_signed() <= first && end <= self.windows.end.cast_signed();
+        if wanted && self.rows.len() >= lanes && self.outputs.elements.step == 1 {
+            self.write_squares(simd);
+        } else {
+            self.write_lanes::<S>();
+        }
+    }
+}
+
+impl Write<'_, '_> {
+    /// Writes out all windows to neighbouring elements. The last square overlaps the one before it where need be.
+    #[inline(always)]
+    fn write_squares<S: Lanes>(&mut self, simd: S) {
+        let Self { tile, rows, block, outputs, .. } = self;
+        let lanes = S::F64_LANES;
+        let zero = self.base + self.ahead - outputs.elements.first.cast_signed();
+        for row in rows.clone().step_by(lanes).map(|row| row.min(rows.end - lanes)) {
+            let first = (zero + row.cast_signed()).unsigned_abs();
+            for (field, values) in outputs.values.iter_mut().enumerate() {
+                if values.is_empty() {
+                    continue;
+                }
+                let square = tile.square(simd, field, row);
+                for (lane, &vector) in square[..lanes].iter().enumerate() {
+                    simd.store(values, first + lane * *block, vector);
+                }
+            }
+            if outputs.status.is_empty() && outputs.order.is_empty() {
+                continue;
+            }
+            let (mut orders, mut statuses) = ([self.fixed_order.unwrap_or(0); MOST_LANES], [0; MOST_LANES]);
+            let codes = match self.fixed_order {
+                Some(_) => [simd.splat_f64s(0.0); MOST_LANES],
+                None => tile.square(simd, outputs.values.len(), row),
+            };
+            for (lane, &codes) in codes[..lanes].iter().enumerate() {
+                if self.fixed_order.is_none() {
+                    simd.split(codes, &mut orders, &mut statuses);
+                }
+                let elements = first + lane * *block..first + lane * *block + lanes;
+                if !outputs.order.is_empty() {
+                    outputs.order[elements.clone()].copy_from_slice(&orders[..lanes]);
+                }
+                if !outputs.status.is_empty() {
+                    outputs.status[elements].copy_from_slice(&statuses[..lanes]);
+                }
+            }
+        }
+    }
+
+    /// Writes out what is wanted of every lane to whatever elements there are.
+    #[inline(always)]
+    fn write_lanes<S: Lanes>(&mut self) {
+        let Self { tile, rows, outputs, .. } = self;
+        let lanes = S::F64_LANES;
+        for lane in 0..lanes {
+            let zero = self.base + (lane * self.block).cast_signed();
+            let row =
+                |window: usize| (window.cast_signed() - zero).clamp(rows.start.cast_signed(), rows.end.cast_signed());
+            let wanted = row(self.windows.start).unsigned_abs()..row(self.windows.end).unsigned_abs();
+            for first in wanted.clone().step_by(TILE) {
+                let part = first..wanted.end.min(first + TILE);
+                let sample = (zero + self.ahead + first.cast_signed()).unsigned_abs();
+                let mut column = [0.0; TILE];
+                for (field, values) in outputs.values.iter_mut().enumerate().filter(|(_, values)| !values.is_empty()) {
+                    for (value, row) in column.iter_mut().zip(part.clone()) {
+                        *value = tile.one(field, row, lane, lanes);
+                    }
+                    outputs.elements.put(values, sample, &column[..part.len()]);
+                }
+                let (mut orders, mut statuses) = ([self.fixed_order.unwrap_or(0); TILE], [0; TILE]);
+                if self.fixed_order.is_none() {
+                    for ((order, status), row) in orders.iter_mut().zip(&mut statuses).zip(part.clone()) {
+                        (*order, *status) = parts(tile.one(outputs.values.len(), row, lane, lanes));
+                    }
+                }
+                outputs.elements.put(outputs.order, sample, &orders[..part.len()]);
+                outputs.elements.put(outputs.status, sample, &statuses[..part.len()]);
+            }
+        }
+    }
+}
+
+/// The order and the flags of a code.
+fn parts(code: f64) -> (u8, u16) {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number below 2^24")]
+    let [order, low, high, _] = (code as u32).to_le_bytes();
+    (order, u16::from_le_bytes([low, high]))
+}

@@ -1,0 +1,101 @@
+//! The bare coefficients of every window, for whatever chooses an order with more than one window in view.
+
+use std::ops::Range;
+
+use crate::lanes::output::Elements;
+use crate::local_polynomials::basis::Basis;
+use crate::local_polynomials::engine::{self, Walk, engine};
+use crate::local_polynomials::estimates::Estimates;
+use crate::local_polynomials::evaluate::Finish;
+use crate::local_polynomials::options::Selection;
+use crate::local_polynomials::options::{Options, Order};
+use crate::record::samples::Samples;
+use crate::simd::vectors::Instructions;
+
+/// Plan of a walk that gives coefficients.
+#[derive(Debug)]
+pub(crate) struct Coefficients {
+    engine: Box<dyn Walk>,
+    /// Degrees of the basis less one: the order whose residual is followed.
+    top: usize,
+    length: usize,
+    wanted: usize,
+    residual: bool,
+}
+
+/// Memory of one thread.
+#[derive(Debug)]
+pub(crate) struct Scratch(engine::Scratch);
+
+/// What is known of some windows, one row a number.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Projected {
+    /// What was taken off the samples; NaN where the window holds a value that cannot be used.
+    pub(crate) level: Vec<f64>,
+    /// The coefficients wanted, by degree.
+    pub(crate) coefficients: Vec<Vec<f64>>,
+    /// Residual sum of squares of the highest order; empty where it is not followed.
+    pub(crate) residual: Vec<f64>,
+}
+
+impl Coefficients {
+    /// Gives the coefficients of the degrees wanted of a basis, and the residual of its highest order.
+    pub(crate) fn new(basis: &Basis, wanted: &[usize], residual: bool, instructions: Instructions) -> Self {
+        let top = basis.degrees() - 1;
+        let options = Options {
+            window_length: basis.length(),
+            order: Order::Fixed(top.min(crate::simd::vectors::TABLE - 1)),
+            selection: Selection::Window,
+            derivatives: Vec::new(),
+            delta: 1.0,
+            noise: residual,
+            quantisation: 0.0,
+            instructions,
+        };
+        let finish = Finish::new(&options, basis).bare(wanted);
+        let engine = engine(basis, finish, residual, instructions);
+        Self { engine, top, length: basis.length(), wanted: wanted.len(), residual }
+    }
+
+    /// Memory for one thread.
+    pub(crate) fn scratch(&self) -> Scratch {
+        Scratch(self.engine.scratch())
+    }
+
+    /// Projects windows, known by their first samples: all of them, or every so manyth from the first on.
+    pub(crate) fn project(
+        &self,
+        record: &dyn Samples,
+        windows: Range<usize>,
+        step: usize,
+        projected: &mut Projected,
+        scratch: &mut Scratch,
+    ) {
+        let count = windows.len().div_ceil(step);
+        let Projected { level, coefficients, residual } = projected;
+        coefficients.resize_with(self.wanted, Vec::new);
+        level.resize(count, 0.0);
+        for row in coefficients.iter_mut() {
+            row.resize(count, 0.0);
+        }
+        residual.resize(if self.residual { count } else { 0 }, 0.0);
+        if count == 0 {
+            return;
+        }
+        let mut fields: Vec<&mut [f64]> = vec![level];
+        fields.extend(coefficients.iter_mut().map(Vec::as_mut_slice));
+        let mut estimates = Estimates {
+            elements: Elements { first: windows.start + (self.length - 1) / 2, step },
+            derivatives: fields,
+            order: &mut [],
+            status: &mut [],
+            sigma: residual,
+        };
+        self.engine.walk(record, windows, &mut estimates, &mut scratch.0);
+        // What the engine gives is the noise.
+        let freedom = (self.length - self.top - 1) as f64;
+        for value in residual {
+            *value = *value * *value * freedom;
+        }
+    }
+}

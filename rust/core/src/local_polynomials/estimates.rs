@@ -1,0 +1,54 @@
+//! Where estimates of every window are written.
+
+use crate::lanes::output::{Elements, split_off};
+use crate::status::Status;
+
+/// Where estimates are written. An empty slice stands for what is not wanted.
+#[derive(Debug)]
+pub struct Estimates<'a> {
+    /// Which samples the elements of every slice belong to.
+    pub elements: Elements,
+    /// One slice a derivative, in the order in which [`Options::derivatives`] names them.
+    pub derivatives: Vec<&'a mut [f64]>,
+    /// Order chosen. Near the ends of a record each derivative may take a lower one.
+    pub order: &'a mut [u8],
+    /// Bits of [`crate::Status`].
+    pub status: &'a mut [u16],
+    /// Standard deviation of the noise.
+    pub sigma: &'a mut [f64],
+}
+
+impl Estimates<'_> {
+    /// Writes what is known of a window beside its derivatives.
+    pub(crate) fn diagnose(&mut self, element: usize, order: usize, status: Status, sigma: f64) {
+        put(self.order, element, u8::try_from(order).unwrap_or(u8::MAX));
+        put(self.status, element, status.bits());
+        put(self.sigma, element, sigma);
+    }
+
+    /// Makes an element NaN.
+    pub(crate) fn invalidate(&mut self, element: usize) {
+        self.derivatives.iter_mut().for_each(|derivative| derivative[element] = f64::NAN);
+        self.diagnose(element, 0, Status::INVALID, f64::NAN);
+    }
+
+    /// Cuts off what belongs to the samples before `sample`.
+    pub(crate) fn split_off_before(&mut self, sample: usize) -> Self {
+        let (elements, count) = (self.elements, self.elements.of(0..sample).len());
+        self.elements = elements.from(count);
+        Estimates {
+            elements,
+            derivatives: self.derivatives.iter_mut().map(|values| split_off(values, count)).collect(),
+            order: split_off(&mut self.order, count),
+            status: split_off(&mut self.status, count),
+            sigma: split_off(&mut self.sigma, count),
+        }
+    }
+}
+
+/// Writes a value that may not be wanted.
+fn put<T>(values: &mut [T], element: usize, value: T) {
+    if let Some(place) = values.get_mut(element) {
+        *place = value;
+    }
+}

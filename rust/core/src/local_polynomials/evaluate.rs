@@ -1,0 +1,199 @@
+//! What becomes of a window's coefficients: its order, its noise and linear functions such as derivatives.
+
+use crate::lanes::tile::Tile;
+use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
+use crate::local_polynomials::criterion::{Tables, choose};
+use crate::local_polynomials::options::{Options, Order};
+use crate::local_polynomials::sliding_projection::State;
+use crate::simd::vectors::{Lanes, TABLE, unroll};
+use crate::status::Status;
+
+/// A linear function of a window's coefficients that is even or odd in time.
+#[derive(Clone, Debug)]
+pub(crate) struct Functional {
+    /// Weights of the coefficients; those of the other parity are zero.
+    weights: [f64; MOST_DEGREES],
+    /// Whether it is odd: in reversed time it changes its sign.
+    odd: bool,
+    /// What a constant signal of one gives.
+    constant: f64,
+}
+
+/// The plan of what is made of every window.
+#[derive(Debug)]
+pub(crate) struct Finish {
+    functionals: Vec<Functional>,
+    tables: Tables,
+    fixed_order: u8,
+}
+
+/// An order and flags as one whole number.
+fn code(order: u8, status: Status) -> f64 {
+    f64::from(order) + 256.0 * f64::from(status.bits())
+}
+
+impl Functional {
+    /// The derivative at the centre.
+    fn derivative(basis: &Basis, derivative: usize, delta: f64) -> Self {
+        let scale = delta.powi(i32::try_from(derivative).unwrap_or(i32::MAX)).recip();
+        let values = basis.evaluate(0.0, derivative);
+        let weights = std::array::from_fn(|j| values.get(j).map_or(0.0, |value| value * scale));
+        Self { weights, odd: derivative % 2 == 1, constant: f64::from(u8::from(derivative == 0)) }
+    }
+
+    /// What was taken off the window's samples before they were projected.
+    fn level() -> Self {
+        Self { weights: [0.0; MOST_DEGREES], odd: false, constant: 1.0 }
+    }
+
+    /// The coefficient of one degree.
+    fn coefficient(degree: usize) -> Self {
+        let weights = std::array::from_fn(|j| f64::from(u8::from(j == degree)));
+        Self { weights, odd: degree % 2 == 1, constant: 0.0 }
+    }
+
+    /// Its value's standard deviation over that of the noise, for every order.
+    pub(crate) fn gains(&self, orders: usize) -> Vec<f64> {
+        let mut sum = 0.0;
+        let gain = |weight: &f64| {
+            sum += weight * weight;
+            sum.sqrt()
+        };
+        self.weights[..orders].iter().map(gain).collect()
+    }
+}
+
+impl Finish {
+    pub(crate) fn new(options: &Options, basis: &Basis) -> Self {
+        let (length, degrees) = (basis.length(), basis.degrees());
+        let functional = |&derivative: &usize| Functional::derivative(basis, derivative, options.delta);
+        let mut weights = [None; TABLE];
+        let mut fixed_order = 0;
+        match options.order {
+            Order::Fixed(order) => {
+                weights[order] = Some(1.0);
+                fixed_order = u8::try_from(order).unwrap_or(u8::MAX);
+            }
+            Order::Chosen { criterion, .. } => {
+                for (order, weight) in weights[..degrees].iter_mut().enumerate() {
+                    *weight = Some(criterion.weight(order, length));
+                }
+            }
+        }
+        let chosen = matches!(options.order, Order::Chosen { .. });
+        let mut tables = Tables::new(&weights);
+        for (order, weight) in weights.iter().enumerate() {
+            if let (Some(weight), true) = (weight, order + 1 < length) {
+                tables.variance[order] = ((length - order - 1) as f64 * weight).recip();
+            }
+            let mut status = Status::GOOD;
+            if chosen && degrees > 1 && order == 0 {
+                status |= Status::LOWEST_ORDER;
+            }
+            if chosen && degrees > 1 && order + 1 == degrees {
+                status |= Status::HIGHEST_ORDER;
+            }
+            tables.code[order] = code(u8::try_from(order).unwrap_or(u8::MAX), status);
+        }
+        tables.exact = code(0, Status::EXACT);
+        tables.floor = options.quantisation_floor();
+        Self { functionals: options.derivatives.iter().map(functional).collect(), tables, fixed_order }
+    }
+
+    /// Gives, instead of derivatives, what was taken off the window's samples and then the coefficients of some degrees.
+    pub(crate) fn bare(mut self, degrees: &[usize]) -> Self {
+        self.functionals = vec![Functional::level()];
+        self.functionals.extend(degrees.iter().copied().map(Functional::coefficient));
+        self
+    }
+
+    pub(crate) fn functionals(&self) -> &[Functional] {
+        &self.functionals
+    }
+
+    /// The order of every window, where none is chosen.
+    pub(crate) fn fixed_order(&self, residual: bool) -> Option<u8> {
+        (!residual).then_some(self.fixed_order)
+    }
+
+    /// Numbers known of every window: its functionals and, where the residual is followed, noise, order and flags.
+    pub(crate) fn fields(&self, residual: bool) -> usize {
+        self.functionals.len() + if residual { 2 } else { 0 }
+    }
+
+    /// Finishes one window of each lane.
+    #[inline(always)]
+    pub(crate) fn finish<S: Lanes, const D: usize, const RESIDUAL: bool>(
+        &self,
+        simd: S,
+        state: &State<S, D>,
+        reference: S::f64s,
+        backward: bool,
+        tile: &mut Tile,
+        place: usize,
+    ) {
+        let fields = self.functionals.len();
+        let mut order = None;
+        if RESIDUAL {
+            let choice = choose(simd, &self.tables, state);
+            tile.put(simd, fields, place, simd.sqrt_f64s(choice.variance));
+            tile.put(simd, fields + 1, place, choice.code);
+            order = Some(choice.order);
+        }
+        let turn = |odd: bool, value: S::f64s| if odd && backward { simd.neg_f64s(value) } else { value };
+        let mut left = self.functionals.as_slice();
+        let mut field = 0;
+        // Value and two derivatives are what is wanted nearly always: all three in one go, each coefficient masked once.
+        if let [
+            value @ Functional { odd: false, .. },
+            first @ Functional { odd: true, .. },
+            second @ Functional { odd: false, .. },
+            rest @ ..,
+        ] = left
+        {
+            let mut sums = [
+                simd.mul_f64s(reference, simd.splat_f64s(value.constant)),
+                simd.splat_f64s(0.0),
+                simd.mul_f64s(reference, simd.splat_f64s(second.constant)),
+            ];
+            unroll!(J < D, {
+                let c = state.coefficients[J];
+                if J % 2 == 1 {
+                    sums[1] = weighted::<S, J>(simd, order, first, c, sums[1]);
+                } else {
+                    sums[0] = weighted::<S, J>(simd, order, value, c, sums[0]);
+                    sums[2] = weighted::<S, J>(simd, order, second, c, sums[2]);
+                }
+            });
+            tile.put(simd, 0, place, sums[0]);
+            tile.put(simd, 1, place, turn(true, sums[1]));
+            tile.put(simd, 2, place, sums[2]);
+            (left, field) = (rest, 3);
+        }
+        for functional in left {
+            let mut sum = simd.mul_f64s(reference, simd.splat_f64s(functional.constant));
+            unroll!(J < D, { sum = weighted::<S, J>(simd, order, functional, state.coefficients[J], sum) });
+            tile.put(simd, field, place, turn(functional.odd, sum));
+            field += 1;
+        }
+    }
+}
+
+/// Adds a functional's share of coefficient `J` where the order reaches it.
+#[inline(always)]
+fn weighted<S: Lanes, const J: usize>(
+    simd: S,
+    order: Option<S::f64s>,
+    functional: &Functional,
+    coefficient: S::f64s,
+    sum: S::f64s,
+) -> S::f64s {
+    let more = simd.mul_add_f64s(simd.splat_f64s(functional.weights[J]), coefficient, sum);
+    match order {
+        Some(order) if J != 0 => {
+            let reached = simd.less_than_or_equal_f64s(simd.splat_f64s(J as f64), order);
+            simd.select_f64s(reached, more, sum)
+        }
+        _ => more,
+    }
+}

@@ -1,0 +1,24 @@
+//! A polynomial fitted in every window, its order chosen by a criterion, and the derivatives that follow from it.
+
+pub(crate) mod basis;
+pub(crate) mod boundary;
+pub(crate) mod coefficients;
+pub(crate) mod criterion;
+pub(crate) mod double_double;
+pub(crate) mod engine;
+pub(crate) mod estimates;
+pub(crate) mod evaluate;
+pub(crate) mod kernels;
+pub(crate) mod neighbour_sums;
+pub(crate) mod options;
+pub(crate) mod order_selection;
+pub(crate) mod plan;
+pub(crate) mod single_window;
+pub(crate) mod sliding_projection;
+
+pub use basis::Basis;
+pub use boundary::End;
+pub use criterion::Criterion;
+pub use estimates::Estimates;
+pub use options::{HIGHEST_ORDER, Options, Order, Selection};
+pub use plan::LocalPolynomials;

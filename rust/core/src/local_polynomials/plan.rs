@@ -1,0 +1,328 @@
+//! Local polynomials in every window, of an order chosen in every window: values, derivatives, noise.
+//!
+//! [`LocalPolynomials`] is the plan: made once for a window length, run over any number of records. [`LocalPolynomials::estimate`] is
+//! the one place where samples are walked. It is entered with absolute sample numbers and gives the same bits however a record is
+//! cut, since windows are reached from starts that lie on a grid of absolute numbers and every lane keeps to itself.
+
+use std::num::NonZeroUsize;
+use std::ops::Range;
+use std::sync::OnceLock;
+
+use crate::error::Error;
+use crate::exec::pool::{self, Piece, Watch};
+use crate::local_polynomials::basis::Basis;
+use crate::local_polynomials::boundary::{End, Ends};
+use crate::local_polynomials::criterion::Criterion;
+use crate::local_polynomials::engine::{Walk, engine};
+use crate::local_polynomials::estimates::Estimates;
+use crate::local_polynomials::evaluate::Finish;
+use crate::local_polynomials::options::{HIGHEST_ORDER, Options, Order, Selection};
+use crate::local_polynomials::order_selection::{self, Selector, Wanted};
+use crate::local_polynomials::single_window::Window;
+use crate::record::samples::Samples;
+
+/// Samples in a piece of work, about: well below 20 ms on any processor, so that a call can be interrupted.
+const PIECE: usize = 1 << 14;
+
+/// The plan for windows of one length.
+#[derive(Debug)]
+pub struct LocalPolynomials {
+    options: Options,
+    basis: Basis,
+    ends: Ends,
+    engine: Box<dyn Walk>,
+    /// Made when it is first needed.
+    selector: OnceLock<Option<Selector>>,
+}
+
+/// What one thread needs to work: made once, used for any number of pieces.
+#[derive(Debug)]
+pub struct Scratch {
+    walk: crate::local_polynomials::engine::Scratch,
+    selection: Option<order_selection::Scratch>,
+}
+
+/// A piece of work: some samples of a record, and where what is known of them goes.
+type Part<'a, 'b> = (&'a dyn Samples, Range<usize>, Estimates<'b>);
+
+impl LocalPolynomials {
+    /// Prepares the tables.
+    ///
+    /// Costs `O(M · D)` with `D` the number of orders.
+    ///
+    /// # Errors
+    /// If the window is shorter than one sample, if an order is higher than [`HIGHEST_ORDER`], or if a fixed order is not determined
+    /// by the window.
+    pub fn new(options: Options) -> Result<Self, Error> {
+        let window_length = options.window_length;
+        if window_length == 0 {
+            return Err(Error::WindowTooShort { window_length, least: 1 });
+        }
+        let (name, order) = match options.order {
+            Order::Fixed(order) => ("order", order),
+            Order::Chosen { highest, .. } => ("max_order", highest),
+        };
+        if order > HIGHEST_ORDER {
+            return Err(Error::OrderTooHigh { name, order, most: HIGHEST_ORDER });
+        }
+        let degrees = match options.order {
+            Order::Fixed(order) if order >= window_length => {
+                return Err(Error::OrderNotDetermined { order, window_length });
+            }
+            Order::Fixed(order) => order + 1,
+            Order::Chosen { criterion, highest } => {
+                (0..=highest).take_while(|&n| criterion.penalty(n, window_length).is_some()).count()
+            }
+        };
+        if degrees == 0 {
+            return Err(Error::WindowTooShort { window_length, least: 4 });
+        }
+        let basis = Basis::new(window_length, degrees);
+        let residual = options.noise || matches!(options.order, Order::Chosen { .. });
+        let engine = engine(&basis, Finish::new(&options, &basis), residual, options.instructions);
+        let ends = Ends::new(&options);
+        Ok(Self { options, basis, ends, engine, selector: OnceLock::new() })
+    }
+
+    /// What was asked for.
+    #[must_use]
+    pub fn options(&self) -> &Options {
+        &self.options
+    }
+
+    /// Number of orders in play: one more than the highest.
+    #[must_use]
+    pub fn orders(&self) -> usize {
+        self.basis.degrees()
+    }
+
+    /// Samples of a window before the one at its centre; where that lies between two samples, before the first of them.
+    #[must_use]
+    pub fn before_centre(&self) -> usize {
+        (self.options.window_length - 1) / 2
+    }
+
+    /// Memory for one thread.
+    #[must_use]
+    pub fn scratch(&self) -> Scratch {
+        self.scratch_for(Wanted::Derivatives)
+    }
+
+    fn scratch_for(&self, wanted: Wanted) -> Scratch {
+        Scratch { walk: self.engine.scratch(), selection: self.selector(wanted).map(Selector::scratch) }
+    }
+
+    /// What looks at all orders, where it is needed: standard errors say how far the orders disagree.
+    fn selector(&self, wanted: Wanted) -> Option<&Selector> {
+        if wanted == Wanted::Derivatives && self.options.selection == Selection::Window {
+            return None;
+        }
+        self.selector.get_or_init(|| Selector::new(&self.options, &self.basis)).as_ref()
+    }
+
+    /// Windows that are worked on side by side: a record may be cut anywhere, but multiples of this waste nothing.
+    #[must_use]
+    pub fn stride(&self) -> usize {
+        self.engine.block() * self.options.instructions.lanes()
+    }
+
+    /// Estimates at the samples `samples` of a record that is at least one window long, with equations (2), (8) and (9).
+    ///
+    /// Samples nearer to an end than half a window are evaluated off the centre of the first or last full window, each derivative
+    /// with the order that has the least estimated squared bias plus variance there. Windows that hold a value that is no number are
+    /// NaN, and no others.
+    ///
+    /// # Errors
+    /// If the record is shorter than the window.
+    pub fn estimate(
+        &self,
+        record: &dyn Samples,
+        samples: Range<usize>,
+        estimates: &mut Estimates<'_>,
+        scratch: &mut Scratch,
+    ) -> Result<(), Error> {
+        self.everywhere(record, samples, Wanted::Derivatives, estimates, scratch)
+    }
+
+    /// The same for samples whose full window lies in the record: those from [`LocalPolynomials::before_centre`] on, as many as the
+    /// record has windows.
+    ///
+    /// # Errors
+    /// If the record is shorter than the window.
+    ///
+    /// # Panics
+    /// If a sample's window does not lie in the record.
+    pub fn estimate_centred(
+        &self,
+        record: &dyn Samples,
+        samples: Range<usize>,
+        estimates: &mut Estimates<'_>,
+        scratch: &mut Scratch,
+    ) -> Result<(), Error> {
+        let (windows, before) = (self.windows(record.len())?, self.before_centre());
+        assert!(before <= samples.start && samples.end <= before + windows, "every window must lie in the record");
+        self.centred(record, samples, Wanted::Derivatives, estimates, scratch);
+        Ok(())
+    }
+
+    fn everywhere(
+        &self,
+        record: &dyn Samples,
+        samples: Range<usize>,
+        wanted: Wanted,
+        estimates: &mut Estimates<'_>,
+        scratch: &mut Scratch,
+    ) -> Result<(), Error> {
+        let (windows, half) = (self.windows(record.len())?, self.options.window_length / 2);
+        let (start, end) = (half, record.len() - half);
+        if samples.start < start {
+            let orders = self.orders_at(record, 0, scratch);
+            let edge = samples.start..samples.end.min(start);
+            self.ends.estimate(&self.basis, record, End::First, orders, edge, wanted, estimates);
+        }
+        let interior = samples.start.max(start)..samples.end.min(end);
+        if !interior.is_empty() {
+            self.centred(record, interior, wanted, estimates, scratch);
+        }
+        if samples.end > end {
+            let orders = self.orders_at(record, windows - 1, scratch);
+            let edge = samples.start.max(end)..samples.end;
+            self.ends.estimate(&self.basis, record, End::Last, orders, edge, wanted, estimates);
+        }
+        Ok(())
+    }
+
+    fn centred(
+        &self,
+        record: &dyn Samples,
+        samples: Range<usize>,
+        wanted: Wanted,
+        estimates: &mut Estimates<'_>,
+        scratch: &mut Scratch,
+    ) {
+        let before = self.before_centre();
+        let windows = samples.start - before..samples.end - before;
+        if let (Some(selector), Some(scratch)) = (self.selector(wanted), &mut scratch.selection) {
+            selector.estimate(record, windows, wanted, estimates, scratch);
+            return;
+        }
+        self.engine.walk(record, windows, estimates, &mut scratch.walk);
+        if wanted == Wanted::Errors {
+            let elements = estimates.elements.of(samples);
+            for (functional, values) in self.engine.functionals().iter().zip(&mut estimates.derivatives) {
+                let gains = functional.gains(self.orders());
+                for element in elements.clone() {
+                    values[element] = gains[usize::from(estimates.order[element])] * estimates.sigma[element];
+                }
+            }
+        }
+    }
+
+    /// The orders that share in a window, where it does not choose for itself.
+    fn orders_at(&self, record: &dyn Samples, window: usize, scratch: &mut Scratch) -> Option<Vec<(usize, f64)>> {
+        let (selector, scratch) = (self.selector(Wanted::Derivatives)?, scratch.selection.as_mut()?);
+        Some(selector.orders(record, window, scratch))
+    }
+
+    /// Estimates at all samples of several records, in parallel. Every element of the outputs must belong to a sample.
+    ///
+    /// The numbers do not depend on the number of workers.
+    ///
+    /// # Errors
+    /// If a record is shorter than the window, or the watch cancels.
+    pub fn run(
+        &self,
+        records: Vec<(&dyn Samples, Estimates<'_>)>,
+        ends: bool,
+        workers: NonZeroUsize,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Error> {
+        let work = |(record, samples, mut estimates): Part<'_, '_>, scratch: &mut Scratch| {
+            let outcome = if ends {
+                self.estimate(record, samples, &mut estimates, scratch)
+            } else {
+                self.estimate_centred(record, samples, &mut estimates, scratch)
+            };
+            debug_assert_eq!(outcome, Ok(()), "the lengths of all records were checked");
+        };
+        pool::run(self.pieces(records, ends, Wanted::Derivatives)?, workers, || self.scratch(), work, watch)
+    }
+
+    /// Standard errors in the place of derivatives, at all samples of several records, in parallel.
+    ///
+    /// They are the noise times the gain of the order that is given; where it was chosen, `Σ w_n √(σ_n² g_n² + (d_n - d)²)`, `d` the estimate.
+    /// The plan must know the noise, and all outputs must be wanted.
+    ///
+    /// # Errors
+    /// As [`LocalPolynomials::run`].
+    pub fn errors(
+        &self,
+        records: Vec<(&dyn Samples, Estimates<'_>)>,
+        workers: NonZeroUsize,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Error> {
+        let work = |(record, samples, mut estimates): Part<'_, '_>, scratch: &mut Scratch| {
+            let outcome = self.everywhere(record, samples, Wanted::Errors, &mut estimates, scratch);
+            debug_assert_eq!(outcome, Ok(()), "the lengths of all records were checked");
+        };
+        let pieces = self.pieces(records, true, Wanted::Errors)?;
+        pool::run(pieces, workers, || self.scratch_for(Wanted::Errors), work, watch)
+    }
+
+    /// Cuts records into pieces of work.
+    fn pieces<'a, 'b>(
+        &self,
+        records: Vec<(&'a dyn Samples, Estimates<'b>)>,
+        ends: bool,
+        wanted: Wanted,
+    ) -> Result<Vec<Piece<Part<'a, 'b>>>, Error> {
+        let least = self.selector(wanted).map_or(0, Selector::least_piece);
+        let piece = PIECE.max(least).next_multiple_of(self.stride());
+        let mut pieces = Vec::new();
+        for (record, mut estimates) in records {
+            let (windows, before) = (self.windows(record.len())?, self.before_centre());
+            let samples = if ends { 0..record.len() } else { before..before + windows };
+            let mut first = samples.start;
+            while first < samples.end {
+                let next = (first.max(before) - before) / piece * piece + piece + before;
+                let end = if next >= before + windows { samples.end } else { next };
+                let part = estimates.split_off_before(end);
+                pieces.push(Piece { size: end - first, content: (record, first..end, part) });
+                first = end;
+            }
+        }
+        Ok(pieces)
+    }
+
+    /// The criterion of every order in the window around a sample, equation (8); infinite for an order that is no candidate. Near an
+    /// end that is the first or last full window.
+    ///
+    /// # Errors
+    /// If the record is shorter than the window.
+    pub fn scores(&self, record: &dyn Samples, sample: usize) -> Result<Vec<f64>, Error> {
+        let windows = self.windows(record.len())?;
+        let window = sample.saturating_sub(self.before_centre()).min(windows - 1);
+        let criterion = match self.options.order {
+            Order::Fixed(_) => Criterion::default(),
+            Order::Chosen { criterion, .. } => criterion,
+        };
+        let mut samples = vec![0.0; self.options.window_length];
+        record.read(window, &mut samples);
+        let Some(window) = Window::project(&self.basis, &samples, self.options.quantisation_floor()) else {
+            return Ok(vec![f64::NAN; self.orders()]);
+        };
+        let score = |(order, residual): (usize, &f64)| {
+            criterion.score(residual.max(window.floor), order, self.options.window_length)
+        };
+        Ok(window.residuals.iter().enumerate().map(score).collect())
+    }
+
+    /// Number of full windows in a record.
+    pub(crate) fn windows(&self, samples: usize) -> Result<usize, Error> {
+        let window_length = self.options.window_length;
+        (samples + 1)
+            .checked_sub(window_length)
+            .filter(|&windows| windows > 0)
+            .ok_or(Error::WindowTooLong { window_length, samples })
+    }
+}

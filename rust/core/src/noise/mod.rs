@@ -1,0 +1,6 @@
+//! The noise of a channel: its variance, its quantisation and its spectrum.
+
+pub(crate) mod channel;
+pub(crate) mod spectrum;
+
+pub use channel::{FEWEST_SAMPLES, noise, quantisation_step};

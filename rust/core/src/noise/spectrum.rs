@@ -1,0 +1,209 @@
+//! Power spectra: Fourier transforms, and the averaged spectrum of a record.
+
+use std::f64::consts::PI;
+use std::ops::Range;
+use std::sync::Arc;
+
+use realfft::{RealFftPlanner, RealToComplex};
+
+use crate::error::Error;
+use crate::exec::pool::Piece;
+use crate::exec::stages::Run;
+use crate::record::samples::{Samples, all_usable, is_usable};
+
+/// Segments that are averaged at most, spread over the record: so many, or fewer long ones that hold so many samples together.
+const MOST_SEGMENTS: usize = 256;
+const MOST_SAMPLES: usize = 1 << 20;
+const FEWEST_SEGMENTS: usize = 32;
+
+/// Segments that a piece of work sums.
+const TOGETHER: usize = 16;
+
+/// The discrete Fourier transform of real sequences of one length.
+pub(crate) struct Transform(Arc<dyn RealToComplex<f64>>);
+
+impl Transform {
+    pub(crate) fn new(length: usize) -> Self {
+        Self(RealFftPlanner::new().plan_fft_forward(length))
+    }
+
+    /// Frequencies from zero to half the sample rate, real and imaginary parts. The samples are used up.
+    pub(crate) fn of(&self, samples: &mut [f64]) -> Vec<[f64; 2]> {
+        let mut values = self.0.make_output_vec();
+        // It fails for another length only, and is all zero then.
+        let done = self.0.process(samples, &mut values);
+        debug_assert!(done.is_ok(), "a transform is for sequences of its length");
+        values.iter().map(|value| [value.re, value.im]).collect()
+    }
+
+    /// The frequency response of a kernel that is centred on its middle sample.
+    pub(crate) fn response(&self, kernel: &[f64]) -> Vec<[f64; 2]> {
+        let (half, length) = (kernel.len() / 2, self.0.len());
+        let mut padded = vec![0.0; length];
+        for (k, &value) in kernel.iter().enumerate() {
+            // A dot product reads forwards in time, so the response is that of the kernel turned round.
+            padded[(length + half - k) % length] += value;
+        }
+        self.of(&mut padded)
+    }
+}
+
+/// The power of a record by frequency, so that its mean over all frequencies, both signs, is the mean square: of segments of `length`
+/// samples that overlap by half and fade in and out. Samples that cannot be used are bridged by a line, and segments where
+/// they are the greater part are left out.
+///
+/// Only the changes are of interest, so the mean of each segment is taken off.
+pub(crate) fn power(record: &dyn Samples, length: usize) -> Vec<f64> {
+    Segments::new(record, length).power().0
+}
+
+/// The same of segments without a sample that cannot be used only, and how many these are: a line in place of samples has no noise.
+pub(crate) fn power_of_whole_segments(record: &dyn Samples, length: usize) -> (Vec<f64>, usize) {
+    Segments { whole: true, ..Segments::new(record, length) }.power()
+}
+
+/// The same, in parallel.
+pub(crate) fn power_in_pieces(record: &dyn Samples, length: usize, run: &mut Run<'_, '_>) -> Result<Vec<f64>, Error> {
+    let segments = Segments::new(record, length);
+    let pieces = segments.parts().map(|part| Piece { size: part.len(), content: part });
+    let sums = run.map(pieces.collect(), || (), |part, (): &mut ()| segments.sum(part))?;
+    Ok(segments.mean(sums.into_iter()).0)
+}
+
+/// The segments of a record that a spectrum is the average of.
+struct Segments<'a> {
+    record: &'a dyn Samples,
+    length: usize,
+    /// How many there are, and samples from one to the next.
+    count: usize,
+    every: usize,
+    fade: Vec<f64>,
+    /// The sum of the squares of what they fade with.
+    energy: f64,
+    transform: Transform,
+    /// Whether segments with a sample that cannot be used are left out.
+    whole: bool,
+}
+
+impl<'a> Segments<'a> {
+    fn new(record: &'a dyn Samples, length: usize) -> Self {
+        let fade: Vec<f64> = (0..length).map(|k| (PI * (k as f64 + 0.5) / length as f64).sin().powi(2)).collect();
+        let energy = fade.iter().map(|value| value * value).sum();
+        let most = (MOST_SAMPLES / length).clamp(FEWEST_SEGMENTS, MOST_SEGMENTS);
+        let last = record.len().checked_sub(length);
+        let every = (length / 2).max(last.unwrap_or(0) / most).max(1);
+        let count = last.map_or(0, |last| last / every + 1);
+        Self { record, length, count, every, fade, energy, transform: Transform::new(length), whole: false }
+    }
+
+    /// Segments that are summed together.
+    fn parts(&self) -> impl Iterator<Item = Range<usize>> {
+        let count = self.count;
+        (0..count).step_by(TOGETHER).map(move |first| first..count.min(first + TOGETHER))
+    }
+
+    /// The mean power of all segments that count, and how many these are.
+    fn power(&self) -> (Vec<f64>, usize) {
+        self.mean(self.parts().map(|part| self.sum(part)))
+    }
+
+    /// The power of some segments together, and how many of them count.
+    fn sum(&self, segments: Range<usize>) -> (Vec<f64>, usize) {
+        let mut sum = vec![0.0; self.length / 2 + 1];
+        let mut count = 0;
+        let mut samples = vec![0.0; self.length];
+        for segment in segments {
+            self.record.read(segment * self.every, &mut samples);
+            if (self.whole && !all_usable(&samples)) || !bridge(&mut samples) {
+                continue;
+            }
+            let mean = samples.iter().sum::<f64>() / self.length as f64;
+            samples.iter_mut().zip(&self.fade).for_each(|(value, fade)| *value = (*value - mean) * fade);
+            for (sum, [real, imaginary]) in sum.iter_mut().zip(self.transform.of(&mut samples)) {
+                *sum += (real * real + imaginary * imaginary) / self.energy;
+            }
+            count += 1;
+        }
+        (sum, count)
+    }
+
+    /// The mean of all segments that count, and how many these are.
+    fn mean(&self, sums: impl Iterator<Item = (Vec<f64>, usize)>) -> (Vec<f64>, usize) {
+        let (mut mean, mut all) = (vec![0.0; self.length / 2 + 1], 0);
+        for (sum, count) in sums {
+            mean.iter_mut().zip(sum).for_each(|(mean, sum)| *mean += sum);
+            all += count;
+        }
+        (mean.into_iter().map(|value| value / all.max(1) as f64).collect(), all)
+    }
+}
+
+/// Puts a line where samples cannot be used; whether at least half of them can.
+fn bridge(samples: &mut [f64]) -> bool {
+    if samples.iter().all(|&value| is_usable(value)) {
+        return true;
+    }
+    let usable: Vec<usize> = (0..samples.len()).filter(|&place| is_usable(samples[place])).collect();
+    let (Some(&first), Some(&last)) = (usable.first(), usable.last()) else { return false };
+    for pair in usable.windows(2) {
+        let (from, to) = (pair[0], pair[1]);
+        let (start, slope) = (samples[from], (samples[to] - samples[from]) / (to - from) as f64);
+        (from + 1..to).for_each(|place| samples[place] = start + slope * (place - from) as f64);
+    }
+    let (start, end) = (samples[first], samples[last]);
+    samples[..first].fill(start);
+    samples[last + 1..].fill(end);
+    2 * usable.len() >= samples.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_few_missing_samples_cost_next_to_nothing() {
+        let whole: Vec<f64> = (0..8192).map(|i| (2.0 * PI * 0.01 * f64::from(i)).sin()).collect();
+        let mut holed = whole.clone();
+        holed.iter_mut().step_by(100).for_each(|value| *value = f64::NAN);
+        let total = |samples: &[f64]| power(&samples, 512).iter().sum::<f64>();
+        // A line over two samples of 100 a cycle misses the sine by at most half the square of 2π/100.
+        assert!((total(&holed) / total(&whole) - 1.0).abs() < 0.5 * (2.0 * PI / 100.0_f64).powi(2));
+    }
+
+    #[test]
+    fn a_transform_is_the_sum_it_is_defined_by() {
+        for length in [1_u32, 2, 8, 64] {
+            let samples: Vec<f64> = (0..length).map(|i| (f64::from(i) * 1.7).sin() + 0.1 * f64::from(i)).collect();
+            let found = Transform::new(samples.len()).of(&mut samples.clone());
+            for (k, [real, imaginary]) in found.into_iter().enumerate() {
+                let angle = |i: usize| -2.0 * PI * (k * i) as f64 / f64::from(length);
+                let expected = [
+                    samples.iter().enumerate().map(|(i, value)| value * angle(i).cos()).sum::<f64>(),
+                    samples.iter().enumerate().map(|(i, value)| value * angle(i).sin()).sum::<f64>(),
+                ];
+                assert!((real - expected[0]).abs() < 1e-11 && (imaginary - expected[1]).abs() < 1e-11);
+            }
+        }
+    }
+
+    #[test]
+    fn a_sine_has_its_power_at_its_frequency() {
+        let samples: Vec<f64> = (0..4096).map(|i| 3.0 + 2.0 * (2.0 * PI * 0.125 * f64::from(i)).sin()).collect();
+        let spectrum = power(&samples.as_slice(), 512);
+        let total = 2.0 * spectrum[1..256].iter().sum::<f64>() / 512.0;
+        assert!((total - 2.0).abs() < 1e-6, "{total}");
+        assert!(2.0 * spectrum[62..=66].iter().sum::<f64>() / 512.0 > 1.999);
+    }
+
+    #[test]
+    fn a_response_tells_what_a_kernel_makes_of_a_sine() {
+        let kernel: Vec<f64> = (-3..=3).map(|k| f64::from(k * k + k)).collect();
+        let found = Transform::new(32).response(&kernel)[5];
+        let omega = 2.0 * PI * 5.0 / 32.0;
+        let expected = kernel.iter().enumerate().fold([0.0, 0.0], |[real, imaginary], (k, value)| {
+            let angle = omega * (k as f64 - 3.0);
+            [real + value * angle.cos(), imaginary + value * angle.sin()]
+        });
+        assert!((found[0] - expected[0]).abs() < 1e-12 && (found[1] - expected[1]).abs() < 1e-12);
+    }
+}

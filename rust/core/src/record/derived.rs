@@ -1,0 +1,127 @@
+//! Channels that are made from others as they are read: nothing of a long record is held twice.
+
+use crate::record::samples::{Samples, read_around};
+
+/// One at every sample.
+pub(crate) struct Ones(pub(crate) usize);
+
+impl Samples for Ones {
+    fn len(&self) -> usize {
+        self.0
+    }
+
+    fn read(&self, _first: usize, into: &mut [f64]) {
+        into.fill(1.0);
+    }
+}
+
+/// A channel as it is.
+pub(crate) struct Whole<'a>(pub(crate) &'a dyn Samples);
+
+impl Samples for Whole<'_> {
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    fn read(&self, first: usize, into: &mut [f64]) {
+        self.0.read(first, into);
+    }
+}
+
+/// A channel that comes late by whole samples. What would lie beyond its ends is missing.
+pub(crate) struct Late<'a> {
+    pub(crate) channel: &'a dyn Samples,
+    pub(crate) samples: isize,
+}
+
+impl Samples for Late<'_> {
+    fn len(&self) -> usize {
+        self.channel.len()
+    }
+
+    fn read(&self, first: usize, into: &mut [f64]) {
+        read_around(self.channel, first.cast_signed() + self.samples, into);
+    }
+}
+
+/// A derivative of a known coefficient times the angle.
+pub(crate) struct Scaled<'a> {
+    pub(crate) factor: &'a dyn Samples,
+    pub(crate) angle: &'a dyn Samples,
+    pub(crate) derivative: usize,
+    pub(crate) delta: f64,
+}
+
+impl Samples for Scaled<'_> {
+    fn len(&self) -> usize {
+        self.angle.len()
+    }
+
+    fn read(&self, first: usize, into: &mut [f64]) {
+        self.angle.read(first, into);
+        let total = self.factor.len();
+        let begin = first.saturating_sub(1);
+        let mut factor = vec![0.0; (first + into.len() + 1).min(total) - begin];
+        self.factor.read(begin, &mut factor);
+        // Beyond an end the coefficient stays as it is.
+        let at = |sample: isize| {
+            let place = (sample - begin.cast_signed()).clamp(0, factor.len().cast_signed() - 1);
+            factor[place.unsigned_abs()]
+        };
+        for (sample, value) in (first.cast_signed()..).zip(into) {
+            let (before, here, after) = (at(sample - 1), at(sample), at(sample + 1));
+            *value *= match self.derivative {
+                0 => here,
+                1 => (after - before) / (2.0 * self.delta),
+                _ => (after - 2.0 * here + before) / (self.delta * self.delta),
+            };
+        }
+    }
+}
+
+/// The cube of a channel.
+pub(crate) struct Cubed<'a>(pub(crate) &'a dyn Samples);
+
+impl Samples for Cubed<'_> {
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    fn read(&self, first: usize, into: &mut [f64]) {
+        self.0.read(first, into);
+        for value in into {
+            *value = value.powi(3);
+        }
+    }
+}
+
+/// The sign of a velocity that is known every `stride` samples from sample `first` on.
+pub(crate) struct Direction<'a> {
+    pub(crate) velocity: &'a [f64],
+    pub(crate) first: usize,
+    pub(crate) stride: usize,
+    pub(crate) samples: usize,
+}
+
+impl Samples for Direction<'_> {
+    fn len(&self) -> usize {
+        self.samples
+    }
+
+    fn read(&self, first: usize, into: &mut [f64]) {
+        let last = self.velocity.len() - 1;
+        for (sample, value) in (first..).zip(into) {
+            let place = (sample as f64 - self.first as f64) / self.stride as f64;
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the rows")]
+            let row = place.floor().clamp(0.0, last as f64) as usize;
+            let part = (place - row as f64).clamp(0.0, 1.0);
+            let (here, next) = (self.velocity[row], self.velocity[(row + 1).min(last)]);
+            *value = sign(here + part * (next - here));
+        }
+    }
+}
+
+/// The sign of a number; zero has none.
+pub(crate) fn sign(value: f64) -> f64 {
+    if value == 0.0 { 0.0 } else { value.signum() }
+}

@@ -1,0 +1,27 @@
+//! Parts of a long record that stand for all of it, where something is only to be chosen.
+//!
+//! A choice is as good after minutes as after hours: its cost must not grow with the record.
+
+use std::ops::Range;
+
+/// All places, or so many of them in a number of stretches evenly spread.
+pub(crate) fn stretches(places: usize, most: usize, count: usize) -> impl Iterator<Item = Range<usize>> {
+    let (count, length) = if places <= most { (1, places) } else { (count, most / count) };
+    let room = places - length;
+    (0..count).map(move |index| {
+        let first = room * index / (count - 1).max(1);
+        first..first + length
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stretches_cover_a_short_record_and_span_a_long_one() {
+        assert!(stretches(10, 100, 64).eq(std::iter::once(0..10)));
+        let parts: Vec<Range<usize>> = stretches(1000, 128, 64).collect();
+        assert_eq!((parts.len(), parts[0].start, parts[63].end), (64, 0, 1000));
+    }
+}

@@ -1,0 +1,114 @@
+//! A window of a given length around every row, as in the paper: shorter near the ends of the record, down to half of its length.
+//!
+//! The record ends where its equations do. Between them rows that are no equations, masked or missing, leave a window with fewer.
+
+use std::ops::Range;
+
+use crate::error::Error;
+use crate::exec::pool::Piece;
+use crate::exec::stages::Run;
+use crate::regression::constants::sums_of_squares;
+use crate::regression::dyadic_windows::{Problem, Shape, Solved, solve_windows};
+use crate::regression::factor::Fields;
+use crate::regression::model::Predictor;
+use crate::simd::vectors::Instructions;
+use crate::status::Status;
+
+/// The condition number of a window is at least the number of its unknowns, but for rounding; a column of zeros takes its share away.
+const LEAST_CONDITION: f64 = 0.999;
+
+/// Rows in a piece of work.
+const PIECE: usize = 2048;
+
+/// What a window around every row says.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct EveryWindow {
+    /// Windowed unknowns, by row.
+    pub(crate) values: Vec<Vec<f64>>,
+    /// Their covariance for given constants, the lower half row by row.
+    pub(crate) covariances: Vec<Vec<f64>>,
+    /// How they change with each constant: unknown by unknown, constant by constant.
+    pub(crate) sensitivities: Vec<Vec<f64>>,
+    pub(crate) condition: Vec<f64>,
+    /// Standard deviation of what is left.
+    pub(crate) deviation: Vec<f64>,
+    pub(crate) status: Vec<u16>,
+}
+
+/// Solves a window of `window` rows around each of some rows, which need not exist, for given constants.
+pub(crate) fn every_window(
+    problem: &Problem<'_>,
+    window: usize,
+    rows: Range<isize>,
+    constants: &[f64],
+    ill_conditioned: f64,
+    instructions: Instructions,
+    run: &mut Run<'_, '_>,
+) -> Result<EveryWindow, Error> {
+    let before = (window / 2).cast_signed();
+    let mut pieces = Vec::new();
+    for first in rows.clone().step_by(PIECE) {
+        let part = first..rows.end.min(first + PIECE.cast_signed());
+        pieces.push(Piece { size: part.len(), content: part.start - before..part.end - before });
+    }
+    let shape = Shape { centre: before as f64, ..Shape::of(0..window, 1) };
+    let work = |blocks: Range<isize>, (): &mut ()| {
+        solve_windows(problem, 1, &blocks, std::slice::from_ref(&shape), instructions).swap_remove(0)
+    };
+    let solved = run.map(pieces, || (), work)?;
+    let solved = Solved::join(&solved.iter().collect::<Vec<_>>());
+    let (fields, layout) = (solved.fields, problem.layout);
+    let predictor = Predictor::new(&solved, constants);
+    let mut found = EveryWindow { condition: solved.field(fields.condition()).to_vec(), ..EveryWindow::default() };
+    for unknown in 0..layout.windowed {
+        found.values.push((0..solved.len()).map(|place| predictor.value(place, unknown, 0.0)).collect());
+        for other in 0..=unknown {
+            found.covariances.push(solved.field(fields.covariance(unknown, other)).to_vec());
+        }
+        for constant in 0..layout.constant {
+            found.sensitivities.push(solved.field(fields.solution(unknown, constant)).iter().map(|s| -s).collect());
+        }
+    }
+    let record = problem.inside();
+    let left = sums_of_squares(&solved, &(0..solved.len()), constants);
+    for place in 0..solved.len() {
+        let begin = solved.first + place.cast_signed();
+        let inside =
+            (begin + window.cast_signed()).min(record.end.cast_signed()) - begin.max(record.start.cast_signed());
+        let inside = usize::try_from(inside).unwrap_or(0);
+        let status = status(&solved, fields, place, [window, inside], ill_conditioned);
+        found.status.push(status.bits());
+        let freedom = solved.field(fields.count())[place] - layout.local() as f64;
+        found.deviation.push((left[place].max(0.0) / freedom.max(1.0)).sqrt());
+        if status.contains(Status::INVALID) {
+            found.values.iter_mut().chain(&mut found.covariances).for_each(|column| column[place] = f64::NAN);
+            found.deviation[place] = f64::NAN;
+            let rank_deficient = status.contains(Status::RANK_DEFICIENT);
+            found.condition[place] = if rank_deficient { f64::INFINITY } else { f64::NAN };
+        }
+    }
+    Ok(found)
+}
+
+/// The status of a window of which so many rows lie between the first equation and the last.
+fn status(solved: &Solved, fields: Fields, place: usize, [window, inside]: [usize; 2], ill_conditioned: f64) -> Status {
+    let count = solved.field(fields.count())[place];
+    let condition = solved.field(fields.condition())[place];
+    let unknowns = fields.layout.local() as f64;
+    let mut status = if inside < window { Status::EDGE } else { Status::GOOD };
+    if count < inside as f64 {
+        status |= Status::GAP;
+    }
+    if 2 * inside < window {
+        status |= Status::INVALID;
+    } else if count <= unknowns
+        || condition < LEAST_CONDITION * unknowns
+        || !condition.is_finite()
+        || condition * f64::EPSILON * count >= 1.0
+    {
+        status |= Status::INVALID | Status::RANK_DEFICIENT;
+    } else if condition > ill_conditioned {
+        status |= Status::ILL_CONDITIONED;
+    }
+    status
+}

@@ -1,0 +1,322 @@
+//! Constant unknowns from all windows together.
+//!
+//! Once a window's own unknowns are eliminated, what is left of its rows speaks of the constant ones only (Speckman 1988): a few rows,
+//! stacked over all windows and decomposed again. A window over a jump fits badly and counts less (Huber's rule on its misfit).
+
+use std::ops::Range;
+
+use crate::least_squares::stacked_qr::Summary;
+use crate::regression::dyadic_windows::{Problem, Solved};
+use crate::regression::factor::{Fields, Layout, absorb};
+use crate::regression::row_covariance::RowCovariance;
+use crate::simd::f64x8::{Packet, WIDTH};
+use crate::simd::vectors::{Instructions, Kernel, Lanes, dispatch};
+
+/// Windows whose misfit exceeds the median by more than so many standard deviations count less.
+const TOLERATED: f64 = 4.0;
+
+/// Rounds of weighting.
+const ROUNDS: usize = 3;
+
+/// What all windows together say of the constant unknowns.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Pooled {
+    pub(crate) values: Vec<f64>,
+    /// The inverse of the normal matrix, row by row.
+    pub(crate) inverse: Vec<f64>,
+    /// Condition number of what the windows left of the columns, each scaled to its norm before.
+    pub(crate) condition: f64,
+    /// Weight of every window.
+    pub(crate) weights: Vec<f64>,
+}
+
+/// What a row's noise is expected to leave.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Expected {
+    /// Variance of a row, and the part of it that is the torque's.
+    pub(crate) variance: f64,
+    pub(crate) torque: f64,
+    /// Rows that stand for one independent row.
+    pub(crate) redundancy: f64,
+}
+
+impl Expected {
+    /// Nothing is known of the noise, so no window is told from the others by its misfit.
+    pub(crate) const UNKNOWN: Self = Self { variance: f64::NAN, torque: 0.0, redundancy: 1.0 };
+
+    pub(crate) fn new(covariance: &RowCovariance, torque: f64) -> Self {
+        Self { variance: covariance.variance(), torque, redundancy: covariance.redundancy() }
+    }
+}
+
+/// Solves for the constant unknowns from some windows; nothing where they are not determined.
+pub(crate) fn pool(
+    full: &Solved,
+    windows: Range<usize>,
+    expected: Expected,
+    instructions: Instructions,
+) -> Option<Pooled> {
+    let fields = full.fields;
+    let mut weights: Vec<f64> =
+        windows.clone().map(|window| f64::from(u8::from(is_determined(full, window)))).collect();
+    let mut pooled = solve(full, &windows, &weights, instructions)?;
+    if fields.layout.local() == 0 {
+        return Some(Pooled { weights, ..pooled });
+    }
+    for _ in 0..ROUNDS {
+        let misfits = misfits(full, &windows, &pooled.values, expected);
+        let mut sorted: Vec<f64> = misfits
+            .iter()
+            .zip(&weights)
+            .filter(|(misfit, weight)| misfit.is_finite() && **weight > 0.0)
+            .map(|(misfit, _)| *misfit)
+            .collect();
+        if sorted.is_empty() {
+            break;
+        }
+        let middle = sorted.len() / 2;
+        let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let counts = &full.field(fields.count())[windows.clone()];
+        for ((count, weight), misfit) in counts.iter().zip(&mut weights).zip(&misfits) {
+            let independent = (count / expected.redundancy - 2.0).max(1.0);
+            let most = median.max(1.0) * (1.0 + TOLERATED * (2.0 / independent).sqrt());
+            if *weight > 0.0 {
+                *weight = if *misfit > most { (most / misfit).powi(2) } else { 1.0 };
+            }
+        }
+        pooled = solve(full, &windows, &weights, instructions)?;
+    }
+    Some(Pooled { weights, ..pooled })
+}
+
+/// The residual sums of squares of some windows over what their noise should leave.
+pub(crate) fn misfits(full: &Solved, windows: &Range<usize>, values: &[f64], expected: Expected) -> Vec<f64> {
+    let field = |field: usize| &full.field(field)[windows.clone()];
+    let (counts, freedoms) = (field(full.fields.count()), field(full.fields.freedom()));
+    let mut misfits = sums_of_squares(full, windows, values);
+    for ((misfit, &count), &freedom) in misfits.iter_mut().zip(counts).zip(freedoms) {
+        let noise = count * expected.variance;
+        let left = (noise - freedom).max(0.3 * noise);
+        *misfit = (*misfit + count * (expected.variance - expected.torque)) / left;
+    }
+    misfits
+}
+
+/// The residual sums of squares of some windows for given constants, the angle's noise taken off.
+pub(crate) fn sums_of_squares(full: &Solved, windows: &Range<usize>, values: &[f64]) -> Vec<f64> {
+    let (fields, constants) = (full.fields, full.fields.layout.constant);
+    let left = |row: usize, column: usize| &full.field(fields.left(row, column))[windows.clone()];
+    let mut sums = left(constants, constants).to_vec();
+    for row in 0..constants {
+        let mut errors = left(row, constants).to_vec();
+        for (column, value) in values.iter().enumerate().take(constants).skip(row) {
+            errors.iter_mut().zip(left(row, column)).for_each(|(error, factor)| *error -= factor * value);
+        }
+        sums.iter_mut().zip(errors).for_each(|(sum, error)| *sum += error * error);
+    }
+    sums
+}
+
+/// How much each constant takes part in the combination that all windows together determine worst, its column scaled to its norm.
+pub(crate) fn weakest(full: &Solved, weights: &[f64]) -> Vec<f64> {
+    let constants = full.fields.layout.constant;
+    if constants == 0 {
+        return Vec::new();
+    }
+    let (total, norms) = Stack { full, windows: &(0..full.len()), weights }.run(pulp::Scalar::new());
+    total.weakest(&norms)
+}
+
+fn solve(full: &Solved, windows: &Range<usize>, weights: &[f64], instructions: Instructions) -> Option<Pooled> {
+    let fields = full.fields;
+    let constants = fields.layout.constant;
+    if constants == 0 {
+        return Some(Pooled { condition: 1.0, ..Pooled::default() });
+    }
+    let (total, norms) = dispatch(instructions, Stack { full, windows, weights });
+    let (values, inverse, condition) = total.solution(&norms)?;
+    Some(Pooled { values, inverse, condition, weights: Vec::new() })
+}
+
+/// Stacks what windows left for the constants and decomposes it, eight windows at a time.
+struct Stack<'a> {
+    full: &'a Solved,
+    windows: &'a Range<usize>,
+    weights: &'a [f64],
+}
+
+impl Kernel for Stack<'_> {
+    /// The factor, and the squared norms of the columns before anything was eliminated.
+    type Output = (Summary, Vec<f64>);
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _simd: S) -> (Summary, Vec<f64>) {
+        let fields = self.full.fields;
+        let constants = fields.layout.constant;
+        let layout = Layout { windowed: 0, linear: false, constant: constants };
+        let columns = layout.columns();
+        let mut factor = vec![Packet::ZERO; layout.size()];
+        let mut rows = vec![Packet::ZERO; columns * columns];
+        let mut norms = vec![0.0; constants];
+        let enough = fields.layout.regressors() as f64;
+        for first in self.windows.clone().step_by(WIDTH) {
+            let mut weight = Packet::ZERO;
+            for (lane, weight) in weight.0.iter_mut().enumerate() {
+                let window = first + lane;
+                if self.windows.contains(&window) && self.full.field(fields.count())[window] > enough {
+                    *weight = self.weights[window - self.windows.start];
+                }
+            }
+            let root = weight.sqrt();
+            let place = first.cast_signed();
+            for row in 0..constants {
+                for column in row..columns {
+                    let value = Packet::gather(self.full.field(fields.left(row, column)), place, 1);
+                    rows[row * columns + column] = root * value;
+                }
+                let squared = weight * Packet::gather(self.full.field(fields.norm(row)), place, 1);
+                norms[row] += squared.0.iter().sum::<f64>();
+            }
+            absorb(layout, &mut factor, &mut rows, constants, true);
+        }
+        let entry = |row: usize, column: usize| {
+            let (lane, row) = (row / columns, row % columns);
+            if column < row { 0.0 } else { factor[layout.entry(row, column)].0[lane] }
+        };
+        (Summary::from_rows(WIDTH * columns, columns, entry), norms)
+    }
+}
+
+/// How every row within some windows moves a constant: a column of `X̃`, so that the constants are `N⁻¹ X̃ᵀ b`.
+///
+/// `step` and `span` are the rows from one window to the next and the rows of a window, `centre` where each is solved.
+pub(crate) fn influence(
+    problem: &Problem<'_>,
+    (full, windows): (&Solved, Range<usize>),
+    weights: &[f64],
+    [step, span]: [usize; 2],
+    centre: impl Fn(usize) -> f64,
+    constant: usize,
+) -> Vec<f64> {
+    let layout = problem.layout;
+    let (fields, q) = (full.fields, layout.windowed);
+    let (rows, blocks) = (problem.rows(), span / step);
+    let first_block = full.first + windows.start.cast_signed();
+    let row =
+        |block: usize| usize::try_from((first_block + block.cast_signed()) * step.cast_signed()).unwrap_or(0).min(rows);
+    let reached = row(0)..row(windows.len() + blocks).max(row(0));
+    let mut column = vec![0.0; reached.len()];
+    // Sums over windows from the first on: weights, then by regressor the part at the window's centre, its rate, and the rate times
+    // the centre. The windows over a block are a stretch of them.
+    let width = 1 + 3 * q;
+    let mut sums = vec![0.0; (windows.len() + 1) * width];
+    for (place, window) in windows.clone().enumerate() {
+        let weight = weights[place];
+        let (before, after) = sums[place * width..(place + 2) * width].split_at_mut(width);
+        after.copy_from_slice(before);
+        after[0] += weight;
+        for regressor in 0..q {
+            let value = weight * full.field(fields.solution(regressor, constant))[window];
+            let rate =
+                if layout.linear { weight * full.field(fields.solution(q + regressor, constant))[window] } else { 0.0 };
+            let parts = [value, rate, rate * centre(window)];
+            after[1 + 3 * regressor..][..3].iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
+        }
+    }
+    let mut taken = vec![0.0; width];
+    for block in 0..windows.len() + blocks - 1 {
+        let covering = block.saturating_sub(blocks - 1)..(block + 1).min(windows.len());
+        let first = (first_block + block.cast_signed()) * step.cast_signed();
+        let Ok(first) = usize::try_from(first) else { continue };
+        for (index, taken) in taken.iter_mut().enumerate() {
+            *taken = sums[covering.end * width + index] - sums[covering.start * width + index];
+        }
+        let last = (first + step).min(rows);
+        for (row, influence) in (first..last).zip(column.get_mut(first - reached.start..).unwrap_or_default()) {
+            let mut value = taken[0] * problem.constants[constant][row];
+            for (regressor, part) in taken[1..].chunks_exact(3).enumerate() {
+                let at_row = part[0] + problem.period * (row as f64 * part[1] - part[2]);
+                value -= at_row * problem.windowed[regressor][row];
+                if layout.linear {
+                    value -= part[1] * problem.companions[regressor][row];
+                }
+            }
+            *influence = value;
+        }
+    }
+    column
+}
+
+/// Covariance of the constants, row by row: `N⁻¹ X̃ᵀ Γ X̃ N⁻¹`.
+pub(crate) fn sandwich(influence: &[Vec<f64>], inverse: &[f64], covariance: &RowCovariance) -> Vec<f64> {
+    let middle = (0..influence.len()).flat_map(|constant| products(influence, constant, covariance));
+    between(&middle.collect::<Vec<_>>(), inverse, influence.len())
+}
+
+/// What the rows' covariance makes of a constant and every other: a row of `X̃ᵀ Γ X̃`.
+pub(crate) fn products(influence: &[Vec<f64>], constant: usize, covariance: &RowCovariance) -> Vec<f64> {
+    let noisy = covariance.times(&influence[constant]);
+    influence.iter().map(|other| other.iter().zip(&noisy).map(|(a, b)| a * b).sum()).collect()
+}
+
+/// A square matrix of so many rows between the inverse of the normal matrix and itself.
+pub(crate) fn between(middle: &[f64], inverse: &[f64], size: usize) -> Vec<f64> {
+    let product = |a: &[f64], b: &[f64]| -> Vec<f64> {
+        let entry = |i: usize, j: usize| (0..size).map(|k| a[i * size + k] * b[k * size + j]).sum();
+        (0..size * size).map(|index| entry(index / size, index % size)).collect()
+    };
+    let result = product(&product(inverse, middle), inverse);
+    (0..size * size).map(|index| f64::midpoint(result[index], result[index % size * size + index / size])).collect()
+}
+
+/// The covariance of two unknowns, of which the first `windowed` ones depend on `constants` others that come after them: the covariance of
+/// their `own`, for given constants, and what the constants pass on to them.
+pub(crate) fn joint_covariance(
+    [one, other]: [usize; 2],
+    [windowed, constants]: [usize; 2],
+    own: impl Fn(usize, usize) -> f64,
+    sensitive: impl Fn(usize, usize) -> f64,
+    between: impl Fn(usize, usize) -> f64,
+) -> f64 {
+    let to = |unknown: usize, constant: usize| -> f64 {
+        (0..constants).map(|k| sensitive(unknown, k) * between(k, constant)).sum()
+    };
+    match (one.checked_sub(windowed), other.checked_sub(windowed)) {
+        (Some(one), Some(other)) => between(one, other),
+        (Some(constant), None) => to(other, constant),
+        (None, Some(constant)) => to(one, constant),
+        (None, None) => {
+            let passed_on: f64 = (0..constants)
+                .flat_map(|i| (0..constants).map(move |j| (i, j)))
+                .map(|(i, j)| sensitive(one, i) * sensitive(other, j) * between(i, j))
+                .sum();
+            own(one, other) + passed_on
+        }
+    }
+}
+
+/// What a window says of its own unknown at its centre, and per second, for given constants.
+pub(crate) fn local(full: &Solved, window: usize, values: &[f64], local: usize) -> f64 {
+    let fields = full.fields;
+    let mut value = full.field(fields.solution(local, fields.layout.constant))[window];
+    for (constant, factor) in values.iter().enumerate() {
+        value -= full.field(fields.solution(local, constant))[window] * factor;
+    }
+    value
+}
+
+/// How a window's own unknown changes with a constant at a time, in seconds after the window's centre.
+pub(crate) fn sensitivity(full: &Solved, window: usize, local: usize, constant: usize, later: f64) -> f64 {
+    let (fields, layout) = (full.fields, full.fields.layout);
+    let mut value = full.field(fields.solution(local, constant))[window];
+    if layout.linear {
+        value += later * full.field(fields.solution(layout.windowed + local, constant))[window];
+    }
+    -value
+}
+
+/// Whether a window has more rows than unknowns.
+pub(crate) fn is_determined(solved: &Solved, window: usize) -> bool {
+    let Fields { layout } = solved.fields;
+    solved.field(solved.fields.count())[window] > (layout.regressors() + 1) as f64
+}

@@ -1,0 +1,16 @@
+//! Unknowns that belong to windows beside unknowns that the whole record shares: their fit, with the noise of the regressors taken off.
+
+pub(crate) mod centred_windows;
+pub(crate) mod constants;
+pub(crate) mod dyadic_windows;
+pub(crate) mod factor;
+pub(crate) mod limits;
+pub(crate) mod model;
+pub(crate) mod newey_west;
+pub(crate) mod residuals;
+pub(crate) mod row_covariance;
+pub(crate) mod subsample;
+pub(crate) mod whitening;
+pub(crate) mod window_length;
+
+pub use limits::{HARDLY_TOLD_APART, NOISE_MODEL_FAILS};

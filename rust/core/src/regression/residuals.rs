@@ -1,0 +1,31 @@
+//! What a fit leaves of the rows.
+
+use crate::error::Error;
+use crate::exec::stages::Run;
+use crate::regression::constants::is_determined;
+use crate::regression::dyadic_windows::Problem;
+use crate::regression::model::{Fit, Predictor, without_constants};
+
+/// What a fit leaves of every row, and where it says anything; zero where it says nothing.
+pub(crate) fn residuals(
+    problem: &Problem<'_>,
+    fit: &Fit,
+    run: &mut Run<'_, '_>,
+) -> Result<(Vec<f64>, Vec<bool>), Error> {
+    let mut left = without_constants(problem, &fit.pooled.values);
+    let windowed = problem.layout.windowed > 0;
+    if windowed {
+        let predictor = Predictor::new(&fit.full, &fit.pooled.values);
+        run.fill([&mut left], |rows, columns| {
+            for (row, left) in rows.zip(&mut *columns[0]).filter(|(row, _)| problem.usable[*row]) {
+                let place = fit.nearest(row);
+                let later = (row as f64 - fit.centre(place)) * problem.period;
+                let determined = is_determined(&fit.full, place);
+                *left = if determined { *left - predictor.predict(problem, place, row, later) } else { 0.0 };
+            }
+        })?;
+    }
+    let says = |(row, usable): (usize, &bool)| *usable && (!windowed || is_determined(&fit.full, fit.nearest(row)));
+    let usable = problem.usable.iter().enumerate().map(says).collect();
+    Ok((left, usable))
+}

@@ -1,0 +1,182 @@
+//! The covariance of rows: known from the noise of both channels, or taken from the residuals.
+
+use std::ops::Range;
+
+use crate::error::Error;
+use crate::exec::stages::Run;
+use crate::regression::dyadic_windows::Correlated;
+use crate::weak_form::test_function::Kernels;
+
+/// Correlations that exceed their standard deviation so many times are no chance.
+const CHANCE: f64 = 5.0;
+
+/// Covariance of rows by their distance.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct RowCovariance {
+    /// By distance in rows, from the variance on.
+    pub(crate) lags: Vec<f64>,
+}
+
+impl RowCovariance {
+    /// What noise of both channels makes of rows `stride` samples apart. `parameters` are inertia, damping and stiffness; the noise is
+    /// given by its variance, that of the angle first.
+    pub(crate) fn known(
+        kernels: &Kernels,
+        torque: &[f64],
+        parameters: [f64; 3],
+        noise: [f64; 2],
+        stride: usize,
+    ) -> Self {
+        let [inertia, damping, stiffness] = &kernels.values;
+        let mixed: Vec<f64> = (0..inertia.len())
+            .map(|k| parameters[0] * inertia[k] + parameters[1] * damping[k] + parameters[2] * stiffness[k])
+            .collect();
+        let lags = (0..inertia.len())
+            .step_by(stride)
+            .map(|lag| noise[0] * products(&mixed, &mixed, lag) + noise[1] * products(torque, torque, lag));
+        Self { lags: lags.collect() }
+    }
+
+    /// That of rows with independent noise of variance one.
+    pub(crate) fn white() -> Self {
+        Self { lags: vec![1.0] }
+    }
+
+    /// The covariance that residuals show up to some distance, tapered so that it stays one.
+    pub(crate) fn of_residuals(residuals: &[f64], usable: &[bool], farthest: usize) -> Self {
+        let whole = usable.iter().all(|&usable| usable);
+        let missing = |(residual, usable): (&f64, &bool)| if *usable { *residual } else { 0.0 };
+        let residuals: Vec<f64> = residuals.iter().zip(usable).map(missing).collect();
+        let lags = (0..=farthest).map(|lag| {
+            let rows = residuals.len().saturating_sub(lag);
+            let later = residuals.len() - rows;
+            let pairs = || usable[..rows].iter().zip(&usable[later..]);
+            let count = if whole { rows } else { pairs().filter(|(early, late)| **early && **late).count() } as f64;
+            let sum = sum_of_products(&residuals[..rows], &residuals[later..]);
+            (1.0 - lag as f64 / (farthest + 1) as f64) * sum / count.max(1.0)
+        });
+        Self { lags: lags.collect() }
+    }
+
+    /// Whether rows so far apart that they share no sample are correlated, by more than a part of the variance and than chance.
+    pub(crate) fn is_coloured(&self, reach: usize, part: f64, rows: usize) -> bool {
+        let chance = CHANCE * (self.redundancy() / rows.max(1) as f64).sqrt();
+        self.lags.iter().skip(reach + 1).any(|lag| lag.abs() > part.max(chance) * self.lags[0])
+    }
+
+    /// The squares of the correlations that residuals show, without the taper, together.
+    pub(crate) fn squared_correlations(&self) -> f64 {
+        let taper = |lag: usize| 1.0 - lag as f64 / self.lags.len() as f64;
+        (1..self.lags.len()).map(|lag| (self.lags[lag] / taper(lag) / self.lags[0]).powi(2)).sum()
+    }
+
+    /// Variance of a row.
+    pub(crate) fn variance(&self) -> f64 {
+        self.lags[0]
+    }
+
+    /// How many rows stand for one independent row: the sum of the squared correlations.
+    pub(crate) fn redundancy(&self) -> f64 {
+        let squared = |lag: &f64| (lag / self.lags[0]).powi(2);
+        1.0 + 2.0 * self.lags[1..].iter().map(squared).sum::<f64>()
+    }
+
+    /// The covariance times a column.
+    pub(crate) fn times(&self, column: &[f64]) -> Vec<f64> {
+        let mut result = vec![0.0; column.len()];
+        self.add(column, 0..column.len(), |lag| [self.lags[lag]; 2], &mut result);
+        result
+    }
+
+    /// The covariance times windowed regressors and their companions, whose times count from their own row.
+    pub(crate) fn correlated(
+        &self,
+        windowed: &[&[f64]],
+        companions: &[&[f64]],
+        period: f64,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Correlated, Error> {
+        let columns = || windowed.iter().map(|column| vec![0.0; column.len()]).collect::<Vec<_>>();
+        let mut found = Correlated { variance: self.variance(), windowed: columns(), companions: columns() };
+        run.fill(found.windowed.iter_mut().chain(&mut found.companions), |rows, columns| {
+            let (values, slopes) = columns.split_at_mut(windowed.len());
+            for (regressor, (value, slope)) in values.iter_mut().zip(slopes).enumerate() {
+                self.add(windowed[regressor], rows.clone(), |lag| [self.lags[lag]; 2], value);
+                self.add(companions[regressor], rows.clone(), |lag| [self.lags[lag]; 2], slope);
+                let weight = |lag: usize| self.lags[lag] * lag as f64 * period;
+                self.add(windowed[regressor], rows.clone(), |lag| [weight(lag), -weight(lag)], slope);
+            }
+        })?;
+        Ok(found)
+    }
+
+    /// Adds a column to some of its rows, each row's neighbours by their distance with one weight for those that come later and one for
+    /// those that came before.
+    fn add(&self, column: &[f64], rows: Range<usize>, weights: impl Fn(usize) -> [f64; 2], sums: &mut [f64]) {
+        for lag in 0..self.lags.len().min(column.len()) {
+            let [later, before] = weights(lag);
+            // The last rows have no neighbours so far behind them.
+            let late = column.get(rows.start + lag..).unwrap_or_default();
+            sums.iter_mut().zip(late).for_each(|(sum, value)| *sum += later * value);
+            if lag > 0 && rows.end > lag {
+                let first = rows.start.max(lag);
+                let early = &column[first - lag..rows.end - lag];
+                sums[first - rows.start..].iter_mut().zip(early).for_each(|(sum, value)| *sum += before * value);
+            }
+        }
+    }
+}
+
+/// The dot product of two columns, in eight sums side by side: one alone waits for every addition.
+fn sum_of_products(one: &[f64], other: &[f64]) -> f64 {
+    let ((one, one_rest), (other, other_rest)) = (one.as_chunks::<8>(), other.as_chunks::<8>());
+    let mut sums = [0.0; 8];
+    for (one, other) in one.iter().zip(other) {
+        for lane in 0..8 {
+            sums[lane] += one[lane] * other[lane];
+        }
+    }
+    let rest: f64 = one_rest.iter().zip(other_rest).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f64>() + rest
+}
+
+/// `Σ_k a(k) b(k + lag)` for two kernels of one length.
+pub(crate) fn products(one: &[f64], other: &[f64], lag: usize) -> f64 {
+    sum_of_products(&one[..one.len() - lag], &other[lag..])
+}
+
+#[cfg(test)]
+mod tests {
+    use std::num::NonZeroUsize;
+
+    use super::*;
+    use crate::exec::pool::ROWS;
+
+    /// The same sums in the same order, however few rows the last piece has.
+    #[test]
+    fn the_last_rows_of_a_long_column_have_fewer_neighbours() {
+        let covariance = RowCovariance { lags: vec![1.0, -0.5, 0.25, 0.125, 3.0] };
+        for count in (1..8).map(|more| ROWS + more).chain([1, 2, 3, 7, ROWS]) {
+            let column: Vec<f64> = (0..count).map(|row| (row as f64 * 0.7).sin()).collect();
+            let mut watch = |_: usize, _: usize| true;
+            let mut run = Run::new(NonZeroUsize::MIN, 1, 1, &mut watch);
+            let found = covariance.correlated(&[&column], &[&column], 0.5, &mut run).expect("not cancelled");
+            let at = |row: isize| usize::try_from(row).ok().and_then(|row| column.get(row)).copied().unwrap_or(0.0);
+            for row in (0..count).rev().take(12) {
+                let lags = covariance.lags.iter().enumerate().skip(1);
+                let sides = lags.clone().map(|(lag, weight)| {
+                    let (row, lag) = (row.cast_signed(), lag.cast_signed());
+                    [weight * at(row + lag), weight * at(row - lag)]
+                });
+                let value = column[row] + sides.clone().map(|[late, early]| late + early).sum::<f64>();
+                let slope =
+                    lags.zip(sides).map(|((lag, _), [late, early])| lag as f64 * 0.5 * (late - early)).sum::<f64>();
+                let near = |a: f64, b: f64| (a - b).abs() < 20.0 * f64::EPSILON * 10.0;
+                assert!(
+                    near(found.windowed[0][row], value) && near(found.companions[0][row], value + slope),
+                    "{row} of {count}"
+                );
+            }
+        }
+    }
+}

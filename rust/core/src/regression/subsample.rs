@@ -1,0 +1,76 @@
+//! Rows of parts of a long record that stand for all of them, where something is only to be chosen.
+
+use std::ops::Range;
+
+use crate::equation::rows::BLOCK;
+use crate::equation::rows::{Regressor, Rows};
+use crate::record::subsample::stretches;
+use crate::regression::window_length::Scale;
+
+/// The same for rows, each stretch from the beginning of a block of them.
+pub(crate) fn stretches_of_blocks(rows: usize, most: usize, count: usize) -> Vec<Range<usize>> {
+    stretches(rows, most, count).map(|one| one.start - one.start % BLOCK..one.end - one.start % BLOCK).collect()
+}
+
+/// A column in stretches, one after another.
+pub(crate) fn thinned_column<T: Copy>(column: &[T], stretches: &[Range<usize>]) -> Vec<T> {
+    stretches.iter().flat_map(|stretch| column.get(stretch.clone()).unwrap_or_default().iter().copied()).collect()
+}
+
+/// Rows in stretches, one after another; windows do not reach from one to the next.
+pub(crate) fn thinned_rows(rows: &Rows, stretches: &[Range<usize>]) -> Rows {
+    let column = |values: &Vec<f64>| thinned_column(values, stretches);
+    let regressor = |one: &Regressor| Regressor {
+        value: column(&one.value),
+        companion: column(&one.companion),
+        noise: one.noise.clone(),
+    };
+    let mut jumps = Vec::new();
+    let mut before = 0;
+    for stretch in stretches {
+        if before > 0 {
+            jumps.push(before);
+        }
+        let inside = rows.jumps.iter().filter(|jump| (stretch.start + 1..stretch.end).contains(jump));
+        jumps.extend(inside.map(|jump| before + jump - stretch.start));
+        before += stretch.len();
+    }
+    Rows {
+        regressors: rows.regressors.iter().map(regressor).collect(),
+        side: column(&rows.side),
+        side_noise: rows.side_noise.clone(),
+        usable: thinned_column(&rows.usable, stretches),
+        jumps,
+        period: rows.period,
+    }
+}
+
+/// Rows of a record with more are thinned where something is only to be chosen: to so many, in so many stretches.
+const LONG: usize = 1 << 15;
+const MOST_ROWS: usize = 1 << 14;
+const STRETCHES: usize = 8;
+
+/// The stretches that stand for so many rows, where those are many.
+pub(crate) fn stretches_of_rows(rows: usize) -> Option<Vec<Range<usize>>> {
+    (rows > LONG).then(|| stretches_of_blocks(rows, MOST_ROWS, STRETCHES))
+}
+
+/// Whether stretches of rows hold enough windows of a length.
+pub(crate) fn holds(scale: Scale) -> bool {
+    2 * scale.span() <= MOST_ROWS / STRETCHES
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stretches_of_rows_begin_with_a_block() {
+        for rows in [40_000, 1_000_003] {
+            let parts = stretches_of_rows(rows).unwrap();
+            assert_eq!(parts.iter().map(Range::len).sum::<usize>(), MOST_ROWS);
+            assert!(parts.iter().all(|part| part.start % BLOCK == 0 && part.end <= rows));
+            assert!(rows - parts[STRETCHES - 1].end < BLOCK);
+        }
+    }
+}

@@ -1,0 +1,289 @@
+//! Rows whose noise is white: each freed from what the rows before it already say of its noise.
+//!
+//! Rows that share samples have correlated noise, and where the angle's noise dominates, hardly any of it lies at the resonance, where
+//! `I θ̈ + C θ̇ + K θ` is small. Least squares that weigh all rows alike throw that away. With the factor `Γ = L Lᵀ` of the rows' covariance,
+//! the rows `L⁻¹ X` and `L⁻¹ b` have noise of variance one, and their least squares are those of maximum likelihood in the frequency domain
+//! (Aitken 1935) as far as the test function lets frequencies through.
+//!
+//! Γ has a few diagonals only, so has L, and its rows settle a while after a gap. What the angle's noise adds to the normal matrix is
+//! `tr(Γ⁻¹ G)` for the products `G` of two kernels, the derivative of `log det Γ` in the direction of `G`: it is found row by row, exactly, by
+//! differentiating the factorisation.
+
+use std::collections::VecDeque;
+
+use crate::equation::rows::{Regressor, Rows};
+use crate::error::Error;
+use crate::exec::pool::Piece;
+use crate::exec::stages::Run;
+use crate::regression::row_covariance::{RowCovariance, products};
+
+/// What is added to the variance of a row, so that frequencies that a test function lets next to nothing of through do not count.
+const RIDGE: f64 = 1e-6;
+
+/// Rows of the factor have settled where they change by less than this part.
+const SETTLED: f64 = 1e-8;
+
+/// Rows after a gap until the factor is taken to have settled, at most.
+const MOST: usize = 1 << 13;
+
+/// How rows are made white.
+#[derive(Clone, Debug)]
+pub(crate) struct Whitening {
+    /// Rows of the factor after a gap, until they have settled: the entry of the row itself, then of the rows before it, nearest first.
+    factor: Vec<Vec<f64>>,
+    /// What noise of variance one adds to the products of every two kernels in these rows.
+    grams: Vec<Vec<f64>>,
+}
+
+/// A row of the factor, and its derivatives in some directions.
+struct Factored {
+    entries: Vec<f64>,
+    changes: Vec<Vec<f64>>,
+}
+
+impl Whitening {
+    /// How rows with some covariance are made white; nothing where it is none.
+    pub(crate) fn new(covariance: &RowCovariance, rows: &Rows, stride: usize) -> Option<Self> {
+        let mut lags = covariance.lags.clone();
+        lags[0] *= 1.0 + RIDGE;
+        let kernels = kernels(rows);
+        let directions: Vec<Vec<f64>> =
+            pairs(kernels.len()).map(|(i, j)| both(kernels[i], kernels[j], lags.len(), stride)).collect();
+        let (mut factor, mut grams) = (Vec::<Vec<f64>>::new(), Vec::new());
+        let mut before: VecDeque<Factored> = VecDeque::new();
+        while factor.len() < rows.len().min(MOST) {
+            let next = Factored::after(&before, &lags, &directions)?;
+            let gram = next.changes.iter().map(|change| 2.0 * change[0] / next.entries[0]);
+            grams.push(gram.collect());
+            let settled = factor.last().is_some_and(|last| {
+                let moved = last.iter().zip(&next.entries).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                last.len() == lags.len() && moved <= SETTLED * next.entries[0]
+            });
+            factor.push(next.entries.clone());
+            if settled {
+                break;
+            }
+            before.push_front(next);
+            before.truncate(lags.len() - 1);
+        }
+        (!factor.is_empty()).then_some(Self { factor, grams })
+    }
+
+    /// Rows made white.
+    pub(crate) fn apply(&self, rows: &Rows, run: &mut Run<'_, '_>) -> Result<Rows, Error> {
+        let columns = rows.regressors.iter().map(|regressor| &regressor.value).chain([&rows.side]);
+        let pieces = columns.map(|column| Piece { size: rows.len(), content: column });
+        let mut white = run.map(pieces.collect(), || (), |column: &Vec<f64>, (): &mut ()| self.column(rows, column))?;
+        let side = white.pop().unwrap_or_default();
+        let roots = self.noise(rows);
+        let mut roots = roots.into_iter();
+        let mut root =
+            |kernel: &Vec<f64>| if kernel.is_empty() { Vec::new() } else { roots.next().unwrap_or_default() };
+        let regressors = white.into_iter().zip(&rows.regressors).map(|(value, regressor)| Regressor {
+            value,
+            companion: Vec::new(),
+            noise: [root(&regressor.noise[0]), Vec::new()],
+        });
+        let regressors = regressors.collect();
+        let side_noise = root(&rows.side_noise);
+        let (usable, jumps) = (rows.usable.clone(), rows.jumps.clone());
+        Ok(Rows { regressors, side, side_noise, usable, jumps, period: rows.period })
+    }
+
+    fn column(&self, rows: &Rows, column: &[f64]) -> Vec<f64> {
+        let mut white = vec![0.0; column.len()];
+        for (row, since) in since_gaps(rows).enumerate() {
+            let Some(since) = since else { continue };
+            let factor = self.at(since);
+            let before = factor[1..].iter().zip(white[..row].iter().rev());
+            white[row] = (column[row] - before.map(|(entry, value)| entry * value).sum::<f64>()) / factor[0];
+        }
+        white
+    }
+
+    fn at(&self, since: usize) -> &[f64] {
+        &self.factor[since.min(self.factor.len() - 1)]
+    }
+
+    /// Vectors in place of the kernels, whose products are what noise of variance one adds to a row on average.
+    fn noise(&self, rows: &Rows) -> Vec<Vec<f64>> {
+        let size = kernels(rows).len();
+        let (mut mean, mut count) = (vec![0.0; size * (size + 1) / 2], 0.0_f64);
+        for since in since_gaps(rows).flatten() {
+            let gram = &self.grams[since.min(self.grams.len() - 1)];
+            mean.iter_mut().zip(gram).for_each(|(sum, entry)| *sum += entry);
+            count += 1.0;
+        }
+        let mean: Vec<f64> = mean.into_iter().map(|sum| sum / count.max(1.0)).collect();
+        square_root(&mean, size)
+    }
+}
+
+impl Factored {
+    /// The row of the factor after some others, the last of which comes first; nothing where the covariance is none.
+    fn after(before: &VecDeque<Self>, lags: &[f64], directions: &[Vec<f64>]) -> Option<Self> {
+        let depth = before.len();
+        let mut entries = vec![0.0; depth + 1];
+        let mut changes = vec![vec![0.0; depth + 1]; directions.len()];
+        for k in (1..=depth).rev() {
+            let other = &before[k - 1];
+            let shared = || (k + 1..=depth).zip(1..other.entries.len());
+            let sum = lags[k] - shared().map(|(own, its)| entries[own] * other.entries[its]).sum::<f64>();
+            entries[k] = sum / other.entries[0];
+            for ((change, direction), theirs) in changes.iter_mut().zip(directions).zip(&other.changes) {
+                let products = shared().map(|(own, its)| change[own] * other.entries[its] + entries[own] * theirs[its]);
+                let sum = direction[k] - products.sum::<f64>();
+                change[k] = (sum - entries[k] * theirs[0]) / other.entries[0];
+            }
+        }
+        let squared = lags[0] - entries.iter().map(|entry| entry * entry).sum::<f64>();
+        if squared.is_nan() || squared <= 0.0 {
+            return None;
+        }
+        entries[0] = squared.sqrt();
+        for (change, direction) in changes.iter_mut().zip(directions) {
+            let products = (1..=depth).map(|k| entries[k] * change[k]).sum::<f64>();
+            change[0] = (direction[0] - 2.0 * products) / (2.0 * entries[0]);
+        }
+        Some(Self { entries, changes })
+    }
+}
+
+/// The kernels that the angle's noise enters by: of regressors, then of the right-hand side, as far as it does.
+fn kernels(rows: &Rows) -> Vec<&[f64]> {
+    let all = rows.regressors.iter().map(|regressor| &regressor.noise[0]).chain([&rows.side_noise]);
+    all.filter(|kernel| !kernel.is_empty()).map(Vec::as_slice).collect()
+}
+
+/// The lower half of a square of so many rows.
+fn pairs(size: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..size).flat_map(|i| (0..=i).map(move |j| (i, j)))
+}
+
+/// The covariance that noise of variance one gives two columns, by the distance of the rows, either before the other.
+fn both(one: &[f64], other: &[f64], lags: usize, stride: usize) -> Vec<f64> {
+    let either = |lag: usize| f64::midpoint(products(one, other, lag * stride), products(other, one, lag * stride));
+    (0..lags).map(either).collect()
+}
+
+/// For every row that can be used, how many have come before it since the last gap.
+fn since_gaps(rows: &Rows) -> impl Iterator<Item = Option<usize>> {
+    let mut since = 0;
+    rows.usable.iter().map(move |&usable| {
+        let place = since;
+        since = if usable { place + 1 } else { 0 };
+        usable.then_some(place)
+    })
+}
+
+/// Vectors with given products, the lower half row by row.
+fn square_root(products: &[f64], size: usize) -> Vec<Vec<f64>> {
+    let mut root = vec![vec![0.0; size]; size];
+    for (place, (i, j)) in pairs(size).enumerate() {
+        let left = products[place] - (0..j).map(|k| root[i][k] * root[j][k]).sum::<f64>();
+        let scale = products[place];
+        root[i][j] = if i == j {
+            // What others say already has nothing left but rounding.
+            if left > f64::EPSILON.sqrt() * scale { left.sqrt() } else { 0.0 }
+        } else if root[j][j] > 0.0 {
+            left / root[j][j]
+        } else {
+            0.0
+        };
+    }
+    root
+}
+
+#[cfg(test)]
+mod tests {
+    use std::num::NonZeroUsize;
+
+    use super::*;
+    use crate::weak_form::test_function::TestFunction;
+
+    const STRIDE: usize = 5;
+    /// Rows of the factor are made from sums of a few products, each row from those before it: relative errors stay near those of one sum.
+    const ROUNDING: f64 = 1e-9;
+
+    /// Rows whose regressors are the columns of a unit matrix, some of them missing, for the kernels of inertia, damping and stiffness.
+    fn units(count: usize, missing: &[usize]) -> (Rows, RowCovariance) {
+        let function = TestFunction::new(30, 8, 1e-3).expect("a test function");
+        let kernels = function.kernels(0.0).values;
+        let covariance =
+            RowCovariance::known(&function.kernels(0.0), &kernels[2], [0.01, 0.1, 15.0], [1e-4, 1e-2], STRIDE);
+        let column = |one: usize| (0..count).map(|row| f64::from(u8::from(row == one))).collect::<Vec<_>>();
+        let noise = |one: usize| [kernels.get(one).cloned().unwrap_or_default(), Vec::new()];
+        let regressors =
+            (0..count).map(|one| Regressor { value: column(one), companion: Vec::new(), noise: noise(one) });
+        let usable = (0..count).map(|row| !missing.contains(&row)).collect();
+        let mut rows = Rows { regressors: regressors.collect(), side: vec![0.0; count], usable, ..Rows::default() };
+        rows.clear_unusable();
+        (rows, covariance)
+    }
+
+    fn whitened(rows: &Rows, covariance: &RowCovariance) -> Rows {
+        let mut watch = |_: usize, _: usize| true;
+        let mut run = Run::new(NonZeroUsize::MIN, 1, 1, &mut watch);
+        let whitening = Whitening::new(covariance, rows, STRIDE).expect("a covariance");
+        whitening.apply(rows, &mut run).expect("not cancelled")
+    }
+
+    /// A number for every two rows by their distance, zero where either is missing or a gap lies between them.
+    fn banded(rows: &Rows, by_distance: impl Fn(usize) -> f64) -> Vec<Vec<f64>> {
+        let entry = |i: usize, j: usize| {
+            let between = i.min(j)..=i.max(j);
+            if between.clone().all(|row| rows.usable[row]) { by_distance(i.abs_diff(j)) } else { 0.0 }
+        };
+        (0..rows.len()).map(|i| (0..rows.len()).map(|j| entry(i, j)).collect()).collect()
+    }
+
+    /// `W A Wᵀ` at some rows, for what is made of unit columns.
+    fn between(white: &Rows, middle: &[Vec<f64>], i: usize, j: usize) -> f64 {
+        let all = || 0..white.len();
+        let value = |row: usize, column: usize| white.regressors[column].value[row];
+        all().map(|k| all().map(|l| value(i, k) * middle[k][l] * value(j, l)).sum::<f64>()).sum()
+    }
+
+    #[test]
+    fn the_noise_of_white_rows_is_white_and_gaps_are_new_beginnings() {
+        let (rows, covariance) = units(90, &[0, 31, 32, 60]);
+        let white = whitened(&rows, &covariance);
+        let lag = |distance: usize| covariance.lags.get(distance).copied().unwrap_or(0.0);
+        let ridge = |distance: usize| if distance == 0 { (1.0 + RIDGE) * lag(0) } else { lag(distance) };
+        let noise = banded(&rows, ridge);
+        for i in 0..rows.len() {
+            for j in 0..rows.len() {
+                let expected = f64::from(u8::from(i == j && rows.usable[i]));
+                let found = between(&white, &noise, i, j);
+                assert!((found - expected).abs() < ROUNDING / RIDGE.sqrt(), "{i} {j}: {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_the_angles_noise_adds_is_exact_over_all_rows() {
+        let (rows, covariance) = units(70, &[25]);
+        let white = whitened(&rows, &covariance);
+        let kernel = |one: usize| rows.regressors[one].noise[0].as_slice();
+        for (one, other) in pairs(3) {
+            let lags = both(kernel(one), kernel(other), covariance.lags.len(), STRIDE);
+            let added = banded(&rows, |distance| lags.get(distance).copied().unwrap_or(0.0));
+            let expected: f64 = (0..rows.len()).map(|row| between(&white, &added, row, row)).sum();
+            let root = |which: usize| &white.regressors[which].noise[0];
+            let found: f64 = 69.0 * root(one).iter().zip(root(other)).map(|(a, b)| a * b).sum::<f64>();
+            let scale: f64 = [one, other].map(|one| root(one).iter().map(|a| a * a).sum::<f64>()).iter().product();
+            assert!((found - expected).abs() < ROUNDING * 69.0 * scale.sqrt(), "{one} {other}: {found} {expected}");
+        }
+    }
+
+    #[test]
+    fn long_records_go_on_as_soon_as_rows_have_settled() {
+        let (mut rows, covariance) = units(3, &[]);
+        rows.side.resize(4000, 0.0);
+        rows.usable.resize(4000, true);
+        let whitening = Whitening::new(&covariance, &rows, STRIDE).expect("a covariance");
+        assert!(whitening.factor.len() < 2000, "{}", whitening.factor.len());
+        let longer = RowCovariance { lags: vec![1.0, 0.6] };
+        assert!(Whitening::new(&longer, &rows, STRIDE).is_none(), "no covariance has such neighbours");
+    }
+}

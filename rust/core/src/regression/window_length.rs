@@ -1,0 +1,249 @@
+//! Windows of one length around a row: one that ends before it, one that begins after it, both of them, and all between as well.
+//!
+//! What a window says is checked against rows it has not seen: the torque of a row is predicted from the window before it, the window
+//! after it and both together, each at least the test function's half-width away. The row's own neighbourhood is used as well where an
+//! estimate is wanted. `step` neighbouring rows share their windows, a *cell*.
+
+use std::ops::Range;
+
+use crate::error::Error;
+use crate::exec::pool::Piece;
+use crate::exec::stages::Run;
+use crate::regression::dyadic_windows::{Problem, Shape, Solved, solve_windows};
+use crate::simd::vectors::Instructions;
+
+/// Cells in a piece of work.
+const PIECE: usize = 512;
+
+/// Rows of the smallest blocks: a third of a test function's half-width.
+const FINEST: usize = 2;
+
+/// Lengths of windows on one side, in blocks of two rows, then of four and so on.
+const BLOCKS: [usize; 2] = [6, 9];
+
+/// Shorter windows on one side: rows of a block, and blocks. They only serve two at a time.
+const SHORT: [[usize; 2]; 4] = [[1, 3], [FINEST, 2], [FINEST, 3], [FINEST, 4]];
+
+/// The shortest window that may serve alone, in rows: two and a half half-widths.
+pub(crate) const SHORTEST_ALONE: usize = 15;
+
+/// One length of windows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Scale {
+    /// Rows of a cell, and of a block.
+    pub(crate) step: usize,
+    /// Blocks of a window on one side.
+    blocks: usize,
+    /// Blocks between the windows on both sides.
+    gap: usize,
+    /// Rows that a window keeps away from the row it predicts.
+    pub(crate) reach: usize,
+}
+
+/// The windows of consecutive cells.
+#[derive(Clone, Debug)]
+pub(crate) struct Cells {
+    /// Windows on one side: that of cell `g` comes before its rows. They reach further than the cells, so that those that come after
+    /// are there too.
+    pub(crate) sides: Solved,
+    /// Both sides without what lies between.
+    pub(crate) hollow: Solved,
+    /// Everything.
+    pub(crate) full: Solved,
+}
+
+impl Scale {
+    /// All lengths that fit into so many rows, from the shortest to half of the rows.
+    pub(crate) fn all(rows: usize, reach: usize) -> Vec<Self> {
+        let mut scales: Vec<Self> = SHORT.iter().map(|&[step, blocks]| Self::new(step, blocks, reach)).collect();
+        let mut step = FINEST;
+        while scales.last().is_some_and(|scale| 2 * scale.span() <= rows) {
+            scales.extend(BLOCKS.map(|blocks| Self::new(step, blocks, reach)));
+            step *= 2;
+        }
+        scales.retain(|scale| 2 * scale.span() <= rows);
+        scales
+    }
+
+    /// The fewest rows that windows of any length fit into.
+    pub(crate) fn fewest_rows(reach: usize) -> usize {
+        let spans = SHORT.iter().map(|&[step, blocks]| Self::new(step, blocks, reach).span());
+        2 * spans.min().unwrap_or(0)
+    }
+
+    fn new(step: usize, blocks: usize, reach: usize) -> Self {
+        // Every row of a cell keeps its distance from both sides.
+        Self { step, blocks, gap: (2 * reach + step).saturating_sub(2).div_ceil(step), reach }
+    }
+
+    /// The scale whose full window is nearest to a number of rows.
+    pub(crate) fn nearest(scales: &[Self], rows: usize) -> Option<usize> {
+        let distance = |scale: &Self| (scale.span() as f64 / rows as f64).ln().abs();
+        (0..scales.len()).min_by(|&a, &b| distance(&scales[a]).total_cmp(&distance(&scales[b])))
+    }
+
+    /// Rows of a window on one side.
+    pub(crate) fn side(self) -> usize {
+        self.blocks * self.step
+    }
+
+    /// Rows of a full window.
+    pub(crate) fn span(self) -> usize {
+        (2 * self.blocks + self.gap) * self.step
+    }
+
+    /// Whether a window on one side is long enough to serve alone.
+    pub(crate) fn stands_alone(self) -> bool {
+        self.side() >= SHORTEST_ALONE
+    }
+
+    /// The cell that a row belongs to. Its windows need not exist.
+    pub(crate) fn cell(self, row: usize) -> isize {
+        (row.cast_signed() - self.first_row()).div_euclid(self.step.cast_signed())
+    }
+
+    /// The first row of cell 0.
+    fn first_row(self) -> isize {
+        let slack = (self.gap * self.step + 2 - 2 * self.reach - self.step) / 2;
+        (self.side() + self.reach + slack).cast_signed() - 1
+    }
+
+    /// The window on one side that comes after the rows of a cell, as the number of its own cell.
+    pub(crate) fn after(self, cell: isize) -> isize {
+        cell + (self.blocks + self.gap).cast_signed()
+    }
+
+    /// The rows of the window before a cell.
+    pub(crate) fn side_rows(self, cell: isize) -> Range<isize> {
+        let first = cell * self.step.cast_signed();
+        first..first + self.side().cast_signed()
+    }
+
+    /// Cells whose full windows lie within the rows.
+    pub(crate) fn full_cells(self, rows: usize) -> Range<isize> {
+        0..((rows + self.step).saturating_sub(self.span()) / self.step).cast_signed()
+    }
+
+    /// Cells whose windows before them lie within the rows.
+    pub(crate) fn side_cells(self, rows: usize) -> Range<isize> {
+        0..((rows + self.step).saturating_sub(self.side()) / self.step).cast_signed()
+    }
+
+    /// Rows whose cells have full windows.
+    pub(crate) fn full_rows(self, rows: usize) -> Range<usize> {
+        let first = self.first_row().unsigned_abs();
+        first..(first + self.full_cells(rows).len() * self.step).min(rows)
+    }
+
+    /// The middle of a cell's windows, in rows: before it, and the full one, which is also that of both sides.
+    pub(crate) fn centres(self, cell: isize) -> [f64; 2] {
+        let first = (cell * self.step.cast_signed()) as f64;
+        [first + (self.side() as f64 - 1.0) / 2.0, first + (self.span() as f64 - 1.0) / 2.0]
+    }
+
+    /// Solves the windows of some cells, in parallel.
+    pub(crate) fn solve(
+        self,
+        problem: &Problem<'_>,
+        cells: &Range<isize>,
+        instructions: Instructions,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Cells, Error> {
+        let shapes = self.shapes();
+        let mut pieces = Vec::new();
+        let end = self.after(cells.end);
+        let mut first = cells.start;
+        while first < end {
+            let next = (first + PIECE.cast_signed()).min(end);
+            pieces.push(Piece { size: (next - first).unsigned_abs() * self.step, content: first..next });
+            first = next;
+        }
+        let work = |blocks: Range<isize>, (): &mut ()| self.part(problem, &shapes, cells, &blocks, instructions);
+        Ok(join(&run.map(pieces, || (), work)?))
+    }
+
+    /// Solves the full windows only, in parallel.
+    pub(crate) fn solve_full(
+        self,
+        problem: &Problem<'_>,
+        instructions: Instructions,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Solved, Error> {
+        let [_, _, full] = self.shapes();
+        Ok(self.solve_shapes(problem, &[full], instructions, run)?.swap_remove(0))
+    }
+
+    /// Solves the full windows and the same without what lies between both sides, in parallel: the hollow ones come first.
+    pub(crate) fn solve_hollow(
+        self,
+        problem: &Problem<'_>,
+        instructions: Instructions,
+        run: &mut Run<'_, '_>,
+    ) -> Result<(Solved, Solved), Error> {
+        let [_, hollow, full] = self.shapes();
+        let mut solved = self.solve_shapes(problem, &[hollow, full], instructions, run)?;
+        let full = solved.swap_remove(1);
+        Ok((solved.swap_remove(0), full))
+    }
+
+    /// Solves windows of some shapes around all cells whose full windows lie within the rows.
+    fn solve_shapes(
+        self,
+        problem: &Problem<'_>,
+        shapes: &[Shape],
+        instructions: Instructions,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Vec<Solved>, Error> {
+        let cells = self.full_cells(problem.rows());
+        let firsts = cells.clone().step_by(PIECE);
+        let pieces = firsts.map(|first| first..(first + PIECE.cast_signed()).min(cells.end));
+        let pieces = pieces.map(|blocks| Piece { size: blocks.len() * self.step, content: blocks });
+        let work = |blocks: Range<isize>, (): &mut ()| solve_windows(problem, self.step, &blocks, shapes, instructions);
+        let solved = run.map(pieces.collect(), || (), work)?;
+        if solved.is_empty() {
+            return Ok(vec![Solved::new(problem.layout, 0, 0); shapes.len()]);
+        }
+        Ok((0..shapes.len()).map(|shape| join_shape(&solved, shape)).collect())
+    }
+
+    /// Solves the windows of some cells on this thread.
+    pub(crate) fn solve_here(self, problem: &Problem<'_>, cells: &Range<isize>, instructions: Instructions) -> Cells {
+        join(&[self.part(problem, &self.shapes(), cells, &(cells.start..self.after(cells.end)), instructions)])
+    }
+
+    /// Before the rows of a cell, on both sides of them, and everything.
+    fn shapes(self) -> [Shape; 3] {
+        let (second, all) = (self.blocks + self.gap, 2 * self.blocks + self.gap);
+        let full = Shape::of(0..all, self.step);
+        let hollow = Shape { parts: vec![0..self.blocks, second..all], centre: full.centre };
+        [Shape::of(0..self.blocks, self.step), hollow, full]
+    }
+
+    /// Solves the windows from some blocks on. The windows that come after the last cells belong to no cell that is wanted.
+    fn part(
+        self,
+        problem: &Problem<'_>,
+        shapes: &[Shape],
+        cells: &Range<isize>,
+        blocks: &Range<isize>,
+        instructions: Instructions,
+    ) -> Vec<Solved> {
+        let whole = blocks.start..blocks.end.min(cells.end).max(blocks.start);
+        let rest = whole.end..blocks.end;
+        let mut solved = solve_windows(problem, self.step, &whole, shapes, instructions);
+        if !rest.is_empty() {
+            let sides = solve_windows(problem, self.step, &rest, &shapes[..1], instructions);
+            solved[0] = Solved::join(&[&solved[0], &sides[0]]);
+        }
+        solved
+    }
+}
+
+/// Puts the parts of each shape together.
+fn join(parts: &[Vec<Solved>]) -> Cells {
+    Cells { sides: join_shape(parts, 0), hollow: join_shape(parts, 1), full: join_shape(parts, 2) }
+}
+
+fn join_shape(parts: &[Vec<Solved>], shape: usize) -> Solved {
+    Solved::join(&parts.iter().map(|part| &part[shape]).collect::<Vec<_>>())
+}

@@ -1,0 +1,178 @@
+//! Eight numbers worked on side by side, for small dense algebra on eight problems at once.
+//!
+//! Plain arithmetic on arrays of a fixed length becomes vector instructions of whatever width the kernel around it is compiled for (see
+//! [`crate::simd::vectors::dispatch`]). Nothing is fused or reordered, so every width gives the same bits.
+
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// Problems side by side.
+pub(crate) const WIDTH: usize = 8;
+
+/// One number of each problem.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(64))]
+pub(crate) struct Packet(pub(crate) [f64; WIDTH]);
+
+impl Packet {
+    pub(crate) const ZERO: Self = Self([0.0; WIDTH]);
+    pub(crate) const ONE: Self = Self([1.0; WIDTH]);
+
+    #[inline(always)]
+    pub(crate) fn splat(value: f64) -> Self {
+        Self([value; WIDTH])
+    }
+
+    /// The first numbers of a column, which must hold as many. A copy of a slice whose length is not known would be a call.
+    #[inline(always)]
+    pub(crate) fn load(from: &[f64]) -> Self {
+        debug_assert!(from.len() >= WIDTH, "eight numbers are read");
+        Self(from.first_chunk().copied().unwrap_or_default())
+    }
+
+    /// Every so-manieth number of a column from a place on; zero where there is none.
+    ///
+    /// A plain loop: closures over arrays are not inlined into vector kernels and cost a third of the time.
+    #[inline(always)]
+    pub(crate) fn gather(column: &[f64], place: isize, step: usize) -> Self {
+        let mut values = [0.0; WIDTH];
+        let inside = usize::try_from(place).ok().and_then(|place| column.get(place..place + (WIDTH - 1) * step + 1));
+        if let Some(inside) = inside {
+            for (lane, value) in values.iter_mut().enumerate() {
+                *value = inside[lane * step];
+            }
+        } else {
+            for (lane, value) in values.iter_mut().enumerate() {
+                let place = usize::try_from(place + (lane * step).cast_signed()).unwrap_or(usize::MAX);
+                if place < column.len() {
+                    *value = column[place];
+                }
+            }
+        }
+        Self(values)
+    }
+
+    /// One where a flag is set and zero where it is not, as [`Packet::gather`].
+    #[inline(always)]
+    pub(crate) fn gather_flags(column: &[bool], place: isize, step: usize) -> Self {
+        let mut values = [0.0; WIDTH];
+        for (lane, value) in values.iter_mut().enumerate() {
+            let place = usize::try_from(place + (lane * step).cast_signed()).unwrap_or(usize::MAX);
+            if place < column.len() {
+                *value = f64::from(u8::from(column[place]));
+            }
+        }
+        Self(values)
+    }
+
+    #[inline(always)]
+    pub(crate) fn store(self, to: &mut [f64]) {
+        debug_assert!(to.len() >= WIDTH, "eight numbers are written");
+        if let Some(to) = to.first_chunk_mut() {
+            *to = self.0;
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn sqrt(self) -> Self {
+        self.map(f64::sqrt)
+    }
+
+    #[inline(always)]
+    pub(crate) fn min(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    pub(crate) fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+
+    /// One over it, or zero where it is zero.
+    #[inline(always)]
+    pub(crate) fn inverse_or_zero(self) -> Self {
+        self.map(|a| if a == 0.0 { 0.0 } else { 1.0 / a })
+    }
+
+    /// Its magnitude with the sign of another number.
+    #[inline(always)]
+    pub(crate) fn with_sign_of(self, sign: Self) -> Self {
+        self.zip(sign, f64::copysign)
+    }
+
+    #[inline(always)]
+    fn map(self, f: impl Fn(f64) -> f64) -> Self {
+        let mut result = self;
+        for value in &mut result.0 {
+            *value = f(*value);
+        }
+        result
+    }
+
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        let mut result = self;
+        for (value, other) in result.0.iter_mut().zip(other.0) {
+            *value = f(*value, other);
+        }
+        result
+    }
+}
+
+impl Add for Packet {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+}
+
+impl Sub for Packet {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip(other, |a, b| a - b)
+    }
+}
+
+impl Mul for Packet {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip(other, |a, b| a * b)
+    }
+}
+
+impl Div for Packet {
+    type Output = Self;
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.zip(other, |a, b| a / b)
+    }
+}
+
+impl Neg for Packet {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        self.map(|a| -a)
+    }
+}
+
+impl AddAssign for Packet {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl SubAssign for Packet {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}

@@ -1,0 +1,7 @@
+//! Vectors of numbers, with the instructions that the processor has, chosen at run time.
+
+pub(crate) mod aligned;
+pub(crate) mod f64x8;
+pub(crate) mod vectors;
+
+pub use vectors::Instructions;

@@ -1,0 +1,360 @@
+//! Vector instructions, chosen at run time, and the little that the kernels need beyond what `pulp` offers.
+//!
+//! Every kernel is written once over [`Lanes`] and keeps its lanes apart: no lane ever reads another, so a window's numbers do not
+//! depend on which lane worked on it or on what its neighbours held. Multiplications and additions are fused where they are written
+//! fused, on every path.
+
+use std::sync::atomic::{AtomicU8, Ordering};
+
+use pulp::{NullaryFnOnce, Scalar, Simd};
+
+/// The longest vector of any path, in numbers of 64 bits.
+pub(crate) const MOST_LANES: usize = 8;
+
+/// A family of vector instructions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Instructions {
+    /// One number at a time: runs anywhere.
+    Scalar = 1,
+    /// 128 bits, 64-bit Arm.
+    Neon = 2,
+    /// 256 bits with fused multiply-add, x86-64.
+    Avx2 = 3,
+    /// 512 bits, x86-64.
+    Avx512 = 4,
+}
+
+impl Instructions {
+    const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Neon, Self::Scalar];
+
+    /// What this processor can run, the fastest first.
+    #[must_use]
+    pub fn available() -> Vec<Self> {
+        Self::ALL.into_iter().filter(|instructions| instructions.runs_here()).collect()
+    }
+
+    /// What the next call will use: the fastest this processor has, unless [`Instructions::force`] said otherwise.
+    #[must_use]
+    pub fn current() -> Self {
+        let forced = FORCED.load(Ordering::Relaxed);
+        Self::ALL.into_iter().find(|&one| one as u8 == forced || forced == 0 && one.runs_here()).unwrap_or(Self::Scalar)
+    }
+
+    /// Uses these instructions in every later call of this process, or the fastest again after `None`. Meant for tests.
+    ///
+    /// Returns whether this processor can run them; where it cannot, nothing changes.
+    pub fn force(choice: Option<Self>) -> bool {
+        let possible = choice.is_none_or(Self::runs_here);
+        if possible {
+            FORCED.store(choice.map_or(0, |instructions| instructions as u8), Ordering::Relaxed);
+        }
+        possible
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    fn runs_here(self) -> bool {
+        match self {
+            Self::Scalar => true,
+            Self::Neon => false,
+            Self::Avx2 => pulp::x86::V3::is_available(),
+            Self::Avx512 => pulp::x86::V4::is_available(),
+        }
+    }
+
+    #[cfg(target_arch = "aarch64")]
+    fn runs_here(self) -> bool {
+        match self {
+            Self::Scalar => true,
+            Self::Neon => pulp::aarch64::Neon::is_available(),
+            Self::Avx2 | Self::Avx512 => false,
+        }
+    }
+
+    #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+    fn runs_here(self) -> bool {
+        self == Self::Scalar
+    }
+
+    /// Numbers worked on side by side.
+    #[must_use]
+    pub fn lanes(self) -> usize {
+        match self {
+            Self::Scalar => 1,
+            Self::Neon => 2,
+            Self::Avx2 => 4,
+            Self::Avx512 => 8,
+        }
+    }
+}
+
+/// Zero, or the path that every call must take.
+static FORCED: AtomicU8 = AtomicU8::new(0);
+
+/// A path's vectors of 64-bit numbers.
+pub(crate) trait Lanes: Simd {
+    /// Transposes a square of [`Simd::F64_LANES`] rows in place.
+    fn transpose(self, rows: &mut [Self::f64s]);
+
+    /// A mask as bits, that of the first lane lowest.
+    fn bits(self, mask: Self::m64s) -> u32;
+
+    /// Looks up an entry of a table by whole numbers below 16.
+    #[inline(always)]
+    fn look_up(self, table: &[f64; TABLE], index: Self::f64s) -> Self::f64s {
+        let mut values = [0.0; MOST_LANES];
+        self.store(&mut values, 0, index);
+        for value in &mut values[..Self::F64_LANES] {
+            *value = table[whole(*value) as usize % TABLE];
+        }
+        self.load(&values, 0)
+    }
+
+    /// Writes the low byte of whole numbers below 2^24 to one place and the two bytes above it to another.
+    #[inline(always)]
+    fn split(self, codes: Self::f64s, low: &mut [u8], high: &mut [u16]) {
+        let mut values = [0.0; MOST_LANES];
+        self.store(&mut values, 0, codes);
+        for ((code, low), high) in values[..Self::F64_LANES].iter().zip(low).zip(high) {
+            [*low, ..] = whole(*code).to_le_bytes();
+            let [_, first, second, _] = whole(*code).to_le_bytes();
+            *high = u16::from_le_bytes([first, second]);
+        }
+    }
+
+    /// Reads a vector that begins anywhere.
+    #[inline(always)]
+    fn load(self, from: &[f64], at: usize) -> Self::f64s {
+        let values = &from[at..at + Self::F64_LANES];
+        // SAFETY: the slice holds exactly the bytes of one vector, any of which are valid, and the read asks for no alignment.
+        unsafe { values.as_ptr().cast::<Self::f64s>().read_unaligned() }
+    }
+
+    /// Writes a vector that begins anywhere.
+    #[inline(always)]
+    fn store(self, to: &mut [f64], at: usize, value: Self::f64s) {
+        let values = &mut to[at..at + Self::F64_LANES];
+        // SAFETY: the slice holds exactly the bytes of one vector, and the write asks for no alignment.
+        unsafe { values.as_mut_ptr().cast::<Self::f64s>().write_unaligned(value) }
+    }
+}
+
+/// Entries of a table that is looked up in: one for every order.
+pub(crate) const TABLE: usize = 16;
+
+/// A whole number that a kernel holds as floating point.
+#[inline(always)]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "kernels hold small whole numbers")]
+fn whole(value: f64) -> u32 {
+    value as u32
+}
+
+/// Work written over any vector length.
+pub(crate) trait Kernel {
+    type Output;
+
+    /// Does the work. Implementations are `#[inline(always)]`, so that they are compiled for the instructions of `S`.
+    fn run<S: Lanes>(self, simd: S) -> Self::Output;
+}
+
+/// Runs a kernel with the given instructions.
+pub(crate) fn dispatch<K: Kernel>(instructions: Instructions, kernel: K) -> K::Output {
+    match instructions {
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx512 => {
+            let simd = pulp::x86::V4::try_new().expect("only instructions that run here are chosen");
+            simd.vectorize(On { simd, kernel })
+        }
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx2 => {
+            let simd = pulp::x86::V3::try_new().expect("only instructions that run here are chosen");
+            simd.vectorize(On { simd, kernel })
+        }
+        #[cfg(target_arch = "aarch64")]
+        Instructions::Neon => {
+            let simd = pulp::aarch64::Neon::try_new().expect("only instructions that run here are chosen");
+            simd.vectorize(On { simd, kernel })
+        }
+        _ => kernel.run(Scalar::new()),
+    }
+}
+
+/// A kernel and the instructions it runs with.
+struct On<S, K> {
+    simd: S,
+    kernel: K,
+}
+
+impl<S: Lanes, K: Kernel> NullaryFnOnce for On<S, K> {
+    type Output = K::Output;
+
+    #[inline(always)]
+    fn call(self) -> K::Output {
+        self.kernel.run(self.simd)
+    }
+}
+
+impl Lanes for Scalar {
+    #[inline(always)]
+    fn transpose(self, _rows: &mut [f64]) {}
+
+    #[inline(always)]
+    fn bits(self, mask: Self::m64s) -> u32 {
+        u32::from(mask)
+    }
+}
+
+#[cfg(target_arch = "aarch64")]
+impl Lanes for pulp::aarch64::Neon {
+    #[inline(always)]
+    fn transpose(self, rows: &mut [Self::f64s]) {
+        let numbers: &mut [f64] = pulp::bytemuck::cast_slice_mut(rows);
+        numbers.swap(1, 2);
+    }
+
+    #[inline(always)]
+    fn bits(self, mask: Self::m64s) -> u32 {
+        let words: [u64; 2] = pulp::bytemuck::cast(self.transmute_u64s_m64s(mask));
+        u32::from(words[0] != 0) | u32::from(words[1] != 0) << 1
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Lanes for pulp::x86::V3 {
+    #[inline(always)]
+    fn transpose(self, rows: &mut [Self::f64s]) {
+        use pulp::bytemuck::cast;
+        let [a, b, c, d] = [cast(rows[0]), cast(rows[1]), cast(rows[2]), cast(rows[3])];
+        let (even_ab, odd_ab) = (self.avx._mm256_unpacklo_pd(a, b), self.avx._mm256_unpackhi_pd(a, b));
+        let (even_cd, odd_cd) = (self.avx._mm256_unpacklo_pd(c, d), self.avx._mm256_unpackhi_pd(c, d));
+        rows[0] = cast(self.avx._mm256_permute2f128_pd::<0x20>(even_ab, even_cd));
+        rows[1] = cast(self.avx._mm256_permute2f128_pd::<0x20>(odd_ab, odd_cd));
+        rows[2] = cast(self.avx._mm256_permute2f128_pd::<0x31>(even_ab, even_cd));
+        rows[3] = cast(self.avx._mm256_permute2f128_pd::<0x31>(odd_ab, odd_cd));
+    }
+
+    #[inline(always)]
+    fn bits(self, mask: Self::m64s) -> u32 {
+        self.avx._mm256_movemask_pd(pulp::bytemuck::cast(self.transmute_u64s_m64s(mask))).cast_unsigned()
+    }
+
+    #[inline(always)]
+    fn split(self, codes: Self::f64s, low: &mut [u8], high: &mut [u16]) {
+        use pulp::bytemuck::{cast, cast_slice_mut};
+        let (low, high): (&mut [u8], &mut [u8]) = (&mut low[..4], cast_slice_mut(&mut high[..4]));
+        let words = self.avx._mm256_cvtpd_epi32(cast(codes));
+        let order = |places: [u8; 16]| -> u128 { cast(self.ssse3._mm_shuffle_epi8(words, cast(places))) };
+        low.copy_from_slice(&order([0, 4, 8, 12, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]).to_le_bytes()[..4]);
+        high.copy_from_slice(&order([1, 2, 5, 6, 9, 10, 13, 14, 0, 0, 0, 0, 0, 0, 0, 0]).to_le_bytes()[..8]);
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Lanes for pulp::x86::V4 {
+    #[inline(always)]
+    fn transpose(self, rows: &mut [Self::f64s]) {
+        use pulp::bytemuck::cast;
+        let avx = self.avx512f;
+        // Pairs of rows, then quarters, then halves: three rounds of eight shuffles.
+        let mut pairs = [avx._mm512_setzero_pd(); 8];
+        for i in 0..4 {
+            let (upper, lower) = (cast(rows[2 * i]), cast(rows[2 * i + 1]));
+            pairs[2 * i] = avx._mm512_unpacklo_pd(upper, lower);
+            pairs[2 * i + 1] = avx._mm512_unpackhi_pd(upper, lower);
+        }
+        for i in 0..2 {
+            let low = avx._mm512_shuffle_f64x2::<0b10_00_10_00>(pairs[i], pairs[2 + i]);
+            let high = avx._mm512_shuffle_f64x2::<0b11_01_11_01>(pairs[i], pairs[2 + i]);
+            let low_below = avx._mm512_shuffle_f64x2::<0b10_00_10_00>(pairs[4 + i], pairs[6 + i]);
+            let high_below = avx._mm512_shuffle_f64x2::<0b11_01_11_01>(pairs[4 + i], pairs[6 + i]);
+            rows[i] = cast(avx._mm512_shuffle_f64x2::<0b10_00_10_00>(low, low_below));
+            rows[4 + i] = cast(avx._mm512_shuffle_f64x2::<0b11_01_11_01>(low, low_below));
+            rows[2 + i] = cast(avx._mm512_shuffle_f64x2::<0b10_00_10_00>(high, high_below));
+            rows[6 + i] = cast(avx._mm512_shuffle_f64x2::<0b11_01_11_01>(high, high_below));
+        }
+    }
+
+    #[inline(always)]
+    fn bits(self, mask: Self::m64s) -> u32 {
+        u32::from(mask.0)
+    }
+
+    #[inline(always)]
+    fn look_up(self, table: &[f64; TABLE], index: Self::f64s) -> Self::f64s {
+        use pulp::bytemuck::cast;
+        // Added to 2^52, a whole number stands in the low bits.
+        let index = self.add_f64s(index, self.splat_f64s(4_503_599_627_370_496.0));
+        let (first, last) = (self.load(table, 0), self.load(table, 8));
+        cast(self.avx512f._mm512_permutex2var_pd(cast(first), cast(index), cast(last)))
+    }
+
+    #[inline(always)]
+    fn split(self, codes: Self::f64s, low: &mut [u8], high: &mut [u16]) {
+        use pulp::bytemuck::{cast, cast_slice_mut};
+        let words = self.avx512f._mm512_cvtpd_epi32(cast(codes));
+        let orders: [u64; 2] = cast(self.avx512f._mm256_cvtepi32_epi8(words));
+        low[..8].copy_from_slice(&orders[0].to_le_bytes());
+        let flags: u128 = cast(self.avx512f._mm256_cvtepi32_epi16(self.avx2._mm256_srli_epi32::<8>(words)));
+        cast_slice_mut::<u16, u8>(&mut high[..8]).copy_from_slice(&flags.to_le_bytes());
+    }
+}
+
+/// Writes a block of code once for every `J` below a bound known when compiling, upwards or downwards.
+///
+/// Loops over the degrees must be unrolled whole, so that the coefficients stay in registers.
+macro_rules! unroll {
+    ($index:ident < $bound:expr, $body:block) => {
+        $crate::simd::vectors::unroll!(@ $index, $bound, $body, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19)
+    };
+    (rev $index:ident < $bound:expr, $body:block) => {
+        $crate::simd::vectors::unroll!(@ $index, $bound, $body, 19 18 17 16 15 14 13 12 11 10 9 8 7 6 5 4 3 2 1 0)
+    };
+    (@ $index:ident, $bound:expr, $body:block, $($value:literal)*) => {
+        $({
+            const $index: usize = $value;
+            if $index < $bound $body
+        })*
+    };
+}
+pub(crate) use unroll;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Transpose;
+
+    impl Kernel for Transpose {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<S: Lanes>(self, simd: S) {
+            let lanes = S::F64_LANES;
+            let numbers: Vec<f64> = (0..lanes * lanes).map(|i| i as f64).collect();
+            let mut rows: Vec<S::f64s> = (0..lanes).map(|row| simd.load(&numbers, row * lanes)).collect();
+            simd.transpose(&mut rows);
+            let mut column = vec![0.0; lanes];
+            for (i, &row) in rows.iter().enumerate() {
+                simd.store(&mut column, 0, row);
+                for (j, &value) in column.iter().enumerate() {
+                    assert_eq!(value, numbers[j * lanes + i], "row {i}, column {j}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_path_transposes() {
+        for instructions in Instructions::available() {
+            dispatch(instructions, Transpose);
+        }
+    }
+
+    #[test]
+    fn the_fastest_path_is_taken_unless_another_is_forced() {
+        let fastest = Instructions::available()[0];
+        assert_eq!(Instructions::current(), fastest);
+        assert!(Instructions::available().contains(&Instructions::Scalar));
+        assert!(fastest.lanes() <= MOST_LANES);
+    }
+}

@@ -1,0 +1,208 @@
+//! Which test function: half-width and exponent that leave inertia, damping and stiffness the smallest error.
+//!
+//! From the angle's spectrum `P` and the noise of both channels the covariance of the three and two kinds of bias follow for any test
+//! function. With `F = (φ̂, -φ̂′, φ̂″)` the responses of its kernels, `S = σ_T²|F_0|² + σ_θ²|K F_0 + C F_1 + I F_2|²` the noise of a row,
+//! `A = Σ F*Fᵀ P` and `M = Σ F*Fᵀ P S`, the covariance is `A⁻¹ M A⁻¹`; the sums are wrong by what `φ″` and `-φ′` differ from the derivatives of
+//! `φ` at the sampled frequencies; and a tenth of what the angle's noise adds to `A` is taken to remain after it was corrected for. The
+//! determinant of their sum is made smallest.
+
+use faer::Mat;
+use faer::linalg::solvers::{DenseSolveCore, Llt, Solve};
+
+use crate::error::Error;
+use crate::exec::pool::Piece;
+use crate::exec::stages::Run;
+use crate::noise::spectrum::Transform;
+use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
+
+/// Exponents tried.
+const EXPONENTS: [usize; 2] = [5, 9];
+
+/// The part of the angle's noise that its correction is taken to leave.
+const LEFT_BY_CORRECTION: f64 = 0.1;
+
+/// A frequency holds signal where its power exceeds the noise's so many times: the mean of as few as three segments does so once in ten
+/// million by chance.
+const ABOVE_NOISE: f64 = 8.0;
+
+/// What the choice is made from.
+#[derive(Clone, Debug)]
+pub(crate) struct Evidence {
+    /// The angle's power by frequency.
+    pub(crate) power: Vec<f64>,
+    /// Samples of the record.
+    pub(crate) samples: usize,
+    /// Variance of the noise of angle and torque.
+    pub(crate) noise: [f64; 2],
+    /// Seconds from one sample to the next.
+    pub(crate) delta: f64,
+    /// Which of inertia, damping and stiffness are unknown.
+    pub(crate) unknown: [bool; 3],
+}
+
+impl Evidence {
+    /// Samples in a typical cycle of what is not noise, the velocity's mean frequency deciding.
+    pub(crate) fn period(&self) -> f64 {
+        let length = 2 * (self.power.len() - 1);
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for (bin, &power) in self.power.iter().enumerate().skip(1) {
+            let frequency = bin as f64 / length as f64;
+            // What scatters about the noise does not count: high frequencies are many, and weigh most.
+            let signal = if power > ABOVE_NOISE * self.noise[0] { power - self.noise[0] } else { 0.0 };
+            let weight = signal * frequency * frequency;
+            sum += weight * frequency;
+            weights += weight;
+        }
+        if sum > 0.0 { weights / sum } else { length as f64 }
+    }
+}
+
+/// Length of the spectra that tell test functions up to a half-width apart.
+pub(crate) fn spectrum_length(samples: usize, widest: usize) -> usize {
+    let wanted = (8 * (2 * widest + 1)).next_power_of_two();
+    let possible = 1 << samples.max(1).ilog2();
+    wanted.min(possible).max(16)
+}
+
+/// Half-widths tried, in steps of √2, up to a number of samples.
+pub(crate) fn half_widths(widest: usize) -> Vec<usize> {
+    let mut widths = Vec::new();
+    let mut width = LEAST_HALF_WIDTH as f64;
+    while width.round() <= widest as f64 {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few thousand at most")]
+        let whole = width.round() as usize;
+        if widths.last() != Some(&whole) {
+            widths.push(whole);
+        }
+        width *= std::f64::consts::SQRT_2;
+    }
+    widths
+}
+
+/// Test functions that are tried, with what does not depend on the parameters.
+pub(crate) struct Candidates {
+    evidence: Evidence,
+    tried: Vec<Tried>,
+}
+
+struct Tried {
+    function: TestFunction,
+    /// Responses of the kernels for inertia, damping and stiffness, by frequency, as far as they let anything through.
+    responses: [Vec<[f64; 2]>; 3],
+    /// Products of the kernels with each other.
+    gram: [[f64; 3]; 3],
+    /// The part of its rows that can be used.
+    share: f64,
+}
+
+/// A response below this part of the largest one lets nothing through.
+const NOTHING: f64 = 1e-9;
+
+impl Candidates {
+    /// Test functions of some half-widths, and of one exponent or all that are tried.
+    ///
+    /// `share` tells which part of the rows of a half-width holds no sample that is missing.
+    pub(crate) fn new(
+        evidence: Evidence,
+        widths: &[usize],
+        exponent: Option<usize>,
+        share: impl Fn(usize) -> f64 + Sync,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Self, Error> {
+        let exponents = exponent.map_or_else(|| EXPONENTS.to_vec(), |exponent| vec![exponent]);
+        let length = 2 * (evidence.power.len() - 1);
+        let functions = exponents.iter().flat_map(|&exponent| {
+            let delta = evidence.delta;
+            widths.iter().filter_map(move |&width| TestFunction::new(width, exponent, delta).ok())
+        });
+        let transform = Transform::new(length);
+        let pieces = functions.map(|function| Piece { size: 1, content: function });
+        let of = |function: TestFunction, (): &mut ()| Tried::new(function, &transform, share(function.half_width()));
+        let tried = run.map(pieces.collect(), || (), of)?;
+        Ok(Self { evidence, tried })
+    }
+
+    /// The test function that leaves the smallest error for given inertia, damping and stiffness, the narrowest among those that are as
+    /// good; nothing where the angle's noise leaves nothing with any.
+    pub(crate) fn best(&self, parameters: [f64; 3]) -> Option<TestFunction> {
+        let scores: Vec<f64> = self.tried.iter().map(|tried| tried.score(&self.evidence, parameters)).collect();
+        let least = scores.iter().copied().fold(f64::INFINITY, f64::min);
+        let good = self.tried.iter().zip(&scores).filter(|(_, score)| **score <= least && score.is_finite());
+        good.map(|(tried, _)| tried.function).min_by_key(TestFunction::half_width)
+    }
+}
+
+impl Tried {
+    fn new(function: TestFunction, transform: &Transform, share: f64) -> Self {
+        let kernels = function.kernels(0.0).values;
+        let mut responses = [0, 1, 2].map(|i: usize| transform.response(&kernels[i]));
+        let through = |response: &[[f64; 2]]| {
+            let largest = response.iter().map(|[a, b]| a * a + b * b).fold(0.0, f64::max);
+            let last = response.iter().rposition(|[a, b]| a * a + b * b > NOTHING * NOTHING * largest);
+            last.map_or(0, |last| last + 1)
+        };
+        let bins = responses.iter().map(|response| through(response)).max().unwrap_or(0);
+        for response in &mut responses {
+            response.truncate(bins);
+        }
+        let dot = |i: usize, j: usize| kernels[i].iter().zip(&kernels[j]).map(|(a, b)| a * b).sum();
+        let gram = std::array::from_fn(|i| std::array::from_fn(|j| dot(i, j)));
+        Self { function, responses, gram, share }
+    }
+
+    /// Half the logarithm of the determinant of the expected squared errors; infinite where the angle's noise leaves nothing.
+    fn score(&self, evidence: &Evidence, parameters: [f64; 3]) -> f64 {
+        let length = 2 * (evidence.power.len() - 1);
+        let [angle_noise, torque_noise] = evidence.noise;
+        let mut information = [[0.0; 3]; 3];
+        let mut noisy = [[0.0; 3]; 3];
+        let mut quadrature = [0.0; 3];
+        for (bin, &power) in evidence.power.iter().enumerate().take(self.responses[0].len()) {
+            let both = if bin == 0 || bin == length / 2 { 1.0 } else { 2.0 };
+            let weight = both * evidence.samples as f64 / length as f64;
+            let omega = 2.0 * std::f64::consts::PI * bin as f64 / (length as f64 * evidence.delta);
+            let at: [[f64; 2]; 3] = std::array::from_fn(|i| self.responses[i][bin]);
+            let [inertia, damping, stiffness] = at;
+            let mixed: [f64; 2] = std::array::from_fn(|part| (0..3).map(|i| parameters[i] * at[i][part]).sum());
+            let row = torque_noise * (stiffness[0].powi(2) + stiffness[1].powi(2))
+                + angle_noise * (mixed[0].powi(2) + mixed[1].powi(2));
+            // What is left of I θ̈ + C θ̇ when the kernels stand in for the derivatives of φ.
+            let error = [
+                parameters[0] * (inertia[0] + omega * omega * stiffness[0])
+                    + parameters[1] * (damping[0] + omega * stiffness[1]),
+                parameters[0] * (inertia[1] + omega * omega * stiffness[1])
+                    + parameters[1] * (damping[1] - omega * stiffness[0]),
+            ];
+            let signal = (power - angle_noise).max(0.0);
+            for i in 0..3 {
+                for j in 0..3 {
+                    let product = weight * (at[i][0] * at[j][0] + at[i][1] * at[j][1]);
+                    information[i][j] += product * power;
+                    noisy[i][j] += product * power * row;
+                }
+                quadrature[i] += weight * (at[i][0] * error[0] + at[i][1] * error[1]) * signal;
+            }
+        }
+        let gram = |i: usize, j: usize| evidence.samples as f64 * angle_noise * self.gram[i][j];
+        let chosen: Vec<usize> = (0..3).filter(|&i| evidence.unknown[i]).collect();
+        let size = chosen.len();
+        let scale: Vec<f64> = chosen.iter().map(|&i| (information[i][i] - gram(i, i)).abs().sqrt().recip()).collect();
+        let scaled = |entry: &dyn Fn(usize, usize) -> f64| {
+            Mat::from_fn(size, size, |i, j| scale[i] * scale[j] * entry(chosen[i], chosen[j]))
+        };
+        let normal = scaled(&|i, j| information[i][j] - gram(i, j));
+        let Ok(factor) = Llt::new(normal.as_ref(), faer::Side::Lower) else { return f64::INFINITY };
+        let inverse = factor.inverse();
+        let vector = |entry: &dyn Fn(usize) -> f64| Mat::from_fn(size, 1, |i, _| scale[i] * entry(chosen[i]));
+        let quadrature = factor.solve(vector(&|i| quadrature[i]));
+        let left = vector(&|i| LEFT_BY_CORRECTION * (0..3).map(|j| gram(i, j) * parameters[j]).sum::<f64>());
+        let left = factor.solve(left);
+        let errors = &inverse * scaled(&|i, j| noisy[i][j]) * &inverse
+            + &quadrature * quadrature.transpose()
+            + &left * left.transpose();
+        let Ok(errors) = Llt::new(errors.as_ref(), faer::Side::Lower) else { return f64::INFINITY };
+        let factor = errors.L();
+        // Half the rows make every variance twice as large; without any the sum is infinite.
+        (0..size).map(|i| factor[(i, i)].ln() + scale[i].ln() - 0.5 * self.share.ln()).sum()
+    }
+}

@@ -1,0 +1,258 @@
+//! Rows of the equation of motion in weak form: dot products of the channels with the kernels of a test function.
+//!
+//! Row `r` belongs to sample `h + r · stride` and reads the samples within `h` of it. What is known moves to the right-hand side; a known
+//! coefficient that changes is multiplied with the angle sample by sample and its product is integrated by parts:
+//! `⟨φ Cθ̇⟩ = -⟨φ′ Cθ⟩ - ⟨φ Ċθ⟩` and `⟨φ Iθ̈⟩ = ⟨φ″ Iθ⟩ + 2⟨φ′ İθ⟩ + ⟨φ Ïθ⟩`. Terms that are not linear in the angle are evaluated sample by
+//! sample and then multiplied with `φ`.
+
+use std::num::NonZeroUsize;
+use std::ops::Range;
+
+use crate::equation::motion::Coefficient;
+use crate::equation::rows::BLOCK;
+use crate::equation::rows::{Regressor, Rows, joints};
+use crate::error::Error;
+use crate::exec::pool::{self, Piece, Watch};
+use crate::record::derived::{Late, Scaled, Whole};
+use crate::record::samples::Samples;
+use crate::weak_form::filter_bank::{FilterBank, Scratch};
+use crate::weak_form::test_function::{Kernels, TestFunction};
+
+/// Rows in a piece of work.
+const PIECE: usize = 32 * BLOCK;
+
+/// A term beside inertia, damping and stiffness, sample by sample.
+#[derive(Clone, Copy)]
+pub(crate) enum TermSamples<'a> {
+    /// One everywhere.
+    One,
+    /// Given at every sample.
+    Given(&'a dyn Samples),
+    /// The rate at which the torque changes: what a lag of the torque multiplies.
+    TorqueRate,
+}
+
+/// The record that rows are made of.
+#[derive(Clone)]
+pub(crate) struct Record<'a> {
+    pub(crate) angle: &'a dyn Samples,
+    pub(crate) torque: &'a dyn Samples,
+    pub(crate) coefficients: [Coefficient<'a>; 3],
+    pub(crate) terms: Vec<TermSamples<'a>>,
+    /// By how many samples the torque comes late.
+    pub(crate) lag: f64,
+    /// Where a sample may be the centre of a row.
+    pub(crate) mask: Option<&'a [bool]>,
+}
+
+/// All rows of a record, and what they were made with.
+#[derive(Clone, Debug)]
+pub(crate) struct WeakRows {
+    pub(crate) function: TestFunction,
+    pub(crate) kernels: Kernels,
+    /// The kernel of the torque.
+    pub(crate) torque: Vec<f64>,
+    /// Sample of the first row.
+    pub(crate) first: usize,
+    /// Samples from one row to the next.
+    pub(crate) stride: usize,
+    pub(crate) rows: Rows,
+}
+
+/// One channel, the kernels that are applied to it, and the columns that they give.
+struct Task<'a> {
+    channel: Box<dyn Samples + 'a>,
+    bank: FilterBank,
+    columns: Range<usize>,
+}
+
+impl WeakRows {
+    /// How many rows a record of so many samples has.
+    pub(crate) fn count(function: TestFunction, samples: usize) -> usize {
+        (samples + function.stride()).saturating_sub(function.window_length()) / function.stride()
+    }
+
+    /// Builds rows of a record, in parallel: all of them, or those in some stretches, one after another. Stretches begin at multiples of
+    /// [`BLOCK`], and windows do not reach from one to the next.
+    pub(crate) fn build(
+        record: &Record<'_>,
+        function: TestFunction,
+        delta: f64,
+        stretches: Option<&[Range<usize>]>,
+        workers: NonZeroUsize,
+        watch: &mut Watch<'_>,
+    ) -> Result<Self, Error> {
+        let (half, stride) = (function.half_width(), function.stride());
+        let all = 0..Self::count(function, record.angle.len());
+        let stretches = stretches.unwrap_or(std::slice::from_ref(&all));
+        let count = stretches.iter().map(Range::len).sum();
+        let kernels = function.kernels(0.0);
+        let whole = record.lag.round();
+        let late = function.kernels(record.lag - whole);
+        let Tasks { tasks, width } = tasks(record, &kernels, &late, whole, stride, delta);
+
+        let mut columns = vec![vec![0.0; count]; width];
+        let mut usable: Vec<bool> = match record.mask {
+            Some(mask) => stretches.iter().cloned().flatten().map(|row| mask[half + row * stride]).collect(),
+            None => vec![true; count],
+        };
+        let mut pieces = Vec::new();
+        {
+            let mut outputs: Vec<&mut [f64]> = columns.iter_mut().map(Vec::as_mut_slice).collect();
+            let mut usable = usable.as_mut_slice();
+            for stretch in stretches {
+                for first in stretch.clone().step_by(PIECE) {
+                    let rows = ..PIECE.min(stretch.end - first);
+                    let outputs: Vec<_> = outputs.iter_mut().filter_map(|output| output.split_off_mut(rows)).collect();
+                    let usable = usable.split_off_mut(rows).unwrap_or_default();
+                    pieces.push(Piece { size: usable.len() * stride, content: (first, outputs, usable) });
+                }
+            }
+        }
+        let work = |(first, mut outputs, usable): (usize, Vec<&mut [f64]>, &mut [bool]), scratch: &mut Scratch| {
+            for task in &tasks {
+                task.bank.apply(&*task.channel, first, &mut outputs[task.columns.clone()], usable, scratch);
+            }
+            for output in outputs {
+                output.iter_mut().zip(&*usable).filter(|(_, usable)| !**usable).for_each(|(value, _)| *value = 0.0);
+            }
+        };
+        pool::run(pieces, workers, Scratch::default, work, watch)?;
+        let torque = late.values[2].clone();
+        let mut rows = Self {
+            function,
+            torque,
+            first: half,
+            stride,
+            rows: Rows { usable, jumps: joints(stretches), period: stride as f64 * delta, ..Rows::default() },
+            kernels,
+        };
+        rows.assemble(record, columns);
+        Ok(rows)
+    }
+
+    /// Sorts the columns that were built into regressors and the right-hand side.
+    fn assemble(&mut self, record: &Record<'_>, columns: Vec<Vec<f64>>) {
+        let mut columns = columns.into_iter();
+        let mut next = || columns.next().unwrap_or_default();
+        let values = [next(), next(), next()];
+        let companions = [next(), next(), next()];
+        for (index, (value, companion)) in values.into_iter().zip(companions).enumerate() {
+            let noise = [self.kernels.values[index].clone(), self.kernels.slopes[index].clone()];
+            self.rows.regressors.push(Regressor { value, companion, noise });
+        }
+        self.rows.side = next();
+        for term in &record.terms {
+            let (value, companion) = match term {
+                TermSamples::One => (
+                    self.rows.usable.iter().map(|&usable| f64::from(u8::from(usable))).collect(),
+                    vec![0.0; self.rows.usable.len()],
+                ),
+                _ => (next(), next()),
+            };
+            self.rows.regressors.push(Regressor { value, companion, noise: Default::default() });
+        }
+        for (index, coefficient) in record.coefficients.iter().enumerate() {
+            let noise = &self.kernels.values[index];
+            let mut known = 0.0;
+            match *coefficient {
+                Coefficient::Unknown => continue,
+                Coefficient::Number(number) => {
+                    known = number;
+                    let column = &self.rows.regressors[index].value;
+                    self.rows.side.iter_mut().zip(column).for_each(|(side, value)| *side -= number * value);
+                }
+                Coefficient::Record(_) => {
+                    // Its parts by derivative: as many as integrations by parts, and one.
+                    for _ in index..3 {
+                        self.rows.side.iter_mut().zip(next()).for_each(|(side, value)| *side -= value);
+                    }
+                }
+            }
+            if let Coefficient::Record(record) = *coefficient {
+                known = mean(record);
+            }
+            if known != 0.0 {
+                self.rows.side_noise.resize(noise.len(), 0.0);
+                self.rows.side_noise.iter_mut().zip(noise).for_each(|(sum, value)| *sum -= known * value);
+            }
+        }
+    }
+
+    /// Rows that a test function reaches to either side.
+    pub(crate) fn reach(&self) -> usize {
+        self.function.half_width().div_ceil(self.stride)
+    }
+}
+
+struct Tasks<'a> {
+    tasks: Vec<Task<'a>>,
+    /// Number of columns.
+    width: usize,
+}
+
+impl<'a> Tasks<'a> {
+    fn add(&mut self, channel: Box<dyn Samples + 'a>, kernels: &[&[f64]], stride: usize) {
+        let columns = self.width..self.width + kernels.len();
+        self.width = columns.end;
+        self.tasks.push(Task { channel, bank: FilterBank::new(kernels, stride), columns });
+    }
+}
+
+/// What has to be computed, in the order in which [`WeakRows::assemble`] takes it.
+fn tasks<'a>(
+    record: &Record<'a>,
+    kernels: &Kernels,
+    late: &Kernels,
+    whole: f64,
+    stride: usize,
+    delta: f64,
+) -> Tasks<'a> {
+    let mut tasks = Tasks { tasks: Vec::new(), width: 0 };
+    let all: Vec<&[f64]> = kernels.values.iter().chain(&kernels.slopes).map(Vec::as_slice).collect();
+    #[allow(clippy::cast_possible_truncation, reason = "a lag of a few samples")]
+    let torque = || Box::new(Late { channel: record.torque, samples: whole as isize });
+    tasks.add(Box::new(Whole(record.angle)), &all, stride);
+    tasks.add(torque(), &[&late.values[2]], stride);
+    let [_, rate, value] = &kernels.values;
+    let slope = &kernels.slopes[2];
+    for term in &record.terms {
+        match *term {
+            TermSamples::One => {}
+            TermSamples::Given(samples) => tasks.add(Box::new(Whole(samples)), &[value, slope], stride),
+            TermSamples::TorqueRate => tasks.add(torque(), &[&late.values[1], &late.slopes[1]], stride),
+        }
+    }
+    for (index, coefficient) in record.coefficients.iter().enumerate() {
+        let Coefficient::Record(factor) = *coefficient else { continue };
+        let mut part = |derivative: usize, kernel: &[f64]| {
+            tasks.add(Box::new(Scaled { factor, angle: record.angle, derivative, delta }), &[kernel], stride);
+        };
+        match index {
+            0 => {
+                part(0, &kernels.values[0]);
+                let twice: Vec<f64> = rate.iter().map(|value| -2.0 * value).collect();
+                part(1, &twice);
+                part(2, value);
+            }
+            1 => {
+                part(0, rate);
+                let minus: Vec<f64> = value.iter().map(|value| -value).collect();
+                part(1, &minus);
+            }
+            _ => part(0, value),
+        }
+    }
+    tasks
+}
+
+/// The mean of the samples that can be used.
+pub(crate) fn mean(samples: &dyn Samples) -> f64 {
+    let mut buffer = vec![0.0; samples.len()];
+    samples.read(0, &mut buffer);
+    let (sum, count) = buffer
+        .iter()
+        .filter(|&&value| crate::record::samples::is_usable(value))
+        .fold((0.0, 0.0_f64), |(sum, count), value| (sum + value, count + 1.0));
+    sum / count.max(1.0)
+}
