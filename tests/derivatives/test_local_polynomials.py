@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import tvident
-from reference.local_polynomials import akaike_weights, errors_around, fit_window
+from reference.local_polynomials import akaike_weights, errors_around, fit_window, fit_windows
 from signals import signal
 from tvident import Status, _core
 
@@ -28,21 +28,21 @@ def assert_agrees(
     fit: tvident.LocalPolynomialFit, y: Array, half: int, delta: float, highest: int, criterion: str
 ) -> None:
     """Compare every full window with the reference."""
-    centres = range(half, y.size - half)
-    scale = np.abs(fit.derivatives[:, half : y.size - half]).max(axis=1)
-    for i in centres:
-        window = fit_window(y[i - half : i + half + 1], delta, highest, fit.derivatives.shape[0] - 1)
-        scores = window.scores(criterion)
-        order = int(fit.order[i])
-        assert scores[order] - scores.min() < TIE, f"sample {i}: order {order} of {scores}"
-        expected = window.derivatives[:, order, half]
-        np.testing.assert_array_less(np.abs(fit.derivatives[:, i] - expected), SCALE * scale + 1e-300)
-        sigma = np.sqrt(window.rss[order] / (2 * half - order))
-        assert fit.sigma[i] == pytest.approx(sigma, rel=1e-6)
-        # The residual of a window is good to 1e-6 of itself: so the criterion, and the weights, are to M of those.
-        errors = errors_around(window, akaike_weights(scores), expected)
-        tolerance = 1e-6 * (2 * half + 1) * np.ptp(window.derivatives[:, :, half], axis=1)
-        assert (np.abs(fit.stderr[:, i] - errors) <= 1e-3 * errors + SCALE * scale + tolerance).all()
+    full = slice(half, y.size - half)
+    found, order = fit.derivatives[:, full].T, fit.order[full].astype(int)
+    scale = np.abs(found).max(axis=0)
+    windows = fit_windows(y, half, delta, highest, fit.derivatives.shape[0] - 1)
+    each = np.arange(order.size)
+    scores = windows.scores(criterion)
+    np.testing.assert_array_less(scores[each, order] - scores.min(axis=1), TIE)
+    expected = windows.derivatives[each, :, order]
+    np.testing.assert_array_less(np.abs(found - expected), np.broadcast_to(SCALE * scale + 1e-300, found.shape))
+    sigma = np.sqrt(windows.rss[each, order] / (2 * half - order))
+    np.testing.assert_allclose(fit.sigma[full], sigma, rtol=1e-6, atol=1e-12)
+    # The residual of a window is good to 1e-6 of itself: so the criterion, and the weights, are to M of those.
+    errors = errors_around(windows, akaike_weights(scores), expected)
+    tolerance = 1e-6 * (2 * half + 1) * np.ptp(windows.derivatives, axis=2)
+    assert (np.abs(fit.stderr[:, full].T - errors) <= 1e-3 * errors + SCALE * scale + tolerance).all()
 
 
 @given(
@@ -73,17 +73,13 @@ def test_a_fixed_order_is_the_least_squares_polynomial_everywhere(seed: int, hal
     order = min(order, 2 * half)
     y = signal(seed, 3 * half + 1, 0.1)
     fit = tvident.fit_local_polynomials(y, 2 * half + 1, order=order, max_deriv=deriv)
-    first = fit_window(y[: 2 * half + 1], 1.0, order, deriv)
-    last = fit_window(y[-2 * half - 1 :], 1.0, order, deriv)
+    windows = [fit_window(y[i : i + 2 * half + 1], 1.0, order, deriv).derivatives[:, order] for i in range(half + 1)]
     for i in range(y.size):
-        if i < half:
-            window, place = first, i
-        elif i >= y.size - half:
-            window, place = last, i - (y.size - 2 * half - 1)
-        else:
-            window, place = fit_window(y[i - half : i + half + 1], 1.0, order, deriv), half
-        scale = np.abs(window.derivatives[:, order]).max(axis=1)
-        assert (np.abs(fit.derivatives[:, i] - window.derivatives[:, order, place]) <= SCALE * scale + 1e-12).all()
+        # At the ends the first and the last full window, off their centres.
+        first = min(max(i - half, 0), half)
+        window = windows[first]
+        scale = np.abs(window).max(axis=1)
+        assert (np.abs(fit.derivatives[:, i] - window[:, i - first]) <= SCALE * scale + 1e-12).all()
     assert (fit.order == order).all()
     assert (fit.status & Status.EDGE != 0).sum() == 2 * half
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import tvident
-from reference.local_polynomials import akaike_average, errors_around, fit_window, pooled_scores, pooled_weights
+from reference.local_polynomials import akaike_average, errors_around, fit_windows, pooled_scores, pooled_weights
 from signals import signal
 from tvident import Status, _core
 
@@ -38,21 +38,21 @@ def test_pooled_orders_are_best_by_the_sum_over_neighbours(
     half = record["half"]
     y = signal(record["seed"], 2 * half + 1 + record["more"], noise)
     fit = tvident.fit_local_polynomials(y, 2 * half + 1, delta=delta, max_order=max_order, selection="pooled")
-    windows = [fit_window(y[i : i + 2 * half + 1], delta, max_order, 2) for i in range(y.size - 2 * half)]
+    windows = fit_windows(y, half, delta, max_order, 2)
     sums = pooled_scores(windows, 2 * half)
+    full, each = slice(half, y.size - half), np.arange(y.size - 2 * half)
+    order = fit.order[full].astype(int)
     scale = np.abs(fit.derivatives).max(axis=1)
-    for window, scores, i in zip(windows, sums, range(half, y.size - half), strict=True):
-        order = int(fit.order[i])
-        assert scores[order] - scores.min() < TIE * len(windows), f"sample {i}: order {order} of {scores}"
-        distance = np.abs(fit.derivatives[:, i] - window.derivatives[:, order, half])
-        np.testing.assert_array_less(distance, SCALE * scale + 1e-300)
-        sigma = np.sqrt(window.rss[order] / (2 * half - order))
-        assert fit.sigma[i] == pytest.approx(sigma, rel=1e-6)
-        place = i - half
-        neighbours = min(place + 2 * half, len(windows) - 1) - max(place - 2 * half, 0) + 1
-        weights = pooled_weights(scores, neighbours, 2 * half + 1)
-        errors = errors_around(window, weights, window.derivatives[:, order, half])
-        np.testing.assert_allclose(fit.stderr[:, i], errors, rtol=1e-3, atol=1e-9 * scale.max())
+    np.testing.assert_array_less(sums[each, order] - sums.min(axis=1), TIE * each.size)
+    expected = windows.derivatives[each, :, order]
+    distance = np.abs(fit.derivatives[:, full].T - expected)
+    np.testing.assert_array_less(distance, np.broadcast_to(SCALE * scale + 1e-300, distance.shape))
+    sigma = np.sqrt(windows.rss[each, order] / (2 * half - order))
+    np.testing.assert_allclose(fit.sigma[full], sigma, rtol=1e-6, atol=1e-12)
+    neighbours = np.minimum(each + 2 * half, each.size - 1) - np.maximum(each - 2 * half, 0) + 1
+    weights = pooled_weights(sums, neighbours, 2 * half + 1)
+    errors = errors_around(windows, weights, expected)
+    np.testing.assert_allclose(fit.stderr[:, full].T, errors, rtol=1e-3, atol=1e-9 * scale.max())
 
 
 @given(record=records, noise=noises, max_order=st.integers(0, 15), delta=st.sampled_from([1.0, 1e-3]))
@@ -61,14 +61,15 @@ def test_average_takes_akaikes_weights(record: dict[str, int], noise: float, max
     y = signal(record["seed"], 2 * half + 1 + record["more"], noise)
     fit = tvident.fit_local_polynomials(y, 2 * half + 1, delta=delta, max_order=max_order, selection="average")
     scale = np.abs(fit.derivatives).max(axis=1)
-    for i in range(half, y.size - half):
-        window = fit_window(y[i - half : i + half + 1], delta, max_order, 2)
-        weights, average, errors = akaike_average(window)
-        # The residual of a window is good to 1e-6 of itself: so the criterion, and the weights, are to M of those.
-        tolerance = 1e-6 * (2 * half + 1) * np.ptp(window.derivatives[:, :, half], axis=1)
-        np.testing.assert_array_less(np.abs(fit.derivatives[:, i] - average), SCALE * scale + tolerance + 1e-300)
-        assert weights[fit.order[i]] > weights.max() - 1e-3
-        np.testing.assert_allclose(fit.stderr[:, i], errors, rtol=1e-3, atol=1e-9 * scale.max())
+    full = slice(half, y.size - half)
+    windows = fit_windows(y, half, delta, max_order, 2)
+    weights, average, errors = akaike_average(windows)
+    # The residual of a window is good to 1e-6 of itself: so the criterion, and the weights, are to M of those.
+    tolerance = 1e-6 * (2 * half + 1) * np.ptp(windows.derivatives, axis=2)
+    np.testing.assert_array_less(np.abs(fit.derivatives[:, full].T - average), SCALE * scale + tolerance + 1e-300)
+    chosen = np.take_along_axis(weights, fit.order[full, None].astype(int), axis=1)[:, 0]
+    assert (chosen > weights.max(axis=1) - 1e-3).all()
+    np.testing.assert_allclose(fit.stderr[:, full].T, errors, rtol=1e-3, atol=1e-9 * scale.max())
 
 
 @given(

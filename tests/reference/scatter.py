@@ -40,11 +40,11 @@ def redundancy(A: Array, b: Array, reach: int) -> Array:
     X[usable] = A[usable]
     e[usable] = b[usable] - A[usable] @ solution.params
     n = len(b)
-    covariance = np.zeros((n, n))
-    for lag in range(reach + 1):
+    by_lag = np.zeros(n)
+    for lag in range(min(reach + 1, n)):
         pairs = max(int(np.sum(usable[lag:] & usable[: n - lag])), 1)
-        value = (1 - lag / (reach + 1)) * (e[lag:] @ e[: n - lag]) / pairs
-        covariance += value * (np.eye(n, k=lag) + (np.eye(n, k=-lag) if lag else 0))
+        by_lag[lag] = (1 - lag / (reach + 1)) * (e[lag:] @ e[: n - lag]) / pairs
+    covariance = by_lag[np.abs(np.subtract.outer(np.arange(n), np.arange(n)))]
     inverse = solution.covariance / (solution.rss / (usable.sum() - A.shape[1]))
     honest = np.diag(inverse @ X.T @ covariance @ X @ inverse)
     return np.asarray(np.sqrt(np.maximum(1.0, honest / (covariance[0, 0] * np.diag(inverse)))))
