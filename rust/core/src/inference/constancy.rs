@@ -9,8 +9,8 @@ use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Run;
 use crate::regression::constants::{Expected, pool};
-use crate::regression::dyadic_windows::Problem;
-use crate::regression::model::Fit;
+use crate::regression::fit::Fit;
+use crate::regression::problem::Problem;
 use crate::regression::row_covariance::RowCovariance;
 use crate::simd::vectors::Instructions;
 

@@ -3,8 +3,9 @@
 use crate::error::Error;
 use crate::exec::stages::Run;
 use crate::regression::constants::Expected;
-use crate::regression::dyadic_windows::Problem;
-use crate::regression::model::{Fit, Predictor, without_constants};
+use crate::regression::fit::Fit;
+use crate::regression::predictor::{Predictor, without_constants};
+use crate::regression::problem::Problem;
 use crate::regression::window_length::Scale;
 use crate::simd::vectors::Instructions;
 

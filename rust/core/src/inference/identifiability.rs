@@ -10,9 +10,10 @@ use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::exec::pool::ranges;
 use crate::exec::stages::Run;
-use crate::regression::constants::sensitivity;
-use crate::regression::dyadic_windows::Problem;
-use crate::regression::model::{Fit, Model};
+use crate::regression::fit::Fit;
+use crate::regression::model::Model;
+use crate::regression::problem::Problem;
+use crate::regression::solved::sensitivity;
 
 /// What is left, in units of what noise leaves, below which noise is all there is: twice itself would mean as much signal as noise.
 const MOSTLY_NOISE: f64 = 2.0;

@@ -8,9 +8,10 @@ use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::exec::stages::Run;
 use crate::regression::constants::Expected;
-use crate::regression::dyadic_windows::Correlated;
-use crate::regression::factor::Layout;
-use crate::regression::model::{Fit, Model};
+use crate::regression::fit::Fit;
+use crate::regression::layout::Layout;
+use crate::regression::model::Model;
+use crate::regression::problem::Correlated;
 use crate::regression::row_covariance::RowCovariance;
 use crate::simd::vectors::Instructions;
 

@@ -8,10 +8,15 @@ use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::exec::stages::Run;
 use crate::inference::cross_validation::validate;
-use crate::regression::constants::{Expected, is_determined, pool};
-use crate::regression::dyadic_windows::{Problem, Solved};
-use crate::regression::factor::{Fields, Layout, RowNoise, Scratch, absorb, solve};
-use crate::regression::model::{Fit, Model};
+use crate::regression::constants::{Expected, pool};
+use crate::regression::fit::Fit;
+use crate::regression::layout::{Fields, Layout};
+use crate::regression::model::Model;
+use crate::regression::noise_correction::RowNoise;
+use crate::regression::problem::Problem;
+use crate::regression::solve::{Scratch, solve};
+use crate::regression::solved::{Solved, is_determined};
+use crate::regression::summary::absorb;
 use crate::regression::window_length::Scale;
 use crate::simd::f64x8::{Packet, WIDTH};
 use crate::simd::vectors::{Instructions, Kernel, Lanes, dispatch};
@@ -103,7 +108,7 @@ impl Slow<'_> {
         };
         let value = |coefficient: usize, point: usize| {
             is_determined(&solved, point)
-                .then(|| crate::regression::constants::local(&solved, point, &constants, coefficient))
+                .then(|| crate::regression::solved::local(&solved, point, &constants, coefficient))
         };
         let mut values = Vec::new();
         let mut variances = Vec::new();

@@ -8,9 +8,11 @@ use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Run;
 use crate::regression::constants::sums_of_squares;
-use crate::regression::dyadic_windows::{Problem, Shape, Solved, solve_windows};
-use crate::regression::factor::Fields;
-use crate::regression::model::Predictor;
+use crate::regression::dyadic_windows::{Shape, solve_windows};
+use crate::regression::layout::Fields;
+use crate::regression::predictor::Predictor;
+use crate::regression::problem::Problem;
+use crate::regression::solved::Solved;
 use crate::simd::vectors::Instructions;
 use crate::status::Status;
 

@@ -6,9 +6,12 @@
 
 use std::cell::RefCell;
 use std::ops::Range;
-use std::sync::Arc;
 
-use crate::regression::factor::{Fields, Layout, RowNoise, Scratch, absorb, count, merge, recentre, solve, symmetric};
+use crate::regression::layout::{Fields, Layout, symmetric};
+use crate::regression::problem::Problem;
+use crate::regression::solve::{Scratch, solve};
+use crate::regression::solved::Solved;
+use crate::regression::summary::{absorb, count, merge, recentre};
 use crate::simd::f64x8::{Packet, WIDTH};
 use crate::simd::vectors::{Instructions, Kernel, Lanes, dispatch};
 
@@ -17,112 +20,6 @@ const MOST_KEPT: usize = 1 << 17;
 
 /// Rows absorbed at a time.
 const BATCH: usize = 8;
-
-/// Rows of a record. Those that are no equations are zero in every column.
-#[derive(Clone, Debug)]
-pub(crate) struct Problem<'a> {
-    pub(crate) layout: Layout,
-    /// Windowed regressors, and their companions where the layout is linear.
-    pub(crate) windowed: Vec<&'a [f64]>,
-    pub(crate) companions: Vec<&'a [f64]>,
-    pub(crate) constants: Vec<&'a [f64]>,
-    pub(crate) side: &'a [f64],
-    pub(crate) usable: &'a [bool],
-    /// The first rows after jumps of what is windowed, in order. A window over a jump counts as one without rows.
-    pub(crate) jumps: &'a [usize],
-    /// Seconds from one row to the next.
-    pub(crate) period: f64,
-    /// What the angle's noise does in a row.
-    pub(crate) noise: RowNoise,
-    /// What the covariance of the rows makes of the windowed regressors; without it errors are those of ordinary least squares.
-    pub(crate) correlated: Option<Arc<Correlated>>,
-}
-
-/// Windowed regressors and their companions, multiplied by the covariance of the rows.
-#[derive(Clone, Debug)]
-pub(crate) struct Correlated {
-    /// Variance of a row's noise.
-    pub(crate) variance: f64,
-    pub(crate) windowed: Vec<Vec<f64>>,
-    pub(crate) companions: Vec<Vec<f64>>,
-}
-
-impl Problem<'_> {
-    /// Number of rows.
-    pub(crate) fn rows(&self) -> usize {
-        self.side.len()
-    }
-
-    /// Rows from the first that can be used to the last.
-    pub(crate) fn inside(&self) -> Range<usize> {
-        let first = self.usable.iter().position(|&usable| usable).unwrap_or(0);
-        first..self.usable.iter().rposition(|&usable| usable).map_or(first, |last| last + 1)
-    }
-
-    /// Whether there is a jump after the first of some rows and not after the end of them.
-    pub(crate) fn jumps_within(&self, rows: &Range<isize>) -> bool {
-        let next = self.jumps.partition_point(|&jump| jump.cast_signed() <= rows.start);
-        self.jumps.get(next).is_some_and(|&jump| jump.cast_signed() <= rows.end)
-    }
-}
-
-/// Numbers of consecutive windows, field by field.
-#[derive(Clone, Debug)]
-pub(crate) struct Solved {
-    pub(crate) fields: Fields,
-    /// The number of the first window; it may begin before the record.
-    pub(crate) first: isize,
-    count: usize,
-    padded: usize,
-    values: Vec<f64>,
-}
-
-impl Solved {
-    pub(crate) fn new(layout: Layout, first: isize, count: usize) -> Self {
-        let (fields, padded) = (Fields { layout }, count.next_multiple_of(WIDTH));
-        Self { fields, first, count, padded, values: vec![0.0; fields.size() * padded] }
-    }
-
-    /// Number of windows.
-    pub(crate) fn len(&self) -> usize {
-        self.count
-    }
-
-    /// A field of every window.
-    pub(crate) fn field(&self, field: usize) -> &[f64] {
-        &self.values[field * self.padded..][..self.count]
-    }
-
-    /// Where a window is in the fields, if it is there.
-    pub(crate) fn place(&self, window: isize) -> Option<usize> {
-        usize::try_from(window - self.first).ok().filter(|&place| place < self.count)
-    }
-
-    /// Puts windows that follow these after them.
-    pub(crate) fn join(parts: &[&Self]) -> Self {
-        let mut all = Self::new(parts[0].fields.layout, parts[0].first, parts.iter().map(|part| part.count).sum());
-        for field in 0..all.fields.size() {
-            let mut place = field * all.padded;
-            for part in parts {
-                all.values[place..place + part.count].copy_from_slice(part.field(field));
-                place += part.count;
-            }
-        }
-        all
-    }
-
-    /// Makes a window one without rows.
-    fn disregard(&mut self, place: usize) {
-        self.values[self.fields.count() * self.padded + place] = 0.0;
-    }
-
-    /// Writes eight windows.
-    pub(crate) fn put(&mut self, place: usize, fields: &[Packet]) {
-        for (field, value) in fields.iter().enumerate() {
-            value.store(&mut self.values[field * self.padded + place..]);
-        }
-    }
-}
 
 /// Summaries of consecutive windows of one length.
 #[derive(Clone, Debug, Default)]

@@ -3,13 +3,21 @@
 pub(crate) mod centred_windows;
 pub(crate) mod constants;
 pub(crate) mod dyadic_windows;
-pub(crate) mod factor;
+pub(crate) mod fit;
+pub(crate) mod layout;
 pub(crate) mod limits;
 pub(crate) mod model;
 pub(crate) mod newey_west;
+pub(crate) mod noise_correction;
+pub(crate) mod predictor;
+pub(crate) mod problem;
 pub(crate) mod residuals;
 pub(crate) mod row_covariance;
+pub(crate) mod sandwich;
+pub(crate) mod solve;
+pub(crate) mod solved;
 pub(crate) mod subsample;
+pub(crate) mod summary;
 pub(crate) mod whitening;
 pub(crate) mod window_length;
 

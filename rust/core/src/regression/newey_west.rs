@@ -4,8 +4,8 @@
 //! read off the residuals, least squares have the covariance `N⁻¹ Xᵀ Γ X N⁻¹` instead of `σ² N⁻¹` (Newey and West 1987).
 
 use crate::least_squares::stacked_qr::Summary;
-use crate::regression::constants::sandwich;
 use crate::regression::row_covariance::RowCovariance;
+use crate::regression::sandwich::sandwich;
 
 /// Rows of stretches of a record, column by column, apart from each other.
 #[derive(Clone, Debug)]

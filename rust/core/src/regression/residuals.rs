@@ -2,9 +2,10 @@
 
 use crate::error::Error;
 use crate::exec::stages::Run;
-use crate::regression::constants::is_determined;
-use crate::regression::dyadic_windows::Problem;
-use crate::regression::model::{Fit, Predictor, without_constants};
+use crate::regression::fit::Fit;
+use crate::regression::predictor::{Predictor, without_constants};
+use crate::regression::problem::Problem;
+use crate::regression::solved::is_determined;
 
 /// What a fit leaves of every row, and where it says anything; zero where it says nothing.
 pub(crate) fn residuals(

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::exec::stages::Run;
-use crate::regression::dyadic_windows::Correlated;
+use crate::regression::problem::Correlated;
 use crate::weak_form::test_function::Kernels;
 
 /// Correlations that exceed their standard deviation so many times are no chance.

@@ -9,7 +9,9 @@ use std::ops::Range;
 use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Run;
-use crate::regression::dyadic_windows::{Problem, Shape, Solved, solve_windows};
+use crate::regression::dyadic_windows::{Shape, solve_windows};
+use crate::regression::problem::Problem;
+use crate::regression::solved::Solved;
 use crate::simd::vectors::Instructions;
 
 /// Cells in a piece of work.

@@ -21,13 +21,16 @@ use crate::local_polynomials::plan::LocalPolynomials;
 use crate::record::delayed::Delayed;
 use crate::record::samples::{Samples, is_usable};
 use crate::regression::centred_windows::every_window;
-use crate::regression::constants::{Expected, joint_covariance, sandwich, sums_of_squares};
-use crate::regression::dyadic_windows::Problem;
+use crate::regression::constants::{Expected, sums_of_squares};
+use crate::regression::fit::Fit;
 use crate::regression::limits::HARDLY_TOLD_APART;
-use crate::regression::model::{Fit, Model, without_constants};
+use crate::regression::model::Model;
 use crate::regression::newey_west::{Stretched, at_least};
+use crate::regression::predictor::without_constants;
+use crate::regression::problem::Problem;
 use crate::regression::residuals::residuals;
 use crate::regression::row_covariance::RowCovariance;
+use crate::regression::sandwich::{joint_covariance, sandwich};
 use crate::regression::subsample::stretches_of_rows;
 use crate::status::Status;
 
@@ -131,7 +134,7 @@ pub fn identify_strong(
         let (ill, window) = (HARDLY_TOLD_APART, options.equations);
         let found = every_window(&problem, window, range, &constants, ill, instructions, &mut run)?;
         let windowed = model.windowed.len();
-        let own = |one, other, row: usize| found.covariances[crate::regression::factor::symmetric(one, other)][row];
+        let own = |one, other, row: usize| found.covariances[crate::regression::layout::symmetric(one, other)][row];
         let errors: Vec<Vec<f64>> =
             (0..windowed).map(|one| (0..samples).map(|row| own(one, one, row).sqrt()).collect()).collect();
         let (values, errors) = (slices(&found.values), slices(&errors));

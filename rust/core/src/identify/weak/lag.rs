@@ -14,8 +14,9 @@ use crate::identify::weak::decide::Decided;
 use crate::identify::weak::session::{Chosen, Session};
 use crate::inference::missing_terms::Judged;
 use crate::regression::constants::Expected;
-use crate::regression::dyadic_windows::Correlated;
-use crate::regression::model::{Fit, Model};
+use crate::regression::fit::Fit;
+use crate::regression::model::Model;
+use crate::regression::problem::Correlated;
 use crate::regression::row_covariance::RowCovariance;
 use crate::weak_form::weak_rows::WeakRows;
 

@@ -8,8 +8,8 @@ use crate::identify::weak::decide::Decided;
 use crate::identify::weak::session::Session;
 use crate::inference::slowly_varying;
 use crate::regression::constants::Expected;
+use crate::regression::fit::Fit;
 use crate::regression::limits::NOISE_MODEL_FAILS;
-use crate::regression::model::Fit;
 use crate::regression::row_covariance::RowCovariance;
 use crate::weak_form::weak_rows::{Record, WeakRows};
 
@@ -77,9 +77,9 @@ impl Session<'_, '_, '_> {
         let left = model.windowed.is_empty().then(|| {
             let inner = decided.rows(&weak.rows);
             let inner = model.problem(inner, decided.side(inner), self.noise[0], None);
-            let square = |problem: &crate::regression::dyadic_windows::Problem<'_>| {
+            let square = |problem: &crate::regression::problem::Problem<'_>| {
                 let count = problem.usable.iter().filter(|usable| **usable).count() as f64;
-                let left = crate::regression::model::without_constants(problem, constants);
+                let left = crate::regression::predictor::without_constants(problem, constants);
                 left.iter().map(|value| value * value).sum::<f64>() / count
             };
             square(&problem) / square(&inner)

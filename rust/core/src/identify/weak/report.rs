@@ -15,13 +15,15 @@ use crate::inference::missing_terms::{Judged, Missing, Suspect};
 use crate::inference::window_averaging::average;
 use crate::record::derived::{Cubed, Direction};
 use crate::regression::centred_windows::every_window;
-use crate::regression::constants::{Expected, is_determined, joint_covariance, sensitivity, weakest};
-use crate::regression::dyadic_windows::Problem;
-use crate::regression::limits::HARDLY_TOLD_APART;
-use crate::regression::limits::NOISE_MODEL_FAILS;
-use crate::regression::model::{Fit, without_constants};
+use crate::regression::constants::{Expected, weakest};
+use crate::regression::fit::Fit;
+use crate::regression::limits::{HARDLY_TOLD_APART, NOISE_MODEL_FAILS};
+use crate::regression::predictor::without_constants;
+use crate::regression::problem::Problem;
 use crate::regression::residuals::residuals;
 use crate::regression::row_covariance::RowCovariance;
+use crate::regression::sandwich::joint_covariance;
+use crate::regression::solved::{is_determined, sensitivity};
 use crate::regression::subsample::{holds, stretches_of_rows, thinned_column, thinned_rows};
 use crate::status::Status;
 use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows};
@@ -372,7 +374,7 @@ impl Session<'_, '_, '_> {
             |unknown: usize, constant: usize, place: usize| tracks.sensitivities[unknown * count + constant][place];
         let covariance = |one: usize, other: usize, place: usize| {
             let own = |one, other| {
-                tracks.covariances[crate::regression::factor::symmetric(one, other)][place] * errors.inflation
+                tracks.covariances[crate::regression::layout::symmetric(one, other)][place] * errors.inflation
             };
             let sensitive = |unknown, constant| sensitive(unknown, constant, place);
             joint_covariance([one, other], [windowed, count], own, sensitive, |i, j| between(i, j, place))

@@ -2,7 +2,7 @@
 
 use crate::record::samples::Samples;
 use crate::regression::constants::Expected;
-use crate::regression::dyadic_windows::Problem;
+use crate::regression::problem::Problem;
 use crate::regression::window_length::Scale;
 use crate::simd::vectors::Instructions;
 

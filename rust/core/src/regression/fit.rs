@@ -1,0 +1,181 @@
+//! What windows of one length, or the whole record, say of a model.
+
+use std::ops::Range;
+
+use crate::error::Error;
+use crate::exec::pool::Piece;
+use crate::exec::stages::Run;
+use crate::regression::constants::{Expected, Pooled, pool};
+use crate::regression::dyadic_windows::{Shape, solve_windows};
+use crate::regression::problem::Problem;
+use crate::regression::row_covariance::RowCovariance;
+use crate::regression::sandwich::{between, influence, products, sandwich};
+use crate::regression::solved::{Solved, is_determined, local};
+use crate::regression::window_length::Scale;
+use crate::simd::vectors::Instructions;
+
+/// Blocks that a record without windowed unknowns is cut into.
+pub(crate) const BLOCKS: usize = 64;
+
+/// Windows that begin within the length of one.
+pub(crate) const DENSITY: usize = 8;
+
+/// What windows of one length, or the whole record, say of a model.
+#[derive(Clone, Debug)]
+pub(crate) struct Fit {
+    /// Nothing where the windows' length was given, or no unknown belongs to a window.
+    pub(crate) scale: Option<Scale>,
+    /// Windows on both sides of the rows between them, where they are wanted.
+    pub(crate) hollow: Option<Solved>,
+    /// The windows that all unknowns are taken from.
+    pub(crate) full: Solved,
+    pub(crate) pooled: Pooled,
+    /// Rows from one window to the next, and rows of a window.
+    pub(crate) step: usize,
+    pub(crate) span: usize,
+}
+
+impl Fit {
+    /// Solves a problem in windows of one length, or in one piece; nothing where the constants are not determined.
+    pub(crate) fn new(
+        problem: &Problem<'_>,
+        scale: Option<Scale>,
+        expected: Expected,
+        instructions: Instructions,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Option<Self>, Error> {
+        let Some(scale) = scale else {
+            let step = problem.rows().div_ceil(BLOCKS).max(1);
+            return Ok(Self::in_windows(problem, step, BLOCKS, expected, instructions));
+        };
+        let full = scale.solve_full(problem, instructions, run)?;
+        let pooled = pool(&full, 0..full.len(), expected, instructions);
+        let (scale, step, span) = (Some(scale), scale.step, scale.span());
+        Ok(pooled.map(|pooled| Self { scale, hollow: None, full, pooled, step, span }))
+    }
+
+    /// As [`Fit::new`], with windows on both sides of the rows between them as well.
+    pub(crate) fn with_hollow(
+        problem: &Problem<'_>,
+        scale: Scale,
+        expected: Expected,
+        instructions: Instructions,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Option<Self>, Error> {
+        let (hollow, full) = scale.solve_hollow(problem, instructions, run)?;
+        let pooled = pool(&full, 0..full.len(), expected, instructions);
+        let (step, span) = (scale.step, scale.span());
+        Ok(pooled.map(|pooled| Self { scale: Some(scale), hollow: Some(hollow), full, pooled, step, span }))
+    }
+
+    /// Solves another problem in the same windows.
+    pub(crate) fn again(
+        &self,
+        problem: &Problem<'_>,
+        expected: Expected,
+        instructions: Instructions,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Option<Self>, Error> {
+        if self.scale.is_none() && problem.layout.local() > 0 {
+            return Ok(Self::in_rows(problem, self.span, expected, instructions));
+        }
+        Self::new(problem, self.scale, expected, instructions, run)
+    }
+
+    /// The covariance of the constants of the problem that was solved, row by row.
+    pub(crate) fn covariance(
+        &self,
+        problem: &Problem<'_>,
+        covariance: &RowCovariance,
+        run: &mut Run<'_, '_>,
+    ) -> Result<Vec<f64>, Error> {
+        let each = || (0..problem.layout.constant).map(|constant| Piece { size: problem.rows(), content: constant });
+        let windows = 0..self.full.len();
+        let influence =
+            |constant: usize, (): &mut ()| self.influence(problem, &windows, &self.pooled.weights, constant);
+        let columns = run.map(each().collect(), || (), influence)?;
+        let products = |constant: usize, (): &mut ()| products(&columns, constant, covariance);
+        let products = run.map(each().collect(), || (), products)?;
+        Ok(between(&products.concat(), &self.pooled.inverse, columns.len()))
+    }
+
+    /// The same for constants that were taken from some of the windows.
+    pub(crate) fn covariance_of(
+        &self,
+        problem: &Problem<'_>,
+        windows: Range<usize>,
+        pooled: &Pooled,
+        covariance: &RowCovariance,
+    ) -> Vec<f64> {
+        let constants = 0..problem.layout.constant;
+        let columns: Vec<_> =
+            constants.map(|constant| self.influence(problem, &windows, &pooled.weights, constant)).collect();
+        sandwich(&columns, &pooled.inverse, covariance)
+    }
+
+    /// How every row within some windows moves a constant that was taken from them.
+    pub(crate) fn influence(
+        &self,
+        problem: &Problem<'_>,
+        windows: &Range<usize>,
+        weights: &[f64],
+        constant: usize,
+    ) -> Vec<f64> {
+        let centre = |window| self.centre(window);
+        influence(problem, (&self.full, windows.clone()), weights, [self.step, self.span], centre, constant)
+    }
+
+    /// Solves a problem in windows of so many rows, or in one piece if that is all of them.
+    pub(crate) fn in_rows(
+        problem: &Problem<'_>,
+        window: usize,
+        expected: Expected,
+        instructions: Instructions,
+    ) -> Option<Self> {
+        let step = (window / DENSITY).max(1);
+        Self::in_windows(problem, step, window / step, expected, instructions)
+    }
+
+    fn in_windows(
+        problem: &Problem<'_>,
+        step: usize,
+        blocks: usize,
+        expected: Expected,
+        instructions: Instructions,
+    ) -> Option<Self> {
+        let span = blocks * step;
+        let windows = problem.rows().saturating_sub(span) / step + 1;
+        let shapes = [Shape::of(0..blocks, step)];
+        let full = solve_windows(problem, step, &(0..windows.cast_signed()), &shapes, instructions).swap_remove(0);
+        let pooled = pool(&full, 0..full.len(), expected, instructions)?;
+        Some(Self { scale: None, hollow: None, full, pooled, step, span })
+    }
+
+    /// The middle of a window, in rows.
+    pub(crate) fn centre(&self, window: usize) -> f64 {
+        let first = (self.full.first + window.cast_signed()) * self.step.cast_signed();
+        first as f64 + (self.span as f64 - 1.0) / 2.0
+    }
+
+    /// The window whose middle is nearest to a row.
+    pub(crate) fn nearest(&self, row: usize) -> usize {
+        let place = (row as f64 - (self.span as f64 - 1.0) / 2.0) / self.step as f64;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the windows")]
+        let place = place.round().clamp(0.0, self.full.len() as f64 - 1.0) as usize;
+        place
+    }
+
+    /// The median over all windows of what they say of a windowed unknown.
+    pub(crate) fn median(&self, unknown: usize) -> f64 {
+        let windows = (0..self.full.len()).filter(|&window| is_determined(&self.full, window));
+        let mut values: Vec<f64> = windows
+            .map(|window| local(&self.full, window, &self.pooled.values, unknown))
+            .filter(|v| v.is_finite())
+            .collect();
+        if values.is_empty() {
+            return 0.0;
+        }
+        let middle = values.len() / 2;
+        *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+}

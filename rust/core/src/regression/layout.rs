@@ -1,0 +1,123 @@
+//! Where the numbers of a summary of rows, and of a solved window, are.
+
+/// Which columns rows have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Layout {
+    /// Regressors of what is wanted in every window.
+    pub(crate) windowed: usize,
+    /// Whether what is wanted may grow linearly within a window.
+    pub(crate) linear: bool,
+    /// Regressors of what is constant over the record.
+    pub(crate) constant: usize,
+}
+
+impl Layout {
+    /// Unknowns that belong to one window.
+    pub(crate) fn local(self) -> usize {
+        self.windowed * if self.linear { 2 } else { 1 }
+    }
+
+    /// All unknowns.
+    pub(crate) fn regressors(self) -> usize {
+        self.local() + self.constant
+    }
+
+    /// Numbers in a row.
+    pub(crate) fn columns(self) -> usize {
+        self.regressors() + 1
+    }
+
+    /// Where an entry of the factor is, `row ≤ column`.
+    #[inline(always)]
+    pub(crate) fn entry(self, row: usize, column: usize) -> usize {
+        row * self.columns() - row * (row + 1) / 2 + column
+    }
+
+    /// Where the sums over the rows begin: their number, their times and the squares of their times.
+    #[inline(always)]
+    pub(crate) fn sums(self) -> usize {
+        triangle(self.columns())
+    }
+
+    /// Where the noise of the local unknowns begins: a symmetric matrix.
+    #[inline(always)]
+    pub(crate) fn noise(self) -> usize {
+        self.sums() + 3
+    }
+
+    /// Numbers in a summary.
+    pub(crate) fn size(self) -> usize {
+        self.noise() + triangle(self.local())
+    }
+}
+
+/// Entries of a symmetric matrix.
+#[inline(always)]
+pub(crate) fn triangle(size: usize) -> usize {
+    size * (size + 1) / 2
+}
+
+/// Where an entry of a symmetric matrix is that is kept row by row, the lower half.
+#[inline(always)]
+pub(crate) fn symmetric(i: usize, j: usize) -> usize {
+    let (low, high) = if i < j { (i, j) } else { (j, i) };
+    triangle(high) + low
+}
+
+/// Where the numbers of a solved window are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Fields {
+    pub(crate) layout: Layout,
+}
+
+impl Fields {
+    /// How a local unknown depends on a constant one (`constant < layout.constant`, its negative), or its value where all those
+    /// are zero (`constant == layout.constant`).
+    #[inline(always)]
+    pub(crate) fn solution(self, local: usize, constant: usize) -> usize {
+        local * (self.layout.constant + 1) + constant
+    }
+
+    /// Entry of the covariance of the local unknowns.
+    #[inline(always)]
+    pub(crate) fn covariance(self, i: usize, j: usize) -> usize {
+        self.layout.local() * (self.layout.constant + 1) + symmetric(i, j)
+    }
+
+    /// Entry of the factor that is left for the constant unknowns once the local ones are eliminated, `row ≤ column`; in the last
+    /// place the residual sum of squares.
+    #[inline(always)]
+    pub(crate) fn left(self, row: usize, column: usize) -> usize {
+        let columns = self.layout.constant + 1;
+        self.covariance(0, 0) + triangle(self.layout.local()) + row * columns - row * (row + 1) / 2 + column
+    }
+
+    /// Squared norm of the column of a constant unknown before anything was eliminated.
+    #[inline(always)]
+    pub(crate) fn norm(self, constant: usize) -> usize {
+        self.left(self.layout.constant, self.layout.constant) + 1 + constant
+    }
+
+    /// What the rows' noise would leave of itself in the local unknowns: the residual's expectation is that much smaller.
+    #[inline(always)]
+    pub(crate) fn freedom(self) -> usize {
+        self.norm(self.layout.constant)
+    }
+
+    /// Number of rows.
+    #[inline(always)]
+    pub(crate) fn count(self) -> usize {
+        self.freedom() + 1
+    }
+
+    /// Condition number of the local regressors, each scaled to the same norm.
+    #[inline(always)]
+    pub(crate) fn condition(self) -> usize {
+        self.freedom() + 2
+    }
+
+    /// Numbers of a window.
+    pub(crate) fn size(self) -> usize {
+        self.freedom() + 3
+    }
+}

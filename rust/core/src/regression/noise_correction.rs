@@ -1,0 +1,157 @@
+//! What the angle's noise adds to the normal matrix, and how it is taken off inside the triangular factor.
+//!
+//! Where the regressors carry noise of a known covariance, it is taken off *inside* the factor: with `R` the factor, `E` the expected
+//! noise in `RᵀR` and `W = R⁻ᵀ E R⁻¹`, the corrected normal matrix is `Rᵀ (1 - W) R = (U R)ᵀ (U R)` with `UᵀU = 1 - W`. So `U R` is the
+//! corrected factor, the condition number is never squared, and the correction is kept positive definite by bounding `W`.
+
+use crate::regression::layout::Layout;
+use crate::simd::f64x8::Packet;
+
+/// The largest part of a window's information that is ever believed to be noise.
+pub(crate) const GUARD: f64 = 0.9;
+
+/// Covariance of the noise that the angle's noise makes in one row: of all regressors' values, of the companions of the windowed ones
+/// and of the right-hand side, in the order of [`Layout`].
+#[derive(Clone, Debug)]
+pub(crate) struct RowNoise {
+    gram: Vec<f64>,
+    size: usize,
+}
+
+impl RowNoise {
+    /// The Gram matrix of kernels times the variance of the samples, in the order: values of the windowed regressors, their
+    /// companions, constant regressors, right-hand side. A kernel without entries is that of a column without noise.
+    pub(crate) fn new(kernels: &[&[f64]], variance: f64) -> Self {
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let gram = kernels.iter().flat_map(|a| kernels.iter().map(move |b| variance * dot(a, b))).collect();
+        Self { gram, size: kernels.len() }
+    }
+
+    pub(crate) fn is_zero(&self) -> bool {
+        self.gram.iter().all(|&value| value == 0.0)
+    }
+
+    #[inline(always)]
+    fn at(&self, i: usize, j: usize) -> Packet {
+        Packet::splat(self.gram[i * self.size + j])
+    }
+
+    /// What the noise adds to entry `(i, j)` of the normal matrix, the right-hand side being the last column.
+    #[inline(always)]
+    pub(crate) fn expected(&self, layout: Layout, summary: &[Packet], i: usize, j: usize) -> Packet {
+        let sums = &summary[layout.sums()..layout.noise()];
+        let (count, times, squares) = (sums[0], sums[1], sums[2]);
+        let q = layout.windowed;
+        // Kernels are listed with companions whether or not the layout uses them.
+        let kernel = |column: usize| if column < layout.local() { column } else { column - layout.local() + 2 * q };
+        let companion = |column: usize| (q..layout.local()).contains(&column);
+        let (a, b) = (kernel(i), kernel(j));
+        match (companion(i), companion(j)) {
+            (false, false) => count * self.at(a, b),
+            (true, false) => count * self.at(a, b) + times * self.at(a - q, b),
+            (false, true) => count * self.at(a, b) + times * self.at(a, b - q),
+            (true, true) => {
+                count * self.at(a, b)
+                    + times * (self.at(a - q, b) + self.at(a, b - q))
+                    + squares * self.at(a - q, b - q)
+            }
+        }
+    }
+}
+
+/// Takes the expected noise off a factor and a right-hand side: see the head of this file.
+#[inline(always)]
+#[allow(clippy::too_many_arguments, reason = "the parts of one scratch")]
+pub(crate) fn correct(
+    layout: Layout,
+    summary: &[Packet],
+    noise: &RowNoise,
+    square: &mut [Packet],
+    factor: &mut [Packet],
+    side: &mut [Packet],
+    column: &mut [Packet],
+    pivots: &mut [Packet],
+    residual: &mut Packet,
+) {
+    let p = layout.regressors();
+    // W = R⁻ᵀ E R⁻¹, first from the left, then from the right.
+    for j in 0..p {
+        for i in 0..p {
+            let mut value = noise.expected(layout, summary, i, j);
+            for k in 0..i {
+                value -= factor[k * p + i] * square[k * p + j];
+            }
+            square[i * p + j] = value * pivots[i];
+        }
+    }
+    let mut norm = Packet::ZERO;
+    for i in 0..p {
+        for j in 0..p {
+            let mut value = square[i * p + j];
+            for k in 0..j {
+                value -= square[i * p + k] * factor[k * p + j];
+            }
+            square[i * p + j] = value * pivots[j];
+            norm += square[i * p + j] * square[i * p + j];
+        }
+    }
+    // No eigenvalue of W exceeds its norm.
+    let part = Packet::ONE.min(Packet::splat(GUARD) * norm.sqrt().inverse_or_zero()).max(Packet::ZERO);
+    let part = zero_where_zero(norm, part);
+    // g = R⁻ᵀ e, and the side that goes with the corrected factor: U⁻ᵀ (d - g).
+    let mut before = Packet::ZERO;
+    for i in 0..p {
+        let mut value = part * noise.expected(layout, summary, i, p);
+        for k in 0..i {
+            value -= factor[k * p + i] * column[k];
+        }
+        column[i] = value * pivots[i];
+        before += side[i] * side[i];
+        side[i] -= column[i];
+    }
+    // U, the factor of 1 - W, in the place of W; and U⁻ᵀ (d - g) in the place of d - g.
+    let mut after = Packet::ZERO;
+    for i in 0..p {
+        let mut diagonal = Packet::ONE - part * square[i * p + i];
+        for k in 0..i {
+            diagonal -= square[k * p + i] * square[k * p + i];
+        }
+        let diagonal = diagonal.max(Packet::splat((1.0 - GUARD) * f64::EPSILON)).sqrt();
+        let inverse = Packet::ONE / diagonal;
+        square[i * p + i] = diagonal;
+        for j in i + 1..p {
+            let mut value = -(part * square[i * p + j]);
+            for k in 0..i {
+                value -= square[k * p + i] * square[k * p + j];
+            }
+            square[i * p + j] = value * inverse;
+        }
+        let mut value = side[i];
+        for k in 0..i {
+            value -= square[k * p + i] * side[k];
+        }
+        side[i] = value * inverse;
+        after += side[i] * side[i];
+        pivots[i] = pivots[i] * inverse;
+    }
+    for i in 0..p {
+        for j in (i..p).rev() {
+            let mut value = Packet::ZERO;
+            for k in i..=j {
+                value += square[i * p + k] * factor[k * p + j];
+            }
+            factor[i * p + j] = value;
+        }
+    }
+    *residual = (*residual + before - after - part * noise.expected(layout, summary, p, p)).max(Packet::ZERO);
+}
+
+/// A number, but zero where another one is.
+#[inline(always)]
+pub(crate) fn zero_where_zero(zero: Packet, value: Packet) -> Packet {
+    let mut result = value;
+    for (value, zero) in result.0.iter_mut().zip(zero.0) {
+        *value = if zero == 0.0 { 0.0 } else { *value };
+    }
+    result
+}
