@@ -5,8 +5,11 @@ pub(crate) mod cross_validation;
 pub(crate) mod identifiability;
 pub(crate) mod jumps;
 pub(crate) mod missing_terms;
+pub(crate) mod slow_curve;
+pub(crate) mod slow_equations;
 pub(crate) mod slowly_varying;
 pub(crate) mod window_averaging;
+pub(crate) mod windows_around;
 
 pub use constancy::{NO_CHANCE, Test};
 pub use missing_terms::{Missing, Suspect};

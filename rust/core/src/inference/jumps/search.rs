@@ -19,7 +19,7 @@ use crate::exec::pool::Piece;
 use crate::exec::stages::Run;
 use crate::inference::jumps::jump::{Jump, Lines, Search, UNLIKELY};
 use crate::inference::jumps::placement::Place;
-use crate::inference::window_averaging::Around;
+use crate::inference::windows_around::Around;
 use crate::regression::window_length::{Cells, SHORTEST_ALONE, Scale};
 
 /// Squared differences between the windows before and after a row, over their variance, from which on a jump is looked for.

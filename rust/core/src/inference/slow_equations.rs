@@ -1,0 +1,203 @@
+//! What windows leave for slow coefficients, and local polynomials in time fitted to it.
+
+use crate::inference::slow_curve::Varying;
+use crate::regression::constants::{Expected, pool};
+use crate::regression::fit::Fit;
+use crate::regression::layout::{Fields, Layout};
+use crate::regression::noise_correction::RowNoise;
+use crate::regression::problem::Problem;
+use crate::regression::solve::{Scratch, solve};
+use crate::regression::solved::{Solved, is_determined};
+use crate::regression::summary::absorb;
+use crate::regression::window_length::Scale;
+use crate::simd::f64x8::{Packet, WIDTH};
+use crate::simd::vectors::{Instructions, Kernel, Lanes, dispatch};
+
+/// Coefficients of the polynomials in time.
+pub(crate) const TERMS: usize = 3;
+
+/// Points within one reach.
+pub(crate) const DENSITY: usize = 8;
+
+/// The equations that windows left for slow coefficients, which come first among their constants.
+pub(crate) struct Slow<'a> {
+    pub(crate) fit: &'a Fit,
+    /// Number of slow coefficients.
+    pub(crate) coefficients: usize,
+    /// What their growth multiplies, by coefficient.
+    pub(crate) companions: Vec<&'a [f64]>,
+    /// Slow coefficients so far, which were taken off the right-hand side.
+    pub(crate) current: Option<&'a Varying>,
+    /// Weight of every window.
+    pub(crate) weights: &'a [f64],
+    /// Rows of the record.
+    pub(crate) rows: usize,
+}
+
+impl Slow<'_> {
+    /// Fits the slow coefficients with equations up to `reach` rows away, those nearer than `hole` rows left out; nothing where they
+    /// do not determine them.
+    pub(crate) fn fit(&self, reach: f64, hole: f64, instructions: Instructions) -> Option<Varying> {
+        let spacing = reach / DENSITY as f64;
+        let last = self.rows as f64 - 1.0;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "points of a record")]
+        let points = (last / spacing).ceil() as usize + 1;
+        let solved = dispatch(instructions, Points { slow: self, reach, hole, spacing, count: points });
+        let fields = solved.fields;
+        let constants = if fields.layout.constant == 0 {
+            Vec::new()
+        } else {
+            pool(&solved, 0..points, Expected::UNKNOWN, instructions)?.values
+        };
+        let value = |coefficient: usize, point: usize| {
+            is_determined(&solved, point)
+                .then(|| crate::regression::solved::local(&solved, point, &constants, coefficient))
+        };
+        let mut values = Vec::new();
+        let mut variances = Vec::new();
+        for coefficient in 0..self.coefficients {
+            values.push(fill(&(0..points).map(|point| value(coefficient * TERMS, point)).collect::<Vec<_>>())?);
+            let variance = solved.field(fields.covariance(coefficient * TERMS, coefficient * TERMS));
+            let variance = (0..points).map(|point| is_determined(&solved, point).then(|| variance[point]));
+            variances.push(fill(&variance.collect::<Vec<_>>())?);
+        }
+        Some(Varying { first: 0.0, spacing, values, variances, constants })
+    }
+}
+
+/// Fills gaps from the nearest number; nothing where there is none.
+pub(crate) fn fill(values: &[Option<f64>]) -> Option<Vec<f64>> {
+    let known: Vec<(usize, f64)> =
+        values.iter().enumerate().filter_map(|(place, value)| value.map(|value| (place, value))).collect();
+    let nearest = |place: usize| known.iter().min_by_key(|(other, _)| other.abs_diff(place)).map(|(_, value)| *value);
+    (0..values.len()).map(|place| values[place].or_else(|| nearest(place))).collect()
+}
+
+/// The kernel: eight points at a time.
+pub(crate) struct Points<'a, 'b> {
+    slow: &'a Slow<'b>,
+    reach: f64,
+    hole: f64,
+    spacing: f64,
+    count: usize,
+}
+
+impl Kernel for Points<'_, '_> {
+    type Output = Solved;
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _simd: S) -> Solved {
+        let Self { slow, reach, hole, spacing, count: points } = self;
+        let full = &slow.fit.full;
+        let from = full.fields;
+        let (all, slow_ones) = (from.layout.constant, slow.coefficients);
+        let layout = Layout { windowed: TERMS * slow_ones, linear: false, constant: all - slow_ones };
+        let columns = layout.columns();
+        let noise = RowNoise::new(&vec![[].as_slice(); 2 * layout.windowed + layout.constant + 1], 0.0);
+        let mut solved = Solved::new(layout, 0, points);
+        let mut scratch = Scratch::new(layout);
+        let mut summary = vec![Packet::ZERO; layout.size()];
+        let mut rows = vec![Packet::ZERO; all * columns];
+        let mut fields = vec![Packet::ZERO; Fields { layout }.size()];
+        let usable: Vec<(usize, f64)> = (0..full.len())
+            .filter(|&window| is_determined(full, window))
+            .map(|window| (window, slow.fit.centre(window)))
+            .collect();
+        for first in (0..points).step_by(WIDTH) {
+            summary.fill(Packet::ZERO);
+            let point = |lane: usize| (first + lane) as f64 * spacing;
+            let near = usable.partition_point(|(_, row)| *row < point(0) - reach)
+                ..usable.partition_point(|(_, row)| *row <= point(WIDTH - 1) + reach);
+            for &(window, row) in &usable[near] {
+                let distance: [f64; WIDTH] = std::array::from_fn(|lane| (row - point(lane)) / reach);
+                let weight = Packet(distance.map(|distance| {
+                    let seen = distance.abs() < 1.0 && distance.abs() * reach >= hole;
+                    if seen { slow.weights[window] * (1.0 - distance * distance) } else { 0.0 }
+                }));
+                let root = weight.sqrt();
+                let distance = Packet(distance);
+                for i in 0..all {
+                    let row_of = &mut rows[i * columns..(i + 1) * columns];
+                    row_of.fill(Packet::ZERO);
+                    let mut side = full.field(from.left(i, all))[window];
+                    for j in i..all {
+                        let entry = full.field(from.left(i, j))[window];
+                        if j < slow_ones {
+                            side += entry * slow.current.map_or(0.0, |current| current.at(j, row).0);
+                            let mut value = root * Packet::splat(entry);
+                            for term in 0..TERMS {
+                                row_of[j * TERMS + term] = value;
+                                value = value * distance;
+                            }
+                        } else {
+                            row_of[layout.windowed + j - slow_ones] = root * Packet::splat(entry);
+                        }
+                    }
+                    row_of[columns - 1] = root * Packet::splat(side);
+                }
+                absorb(layout, &mut summary, &mut rows, all, false);
+                let sums = layout.noise() - 3;
+                for (count, weight) in summary[sums].0.iter_mut().zip(weight.0) {
+                    *count += if weight > 0.0 { all as f64 } else { 0.0 };
+                }
+            }
+            solve(layout, &summary, &noise, Some(1.0), &mut scratch, &mut fields);
+            solved.put(first, &fields);
+        }
+        solved
+    }
+}
+
+/// The largest squared error, over the noise's, that a single row counts with.
+pub(crate) const MOST: f64 = 25.0;
+
+impl Slow<'_> {
+    /// Mean squared error of predicting rows, over the noise's variance: slow coefficients from equations that the row had no part in,
+    /// what is windowed from windows on both sides of it.
+    pub(crate) fn error(
+        &self,
+        problem: &Problem<'_>,
+        hollow: &Varying,
+        full: &Varying,
+        scale: Scale,
+        variance: f64,
+    ) -> f64 {
+        let Some(solved) = &self.fit.hollow else { return f64::INFINITY };
+        let (fields, layout) = (solved.fields, problem.layout);
+        let (mut sum, mut count) = (0.0, 0.0);
+        let mut constants = vec![0.0; layout.constant];
+        constants[self.coefficients..].copy_from_slice(&hollow.constants);
+        for row in (0..self.rows).filter(|&row| problem.usable[row]) {
+            let cell = scale.cell(row);
+            let Some(place) = solved.place(cell).filter(|&place| is_determined(solved, place)) else { continue };
+            let mut error = problem.side[row];
+            for (coefficient, companion) in self.companions.iter().enumerate() {
+                let (mut value, mut slope) = (hollow.at(coefficient, row as f64).0, full.at(coefficient, row as f64).1);
+                if let Some(current) = self.current {
+                    let (taken, rate) = current.at(coefficient, row as f64);
+                    (value, slope) = (value - taken, slope - rate);
+                }
+                constants[coefficient] = value;
+                error -= slope / problem.period * companion[row];
+            }
+            for (constant, column) in constants.iter().zip(&problem.constants) {
+                error -= constant * column[row];
+            }
+            let later = (row as f64 - scale.centres(cell)[1]) * problem.period;
+            for unknown in 0..layout.local() {
+                let mut value = solved.field(fields.solution(unknown, layout.constant))[place];
+                for (constant, factor) in constants.iter().enumerate() {
+                    value -= solved.field(fields.solution(unknown, constant))[place] * factor;
+                }
+                error -= value
+                    * match unknown.checked_sub(layout.windowed) {
+                        None => problem.windowed[unknown][row],
+                        Some(slope) => problem.companions[slope][row] + later * problem.windowed[slope][row],
+                    };
+            }
+            sum += (error * error / variance).min(MOST);
+            count += 1.0;
+        }
+        if count > 0.0 { sum / count } else { f64::INFINITY }
+    }
+}
