@@ -9,7 +9,7 @@ use std::num::NonZeroUsize;
 use crate::auto_derivatives::boundary;
 use crate::auto_derivatives::candidates::Target;
 use crate::auto_derivatives::global_choice::{Pair, SHORTEST, Survey, rounded};
-use crate::auto_derivatives::local_average::{Outputs, Refinement};
+use crate::auto_derivatives::local_average::{DerivativeOutputs, Refinement};
 use crate::error::Error;
 use crate::exec::pool::Watch;
 use crate::local_polynomials::boundary::End;
@@ -55,7 +55,7 @@ pub struct AutomaticEstimates<'a> {
 
 /// The window and the order that suit a record as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Chosen {
+pub struct AutomaticChoice {
     /// Samples in the window.
     pub window_length: usize,
     /// Order of the polynomial.
@@ -88,7 +88,7 @@ pub fn estimate_automatically(
     estimates: &mut AutomaticEstimates<'_>,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
-) -> Result<Option<Chosen>, Error> {
+) -> Result<Option<AutomaticChoice>, Error> {
     let samples = record.len();
     let &AutomaticOptions { derivative, highest, fixed, delta, sigma, instructions } = options;
     if samples < FEWEST_SAMPLES {
@@ -111,21 +111,21 @@ pub fn estimate_automatically(
     };
     let target = Target { derivative, highest, fixed, shortest, delta, instructions };
     let total = 2 * samples;
-    let best = Survey::new(record).best(&target, variance, &mut || look_up(watch, 0, total))?;
+    let best = Survey::new(record).best(&target, variance, &mut || check_cancelled(watch, 0, total))?;
     let planned = best.and_then(|pair| Some((pair, Refinement::new(samples, pair, &target, variance)?)));
     let Some((pair, refinement)) = planned else {
         estimates.values.fill(f64::NAN);
         estimates.errors.fill(f64::NAN);
         estimates.order.fill(0);
         estimates.status.fill(Status::INVALID.bits());
-        look_up(watch, total, total)?;
+        check_cancelled(watch, total, total)?;
         return Ok(None);
     };
-    let mut outputs = Outputs { values: estimates.values, errors: estimates.errors, order: estimates.order };
+    let mut outputs = DerivativeOutputs { values: estimates.values, errors: estimates.errors, order: estimates.order };
     refinement.estimate(record, &mut outputs, workers, watch)?;
     for end in [End::First, End::Last] {
-        let mut look_up = || look_up(watch, total, total);
-        let at_end = boundary::estimate(record, end, pair, &target, variance, &mut look_up)?;
+        let mut check_cancelled = || check_cancelled(watch, total, total);
+        let at_end = boundary::estimate(record, end, pair, &target, variance, &mut check_cancelled)?;
         for (place, (&value, &error)) in at_end.values.iter().zip(&at_end.errors).enumerate() {
             let sample = if end == End::First { place } else { samples - 1 - place };
             // What the windows at the end cannot give may still come from shorter ones inside.
@@ -147,7 +147,7 @@ pub fn estimate_automatically(
         *status = flags.bits();
     }
     let Pair { half, order } = pair;
-    Ok(Some(Chosen { window_length: 2 * half + 1, order }))
+    Ok(Some(AutomaticChoice { window_length: 2 * half + 1, order }))
 }
 
 /// The step of a quantised signal that the noise does not hide, and how many samples it needs to move by one where it does not rest.
@@ -202,7 +202,7 @@ fn crowding(samples_per_step: f64) -> f64 {
     (CROWDING * samples_per_step).max(1.0)
 }
 
-fn look_up(watch: &mut Watch<'_>, done: usize, total: usize) -> Result<(), Error> {
+fn check_cancelled(watch: &mut Watch<'_>, done: usize, total: usize) -> Result<(), Error> {
     if watch(done, total) { Ok(()) } else { Err(Error::Cancelled) }
 }
 

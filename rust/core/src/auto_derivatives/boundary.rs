@@ -21,7 +21,7 @@ use std::ops::Range;
 
 use crate::auto_derivatives::candidates::{Target, product};
 use crate::auto_derivatives::eigen;
-use crate::auto_derivatives::global_choice::{LookUp, Pair, rounded};
+use crate::auto_derivatives::global_choice::{CheckCancelled, Pair, rounded};
 use crate::auto_derivatives::local_average::Reference;
 use crate::error::Error;
 use crate::local_polynomials::basis::Basis;
@@ -73,17 +73,17 @@ struct Near<'a> {
     gain: f64,
 }
 
-/// Estimates the samples within half of a record's best window of one end; NaN where nothing is known. `look_up` is called now and then.
+/// Estimates the samples within half of a record's best window of one end; NaN where nothing is known. `check_cancelled` is called now and then.
 ///
 /// # Errors
-/// Those of `look_up`, at once.
+/// Those of `check_cancelled`, at once.
 pub(crate) fn estimate(
     record: &dyn Samples,
     end: End,
     pair: Pair,
     target: &Target,
     variance: f64,
-    look_up: &mut LookUp<'_>,
+    check_cancelled: &mut CheckCancelled<'_>,
 ) -> Result<AtEnd, Error> {
     let samples = record.len();
     let Some(reference) = Reference::new(pair, REFERENCE, target) else { return Ok(average(&[], pair.half)) };
@@ -99,7 +99,7 @@ pub(crate) fn estimate(
         if (SHORTEST..samples.div_ceil(4)).contains(&half) && 2 * half < samples / 2 {
             found.extend(near.shrink(half, pair.half, target, variance));
         }
-        look_up()?;
+        check_cancelled()?;
     }
     Ok(average(&found, pair.half))
 }
@@ -179,7 +179,7 @@ impl<'a> Near<'a> {
                 .iter()
                 .map(|row| scale * row.iter().zip(&at_place).map(|(a, q)| a * q).sum::<f64>())
                 .collect();
-            let estimates = Estimates::new(&projected, &weights, constant, target.derivative);
+            let estimates = BoundaryEstimates::new(&projected, &weights, constant, target.derivative);
             shrunk.values.push(match self.end {
                 End::First => estimates.forwards[outermost],
                 End::Last => estimates.backwards[outermost],
@@ -206,12 +206,12 @@ impl<'a> Near<'a> {
 }
 
 /// Estimates at one place of every window, and at its mirror image.
-struct Estimates {
+struct BoundaryEstimates {
     forwards: Vec<f64>,
     backwards: Vec<f64>,
 }
 
-impl Estimates {
+impl BoundaryEstimates {
     fn new(projected: &Projected, weights: &[f64], constant: f64, derivative: usize) -> Self {
         let mut parts = [projected.level.iter().map(|level| level * constant).collect::<Vec<f64>>(), Vec::new()];
         parts[1].resize(projected.level.len(), 0.0);

@@ -68,8 +68,8 @@ pub(crate) struct Bank {
 
 /// Memory of one thread for one bank.
 #[derive(Debug)]
-pub(crate) struct Scratch {
-    coefficients: coefficients::Scratch,
+pub(crate) struct CandidateScratch {
+    coefficients: coefficients::CoefficientScratch,
     projected: Projected,
 }
 
@@ -92,8 +92,8 @@ impl Bank {
         Some(Self { half, orders, gains, leverages, basis, coefficients, weights, first, constant })
     }
 
-    pub(crate) fn scratch(&self) -> Scratch {
-        Scratch { coefficients: self.coefficients.scratch(), projected: Projected::default() }
+    pub(crate) fn scratch(&self) -> CandidateScratch {
+        CandidateScratch { coefficients: self.coefficients.scratch(), projected: Projected::default() }
     }
 
     /// The samples of a record that can be centres of windows.
@@ -107,9 +107,9 @@ impl Bank {
         record: &dyn Samples,
         centres: Range<usize>,
         step: usize,
-        scratch: &'a mut Scratch,
+        scratch: &'a mut CandidateScratch,
     ) -> &'a [Vec<f64>] {
-        let Scratch { coefficients, projected } = scratch;
+        let CandidateScratch { coefficients, projected } = scratch;
         let windows = centres.start - self.half..centres.end - self.half;
         self.coefficients.project(record, windows, step, projected, coefficients);
         let Projected { level: sums, coefficients: rows, .. } = projected;

@@ -48,7 +48,7 @@ pub(crate) const OPTIMISM: f64 = 1.3;
 const REFINEMENTS: [f64; 4] = [0.25, 0.125, 0.0625, 0.031_25];
 
 /// Called now and then; an error ends the work.
-pub(crate) type LookUp<'a> = dyn FnMut() -> Result<(), Error> + 'a;
+pub(crate) type CheckCancelled<'a> = dyn FnMut() -> Result<(), Error> + 'a;
 
 /// Where candidates are compared.
 pub(crate) struct Survey<'a> {
@@ -66,7 +66,7 @@ struct Surveyed {
 
 /// A candidate of a window, and its risk where that is known.
 #[derive(Clone, Copy)]
-struct Judged<'a> {
+struct JudgedWindow<'a> {
     looked: &'a Surveyed,
     candidate: usize,
     risk: f64,
@@ -88,23 +88,28 @@ impl<'a> Survey<'a> {
         Self { record, stretches, step: (count * length).div_ceil(MOST_PLACES) }
     }
 
-    /// The pair of least risk, or nothing where no window holds only what can be used. `look_up` is called now and then.
+    /// The pair of least risk, or nothing where no window holds only what can be used. `check_cancelled` is called now and then.
     ///
     /// # Errors
-    /// Those of `look_up`, at once.
-    pub(crate) fn best(&self, target: &Target, variance: f64, look_up: &mut LookUp<'_>) -> Result<Option<Pair>, Error> {
+    /// Those of `check_cancelled`, at once.
+    pub(crate) fn best(
+        &self,
+        target: &Target,
+        variance: f64,
+        check_cancelled: &mut CheckCancelled<'_>,
+    ) -> Result<Option<Pair>, Error> {
         let mut ladder = Vec::new();
         for half in ladder_of_windows(self.record.len(), target.shortest) {
             if let Some(bank) = Bank::new(half, target) {
                 ladder.push(self.look(bank));
             }
-            look_up()?;
+            check_cancelled()?;
         }
-        let Some((pair, (window, candidate))) = climb(&ladder, variance) else { return Ok(None) };
+        let Some((pair, (window, candidate))) = best_of(&ladder, variance) else { return Ok(None) };
         let looked = ladder.swap_remove(window);
         drop(ladder);
-        let reference = Judged { looked: &looked, candidate, risk: f64::NAN };
-        self.refine(target, variance, pair, reference, look_up).map(Some)
+        let reference = JudgedWindow { looked: &looked, candidate, risk: f64::NAN };
+        self.refine(target, variance, pair, reference, check_cancelled).map(Some)
     }
 
     /// Finds the window, and the order, between those of the ladder.
@@ -113,13 +118,13 @@ impl<'a> Survey<'a> {
         target: &Target,
         variance: f64,
         pair: Pair,
-        reference: Judged<'_>,
-        look_up: &mut LookUp<'_>,
+        reference: JudgedWindow<'_>,
+        check_cancelled: &mut CheckCancelled<'_>,
     ) -> Result<Pair, Error> {
         // The best of a window beside what is best so far.
         let best_of = |half: usize, best: Option<&(Surveyed, usize, f64)>| {
             let looked = self.look(Bank::new(half, target)?);
-            let best = best.map(|&(ref looked, candidate, risk)| Judged { looked, candidate, risk });
+            let best = best.map(|&(ref looked, candidate, risk)| JudgedWindow { looked, candidate, risk });
             let risks = risks(reference, &looked, best, variance);
             let (candidate, risk) = risks.into_iter().enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
             Some((looked, candidate, risk))
@@ -136,7 +141,7 @@ impl<'a> Survey<'a> {
                 {
                     best = found;
                 }
-                look_up()?;
+                check_cancelled()?;
             }
         }
         let (looked, candidate, _) = best;
@@ -171,21 +176,21 @@ impl<'a> Survey<'a> {
 }
 
 /// Climbs to the best pair of a ladder. Returns it and the place of what it was compared with.
-fn climb(ladder: &[Surveyed], variance: f64) -> Option<(Pair, (usize, usize))> {
+fn best_of(ladder: &[Surveyed], variance: f64) -> Option<(Pair, (usize, usize))> {
     let mut reference = (0, ladder.first()?.bank.orders.len() - 1);
     let mut seen = Vec::new();
     let mut best = None;
     while !seen.contains(&reference) {
         seen.push(reference);
         let least_gain = ladder.get(reference.0)?.bank.gains[reference.1] / JUDGED;
-        let compared = Judged { looked: &ladder[reference.0], candidate: reference.1, risk: f64::NAN };
+        let compared = JudgedWindow { looked: &ladder[reference.0], candidate: reference.1, risk: f64::NAN };
         let (mut shorter_best, mut least): (_, Option<(f64, usize, usize)>) = (None, None);
         for (window, looked) in ladder.iter().enumerate() {
             let risks = risks(compared, looked, shorter_best, variance).into_iter().enumerate();
             let judged =
                 risks.filter(|&(candidate, risk)| looked.bank.gains[candidate] >= least_gain && risk.is_finite());
             let Some((candidate, risk)) = judged.min_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
-            shorter_best = Some(Judged { looked, candidate, risk });
+            shorter_best = Some(JudgedWindow { looked, candidate, risk });
             if least.is_none_or(|(least, ..)| risk < least) {
                 least = Some((risk, window, candidate));
             }
@@ -200,7 +205,7 @@ fn climb(ladder: &[Surveyed], variance: f64) -> Option<(Pair, (usize, usize))> {
 
 /// The risk of every candidate of a window, by comparison with a reference; infinite where they cannot be compared. Beside another
 /// candidate whose risk is known, it is that risk and what it differs by where both windows fit.
-fn risks(reference: Judged<'_>, looked: &Surveyed, beside: Option<Judged<'_>>, variance: f64) -> Vec<f64> {
+fn risks(reference: JudgedWindow<'_>, looked: &Surveyed, beside: Option<JudgedWindow<'_>>, variance: f64) -> Vec<f64> {
     let kernel = reference.looked.bank.kernel(reference.candidate);
     let compare = &reference.looked.rows[reference.candidate];
     let fits = |place: usize| {
@@ -267,7 +272,7 @@ mod tests {
         };
         // The longest fits in the middle only, and what all are compared with is far off wherever it does not.
         let (reference, short, long) = (surveyed(4, 9.0, 0.0), surveyed(8, 0.0, 0.1), surveyed(30, f64::NAN, 0.3));
-        let judged = |looked, candidate, risk| Judged { looked, candidate, risk };
+        let judged = |looked, candidate, risk| JudgedWindow { looked, candidate, risk };
         let reference = judged(&reference, 0, f64::NAN);
         let of_short = risks(reference, &short, None, 0.0)[0];
         let of_long = risks(reference, &long, Some(judged(&short, 0, of_short)), 0.0)[0];

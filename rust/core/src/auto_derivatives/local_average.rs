@@ -83,7 +83,7 @@ impl Reference {
 
 /// Where the estimates of one record go. Slices that are empty are not wanted.
 #[derive(Debug)]
-pub(crate) struct Outputs<'a> {
+pub(crate) struct DerivativeOutputs<'a> {
     pub(crate) values: &'a mut [f64],
     pub(crate) errors: &'a mut [f64],
     pub(crate) order: &'a mut [u8],
@@ -98,9 +98,9 @@ struct Weighed {
 }
 
 /// Memory of one thread.
-struct Scratch {
-    banks: Vec<candidates::Scratch>,
-    reference: candidates::Scratch,
+struct AverageScratch {
+    banks: Vec<candidates::CandidateScratch>,
+    reference: candidates::CandidateScratch,
     compare: Vec<f64>,
     rows: Vec<Vec<f64>>,
 }
@@ -137,7 +137,7 @@ impl Refinement {
     pub(crate) fn estimate(
         &self,
         record: &dyn Samples,
-        outputs: &mut Outputs<'_>,
+        outputs: &mut DerivativeOutputs<'_>,
         workers: NonZeroUsize,
         watch: &mut Watch<'_>,
     ) -> Result<(), Error> {
@@ -153,7 +153,7 @@ impl Refinement {
                 let own_counts = split_off(&mut counts, part.len() * self.banks.len());
                 pieces.push(Piece { size: self.samples(&part).len(), content: (part, own, own_counts) });
             }
-            let work = |(part, sums, counts): (Range<usize>, &mut [f64], &mut [f64]), scratch: &mut Scratch| {
+            let work = |(part, sums, counts): (Range<usize>, &mut [f64], &mut [f64]), scratch: &mut AverageScratch| {
                 self.compare(record, part, sums, counts, scratch);
             };
             pool::run(pieces, workers, || self.scratch(), work, &mut |done, _| watch(done, total))?;
@@ -161,18 +161,18 @@ impl Refinement {
         let weighed = self.weigh(&sums, &counts);
         drop((sums, counts));
         let mut pieces = Vec::new();
-        let Outputs { values, errors, order } = outputs;
+        let DerivativeOutputs { values, errors, order } = outputs;
         let (mut values, mut errors, mut order) = (&mut **values, &mut **errors, &mut **order);
         for part in self.pieces() {
             let size = self.samples(&part).len();
-            let own = Outputs {
+            let own = DerivativeOutputs {
                 values: split_off(&mut values, size),
                 errors: split_off(&mut errors, size),
                 order: split_off(&mut order, size),
             };
             pieces.push(Piece { size, content: (part, own) });
         }
-        let work = |(part, mut outputs): (Range<usize>, Outputs<'_>), scratch: &mut Scratch| {
+        let work = |(part, mut outputs): (Range<usize>, DerivativeOutputs<'_>), scratch: &mut AverageScratch| {
             self.average(record, part, &weighed, &mut outputs, scratch);
         };
         let samples = record.len();
@@ -189,8 +189,8 @@ impl Refinement {
         self.blocks.samples(blocks.start).start..self.blocks.samples(blocks.end - 1).end
     }
 
-    fn scratch(&self) -> Scratch {
-        Scratch {
+    fn scratch(&self) -> AverageScratch {
+        AverageScratch {
             banks: self.banks.iter().map(Bank::scratch).collect(),
             reference: self.reference.bank.scratch(),
             compare: Vec::new(),
@@ -206,10 +206,10 @@ impl Refinement {
         blocks: Range<usize>,
         sums: &mut [f64],
         counts: &mut [f64],
-        scratch: &mut Scratch,
+        scratch: &mut AverageScratch,
     ) {
         let samples = self.samples(&blocks);
-        let Scratch { banks, reference, compare, .. } = scratch;
+        let AverageScratch { banks, reference, compare, .. } = scratch;
         let own = &self.reference;
         let centres = within(&samples, &own.bank.centres(record.len()));
         compare.clear();
@@ -297,8 +297,8 @@ impl Refinement {
         record: &dyn Samples,
         blocks: Range<usize>,
         weighed: &Weighed,
-        outputs: &mut Outputs<'_>,
-        scratch: &mut Scratch,
+        outputs: &mut DerivativeOutputs<'_>,
+        scratch: &mut AverageScratch,
     ) {
         let (samples, candidates) = (self.samples(&blocks), self.offsets.len());
         // Weights are linear between the centres of neighbouring blocks.
@@ -341,8 +341,8 @@ impl Refinement {
     }
 
     /// Fills the rows of the candidates wanted; NaN where a window does not fit.
-    fn fill(&self, record: &dyn Samples, samples: &Range<usize>, wanted: &[bool], scratch: &mut Scratch) {
-        let Scratch { banks, rows, .. } = scratch;
+    fn fill(&self, record: &dyn Samples, samples: &Range<usize>, wanted: &[bool], scratch: &mut AverageScratch) {
+        let AverageScratch { banks, rows, .. } = scratch;
         let mut first = 0;
         for (bank, scratch) in self.banks.iter().zip(banks) {
             let own = first..first + bank.orders.len();
@@ -371,8 +371,8 @@ impl Refinement {
         bias: impl Fn(usize) -> f64,
         used: &[bool],
         place: usize,
-        outputs: &mut Outputs<'_>,
-        scratch: &Scratch,
+        outputs: &mut DerivativeOutputs<'_>,
+        scratch: &AverageScratch,
     ) -> bool {
         let known = || {
             let weighed =

@@ -8,4 +8,4 @@ pub(crate) mod global_choice;
 pub(crate) mod local_average;
 pub(crate) mod symmetric_grid;
 
-pub use automatic::{AutomaticEstimates, AutomaticOptions, Chosen, FEWEST_SAMPLES, estimate_automatically};
+pub use automatic::{AutomaticChoice, AutomaticEstimates, AutomaticOptions, FEWEST_SAMPLES, estimate_automatically};

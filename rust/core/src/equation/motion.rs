@@ -61,22 +61,22 @@ impl Motion<'_> {
     ) {
         let [angle, velocity, acceleration] = derivatives;
         let count = angle.len();
-        let Some((side, unknowns)) = columns.split_last_mut() else { return };
-        side.resize(count, 0.0);
-        self.torque.read(first, side);
+        let Some((rhs, unknowns)) = columns.split_last_mut() else { return };
+        rhs.resize(count, 0.0);
+        self.torque.read(first, rhs);
         for (coefficient, factor) in self.coefficients.iter().zip([&*acceleration, velocity, angle]) {
             match *coefficient {
                 Coefficient::Unknown => {}
                 Coefficient::Number(number) => {
                     if number != 0.0 {
-                        side.iter_mut().zip(factor).for_each(|(side, factor)| *side -= number * factor);
+                        rhs.iter_mut().zip(factor).for_each(|(rhs, factor)| *rhs -= number * factor);
                     }
                 }
                 Coefficient::Record(record) => {
                     known.resize(count, 0.0);
                     record.read(first, known);
-                    for ((side, factor), known) in side.iter_mut().zip(factor).zip(&*known) {
-                        *side -= known * factor;
+                    for ((rhs, factor), known) in rhs.iter_mut().zip(factor).zip(&*known) {
+                        *rhs -= known * factor;
                     }
                 }
             }

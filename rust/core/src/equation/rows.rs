@@ -22,9 +22,9 @@ pub(crate) struct Rows {
     /// Inertia, damping, stiffness and terms, known or not.
     pub(crate) regressors: Vec<Regressor>,
     /// The torque, with what is known taken off.
-    pub(crate) side: Vec<f64>,
+    pub(crate) rhs: Vec<f64>,
     /// The kernel that the angle's noise enters the right-hand side by; empty where it does not.
-    pub(crate) side_noise: Vec<f64>,
+    pub(crate) rhs_noise: Vec<f64>,
     pub(crate) usable: Vec<bool>,
     /// The first rows after jumps of what is windowed, in order.
     pub(crate) jumps: Vec<usize>,
@@ -35,7 +35,7 @@ pub(crate) struct Rows {
 impl Rows {
     /// Number of rows.
     pub(crate) fn len(&self) -> usize {
-        self.side.len()
+        self.rhs.len()
     }
 
     /// Makes rows no equations.
@@ -63,7 +63,7 @@ impl Rows {
 
     /// Makes every column zero in a row.
     pub(crate) fn clear(&mut self, row: usize) {
-        self.side[row] = 0.0;
+        self.rhs[row] = 0.0;
         for Regressor { value, companion, .. } in &mut self.regressors {
             value[row] = 0.0;
             if let Some(value) = companion.get_mut(row) {

@@ -7,19 +7,19 @@ use crate::error::Error;
 use crate::exec::pool::{self, Piece, Watch, ranges};
 
 /// Workers and watch of a call that goes through a number of stages.
-pub(crate) struct Run<'a, 'b> {
+pub(crate) struct Stages<'a, 'b> {
     pub(crate) workers: NonZeroUsize,
     watch: &'a mut Watch<'b>,
     /// What the watch is told at the end.
     total: usize,
     /// Stages done, and about how many there will be.
     done: usize,
-    stages: usize,
+    expected: usize,
 }
 
-impl<'a, 'b> Run<'a, 'b> {
-    pub(crate) fn new(workers: NonZeroUsize, total: usize, stages: usize, watch: &'a mut Watch<'b>) -> Self {
-        Self { workers, watch, total, done: 0, stages }
+impl<'a, 'b> Stages<'a, 'b> {
+    pub(crate) fn new(workers: NonZeroUsize, total: usize, expected: usize, watch: &'a mut Watch<'b>) -> Self {
+        Self { workers, watch, total, done: 0, expected }
     }
 
     /// Does every piece once and returns what each gave, in their order.
@@ -61,9 +61,9 @@ impl<'a, 'b> Run<'a, 'b> {
 
     /// Does one stage, of which the watch sees its share of the whole.
     pub(crate) fn stage<R>(&mut self, work: impl FnOnce(&mut Watch<'_>) -> Result<R, Error>) -> Result<R, Error> {
-        let (total, stages, done) = (self.total, self.stages, self.done);
+        let (total, expected, done) = (self.total, self.expected, self.done);
         let watch = &mut *self.watch;
-        let share = |part: f64| (total as f64 * ((done as f64 + part) / stages as f64).min(1.0)).floor();
+        let share = |part: f64| (total as f64 * ((done as f64 + part) / expected as f64).min(1.0)).floor();
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between zero and the total")]
         let result = work(&mut |now, all| watch(share(now as f64 / all.max(1) as f64) as usize, total));
         self.done += 1;

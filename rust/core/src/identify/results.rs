@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::error::Error;
 use crate::exec::huge_pages::zeros;
 use crate::exec::pool::Piece;
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::inference::jumps::jump::{Jump, UNLIKELY};
 use crate::status::Status;
 
@@ -74,7 +74,7 @@ impl RowResults {
         &self,
         samples: usize,
         step: usize,
-        run: &mut Run<'_, '_>,
+        stages: &mut Stages<'_, '_>,
     ) -> Result<SampleResults, Error> {
         let (rows, count) = (self.status.len(), samples.div_ceil(step));
         let carried = self.values.iter().zip(&self.slopes).map(|(column, slopes)| (column, Some(slopes)));
@@ -96,7 +96,7 @@ impl RowResults {
                 done = end;
             }
         }
-        run.map(
+        stages.map(
             pieces,
             || (),
             |(first, rows, columns, status): (_, _, Vec<&mut [f64]>, &mut [u16]), (): &mut ()| {

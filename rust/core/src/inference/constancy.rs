@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::exec::pool::Piece;
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::regression::constants::{Expected, pool};
 use crate::regression::fit::Fit;
 use crate::regression::problem::Problem;
@@ -37,7 +37,7 @@ pub(crate) fn test(
     covariance: &RowCovariance,
     inflation: f64,
     instructions: Instructions,
-    run: &mut Run<'_, '_>,
+    stages: &mut Stages<'_, '_>,
 ) -> Result<Vec<Option<Test>>, Error> {
     let rows = problem.rows();
     let constants = problem.layout.constant;
@@ -54,7 +54,7 @@ pub(crate) fn test(
         Some((pooled.values, variances))
     };
     let blocks = (0..BLOCKS).map(|block| Piece { size: rows.div_ceil(BLOCKS), content: block });
-    let estimates = run.map(blocks.collect(), || (), estimate)?;
+    let estimates = stages.map(blocks.collect(), || (), estimate)?;
     let estimates: Vec<_> = estimates.into_iter().flatten().collect();
     let tests = (0..constants)
         .map(|constant| {

@@ -1,7 +1,7 @@
 //! Which length of windows predicts best what it has not seen.
 
 use crate::error::Error;
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::predictor::{Predictor, without_constants};
@@ -27,7 +27,7 @@ pub(crate) fn validate(
     scales: &[Scale],
     expected: Expected,
     instructions: Instructions,
-    run: &mut Run<'_, '_>,
+    stages: &mut Stages<'_, '_>,
 ) -> Result<Vec<Validated>, Error> {
     let rows = problem.rows();
     let inside = problem.inside();
@@ -42,7 +42,7 @@ pub(crate) fn validate(
         .max(inside.start + 3 * inside.len() / 4);
     let mut validated = Vec::new();
     for &scale in scales {
-        if let Some(fit) = Fit::with_hollow(problem, scale, expected, instructions, run)? {
+        if let Some(fit) = Fit::with_leave_gap_out(problem, scale, expected, instructions, stages)? {
             let error = error(problem, scale, &fit, start..end, expected.variance);
             validated.push(Validated { fit, error });
         }
@@ -63,15 +63,15 @@ pub(crate) fn error(
     rows: std::ops::Range<usize>,
     variance: f64,
 ) -> f64 {
-    let Some(hollow) = &fit.hollow else { return f64::NAN };
-    let side = without_constants(problem, &fit.pooled.values);
-    let predictor = Predictor::new(hollow, &fit.pooled.values);
+    let Some(leave_gap_out) = &fit.leave_gap_out else { return f64::NAN };
+    let rhs = without_constants(problem, &fit.pooled.values);
+    let predictor = Predictor::new(leave_gap_out, &fit.pooled.values);
     let (mut sum, mut count) = (0.0, 0.0);
     for row in rows.filter(|&row| problem.usable[row]) {
         let cell = scale.cell(row);
         let Some(place) = predictor.place(cell) else { continue };
         let later = (row as f64 - scale.centres(cell)[1]) * problem.period;
-        let error = side[row] - predictor.predict(problem, place, row, later);
+        let error = rhs[row] - predictor.predict(problem, place, row, later);
         sum += (error * error / variance).min(MOST);
         count += 1.0;
     }

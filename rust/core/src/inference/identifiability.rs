@@ -9,7 +9,7 @@ use std::ops::Range;
 use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::exec::pool::ranges;
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
 use crate::regression::problem::Problem;
@@ -27,7 +27,7 @@ pub(crate) fn is_mostly_noise(
     fit: &Fit,
     weakest: &[f64],
     variance: f64,
-    run: &mut Run<'_, '_>,
+    stages: &mut Stages<'_, '_>,
 ) -> Result<bool, Error> {
     if variance == 0.0 || weakest.is_empty() {
         return Ok(false);
@@ -65,7 +65,7 @@ pub(crate) fn is_mostly_noise(
         }
         [left, noise]
     };
-    let sums = run.map(ranges(problem.rows()), || (), of)?;
+    let sums = stages.map(ranges(problem.rows()), || (), of)?;
     let [left, noise] = sums.iter().fold([0.0, 0.0], |[a, b], [c, d]| [a + c, b + d]);
     Ok(left < MOSTLY_NOISE * variance * noise)
 }

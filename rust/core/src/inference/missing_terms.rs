@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::equation::rows::Rows;
 use crate::error::Error;
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::layout::Layout;
@@ -51,10 +51,10 @@ impl Suspect {
 }
 
 /// What a fit was made with.
-pub(crate) struct Judged<'a> {
+pub(crate) struct JudgedTerm<'a> {
     pub(crate) rows: &'a Rows,
     pub(crate) model: &'a Model,
-    pub(crate) side: &'a [f64],
+    pub(crate) rhs: &'a [f64],
     /// Variance of the angle's noise.
     pub(crate) noise: f64,
     pub(crate) fit: &'a Fit,
@@ -66,16 +66,16 @@ pub(crate) struct Judged<'a> {
     pub(crate) instructions: Instructions,
 }
 
-impl Judged<'_> {
+impl JudgedTerm<'_> {
     /// Adds one regressor to the constants and returns its factor with its standard error; nothing where it is not determined.
-    pub(crate) fn factor(&self, regressor: usize, run: &mut Run<'_, '_>) -> Result<Option<(f64, f64)>, Error> {
+    pub(crate) fn factor(&self, regressor: usize, stages: &mut Stages<'_, '_>) -> Result<Option<(f64, f64)>, Error> {
         let mut model = self.model.clone();
         model.constant.push(regressor);
-        let problem = model.problem(self.rows, self.side, self.noise, Some(self.correlated));
-        let fit = self.fit.again(&problem, self.expected, self.instructions, run)?;
+        let problem = model.problem(self.rows, self.rhs, self.noise, Some(self.correlated));
+        let fit = self.fit.again(&problem, self.expected, self.instructions, stages)?;
         let Some(fit) = fit else { return Ok(None) };
         let Layout { constant, .. } = problem.layout;
-        let variances = fit.covariance(&problem, self.covariance, run)?;
+        let variances = fit.covariance(&problem, self.covariance, stages)?;
         let variance = self.inflation * variances[constant * constant - 1];
         Ok(Some((fit.pooled.values[constant - 1], variance.sqrt())))
     }

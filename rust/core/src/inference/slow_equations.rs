@@ -6,7 +6,7 @@ use crate::regression::fit::Fit;
 use crate::regression::layout::{Fields, Layout};
 use crate::regression::noise_correction::RowNoise;
 use crate::regression::problem::Problem;
-use crate::regression::solve::{Scratch, solve};
+use crate::regression::solve::{SolveScratch, solve};
 use crate::regression::solved::{Solved, is_determined};
 use crate::regression::summary::absorb;
 use crate::regression::window_length::Scale;
@@ -95,7 +95,7 @@ impl Kernel for Points<'_, '_> {
         let columns = layout.columns();
         let noise = RowNoise::new(&vec![[].as_slice(); 2 * layout.windowed + layout.constant + 1], 0.0);
         let mut solved = Solved::new(layout, 0, points);
-        let mut scratch = Scratch::new(layout);
+        let mut scratch = SolveScratch::new(layout);
         let mut summary = vec![Packet::ZERO; layout.size()];
         let mut rows = vec![Packet::ZERO; all * columns];
         let mut fields = vec![Packet::ZERO; Fields { layout }.size()];
@@ -119,11 +119,11 @@ impl Kernel for Points<'_, '_> {
                 for i in 0..all {
                     let row_of = &mut rows[i * columns..(i + 1) * columns];
                     row_of.fill(Packet::ZERO);
-                    let mut side = full.field(from.left(i, all))[window];
+                    let mut rhs = full.field(from.left(i, all))[window];
                     for j in i..all {
                         let entry = full.field(from.left(i, j))[window];
                         if j < slow_ones {
-                            side += entry * slow.current.map_or(0.0, |current| current.at(j, row).0);
+                            rhs += entry * slow.current.map_or(0.0, |current| current.at(j, row).0);
                             let mut value = root * Packet::splat(entry);
                             for term in 0..TERMS {
                                 row_of[j * TERMS + term] = value;
@@ -133,7 +133,7 @@ impl Kernel for Points<'_, '_> {
                             row_of[layout.windowed + j - slow_ones] = root * Packet::splat(entry);
                         }
                     }
-                    row_of[columns - 1] = root * Packet::splat(side);
+                    row_of[columns - 1] = root * Packet::splat(rhs);
                 }
                 absorb(layout, &mut summary, &mut rows, all, false);
                 let sums = layout.noise() - 3;
@@ -157,22 +157,23 @@ impl Slow<'_> {
     pub(crate) fn error(
         &self,
         problem: &Problem<'_>,
-        hollow: &Varying,
+        leave_gap_out: &Varying,
         full: &Varying,
         scale: Scale,
         variance: f64,
     ) -> f64 {
-        let Some(solved) = &self.fit.hollow else { return f64::INFINITY };
+        let Some(solved) = &self.fit.leave_gap_out else { return f64::INFINITY };
         let (fields, layout) = (solved.fields, problem.layout);
         let (mut sum, mut count) = (0.0, 0.0);
         let mut constants = vec![0.0; layout.constant];
-        constants[self.coefficients..].copy_from_slice(&hollow.constants);
+        constants[self.coefficients..].copy_from_slice(&leave_gap_out.constants);
         for row in (0..self.rows).filter(|&row| problem.usable[row]) {
             let cell = scale.cell(row);
             let Some(place) = solved.place(cell).filter(|&place| is_determined(solved, place)) else { continue };
-            let mut error = problem.side[row];
+            let mut error = problem.rhs[row];
             for (coefficient, companion) in self.companions.iter().enumerate() {
-                let (mut value, mut slope) = (hollow.at(coefficient, row as f64).0, full.at(coefficient, row as f64).1);
+                let (mut value, mut slope) =
+                    (leave_gap_out.at(coefficient, row as f64).0, full.at(coefficient, row as f64).1);
                 if let Some(current) = self.current {
                     let (taken, rate) = current.at(coefficient, row as f64);
                     (value, slope) = (value - taken, slope - rate);

@@ -6,7 +6,7 @@
 
 use crate::equation::rows::Rows;
 use crate::error::Error;
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::inference::cross_validation::validate;
 use crate::inference::slow_curve::Varying;
 use crate::inference::slow_equations::Slow;
@@ -27,7 +27,7 @@ const ROUNDS: usize = 3;
 pub(crate) struct Found {
     pub(crate) varying: Varying,
     /// The right-hand side without them.
-    pub(crate) side: Vec<f64>,
+    pub(crate) rhs: Vec<f64>,
     /// The length of windows that predicts best.
     pub(crate) scale: Scale,
     /// Mean squared error of predicting rows, over the noise's variance.
@@ -37,7 +37,7 @@ pub(crate) struct Found {
 }
 
 /// Where slow coefficients are looked for.
-pub(crate) struct Search<'a> {
+pub(crate) struct SlowSearch<'a> {
     pub(crate) rows: &'a Rows,
     /// The slow coefficients come first among its constants.
     pub(crate) model: &'a Model,
@@ -51,17 +51,19 @@ pub(crate) struct Search<'a> {
 }
 
 /// Finds slow coefficients; nothing where they are not determined. `first` is the length of windows to begin with.
-pub(crate) fn find(search: &Search<'_>, first: Scale, run: &mut Run<'_, '_>) -> Result<Option<Found>, Error> {
-    let &Search { rows, model, coefficients, noise, expected, scales, instructions } = search;
+pub(crate) fn find(search: &SlowSearch<'_>, first: Scale, stages: &mut Stages<'_, '_>) -> Result<Option<Found>, Error> {
+    let &SlowSearch { rows, model, coefficients, noise, expected, scales, instructions } = search;
     let slow = &model.constant[..coefficients];
     let rest = Model { constant: model.constant[coefficients..].to_vec(), ..model.clone() };
     let mut scale = first;
     let mut found: Option<Found> = None;
     for _ in 0..ROUNDS {
         let current = found.as_ref().map(|found| &found.varying);
-        let side = found.as_ref().map_or_else(|| rows.side.clone(), |found| found.side.clone());
-        let problem = model.problem(rows, &side, noise, None);
-        let Some(fit) = Fit::with_hollow(&problem, scale, expected, instructions, run)? else { return Ok(None) };
+        let rhs = found.as_ref().map_or_else(|| rows.rhs.clone(), |found| found.rhs.clone());
+        let problem = model.problem(rows, &rhs, noise, None);
+        let Some(fit) = Fit::with_leave_gap_out(&problem, scale, expected, instructions, stages)? else {
+            return Ok(None);
+        };
         let ones = vec![1.0; fit.full.len()];
         let weights = if current.is_some() { &fit.pooled.weights } else { &ones };
         let companions = slow.iter().map(|&one| rows.regressors[one].companion.as_slice()).collect();
@@ -72,34 +74,34 @@ pub(crate) fn find(search: &Search<'_>, first: Scale, run: &mut Run<'_, '_>) -> 
             if 2.0 * reach > rows.len() as f64 {
                 break;
             }
-            let Some(hollow) = equations.fit(reach, hole, instructions) else { continue };
+            let Some(leave_gap_out) = equations.fit(reach, hole, instructions) else { continue };
             let Some(full) = equations.fit(reach, 0.0, instructions) else { continue };
-            let error = equations.error(&problem, &hollow, &full, scale, expected.variance);
+            let error = equations.error(&problem, &leave_gap_out, &full, scale, expected.variance);
             if best.as_ref().is_none_or(|best| error < best.0) {
                 best = Some((error, full, reach));
             }
         }
         let Some((_, varying, reach)) = best else { return Ok(None) };
-        let side = without(rows, slow, &varying);
-        let problem = rest.problem(rows, &side, noise, None);
-        let validated = validate(&problem, scales, expected, instructions, run)?;
+        let rhs = without(rows, slow, &varying);
+        let problem = rest.problem(rows, &rhs, noise, None);
+        let validated = validate(&problem, scales, expected, instructions, stages)?;
         let Some(next) = validated.iter().min_by(|a, b| a.error.total_cmp(&b.error)) else { return Ok(None) };
         let error = next.error;
         scale = next.fit.scale.unwrap_or(scale);
-        found = Some(Found { varying, side, scale, error, reach });
+        found = Some(Found { varying, rhs, scale, error, reach });
     }
     Ok(found)
 }
 
 /// The right-hand side without slow coefficients.
 pub(crate) fn without(rows: &Rows, slow: &[usize], varying: &Varying) -> Vec<f64> {
-    let mut side = rows.side.clone();
+    let mut rhs = rows.rhs.clone();
     for (coefficient, &regressor) in slow.iter().enumerate() {
         let regressor = &rows.regressors[regressor];
-        for (row, side) in side.iter_mut().enumerate() {
+        for (row, rhs) in rhs.iter_mut().enumerate() {
             let (value, slope) = varying.at(coefficient, row as f64);
-            *side -= value * regressor.value[row] + slope / rows.period * regressor.companion[row];
+            *rhs -= value * regressor.value[row] + slope / rows.period * regressor.companion[row];
         }
     }
-    side
+    rhs
 }

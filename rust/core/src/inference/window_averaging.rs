@@ -8,8 +8,8 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::exec::pool::ranges;
-use crate::exec::stages::Run;
-use crate::inference::windows_around::{Around, Seen};
+use crate::exec::stages::Stages;
+use crate::inference::windows_around::{Around, WindowAtRow};
 use crate::regression::constants::Expected;
 use crate::regression::problem::Problem;
 use crate::regression::subsample::holds;
@@ -50,15 +50,15 @@ impl Averages {
 }
 
 /// Which windows of a scale: before a row, around it, after it.
-const SIDES: usize = 3;
+const POSITIONS: usize = 3;
 
 /// A scale and what is known of it beforehand.
 struct Candidate {
     scale: Scale,
     /// All cells, where they are few.
     cells: Option<Cells>,
-    /// Mean squared error over the record, by side; infinite where it takes no part.
-    record: [f64; SIDES],
+    /// Mean squared error over the record, by position; infinite where it takes no part.
+    record: [f64; POSITIONS],
 }
 
 /// Averages windows of several lengths at every row of a problem without constants. `best` is the length of the windows that predict best, in
@@ -70,14 +70,14 @@ pub(crate) fn average(
     scales: &[Scale],
     (expected, best): (Expected, usize),
     instructions: Instructions,
-    run: &mut Run<'_, '_>,
+    stages: &mut Stages<'_, '_>,
 ) -> Result<Averages, Error> {
     let rows = problem.rows();
     let reach = scales.first().map_or(1, |scale| scale.reach);
     let view = View { problem, variance: expected.variance, reach, instructions };
     let mut candidates: Vec<_> =
-        scales.iter().map(|&scale| Candidate { scale, cells: None, record: [f64::INFINITY; SIDES] }).collect();
-    let record = RECORD[0].max(RECORD[1] * best as f64 / expected.redundancy);
+        scales.iter().map(|&scale| Candidate { scale, cells: None, record: [f64::INFINITY; POSITIONS] }).collect();
+    let record = RECORD[0].max(RECORD[1] * best as f64 / expected.variance_inflation);
     let hope = HOPELESS / record;
     let middle = rows / 5..(4 * rows / 5).max(rows / 5 + 1).min(rows);
     let short = match thinned {
@@ -85,7 +85,7 @@ pub(crate) fn average(
         Some(thinned) => {
             let short = scales.partition_point(|scale| holds(*scale));
             let view = View { problem: thinned, ..view };
-            view.judge(&mut candidates[..short], &(0..thinned.rows()), run)?;
+            view.judge(&mut candidates[..short], &(0..thinned.rows()), stages)?;
             short
         }
     };
@@ -94,21 +94,21 @@ pub(crate) fn average(
     };
     let long = short.saturating_sub(OVERLAP);
     if thinned.is_none() || errors(&candidates[long..short]) <= errors(&candidates[..short]) + hope {
-        view.judge(&mut candidates[short..], &middle, run)?;
+        view.judge(&mut candidates[short..], &middle, stages)?;
     }
     let hopeless = errors(&candidates) + hope;
     for candidate in &mut candidates {
         let chosen = candidate.record.iter().any(|&error| error <= hopeless);
         if chosen && candidate.scale.step >= COARSE && candidate.cells.is_none() {
-            let all = candidate.scale.side_cells(rows);
-            candidate.cells = Some(candidate.scale.solve(problem, &all, instructions, run)?);
+            let all = candidate.scale.one_sided_cells(rows);
+            candidate.cells = Some(candidate.scale.solve(problem, &all, instructions, stages)?);
         }
     }
 
     let ready = ready(&candidates);
     let mut averages = Averages::new(problem.layout.windowed, rows);
     let nearby = view.nearby(expected);
-    run.fill(averages.columns(), |rows, columns| {
+    stages.fill(averages.columns(), |rows, columns| {
         view.average((&candidates, &ready), rows, nearby, record, hopeless, columns);
     })?;
     Ok(averages)
@@ -138,12 +138,17 @@ struct View<'a, 'b> {
 
 impl View<'_, '_> {
     /// Finds how well candidates predict some rows of the record.
-    fn judge(&self, candidates: &mut [Candidate], rows: &Range<usize>, run: &mut Run<'_, '_>) -> Result<(), Error> {
+    fn judge(
+        &self,
+        candidates: &mut [Candidate],
+        rows: &Range<usize>,
+        stages: &mut Stages<'_, '_>,
+    ) -> Result<(), Error> {
         let mut solved = Vec::new();
         for candidate in &*candidates {
-            let (scale, all) = (candidate.scale, candidate.scale.side_cells(self.problem.rows()));
+            let (scale, all) = (candidate.scale, candidate.scale.one_sided_cells(self.problem.rows()));
             let coarse = scale.step >= COARSE;
-            let cells = if coarse { Some(scale.solve(self.problem, &all, self.instructions, run)?) } else { None };
+            let cells = if coarse { Some(scale.solve(self.problem, &all, self.instructions, stages)?) } else { None };
             solved.push(Candidate { scale, cells, record: candidate.record });
         }
         let ready = ready(&solved);
@@ -152,9 +157,9 @@ impl View<'_, '_> {
             let both = solved.iter().zip(&ready);
             both.map(|(candidate, ready)| self.sums(candidate, ready.as_ref(), counted.clone())).collect::<Vec<_>>()
         };
-        let sums = run.map(ranges(self.problem.rows()), || (), work)?;
+        let sums = stages.map(ranges(self.problem.rows()), || (), work)?;
         for (index, candidate) in candidates.iter_mut().enumerate() {
-            for which in 0..SIDES {
+            for which in 0..POSITIONS {
                 let parts = sums.iter().map(|sums| sums[index][which]);
                 let (sum, count) = parts.fold((0.0, 0.0), |all, part| (all.0 + part.0, all.1 + part.1));
                 if count > 0.0 {
@@ -167,27 +172,27 @@ impl View<'_, '_> {
 
     fn nearby(&self, expected: Expected) -> Nearby {
         let rows = self.reach;
-        Nearby { rows, independent: (2 * rows + 1) as f64 / expected.redundancy }
+        Nearby { rows, independent: (2 * rows + 1) as f64 / expected.variance_inflation }
     }
 
     /// The cells of a candidate around some rows.
     fn cells(&self, candidate: &Candidate, rows: &Range<usize>) -> Cells {
         let scale = candidate.scale;
-        let all = scale.side_cells(self.problem.rows());
+        let all = scale.one_sided_cells(self.problem.rows());
         let wanted = scale.cell(rows.start).max(all.start)..(scale.cell(rows.end.max(1) - 1) + 1).min(all.end);
         let wanted = wanted.start..wanted.end.max(wanted.start);
         scale.solve_here(self.problem, &wanted, self.instructions)
     }
 
     /// Squared error of a row, over the noise's variance.
-    fn error(&self, seen: &Seen<'_, '_>, row: usize) -> f64 {
-        let error = self.problem.side[row] - seen.predict(self.problem, row);
+    fn error(&self, window: &WindowAtRow<'_, '_>, row: usize) -> f64 {
+        let error = self.problem.rhs[row] - window.predict(self.problem, row);
         (error * error / self.variance).min(MOST)
     }
 
-    /// Sums of squared errors and their number, by side.
-    fn sums(&self, candidate: &Candidate, ready: Option<&Around<'_>>, rows: Range<usize>) -> [(f64, f64); SIDES] {
-        let mut sums = [(0.0, 0.0); SIDES];
+    /// Sums of squared errors and their number, by position.
+    fn sums(&self, candidate: &Candidate, ready: Option<&Around<'_>>, rows: Range<usize>) -> [(f64, f64); POSITIONS] {
+        let mut sums = [(0.0, 0.0); POSITIONS];
         if rows.start >= rows.end {
             return sums;
         }
@@ -201,8 +206,8 @@ impl View<'_, '_> {
         };
         for row in rows.filter(|&row| self.problem.usable[row]) {
             for (which, (sum, count)) in sums.iter_mut().enumerate() {
-                if let Some(seen) = around.seen(self.problem, row, which) {
-                    *sum += self.error(&seen, row);
+                if let Some(window) = around.at_row(self.problem, row, which) {
+                    *sum += self.error(&window, row);
                     *count += 1.0;
                 }
             }
@@ -246,27 +251,27 @@ impl View<'_, '_> {
                     here = Around::new(candidate.scale, &cells, &[]);
                     &here
                 };
-                for which in (0..SIDES).filter(|&which| (candidate.record[which] <= hopeless) == hope) {
+                for which in (0..POSITIONS).filter(|&which| (candidate.record[which] <= hopeless) == hope) {
                     // Running sums of the errors, so that every mean costs two differences; they restart with every piece.
                     let mut errors = vec![[0.0, 0.0]; wide.len() + 1];
                     for (place, row) in wide.clone().enumerate() {
                         let mut next = errors[place];
                         if self.problem.usable[row]
-                            && let Some(seen) = around.seen(self.problem, row, which)
+                            && let Some(window) = around.at_row(self.problem, row, which)
                         {
-                            next = [next[0] + self.error(&seen, row), next[1] + 1.0];
+                            next = [next[0] + self.error(&window, row), next[1] + 1.0];
                         }
                         errors[place + 1] = next;
                     }
                     for (place, row) in rows.clone().enumerate().filter(|(place, _)| wanted[*place]) {
-                        let Some(seen) = around.seen(self.problem, row, which) else { continue };
+                        let Some(window) = around.at_row(self.problem, row, which) else { continue };
                         let first = row.saturating_sub(nearby.rows).max(wide.start) - wide.start;
                         let last = (row + nearby.rows + 1).min(wide.end) - wide.start;
                         let (sum, count) = (errors[last][0] - errors[first][0], errors[last][1] - errors[first][1]);
                         // Within a gap nothing is known nearby, and the record decides.
                         let here = if count == 0.0 { 0.0 } else { nearby.independent * sum / count };
                         let exponent = 0.5 * (here + record * candidate.record[which].min(MOST));
-                        self.believe(&seen, &mut numbers_here);
+                        self.numbers_at_row(&window, &mut numbers_here);
                         let sums = &mut sums[place * numbers..(place + 1) * numbers];
                         if exponent < least[place] {
                             let shrink = (exponent - least[place]).exp();
@@ -291,12 +296,12 @@ impl View<'_, '_> {
     }
 
     /// What a window says at a row: values, slopes and standard errors.
-    fn believe(&self, seen: &Seen<'_, '_>, numbers: &mut [f64]) {
+    fn numbers_at_row(&self, window: &WindowAtRow<'_, '_>, numbers: &mut [f64]) {
         let windowed = self.problem.layout.windowed;
         for unknown in 0..windowed {
-            numbers[unknown] = seen.value(unknown);
-            numbers[windowed + unknown] = seen.slope(unknown);
-            numbers[2 * windowed + unknown] = seen.variance(unknown).max(0.0).sqrt();
+            numbers[unknown] = window.value(unknown);
+            numbers[windowed + unknown] = window.slope(unknown);
+            numbers[2 * windowed + unknown] = window.variance(unknown).max(0.0).sqrt();
         }
     }
 }

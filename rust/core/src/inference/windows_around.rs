@@ -7,66 +7,79 @@ use crate::regression::window_length::{Cells, Scale};
 /// The windows of one scale around some rows, ready to predict.
 pub(crate) struct Around<'a> {
     scale: Scale,
-    sides: Predictor<'a>,
-    hollow: Predictor<'a>,
+    one_sided: Predictor<'a>,
+    leave_gap_out: Predictor<'a>,
     full: Predictor<'a>,
 }
 
 /// One window as seen from a row: what predicts the row, what is believed there, and how much later the row is than either's centre.
-pub(crate) struct Seen<'a, 'b> {
-    predictor: &'b Predictor<'a>,
-    believed: &'b Predictor<'a>,
+pub(crate) struct WindowAtRow<'a, 'b> {
+    candidate: &'b Predictor<'a>,
+    reference: &'b Predictor<'a>,
     place: usize,
-    believed_place: usize,
+    reference_place: usize,
     later: f64,
 }
 
 impl<'a> Around<'a> {
     pub(crate) fn new(scale: Scale, cells: &'a Cells, constants: &[f64]) -> Self {
         let of = |solved| Predictor::new(solved, constants);
-        Self { scale, sides: of(&cells.sides), hollow: of(&cells.hollow), full: of(&cells.full) }
+        Self { scale, one_sided: of(&cells.one_sided), leave_gap_out: of(&cells.leave_gap_out), full: of(&cells.full) }
     }
 
     /// The window of one scale before (0), around (1) or after (2) a row, if there is one and no jump lies between.
-    pub(crate) fn seen(&self, problem: &Problem<'_>, row: usize, which: usize) -> Option<Seen<'a, '_>> {
+    pub(crate) fn at_row(&self, problem: &Problem<'_>, row: usize, which: usize) -> Option<WindowAtRow<'a, '_>> {
         let cell = self.scale.cell(row);
         let later = |centre: f64| (row as f64 - centre) * problem.period;
         if which == 1 {
-            let (place, believed_place) = (self.hollow.place(cell)?, self.full.place(cell)?);
+            let (place, reference_place) = (self.leave_gap_out.place(cell)?, self.full.place(cell)?);
             let later = later(self.scale.centres(cell)[1]);
-            return Some(Seen { predictor: &self.hollow, believed: &self.full, place, believed_place, later });
+            return Some(WindowAtRow {
+                candidate: &self.leave_gap_out,
+                reference: &self.full,
+                place,
+                reference_place,
+                later,
+            });
         }
         if !self.scale.stands_alone() {
             return None;
         }
         let cell = if which == 0 { cell } else { self.scale.after(cell) };
-        let place = self.sides.place(cell)?;
-        let rows = self.scale.side_rows(cell);
+        let place = self.one_sided.place(cell)?;
+        let rows = self.scale.one_sided_rows(cell);
         let between = if which == 0 { rows.end - 1..row.cast_signed() } else { row.cast_signed()..rows.start };
         if problem.jumps_within(&between) {
             return None;
         }
         let later = later(self.scale.centres(cell)[0]);
-        Some(Seen { predictor: &self.sides, believed: &self.sides, place, believed_place: place, later })
+        Some(WindowAtRow {
+            candidate: &self.one_sided,
+            reference: &self.one_sided,
+            place,
+            reference_place: place,
+            later,
+        })
     }
 }
 
-impl Seen<'_, '_> {
+impl WindowAtRow<'_, '_> {
     /// What is believed of a windowed unknown at the row, per second and how uncertain it is.
     pub(crate) fn value(&self, unknown: usize) -> f64 {
-        self.believed.value(self.believed_place, unknown, self.later)
+        self.reference.value(self.reference_place, unknown, self.later)
     }
 
     pub(crate) fn slope(&self, unknown: usize) -> f64 {
-        self.believed.value(self.believed_place, unknown, 1.0) - self.believed.value(self.believed_place, unknown, 0.0)
+        self.reference.value(self.reference_place, unknown, 1.0)
+            - self.reference.value(self.reference_place, unknown, 0.0)
     }
 
     pub(crate) fn variance(&self, unknown: usize) -> f64 {
-        self.believed.variance(self.believed_place, unknown, self.later)
+        self.reference.variance(self.reference_place, unknown, self.later)
     }
 
     /// What the windowed unknowns add to the row's right-hand side, from windows that have not seen it.
     pub(crate) fn predict(&self, problem: &Problem<'_>, row: usize) -> f64 {
-        self.predictor.predict(problem, self.place, row, self.later)
+        self.candidate.predict(problem, self.place, row, self.later)
     }
 }

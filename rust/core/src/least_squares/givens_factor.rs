@@ -18,12 +18,12 @@ const UNDETERMINED: f64 = 1e-290;
 pub(crate) const MOST_REGRESSORS: usize = 16;
 
 /// How many regressors and right-hand sides a problem has: known when compiling, or not.
-pub(crate) trait Shape: Copy + Send + Sync {
-    /// The numbers of one factor, as many as [`Shape::size`].
+pub(crate) trait Dimensions: Copy + Send + Sync {
+    /// The numbers of one factor, as many as [`Dimensions::size`].
     type Factor<V: Copy>: Clone + IndexMut<usize, Output = V>;
 
     fn regressors(self) -> usize;
-    fn sides(self) -> usize;
+    fn rhs_count(self) -> usize;
 
     /// A factor full of one value.
     fn factor<V: Copy>(self, value: V) -> Self::Factor<V>;
@@ -32,13 +32,13 @@ pub(crate) trait Shape: Copy + Send + Sync {
     /// sums of squares.
     #[inline(always)]
     fn size(self) -> usize {
-        self.row(self.regressors()) + self.sides()
+        self.row(self.regressors()) + self.rhs_count()
     }
 
     /// Where the row of a regressor begins; its weight comes first.
     #[inline(always)]
     fn row(self, regressor: usize) -> usize {
-        let (p, q) = (self.regressors(), self.sides());
+        let (p, q) = (self.regressors(), self.rhs_count());
         regressor * (p + q) - regressor * regressor.saturating_sub(1) / 2
     }
 
@@ -57,12 +57,12 @@ pub(crate) struct Few<const P: usize>;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Many {
     pub(crate) regressors: usize,
-    pub(crate) sides: usize,
+    pub(crate) rhs_count: usize,
 }
 
 macro_rules! few {
     ($($regressors:literal has $size:literal),*) => {$(
-        impl Shape for Few<$regressors> {
+        impl Dimensions for Few<$regressors> {
             type Factor<V: Copy> = [V; $size];
 
             #[inline(always)]
@@ -71,7 +71,7 @@ macro_rules! few {
             }
 
             #[inline(always)]
-            fn sides(self) -> usize {
+            fn rhs_count(self) -> usize {
                 1
             }
 
@@ -84,15 +84,15 @@ macro_rules! few {
 }
 few!(1 has 3, 2 has 6, 3 has 10, 4 has 15);
 
-impl Shape for Many {
+impl Dimensions for Many {
     type Factor<V: Copy> = Vec<V>;
 
     fn regressors(self) -> usize {
         self.regressors
     }
 
-    fn sides(self) -> usize {
-        self.sides
+    fn rhs_count(self) -> usize {
+        self.rhs_count
     }
 
     fn factor<V: Copy>(self, value: V) -> Vec<V> {
@@ -102,7 +102,7 @@ impl Shape for Many {
 
 /// The factor of no rows.
 #[inline(always)]
-pub(crate) fn empty<S: Lanes, H: Shape>(simd: S, shape: H) -> H::Factor<S::f64s> {
+pub(crate) fn empty<S: Lanes, H: Dimensions>(simd: S, shape: H) -> H::Factor<S::f64s> {
     let mut factor = shape.factor(simd.splat_f64s(0.0));
     for i in 0..shape.regressors() {
         factor[shape.row(i)] = simd.splat_f64s(NOTHING);
@@ -112,7 +112,7 @@ pub(crate) fn empty<S: Lanes, H: Shape>(simd: S, shape: H) -> H::Factor<S::f64s>
 
 /// Appends a row of each lane, `weight` times over, of which the columns before `first` are zero. The row is used up.
 #[inline(always)]
-pub(crate) fn append<S: Lanes, H: Shape>(
+pub(crate) fn append<S: Lanes, H: Dimensions>(
     simd: S,
     shape: H,
     factor: &mut H::Factor<S::f64s>,
@@ -120,7 +120,7 @@ pub(crate) fn append<S: Lanes, H: Shape>(
     first: usize,
     mut weight: S::f64s,
 ) {
-    let (p, q) = (shape.regressors(), shape.sides());
+    let (p, q) = (shape.regressors(), shape.rhs_count());
     for i in first..p {
         let x = row[i];
         let old = factor[shape.row(i)];
@@ -147,14 +147,14 @@ pub(crate) fn append<S: Lanes, H: Shape>(
 
 /// Merges the rows of another factor into this one. `row` is scratch.
 #[inline(always)]
-pub(crate) fn merge<S: Lanes, H: Shape>(
+pub(crate) fn merge<S: Lanes, H: Dimensions>(
     simd: S,
     shape: H,
     factor: &mut H::Factor<S::f64s>,
     other: &H::Factor<S::f64s>,
     row: &mut H::Factor<S::f64s>,
 ) {
-    let (p, q) = (shape.regressors(), shape.sides());
+    let (p, q) = (shape.regressors(), shape.rhs_count());
     for i in 0..p {
         row[i] = simd.splat_f64s(1.0);
         for k in i + 1..p + q {
@@ -168,18 +168,18 @@ pub(crate) fn merge<S: Lanes, H: Shape>(
     }
 }
 
-/// The parameters of right-hand side `side`, by substitution from the last.
+/// The parameters of right-hand side `rhs`, by substitution from the last.
 #[inline(always)]
-pub(crate) fn solve<S: Lanes, H: Shape>(
+pub(crate) fn solve<S: Lanes, H: Dimensions>(
     simd: S,
     shape: H,
     factor: &H::Factor<S::f64s>,
-    side: usize,
+    rhs: usize,
     parameters: &mut H::Factor<S::f64s>,
 ) {
     let p = shape.regressors();
     for i in (0..p).rev() {
-        let mut value = factor[shape.entry(i, p + side)];
+        let mut value = factor[shape.entry(i, p + rhs)];
         for k in i + 1..p {
             value = simd.negate_mul_add_f64s(factor[shape.entry(i, k)], parameters[k], value);
         }
@@ -191,7 +191,7 @@ pub(crate) fn solve<S: Lanes, H: Shape>(
 ///
 /// `(AᵀA)⁻¹` is `U⁻¹ W⁻¹ U⁻ᵀ`: see [`covariance`].
 #[inline(always)]
-pub(crate) fn invert<S: Lanes, H: Shape>(
+pub(crate) fn invert<S: Lanes, H: Dimensions>(
     simd: S,
     shape: H,
     factor: &H::Factor<S::f64s>,
@@ -214,7 +214,7 @@ pub(crate) fn invert<S: Lanes, H: Shape>(
 
 /// Entry `(i, j)` of `(AᵀA)⁻¹`, `i ≤ j`, from an inverted factor: the covariance of two parameters over the noise variance.
 #[inline(always)]
-pub(crate) fn covariance<S: Lanes, H: Shape>(
+pub(crate) fn covariance<S: Lanes, H: Dimensions>(
     simd: S,
     shape: H,
     inverse: &H::Factor<S::f64s>,
@@ -232,7 +232,12 @@ pub(crate) fn covariance<S: Lanes, H: Shape>(
 
 /// The squared norm of regressor `i`, summed over the rows.
 #[inline(always)]
-pub(crate) fn squared_norm<S: Lanes, H: Shape>(simd: S, shape: H, factor: &H::Factor<S::f64s>, i: usize) -> S::f64s {
+pub(crate) fn squared_norm<S: Lanes, H: Dimensions>(
+    simd: S,
+    shape: H,
+    factor: &H::Factor<S::f64s>,
+    i: usize,
+) -> S::f64s {
     let mut sum = factor[shape.row(i)];
     for j in 0..i {
         let entry = factor[shape.entry(j, i)];
@@ -243,7 +248,7 @@ pub(crate) fn squared_norm<S: Lanes, H: Shape>(simd: S, shape: H, factor: &H::Fa
 
 /// Writes a factor to memory.
 #[inline(always)]
-pub(crate) fn store<S: Lanes, H: Shape>(simd: S, shape: H, to: &mut [f64], factor: &H::Factor<S::f64s>) {
+pub(crate) fn store<S: Lanes, H: Dimensions>(simd: S, shape: H, to: &mut [f64], factor: &H::Factor<S::f64s>) {
     for i in 0..shape.size() {
         simd.store(to, i * S::F64_LANES, factor[i]);
     }
@@ -251,7 +256,7 @@ pub(crate) fn store<S: Lanes, H: Shape>(simd: S, shape: H, to: &mut [f64], facto
 
 /// Reads a factor from memory.
 #[inline(always)]
-pub(crate) fn load<S: Lanes, H: Shape>(simd: S, shape: H, from: &[f64], factor: &mut H::Factor<S::f64s>) {
+pub(crate) fn load<S: Lanes, H: Dimensions>(simd: S, shape: H, from: &[f64], factor: &mut H::Factor<S::f64s>) {
     for i in 0..shape.size() {
         factor[i] = simd.load(from, i * S::F64_LANES);
     }

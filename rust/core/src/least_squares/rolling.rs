@@ -17,7 +17,7 @@ use crate::lanes::output::{Elements, Outputs, split_off};
 use crate::lanes::store::Write;
 use crate::lanes::tile::Tile;
 use crate::least_squares::givens_factor::{
-    Few, MOST_REGRESSORS, Many, Shape, append, covariance, empty, invert, load, merge, solve, squared_norm, store,
+    Dimensions, Few, MOST_REGRESSORS, Many, append, covariance, empty, invert, load, merge, solve, squared_norm, store,
 };
 use crate::record::samples::{Samples, all_usable, is_usable};
 use crate::simd::aligned::Aligned;
@@ -41,7 +41,7 @@ pub const HALF_OF_THE_DIGITS: f64 = 1e8;
 pub struct RollingLeastSquares {
     window: usize,
     regressors: usize,
-    sides: usize,
+    rhs_count: usize,
     covariances: Vec<(usize, usize)>,
     ill_conditioned: f64,
     instructions: Instructions,
@@ -98,7 +98,7 @@ impl Regressions<'_> {
 
 /// Memory of one thread.
 #[derive(Debug)]
-pub struct Scratch {
+pub struct RollingScratch {
     /// One column of a run's rows.
     column: Vec<f64>,
     /// Rows of the run that hold a value that cannot be used, in order.
@@ -110,7 +110,7 @@ pub struct Scratch {
 }
 
 impl RollingLeastSquares {
-    /// Prepares windows of `window` rows of `regressors` regressors and `sides` right-hand sides. Of every pair of regressors in
+    /// Prepares windows of `window` rows of `regressors` regressors and `rhs_count` right-hand sides. Of every pair of regressors in
     /// `covariances` the covariance is wanted too. Condition numbers above `ill_conditioned` are flagged.
     ///
     /// # Errors
@@ -118,7 +118,7 @@ impl RollingLeastSquares {
     pub fn new(
         window: usize,
         regressors: usize,
-        sides: usize,
+        rhs_count: usize,
         covariances: Vec<(usize, usize)>,
         ill_conditioned: f64,
         instructions: Instructions,
@@ -129,7 +129,7 @@ impl RollingLeastSquares {
         if window <= regressors {
             return Err(Error::RowsTooFew { window, regressors });
         }
-        Ok(Self { window, regressors, sides, covariances, ill_conditioned, instructions })
+        Ok(Self { window, regressors, rhs_count, covariances, ill_conditioned, instructions })
     }
 
     /// Windows that are worked on side by side: a record may be cut anywhere, but multiples of this waste nothing.
@@ -145,12 +145,12 @@ impl RollingLeastSquares {
 
     /// Memory for one thread.
     #[must_use]
-    pub fn scratch(&self) -> Scratch {
+    pub fn scratch(&self) -> RollingScratch {
         let lanes = self.instructions.lanes();
-        let columns = self.regressors + self.sides;
+        let columns = self.regressors + self.rhs_count;
         let strips = Strips::new(self.window, self.window, lanes);
-        let factor = Many { regressors: self.regressors, sides: self.sides }.size() * lanes;
-        Scratch {
+        let factor = Many { regressors: self.regressors, rhs_count: self.rhs_count }.size() * lanes;
+        RollingScratch {
             column: vec![0.0; strips.samples()],
             unusable: Vec::new(),
             strips: vec![strips; columns],
@@ -179,9 +179,10 @@ impl RollingLeastSquares {
             let part = regressions.split_off_before(piece.end);
             pieces.push(Piece { size: piece.len(), content: (piece, part) });
         }
-        let work = |(rows, mut part): (Range<usize>, Regressions<'_>), scratch: &mut Scratch, go_on: &GoOn<'_>| {
-            self.solve_while(equations, rows, &mut part, scratch, go_on);
-        };
+        let work =
+            |(rows, mut part): (Range<usize>, Regressions<'_>), scratch: &mut RollingScratch, go_on: &GoOn<'_>| {
+                self.solve_while(equations, rows, &mut part, scratch, go_on);
+            };
         pool::run_long(pieces, workers, || self.scratch(), work, watch)
     }
 
@@ -191,7 +192,7 @@ impl RollingLeastSquares {
         equations: &Equations<'_>,
         rows: Range<usize>,
         regressions: &mut Regressions<'_>,
-        scratch: &mut Scratch,
+        scratch: &mut RollingScratch,
     ) {
         self.solve_while(equations, rows, regressions, scratch, &|| true);
     }
@@ -202,7 +203,7 @@ impl RollingLeastSquares {
         equations: &Equations<'_>,
         rows: Range<usize>,
         regressions: &mut Regressions<'_>,
-        scratch: &mut Scratch,
+        scratch: &mut RollingScratch,
         go_on: &GoOn<'_>,
     ) {
         let mut outputs = Slots::of(self).outputs(regressions);
@@ -211,24 +212,36 @@ impl RollingLeastSquares {
         while window < end && go_on() {
             let first = window - window % self.window;
             let next = end.min(first + self.stride());
-            let run = Run { plan: self, base: first, windows: window..next, rows: equations.rows.clone() };
+            let run = RollingRun { plan: self, base: first, windows: window..next, rows: equations.rows.clone() };
             let outputs = &mut outputs;
-            match (self.regressors, self.sides) {
+            match (self.regressors, self.rhs_count) {
                 (1, 1) => {
-                    dispatch(self.instructions, Work { run, shape: Few::<1>, equations, scratch, outputs, go_on });
+                    dispatch(
+                        self.instructions,
+                        RollingKernel { run, shape: Few::<1>, equations, scratch, outputs, go_on },
+                    );
                 }
                 (2, 1) => {
-                    dispatch(self.instructions, Work { run, shape: Few::<2>, equations, scratch, outputs, go_on });
+                    dispatch(
+                        self.instructions,
+                        RollingKernel { run, shape: Few::<2>, equations, scratch, outputs, go_on },
+                    );
                 }
                 (3, 1) => {
-                    dispatch(self.instructions, Work { run, shape: Few::<3>, equations, scratch, outputs, go_on });
+                    dispatch(
+                        self.instructions,
+                        RollingKernel { run, shape: Few::<3>, equations, scratch, outputs, go_on },
+                    );
                 }
                 (4, 1) => {
-                    dispatch(self.instructions, Work { run, shape: Few::<4>, equations, scratch, outputs, go_on });
+                    dispatch(
+                        self.instructions,
+                        RollingKernel { run, shape: Few::<4>, equations, scratch, outputs, go_on },
+                    );
                 }
-                (regressors, sides) => {
-                    let shape = Many { regressors, sides };
-                    dispatch(self.instructions, Work { run, shape, equations, scratch, outputs, go_on });
+                (regressors, rhs_count) => {
+                    let shape = Many { regressors, rhs_count };
+                    dispatch(self.instructions, RollingKernel { run, shape, equations, scratch, outputs, go_on });
                 }
             }
             window = next;
@@ -237,7 +250,7 @@ impl RollingLeastSquares {
 
     /// Number of columns of a row, the right-hand sides included.
     pub(crate) fn columns(&self) -> usize {
-        self.regressors + self.sides
+        self.regressors + self.rhs_count
     }
 
     /// Cuts the rows of a record into pieces of about so many, so that no run is cut.
@@ -276,7 +289,7 @@ struct Slots {
 
 impl Slots {
     fn of(plan: &RollingLeastSquares) -> Self {
-        let (p, q, pairs) = (plan.regressors, plan.sides, plan.covariances.len());
+        let (p, q, pairs) = (plan.regressors, plan.rhs_count, plan.covariances.len());
         let errors = p * q;
         let covariances = errors + p * q;
         let residuals = covariances + pairs * q;
@@ -310,7 +323,7 @@ impl Slots {
 }
 
 /// Blocks of windows side by side: lane `l` works on those that begin at `base + l w`, of which `windows` are wanted.
-struct Run<'a> {
+struct RollingRun<'a> {
     plan: &'a RollingLeastSquares,
     base: usize,
     windows: Range<usize>,
@@ -318,11 +331,11 @@ struct Run<'a> {
     rows: Range<usize>,
 }
 
-impl Run<'_> {
+impl RollingRun<'_> {
     /// Lays out the rows of the run. Those that are no equations, or hold what cannot be used, become zero.
     #[inline(always)]
-    fn load<S: Lanes>(&self, simd: S, equations: &Equations<'_>, scratch: &mut Scratch) {
-        let Scratch { column, unusable, strips, .. } = scratch;
+    fn load<S: Lanes>(&self, simd: S, equations: &Equations<'_>, scratch: &mut RollingScratch) {
+        let RollingScratch { column, unusable, strips, .. } = scratch;
         let before = self.plan.window;
         let end = self.base + column.len();
         let present = (self.rows.start + before).clamp(self.base, end)..(self.rows.end + before).clamp(self.base, end);
@@ -395,16 +408,16 @@ impl Run<'_> {
 }
 
 /// The kernel of a run.
-struct Work<'a, 'b, 'c, H: Shape> {
-    run: Run<'a>,
+struct RollingKernel<'a, 'b, 'c, H: Dimensions> {
+    run: RollingRun<'a>,
     shape: H,
     equations: &'a Equations<'a>,
-    scratch: &'b mut Scratch,
+    scratch: &'b mut RollingScratch,
     outputs: &'b mut Outputs<'c>,
     go_on: &'b GoOn<'b>,
 }
 
-impl<H: Shape> Kernel for Work<'_, '_, '_, H> {
+impl<H: Dimensions> Kernel for RollingKernel<'_, '_, '_, H> {
     type Output = ();
 
     #[inline(always)]
@@ -470,7 +483,7 @@ impl<H: Shape> Kernel for Work<'_, '_, '_, H> {
     }
 }
 
-impl<H: Shape> Work<'_, '_, '_, H> {
+impl<H: Dimensions> RollingKernel<'_, '_, '_, H> {
     /// Appends the row at an offset of each lane's block, or of the block after it.
     #[inline(always)]
     fn append<S: Lanes>(
@@ -481,7 +494,7 @@ impl<H: Shape> Work<'_, '_, '_, H> {
         block: usize,
         row: &mut H::Factor<S::f64s>,
     ) {
-        for column in 0..self.shape.regressors() + self.shape.sides() {
+        for column in 0..self.shape.regressors() + self.shape.rhs_count() {
             row[column] = self.scratch.strips[column].in_block(simd, offset, block);
         }
         append(simd, self.shape, factor, row, 0, simd.splat_f64s(1.0));
@@ -498,7 +511,7 @@ impl<H: Shape> Work<'_, '_, '_, H> {
         values: &mut H::Factor<S::f64s>,
     ) {
         let (shape, plan) = (self.shape, self.run.plan);
-        let (p, q) = (shape.regressors(), shape.sides());
+        let (p, q) = (shape.regressors(), shape.rhs_count());
         let slots = Slots::of(plan);
         let freedom = self.freedom(simd, offset, full);
         let tile = &mut self.scratch.tile;
@@ -520,25 +533,25 @@ impl<H: Shape> Work<'_, '_, '_, H> {
         tile.put(simd, slots.condition + 1, offset, simd.select_f64s(determined, flags, deficient));
 
         let nothing = simd.select_f64s(determined, simd.splat_f64s(0.0), simd.splat_f64s(f64::NAN));
-        for side in 0..q {
-            let residual = simd.add_f64s(factor[shape.row(p) + side], nothing);
+        for rhs in 0..q {
+            let residual = simd.add_f64s(factor[shape.row(p) + rhs], nothing);
             let variance = simd.mul_f64s(residual, freedom);
-            tile.put(simd, slots.residuals + side, offset, residual);
+            tile.put(simd, slots.residuals + rhs, offset, residual);
             for (pair, &(i, j)) in plan.covariances.iter().enumerate() {
                 let one = covariance(simd, shape, values, i.min(j), i.max(j));
-                tile.put(simd, slots.covariances + pair * q + side, offset, simd.mul_f64s(one, variance));
+                tile.put(simd, slots.covariances + pair * q + rhs, offset, simd.mul_f64s(one, variance));
             }
             let deviation = simd.sqrt_f64s(variance);
-            tile.put(simd, slots.deviations + side, offset, deviation);
+            tile.put(simd, slots.deviations + rhs, offset, deviation);
             for i in 0..p {
                 let error = simd.mul_f64s(simd.sqrt_f64s(covariance(simd, shape, values, i, i)), deviation);
-                tile.put(simd, slots.errors + i * q + side, offset, error);
+                tile.put(simd, slots.errors + i * q + rhs, offset, error);
             }
         }
-        for side in 0..q {
-            solve(simd, shape, factor, side, values);
+        for rhs in 0..q {
+            solve(simd, shape, factor, rhs, values);
             for i in 0..p {
-                tile.put(simd, i * q + side, offset, simd.add_f64s(values[i], nothing));
+                tile.put(simd, i * q + rhs, offset, simd.add_f64s(values[i], nothing));
             }
         }
     }

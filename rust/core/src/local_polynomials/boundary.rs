@@ -92,7 +92,7 @@ impl Ends {
         record: &dyn Samples,
         end: End,
         orders: Option<Vec<(usize, f64)>>,
-    ) -> (usize, Option<Fit>) {
+    ) -> (usize, Option<BoundaryFit>) {
         let length = basis.length();
         let first = match end {
             End::First => 0,
@@ -101,11 +101,11 @@ impl Ends {
         let mut samples = vec![0.0; length];
         record.read(first, &mut samples);
         let window = Window::project(basis, &samples, self.floor);
-        (first, window.map(|window| Fit::new(window, self.order, orders, length)))
+        (first, window.map(|window| BoundaryFit::new(window, self.order, orders, length)))
     }
 
     /// Gives every derivative at sample `place` of the window to `give`, with its place among those asked for.
-    fn evaluate(&self, basis: &Basis, fit: &Fit, place: usize, mut give: impl FnMut(usize, Estimate)) {
+    fn evaluate(&self, basis: &Basis, fit: &BoundaryFit, place: usize, mut give: impl FnMut(usize, Estimate)) {
         let degrees = basis.degrees();
         let highest = self.derivatives.iter().max().copied().unwrap_or(0);
         let mut polynomials = [0.0; MOST_DEGREES];
@@ -131,7 +131,7 @@ impl Ends {
 }
 
 /// A window at an end, its order and noise.
-struct Fit {
+struct BoundaryFit {
     window: Window,
     /// The orders that share in the window, their shares and noise.
     tops: Vec<Top>,
@@ -148,7 +148,7 @@ struct Top {
     variance: f64,
 }
 
-impl Fit {
+impl BoundaryFit {
     fn new(window: Window, order: Order, shares: Option<Vec<(usize, f64)>>, length: usize) -> Self {
         let chosen = matches!(order, Order::Chosen { .. });
         let shares = shares.unwrap_or_else(|| vec![(window.order(order, length), 1.0)]);

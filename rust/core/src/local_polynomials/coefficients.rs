@@ -25,7 +25,7 @@ pub(crate) struct Coefficients {
 
 /// Memory of one thread.
 #[derive(Debug)]
-pub(crate) struct Scratch(engine::Scratch);
+pub(crate) struct CoefficientScratch(engine::EngineScratch);
 
 /// What is known of some windows, one row a number.
 #[derive(Clone, Debug, Default)]
@@ -58,8 +58,8 @@ impl Coefficients {
     }
 
     /// Memory for one thread.
-    pub(crate) fn scratch(&self) -> Scratch {
-        Scratch(self.engine.scratch())
+    pub(crate) fn scratch(&self) -> CoefficientScratch {
+        CoefficientScratch(self.engine.scratch())
     }
 
     /// Projects windows, known by their first samples: all of them, or every so manyth from the first on.
@@ -69,7 +69,7 @@ impl Coefficients {
         windows: Range<usize>,
         step: usize,
         projected: &mut Projected,
-        scratch: &mut Scratch,
+        scratch: &mut CoefficientScratch,
     ) {
         let count = windows.len().div_ceil(step);
         let Projected { level, coefficients, residual } = projected;

@@ -120,12 +120,12 @@ pub(crate) fn choose<S: Lanes, const D: usize>(simd: S, tables: &Tables, state: 
     // Put into the last bits of 2^52, a whole number is that much more than 2^52.
     let base = simd.splat_f64s(4_503_599_627_370_496.0);
     let order = simd.sub_f64s(simd.transmute_f64s_u64s(simd.or_u64s(tag, simd.transmute_u64s_f64s(base))), base);
-    let floor = tagged(simd, simd.mul_f64s(floor, simd.look_up(&tables.weights, order)), tag);
+    let floor = tagged(simd, simd.mul_f64s(floor, simd.table_lookup(&tables.weights, order)), tag);
     let exact = simd.select_f64s(simd.equal_f64s(best, floor), simd.splat_f64s(tables.exact), zero);
     Choice {
         order,
-        variance: simd.mul_f64s(best, simd.look_up(&tables.variance, order)),
-        code: simd.add_f64s(simd.look_up(&tables.code, order), exact),
+        variance: simd.mul_f64s(best, simd.table_lookup(&tables.variance, order)),
+        code: simd.add_f64s(simd.table_lookup(&tables.code, order), exact),
     }
 }
 

@@ -29,9 +29,15 @@ const STRETCH: usize = 1 << 13;
 /// What an engine can do, whatever the number of its degrees.
 pub(crate) trait Walk: Debug + Send + Sync {
     fn block(&self) -> usize;
-    fn scratch(&self) -> Scratch;
+    fn scratch(&self) -> EngineScratch;
     fn functionals(&self) -> &[Functional];
-    fn walk(&self, record: &dyn Samples, windows: Range<usize>, estimates: &mut Estimates<'_>, scratch: &mut Scratch);
+    fn walk(
+        &self,
+        record: &dyn Samples,
+        windows: Range<usize>,
+        estimates: &mut Estimates<'_>,
+        scratch: &mut EngineScratch,
+    );
 }
 
 /// The engine with the smallest kernels that hold a basis, which follow the residual or do not.
@@ -58,7 +64,7 @@ pub(crate) struct Engine<const D: usize, const RESIDUAL: bool> {
 
 /// Memory of one thread.
 #[derive(Debug)]
-pub(crate) struct Scratch {
+pub(crate) struct EngineScratch {
     stretch: Stretch,
     strips: Strips,
     /// What is taken off each lane's samples.
@@ -91,9 +97,9 @@ impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
         self.finish.functionals()
     }
 
-    fn scratch(&self) -> Scratch {
+    fn scratch(&self) -> EngineScratch {
         let lanes = self.instructions.lanes();
-        Scratch {
+        EngineScratch {
             stretch: Stretch::default(),
             strips: Strips::new(self.block(), self.projection.length(), lanes),
             references: [0.0; MOST_LANES],
@@ -104,7 +110,13 @@ impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
         }
     }
 
-    fn walk(&self, record: &dyn Samples, windows: Range<usize>, estimates: &mut Estimates<'_>, scratch: &mut Scratch) {
+    fn walk(
+        &self,
+        record: &dyn Samples,
+        windows: Range<usize>,
+        estimates: &mut Estimates<'_>,
+        scratch: &mut EngineScratch,
+    ) {
         let (block, backward, lanes) = (self.block(), self.projection.backward(), self.instructions.lanes());
         let last = record.len() - self.projection.length();
         debug_assert!(windows.end <= last + 1, "a window must lie in the record");
@@ -133,7 +145,7 @@ impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
                     (STRETCH.cast_signed() / advance).clamp(1, (windows.end - window).cast_signed() / advance + 1);
                 scratch.stretch.load(record, base..base + read + (runs - 1) * advance);
             }
-            let run = Run { engine: self, base, windows: window..end };
+            let run = EngineRun { engine: self, base, windows: window..end };
             run.work(scratch, &mut outputs);
             run.invalidate(scratch.stretch.unusable(base..base + read), &mut outputs);
             window = end;
@@ -142,20 +154,20 @@ impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
 }
 
 /// Blocks side by side: lane `l` works on the windows that begin from `base + l B` on, of which `windows` are wanted.
-struct Run<'a, const D: usize, const RESIDUAL: bool> {
+struct EngineRun<'a, const D: usize, const RESIDUAL: bool> {
     engine: &'a Engine<D, RESIDUAL>,
     base: isize,
     windows: Range<usize>,
 }
 
-impl<const D: usize, const RESIDUAL: bool> Run<'_, D, RESIDUAL> {
+impl<const D: usize, const RESIDUAL: bool> EngineRun<'_, D, RESIDUAL> {
     /// Finishes the windows of the run, span by span, from the start forwards, then backwards.
     ///
     /// The kernels are called one by one, not from one another: in one function they would spill each other's registers.
-    fn work(&self, scratch: &mut Scratch, outputs: &mut Outputs<'_>) {
+    fn work(&self, scratch: &mut EngineScratch, outputs: &mut Outputs<'_>) {
         let Engine { projection, finish, instructions } = self.engine;
         let (instructions, span, wanted) = (*instructions, projection.span(), self.rows());
-        let Scratch { stretch, strips, references, start: at_start, state, states, tile } = scratch;
+        let EngineScratch { stretch, strips, references, start: at_start, state, states, tile } = scratch;
         dispatch(instructions, Fill { samples: stretch.from(self.base, strips.samples()), strips });
         // A short block is written whole, with its spans together; a long one tile by tile.
         let whole = projection.block() <= TILE;

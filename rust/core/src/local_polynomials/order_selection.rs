@@ -62,8 +62,8 @@ struct Derivative {
 
 /// Memory of one thread. Rows hold one number a window.
 #[derive(Debug)]
-pub(crate) struct Scratch {
-    coefficients: coefficients::Scratch,
+pub(crate) struct SelectionScratch {
+    coefficients: coefficients::CoefficientScratch,
     projected: Projected,
     pool: Pool,
     /// Residual sums of squares, one row an order, none below the floor.
@@ -101,9 +101,9 @@ impl Selector {
         })
     }
 
-    pub(crate) fn scratch(&self) -> Scratch {
+    pub(crate) fn scratch(&self) -> SelectionScratch {
         let rows = vec![Vec::new(); self.weights.len()];
-        Scratch {
+        SelectionScratch {
             coefficients: self.coefficients.scratch(),
             projected: Projected::default(),
             pool: Pool::default(),
@@ -130,7 +130,7 @@ impl Selector {
         windows: Range<usize>,
         wanted: Wanted,
         estimates: &mut Estimates<'_>,
-        scratch: &mut Scratch,
+        scratch: &mut SelectionScratch,
     ) {
         let (batch, before) = (BATCH.max(self.least_piece()), (self.length - 1) / 2);
         for first in windows.clone().step_by(batch) {
@@ -145,7 +145,12 @@ impl Selector {
     }
 
     /// The orders that stand for one window, each with its share.
-    pub(crate) fn orders(&self, record: &dyn Samples, window: usize, scratch: &mut Scratch) -> Vec<(usize, f64)> {
+    pub(crate) fn orders(
+        &self,
+        record: &dyn Samples,
+        window: usize,
+        scratch: &mut SelectionScratch,
+    ) -> Vec<(usize, f64)> {
         let (place, _) = self.share(record, window..window + 1, 1, Wanted::Derivatives, scratch);
         let shares = scratch.shares.iter().map(|row| row[place]).enumerate();
         shares.filter(|(_, share)| *share > 0.0).collect()
@@ -158,7 +163,7 @@ impl Selector {
         windows: Range<usize>,
         step: usize,
         wanted: Wanted,
-        scratch: &mut Scratch,
+        scratch: &mut SelectionScratch,
     ) -> (usize, usize) {
         if self.selection == Selection::Pooled {
             let known = Pool::needs(&windows, self.length, record.len() + 1 - self.length);
@@ -174,8 +179,8 @@ impl Selector {
     }
 
     /// Projects windows and sums up the residuals of every order.
-    fn project(&self, record: &dyn Samples, windows: Range<usize>, step: usize, scratch: &mut Scratch) {
-        let Scratch { coefficients, projected, residuals, floor, row: sum, .. } = scratch;
+    fn project(&self, record: &dyn Samples, windows: Range<usize>, step: usize, scratch: &mut SelectionScratch) {
+        let SelectionScratch { coefficients, projected, residuals, floor, row: sum, .. } = scratch;
         self.coefficients.project(record, windows, step, projected, coefficients);
         sum.clone_from(&projected.residual);
         for (residuals, row) in residuals.iter_mut().zip(&projected.coefficients).rev() {
@@ -196,8 +201,8 @@ impl Selector {
     }
 
     /// Gives every order its share by the sum over a window's neighbours: all of it to the best, or for errors by Akaike's weights.
-    fn pool(&self, first: usize, windows: Range<usize>, wanted: Wanted, scratch: &mut Scratch) {
-        let Scratch { projected, pool, residuals, shares, neighbours, row: scores, mean: total, .. } = scratch;
+    fn pool(&self, first: usize, windows: Range<usize>, wanted: Wanted, scratch: &mut SelectionScratch) {
+        let SelectionScratch { projected, pool, residuals, shares, neighbours, row: scores, mean: total, .. } = scratch;
         for shares in shares.iter_mut() {
             shares.clear();
             shares.resize(projected.level.len(), 0.0);
@@ -252,8 +257,8 @@ impl Selector {
     }
 
     /// Gives every order its share by Akaike's weights.
-    fn weigh(&self, scratch: &mut Scratch) {
-        let Scratch { residuals, shares, row: best, mean: total, .. } = scratch;
+    fn weigh(&self, scratch: &mut SelectionScratch) {
+        let SelectionScratch { residuals, shares, row: best, mean: total, .. } = scratch;
         best.clear();
         best.resize(residuals[0].len(), f64::INFINITY);
         total.clear();
@@ -292,7 +297,7 @@ impl Selector {
         step: usize,
         wanted: Wanted,
         estimates: &mut Estimates<'_>,
-        scratch: &mut Scratch,
+        scratch: &mut SelectionScratch,
     ) {
         if wanted == Wanted::Errors {
             choose(scratch);
@@ -314,8 +319,8 @@ impl Selector {
     }
 
     /// The average over orders of a derivative, and its error where it is wanted, at all places.
-    fn average(&self, derivative: &Derivative, wanted: Wanted, scratch: &mut Scratch) {
-        let Scratch { projected, residuals, shares, chosen, row: value, mean, error, .. } = scratch;
+    fn average(&self, derivative: &Derivative, wanted: Wanted, scratch: &mut SelectionScratch) {
+        let SelectionScratch { projected, residuals, shares, chosen, row: value, mean, error, .. } = scratch;
         let start = |row: &mut Vec<f64>| {
             row.clear();
             row.extend(projected.level.iter().map(|level| derivative.constant * level));
@@ -362,7 +367,7 @@ impl Selector {
     }
 
     /// Writes order, flags and noise of one window.
-    fn diagnose(&self, place: usize, element: usize, estimates: &mut Estimates<'_>, scratch: &Scratch) {
+    fn diagnose(&self, place: usize, element: usize, estimates: &mut Estimates<'_>, scratch: &SelectionScratch) {
         let (mut order, mut largest, mut variance) = (0, 0.0, 0.0);
         for (candidate, (shares, residuals)) in scratch.shares.iter().zip(&scratch.residuals).enumerate() {
             let share = shares[place];
@@ -388,8 +393,8 @@ impl Selector {
 }
 
 /// Finds the order of the largest share, the lowest of equals, at all places.
-fn choose(scratch: &mut Scratch) {
-    let Scratch { shares, chosen, row: largest, .. } = scratch;
+fn choose(scratch: &mut SelectionScratch) {
+    let SelectionScratch { shares, chosen, row: largest, .. } = scratch;
     chosen.clear();
     chosen.resize(shares[0].len(), 0);
     largest.clear();

@@ -37,9 +37,9 @@ pub struct LocalPolynomials {
 
 /// What one thread needs to work: made once, used for any number of pieces.
 #[derive(Debug)]
-pub struct Scratch {
-    walk: crate::local_polynomials::engine::Scratch,
-    selection: Option<order_selection::Scratch>,
+pub struct PolynomialScratch {
+    walk: crate::local_polynomials::engine::EngineScratch,
+    selection: Option<order_selection::SelectionScratch>,
 }
 
 /// A piece of work: some samples of a record, and where what is known of them goes.
@@ -104,12 +104,12 @@ impl LocalPolynomials {
 
     /// Memory for one thread.
     #[must_use]
-    pub fn scratch(&self) -> Scratch {
+    pub fn scratch(&self) -> PolynomialScratch {
         self.scratch_for(Wanted::Derivatives)
     }
 
-    fn scratch_for(&self, wanted: Wanted) -> Scratch {
-        Scratch { walk: self.engine.scratch(), selection: self.selector(wanted).map(Selector::scratch) }
+    fn scratch_for(&self, wanted: Wanted) -> PolynomialScratch {
+        PolynomialScratch { walk: self.engine.scratch(), selection: self.selector(wanted).map(Selector::scratch) }
     }
 
     /// What looks at all orders, where it is needed: standard errors say how far the orders disagree.
@@ -139,7 +139,7 @@ impl LocalPolynomials {
         record: &dyn Samples,
         samples: Range<usize>,
         estimates: &mut Estimates<'_>,
-        scratch: &mut Scratch,
+        scratch: &mut PolynomialScratch,
     ) -> Result<(), Error> {
         self.everywhere(record, samples, Wanted::Derivatives, estimates, scratch)
     }
@@ -157,7 +157,7 @@ impl LocalPolynomials {
         record: &dyn Samples,
         samples: Range<usize>,
         estimates: &mut Estimates<'_>,
-        scratch: &mut Scratch,
+        scratch: &mut PolynomialScratch,
     ) -> Result<(), Error> {
         let (windows, before) = (self.windows(record.len())?, self.before_centre());
         assert!(before <= samples.start && samples.end <= before + windows, "every window must lie in the record");
@@ -171,7 +171,7 @@ impl LocalPolynomials {
         samples: Range<usize>,
         wanted: Wanted,
         estimates: &mut Estimates<'_>,
-        scratch: &mut Scratch,
+        scratch: &mut PolynomialScratch,
     ) -> Result<(), Error> {
         let (windows, half) = (self.windows(record.len())?, self.options.window_length / 2);
         let (start, end) = (half, record.len() - half);
@@ -198,7 +198,7 @@ impl LocalPolynomials {
         samples: Range<usize>,
         wanted: Wanted,
         estimates: &mut Estimates<'_>,
-        scratch: &mut Scratch,
+        scratch: &mut PolynomialScratch,
     ) {
         let before = self.before_centre();
         let windows = samples.start - before..samples.end - before;
@@ -219,7 +219,12 @@ impl LocalPolynomials {
     }
 
     /// The orders that share in a window, where it does not choose for itself.
-    fn orders_at(&self, record: &dyn Samples, window: usize, scratch: &mut Scratch) -> Option<Vec<(usize, f64)>> {
+    fn orders_at(
+        &self,
+        record: &dyn Samples,
+        window: usize,
+        scratch: &mut PolynomialScratch,
+    ) -> Option<Vec<(usize, f64)>> {
         let (selector, scratch) = (self.selector(Wanted::Derivatives)?, scratch.selection.as_mut()?);
         Some(selector.orders(record, window, scratch))
     }
@@ -237,7 +242,7 @@ impl LocalPolynomials {
         workers: NonZeroUsize,
         watch: &mut Watch<'_>,
     ) -> Result<(), Error> {
-        let work = |(record, samples, mut estimates): Part<'_, '_>, scratch: &mut Scratch| {
+        let work = |(record, samples, mut estimates): Part<'_, '_>, scratch: &mut PolynomialScratch| {
             let outcome = if ends {
                 self.estimate(record, samples, &mut estimates, scratch)
             } else {
@@ -261,7 +266,7 @@ impl LocalPolynomials {
         workers: NonZeroUsize,
         watch: &mut Watch<'_>,
     ) -> Result<(), Error> {
-        let work = |(record, samples, mut estimates): Part<'_, '_>, scratch: &mut Scratch| {
+        let work = |(record, samples, mut estimates): Part<'_, '_>, scratch: &mut PolynomialScratch| {
             let outcome = self.everywhere(record, samples, Wanted::Errors, &mut estimates, scratch);
             debug_assert_eq!(outcome, Ok(()), "the lengths of all records were checked");
         };

@@ -8,7 +8,7 @@ use realfft::{RealFftPlanner, RealToComplex};
 
 use crate::error::Error;
 use crate::exec::pool::Piece;
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::record::samples::{Samples, all_usable, is_usable};
 
 /// Segments that are averaged at most, spread over the record: so many, or fewer long ones that hold so many samples together.
@@ -63,10 +63,14 @@ pub(crate) fn power_of_whole_segments(record: &dyn Samples, length: usize) -> (V
 }
 
 /// The same, in parallel.
-pub(crate) fn power_in_pieces(record: &dyn Samples, length: usize, run: &mut Run<'_, '_>) -> Result<Vec<f64>, Error> {
+pub(crate) fn power_in_pieces(
+    record: &dyn Samples,
+    length: usize,
+    stages: &mut Stages<'_, '_>,
+) -> Result<Vec<f64>, Error> {
     let segments = Segments::new(record, length);
     let pieces = segments.parts().map(|part| Piece { size: part.len(), content: part });
-    let sums = run.map(pieces.collect(), || (), |part, (): &mut ()| segments.sum(part))?;
+    let sums = stages.map(pieces.collect(), || (), |part, (): &mut ()| segments.sum(part))?;
     Ok(segments.mean(sums.into_iter()).0)
 }
 

@@ -96,14 +96,14 @@ impl Samples for Cubed<'_> {
 }
 
 /// The sign of a velocity that is known every `stride` samples from sample `first` on.
-pub(crate) struct Direction<'a> {
+pub(crate) struct VelocitySign<'a> {
     pub(crate) velocity: &'a [f64],
     pub(crate) first: usize,
     pub(crate) stride: usize,
     pub(crate) samples: usize,
 }
 
-impl Samples for Direction<'_> {
+impl Samples for VelocitySign<'_> {
     fn len(&self) -> usize {
         self.samples
     }

@@ -6,9 +6,9 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::exec::pool::Piece;
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::regression::constants::sums_of_squares;
-use crate::regression::dyadic_windows::{Shape, solve_windows};
+use crate::regression::dyadic_windows::{WindowShape, solve_windows};
 use crate::regression::layout::Fields;
 use crate::regression::predictor::Predictor;
 use crate::regression::problem::Problem;
@@ -45,7 +45,7 @@ pub(crate) fn every_window(
     constants: &[f64],
     ill_conditioned: f64,
     instructions: Instructions,
-    run: &mut Run<'_, '_>,
+    stages: &mut Stages<'_, '_>,
 ) -> Result<EveryWindow, Error> {
     let before = (window / 2).cast_signed();
     let mut pieces = Vec::new();
@@ -53,11 +53,11 @@ pub(crate) fn every_window(
         let part = first..rows.end.min(first + PIECE.cast_signed());
         pieces.push(Piece { size: part.len(), content: part.start - before..part.end - before });
     }
-    let shape = Shape { centre: before as f64, ..Shape::of(0..window, 1) };
+    let shape = WindowShape { centre: before as f64, ..WindowShape::of(0..window, 1) };
     let work = |blocks: Range<isize>, (): &mut ()| {
         solve_windows(problem, 1, &blocks, std::slice::from_ref(&shape), instructions).swap_remove(0)
     };
-    let solved = run.map(pieces, || (), work)?;
+    let solved = stages.map(pieces, || (), work)?;
     let solved = Solved::join(&solved.iter().collect::<Vec<_>>());
     let (fields, layout) = (solved.fields, problem.layout);
     let predictor = Predictor::new(&solved, constants);

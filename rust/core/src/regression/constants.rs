@@ -38,15 +38,15 @@ pub(crate) struct Expected {
     pub(crate) variance: f64,
     pub(crate) torque: f64,
     /// Rows that stand for one independent row.
-    pub(crate) redundancy: f64,
+    pub(crate) variance_inflation: f64,
 }
 
 impl Expected {
     /// Nothing is known of the noise, so no window is told from the others by its misfit.
-    pub(crate) const UNKNOWN: Self = Self { variance: f64::NAN, torque: 0.0, redundancy: 1.0 };
+    pub(crate) const UNKNOWN: Self = Self { variance: f64::NAN, torque: 0.0, variance_inflation: 1.0 };
 
     pub(crate) fn new(covariance: &RowCovariance, torque: f64) -> Self {
-        Self { variance: covariance.variance(), torque, redundancy: covariance.redundancy() }
+        Self { variance: covariance.variance(), torque, variance_inflation: covariance.variance_inflation() }
     }
 }
 
@@ -79,7 +79,7 @@ pub(crate) fn pool(
         let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
         let counts = &full.field(fields.count())[windows.clone()];
         for ((count, weight), misfit) in counts.iter().zip(&mut weights).zip(&misfits) {
-            let independent = (count / expected.redundancy - 2.0).max(1.0);
+            let independent = (count / expected.variance_inflation - 2.0).max(1.0);
             let most = median.max(1.0) * (1.0 + TOLERATED * (2.0 / independent).sqrt());
             if *weight > 0.0 {
                 *weight = if *misfit > most { (most / misfit).powi(2) } else { 1.0 };

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use crate::regression::layout::{Fields, Layout, symmetric};
 use crate::regression::problem::Problem;
-use crate::regression::solve::{Scratch, solve};
+use crate::regression::solve::{SolveScratch, solve};
 use crate::regression::solved::Solved;
 use crate::regression::summary::{absorb, count, merge, recentre};
 use crate::simd::f64x8::{Packet, WIDTH};
@@ -55,14 +55,14 @@ impl Table {
 
 /// A window of blocks relative to the block it is counted from: parts that are merged, and where it is solved.
 #[derive(Clone, Debug)]
-pub(crate) struct Shape {
+pub(crate) struct WindowShape {
     /// Blocks of every part.
     pub(crate) parts: Vec<Range<usize>>,
     /// Time at which it is solved, in rows from the first row of block 0.
     pub(crate) centre: f64,
 }
 
-impl Shape {
+impl WindowShape {
     /// Consecutive blocks of `step` rows.
     pub(crate) fn of(blocks: Range<usize>, step: usize) -> Self {
         let centre = ((blocks.start + blocks.end) * step - 1) as f64 / 2.0;
@@ -94,11 +94,11 @@ pub(crate) fn solve_windows(
     problem: &Problem<'_>,
     step: usize,
     blocks: &Range<isize>,
-    shapes: &[Shape],
+    shapes: &[WindowShape],
     instructions: Instructions,
 ) -> Vec<Solved> {
     let mut tables = TABLES.take();
-    let mut solved = dispatch(instructions, Work { problem, step, blocks, shapes, tables: &mut tables });
+    let mut solved = dispatch(instructions, DyadicKernel { problem, step, blocks, shapes, tables: &mut tables });
     tables.iter_mut().filter(|table| table.values.len() > MOST_KEPT).for_each(|table| *table = Table::default());
     TABLES.set(tables);
     if !problem.jumps.is_empty() {
@@ -140,15 +140,15 @@ impl Memory {
     }
 }
 
-struct Work<'a, 'b> {
+struct DyadicKernel<'a, 'b> {
     problem: &'a Problem<'b>,
     step: usize,
     blocks: &'a Range<isize>,
-    shapes: &'a [Shape],
+    shapes: &'a [WindowShape],
     tables: &'a mut Vec<Table>,
 }
 
-impl Kernel for Work<'_, '_> {
+impl Kernel for DyadicKernel<'_, '_> {
     type Output = Vec<Solved>;
 
     #[inline(always)]
@@ -166,7 +166,7 @@ impl Kernel for Work<'_, '_> {
 const ALONE: Layout = Layout { windowed: 1, linear: true, constant: 0 };
 const BESIDE_TWO: Layout = Layout { constant: 2, ..ALONE };
 
-impl Work<'_, '_> {
+impl DyadicKernel<'_, '_> {
     #[inline(always)]
     fn with(self, layout: Layout) -> Vec<Solved> {
         let Self { problem, step, blocks, shapes, tables } = self;
@@ -175,8 +175,8 @@ impl Work<'_, '_> {
         if windows == 0 {
             return results;
         }
-        let reach = shapes.iter().map(Shape::end).max().unwrap_or(0);
-        let pieces: Vec<_> = shapes.iter().map(Shape::pieces).collect();
+        let reach = shapes.iter().map(WindowShape::end).max().unwrap_or(0);
+        let pieces: Vec<_> = shapes.iter().map(WindowShape::pieces).collect();
         let levels = pieces.iter().flatten().map(|&(_, level)| level).max().unwrap_or(0);
         let block_period = step as f64 * problem.period;
 
@@ -206,7 +206,7 @@ impl Work<'_, '_> {
                 table.store(place, summary);
             }
         }
-        let mut scratch = Scratch::new(layout);
+        let mut scratch = SolveScratch::new(layout);
         let variance = problem.correlated.as_ref().map(|correlated| correlated.variance);
         for ((shape, pieces), result) in shapes.iter().zip(&pieces).zip(&mut results) {
             for place in (0..windows).step_by(WIDTH) {
@@ -260,7 +260,7 @@ fn summarise(
             for i in 0..layout.constant {
                 row[layout.local() + i] = Packet::gather(problem.constants[i], place, step);
             }
-            row[columns - 1] = Packet::gather(problem.side, place, step);
+            row[columns - 1] = Packet::gather(problem.rhs, place, step);
             count(layout, summary, Packet::gather_flags(problem.usable, place, step), time);
             if let Some(correlated) = &problem.correlated {
                 for i in 0..layout.local() {

@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::exec::pool::Piece;
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::regression::constants::{Expected, Pooled, pool};
-use crate::regression::dyadic_windows::{Shape, solve_windows};
+use crate::regression::dyadic_windows::{WindowShape, solve_windows};
 use crate::regression::problem::Problem;
 use crate::regression::row_covariance::RowCovariance;
 use crate::regression::sandwich::{between, influence, products, sandwich};
@@ -26,7 +26,7 @@ pub(crate) struct Fit {
     /// Nothing where the windows' length was given, or no unknown belongs to a window.
     pub(crate) scale: Option<Scale>,
     /// Windows on both sides of the rows between them, where they are wanted.
-    pub(crate) hollow: Option<Solved>,
+    pub(crate) leave_gap_out: Option<Solved>,
     /// The windows that all unknowns are taken from.
     pub(crate) full: Solved,
     pub(crate) pooled: Pooled,
@@ -42,30 +42,37 @@ impl Fit {
         scale: Option<Scale>,
         expected: Expected,
         instructions: Instructions,
-        run: &mut Run<'_, '_>,
+        stages: &mut Stages<'_, '_>,
     ) -> Result<Option<Self>, Error> {
         let Some(scale) = scale else {
             let step = problem.rows().div_ceil(BLOCKS).max(1);
             return Ok(Self::in_windows(problem, step, BLOCKS, expected, instructions));
         };
-        let full = scale.solve_full(problem, instructions, run)?;
+        let full = scale.solve_full(problem, instructions, stages)?;
         let pooled = pool(&full, 0..full.len(), expected, instructions);
         let (scale, step, span) = (Some(scale), scale.step, scale.span());
-        Ok(pooled.map(|pooled| Self { scale, hollow: None, full, pooled, step, span }))
+        Ok(pooled.map(|pooled| Self { scale, leave_gap_out: None, full, pooled, step, span }))
     }
 
     /// As [`Fit::new`], with windows on both sides of the rows between them as well.
-    pub(crate) fn with_hollow(
+    pub(crate) fn with_leave_gap_out(
         problem: &Problem<'_>,
         scale: Scale,
         expected: Expected,
         instructions: Instructions,
-        run: &mut Run<'_, '_>,
+        stages: &mut Stages<'_, '_>,
     ) -> Result<Option<Self>, Error> {
-        let (hollow, full) = scale.solve_hollow(problem, instructions, run)?;
+        let (leave_gap_out, full) = scale.solve_leave_gap_out(problem, instructions, stages)?;
         let pooled = pool(&full, 0..full.len(), expected, instructions);
         let (step, span) = (scale.step, scale.span());
-        Ok(pooled.map(|pooled| Self { scale: Some(scale), hollow: Some(hollow), full, pooled, step, span }))
+        Ok(pooled.map(|pooled| Self {
+            scale: Some(scale),
+            leave_gap_out: Some(leave_gap_out),
+            full,
+            pooled,
+            step,
+            span,
+        }))
     }
 
     /// Solves another problem in the same windows.
@@ -74,12 +81,12 @@ impl Fit {
         problem: &Problem<'_>,
         expected: Expected,
         instructions: Instructions,
-        run: &mut Run<'_, '_>,
+        stages: &mut Stages<'_, '_>,
     ) -> Result<Option<Self>, Error> {
         if self.scale.is_none() && problem.layout.local() > 0 {
             return Ok(Self::in_rows(problem, self.span, expected, instructions));
         }
-        Self::new(problem, self.scale, expected, instructions, run)
+        Self::new(problem, self.scale, expected, instructions, stages)
     }
 
     /// The covariance of the constants of the problem that was solved, row by row.
@@ -87,15 +94,15 @@ impl Fit {
         &self,
         problem: &Problem<'_>,
         covariance: &RowCovariance,
-        run: &mut Run<'_, '_>,
+        stages: &mut Stages<'_, '_>,
     ) -> Result<Vec<f64>, Error> {
         let each = || (0..problem.layout.constant).map(|constant| Piece { size: problem.rows(), content: constant });
         let windows = 0..self.full.len();
         let influence =
             |constant: usize, (): &mut ()| self.influence(problem, &windows, &self.pooled.weights, constant);
-        let columns = run.map(each().collect(), || (), influence)?;
+        let columns = stages.map(each().collect(), || (), influence)?;
         let products = |constant: usize, (): &mut ()| products(&columns, constant, covariance);
-        let products = run.map(each().collect(), || (), products)?;
+        let products = stages.map(each().collect(), || (), products)?;
         Ok(between(&products.concat(), &self.pooled.inverse, columns.len()))
     }
 
@@ -145,10 +152,10 @@ impl Fit {
     ) -> Option<Self> {
         let span = blocks * step;
         let windows = problem.rows().saturating_sub(span) / step + 1;
-        let shapes = [Shape::of(0..blocks, step)];
+        let shapes = [WindowShape::of(0..blocks, step)];
         let full = solve_windows(problem, step, &(0..windows.cast_signed()), &shapes, instructions).swap_remove(0);
         let pooled = pool(&full, 0..full.len(), expected, instructions)?;
-        Some(Self { scale: None, hollow: None, full, pooled, step, span })
+        Some(Self { scale: None, leave_gap_out: None, full, pooled, step, span })
     }
 
     /// The middle of a window, in rows.

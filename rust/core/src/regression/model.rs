@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::equation::rows::{Regressor, Rows};
 use crate::error::Error;
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::regression::layout::Layout;
 use crate::regression::noise_correction::RowNoise;
 use crate::regression::problem::{Correlated, Problem};
@@ -38,20 +38,20 @@ impl Model {
         &self,
         rows: &Rows,
         covariance: &RowCovariance,
-        run: &mut Run<'_, '_>,
+        stages: &mut Stages<'_, '_>,
     ) -> Result<Arc<Correlated>, Error> {
         let of = |pick: fn(&Regressor) -> &Vec<f64>| -> Vec<&[f64]> {
             self.windowed.iter().map(|&index| pick(&rows.regressors[index]).as_slice()).collect()
         };
         let (values, companions) = (of(|regressor| &regressor.value), of(|regressor| &regressor.companion));
-        covariance.correlated(&values, &companions, rows.period, run).map(Arc::new)
+        covariance.correlated(&values, &companions, rows.period, stages).map(Arc::new)
     }
 
     /// The least-squares problem of some rows, with a right-hand side. `noise` is the variance of the angle's.
     pub(crate) fn problem<'a>(
         &self,
         rows: &'a Rows,
-        side: &'a [f64],
+        rhs: &'a [f64],
         noise: f64,
         correlated: Option<&Arc<Correlated>>,
     ) -> Problem<'a> {
@@ -64,11 +64,11 @@ impl Model {
             windowed: of(&self.windowed, |regressor| &regressor.value),
             companions: of(&self.windowed, |regressor| &regressor.companion),
             constants: of(&self.constant, |regressor| &regressor.value),
-            side,
+            rhs,
             usable: &rows.usable,
             jumps: &rows.jumps,
             period: rows.period,
-            noise: self.row_noise(rows, &rows.side_noise, noise),
+            noise: self.row_noise(rows, &rows.rhs_noise, noise),
         }
     }
 
@@ -77,26 +77,26 @@ impl Model {
         &self,
         rows: &Rows,
         whole: &Problem<'a>,
-        side: &'a [f64],
+        rhs: &'a [f64],
         constants: &[f64],
         noise: f64,
     ) -> Problem<'a> {
         let rest = Self { constant: Vec::new(), ..self.clone() };
-        let mut side_noise = rows.side_noise.clone();
+        let mut rhs_noise = rows.rhs_noise.clone();
         for (&regressor, constant) in self.constant.iter().zip(constants) {
             let kernel = &rows.regressors[regressor].noise[0];
-            side_noise.resize(side_noise.len().max(kernel.len()), 0.0);
-            side_noise.iter_mut().zip(kernel).for_each(|(sum, value)| *sum -= constant * value);
+            rhs_noise.resize(rhs_noise.len().max(kernel.len()), 0.0);
+            rhs_noise.iter_mut().zip(kernel).for_each(|(sum, value)| *sum -= constant * value);
         }
-        let noise = rest.row_noise(rows, &side_noise, noise);
-        Problem { layout: rest.layout(), constants: Vec::new(), side, noise, ..whole.clone() }
+        let noise = rest.row_noise(rows, &rhs_noise, noise);
+        Problem { layout: rest.layout(), constants: Vec::new(), rhs, noise, ..whole.clone() }
     }
 
-    fn row_noise(&self, rows: &Rows, side: &[f64], noise: f64) -> RowNoise {
+    fn row_noise(&self, rows: &Rows, rhs: &[f64], noise: f64) -> RowNoise {
         let kernels = |regressors: &[usize], which: usize| -> Vec<&[f64]> {
             regressors.iter().map(|&index| rows.regressors[index].noise[which].as_slice()).collect()
         };
         let windowed = [kernels(&self.windowed, 0), kernels(&self.windowed, 1)];
-        RowNoise::new(&[windowed.concat(), kernels(&self.constant, 0), vec![side]].concat(), noise)
+        RowNoise::new(&[windowed.concat(), kernels(&self.constant, 0), vec![rhs]].concat(), noise)
     }
 }

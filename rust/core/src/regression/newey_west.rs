@@ -98,10 +98,9 @@ pub(crate) mod tests {
     /// Rows of one regressor whose noise is a mean over `width` samples.
     fn factor(width: usize) -> f64 {
         let noise = white(20_000 + width, 7);
-        let side: Vec<f64> =
-            (0..20_000).map(|row| noise[row..row + width].iter().sum::<f64>() / width as f64).collect();
+        let rhs: Vec<f64> = (0..20_000).map(|row| noise[row..row + width].iter().sum::<f64>() / width as f64).collect();
         let mut rows = Stretched::new(2, 4 * width);
-        rows.push(&[vec![1.0; side.len()], side], |_| true);
+        rows.push(&[vec![1.0; rhs.len()], rhs], |_| true);
         rows.factors().expect("determined")[0]
     }
 

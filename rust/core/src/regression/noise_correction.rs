@@ -68,7 +68,7 @@ pub(crate) fn correct(
     noise: &RowNoise,
     square: &mut [Packet],
     factor: &mut [Packet],
-    side: &mut [Packet],
+    rhs: &mut [Packet],
     column: &mut [Packet],
     pivots: &mut [Packet],
     residual: &mut Packet,
@@ -106,8 +106,8 @@ pub(crate) fn correct(
             value -= factor[k * p + i] * column[k];
         }
         column[i] = value * pivots[i];
-        before += side[i] * side[i];
-        side[i] -= column[i];
+        before += rhs[i] * rhs[i];
+        rhs[i] -= column[i];
     }
     // U, the factor of 1 - W, in the place of W; and U⁻ᵀ (d - g) in the place of d - g.
     let mut after = Packet::ZERO;
@@ -126,12 +126,12 @@ pub(crate) fn correct(
             }
             square[i * p + j] = value * inverse;
         }
-        let mut value = side[i];
+        let mut value = rhs[i];
         for k in 0..i {
-            value -= square[k * p + i] * side[k];
+            value -= square[k * p + i] * rhs[k];
         }
-        side[i] = value * inverse;
-        after += side[i] * side[i];
+        rhs[i] = value * inverse;
+        after += rhs[i] * rhs[i];
         pivots[i] = pivots[i] * inverse;
     }
     for i in 0..p {

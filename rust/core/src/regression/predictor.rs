@@ -68,9 +68,9 @@ impl<'a> Predictor<'a> {
 
 /// What is left of a right-hand side once the constants are taken off.
 pub(crate) fn without_constants(problem: &Problem<'_>, constants: &[f64]) -> Vec<f64> {
-    let mut side = problem.side.to_vec();
+    let mut rhs = problem.rhs.to_vec();
     for (column, value) in problem.constants.iter().zip(constants) {
-        side.iter_mut().zip(*column).for_each(|(side, factor)| *side -= value * factor);
+        rhs.iter_mut().zip(*column).for_each(|(rhs, factor)| *rhs -= value * factor);
     }
-    side
+    rhs
 }

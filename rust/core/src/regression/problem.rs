@@ -14,7 +14,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) windowed: Vec<&'a [f64]>,
     pub(crate) companions: Vec<&'a [f64]>,
     pub(crate) constants: Vec<&'a [f64]>,
-    pub(crate) side: &'a [f64],
+    pub(crate) rhs: &'a [f64],
     pub(crate) usable: &'a [bool],
     /// The first rows after jumps of what is windowed, in order. A window over a jump counts as one without rows.
     pub(crate) jumps: &'a [usize],
@@ -38,7 +38,7 @@ pub(crate) struct Correlated {
 impl Problem<'_> {
     /// Number of rows.
     pub(crate) fn rows(&self) -> usize {
-        self.side.len()
+        self.rhs.len()
     }
 
     /// Rows from the first that can be used to the last.

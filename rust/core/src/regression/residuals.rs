@@ -1,7 +1,7 @@
 //! What a fit leaves of the rows.
 
 use crate::error::Error;
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::regression::fit::Fit;
 use crate::regression::predictor::{Predictor, without_constants};
 use crate::regression::problem::Problem;
@@ -11,13 +11,13 @@ use crate::regression::solved::is_determined;
 pub(crate) fn residuals(
     problem: &Problem<'_>,
     fit: &Fit,
-    run: &mut Run<'_, '_>,
+    stages: &mut Stages<'_, '_>,
 ) -> Result<(Vec<f64>, Vec<bool>), Error> {
     let mut left = without_constants(problem, &fit.pooled.values);
     let windowed = problem.layout.windowed > 0;
     if windowed {
         let predictor = Predictor::new(&fit.full, &fit.pooled.values);
-        run.fill([&mut left], |rows, columns| {
+        stages.fill([&mut left], |rows, columns| {
             for (row, left) in rows.zip(&mut *columns[0]).filter(|(row, _)| problem.usable[*row]) {
                 let place = fit.nearest(row);
                 let later = (row as f64 - fit.centre(place)) * problem.period;

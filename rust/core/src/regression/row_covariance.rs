@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::error::Error;
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::regression::problem::Correlated;
 use crate::weak_form::test_function::Kernels;
 
@@ -60,7 +60,7 @@ impl RowCovariance {
 
     /// Whether rows so far apart that they share no sample are correlated, by more than a part of the variance and than chance.
     pub(crate) fn is_coloured(&self, reach: usize, part: f64, rows: usize) -> bool {
-        let chance = CHANCE * (self.redundancy() / rows.max(1) as f64).sqrt();
+        let chance = CHANCE * (self.variance_inflation() / rows.max(1) as f64).sqrt();
         self.lags.iter().skip(reach + 1).any(|lag| lag.abs() > part.max(chance) * self.lags[0])
     }
 
@@ -76,7 +76,7 @@ impl RowCovariance {
     }
 
     /// How many rows stand for one independent row: the sum of the squared correlations.
-    pub(crate) fn redundancy(&self) -> f64 {
+    pub(crate) fn variance_inflation(&self) -> f64 {
         let squared = |lag: &f64| (lag / self.lags[0]).powi(2);
         1.0 + 2.0 * self.lags[1..].iter().map(squared).sum::<f64>()
     }
@@ -94,11 +94,11 @@ impl RowCovariance {
         windowed: &[&[f64]],
         companions: &[&[f64]],
         period: f64,
-        run: &mut Run<'_, '_>,
+        stages: &mut Stages<'_, '_>,
     ) -> Result<Correlated, Error> {
         let columns = || windowed.iter().map(|column| vec![0.0; column.len()]).collect::<Vec<_>>();
         let mut found = Correlated { variance: self.variance(), windowed: columns(), companions: columns() };
-        run.fill(found.windowed.iter_mut().chain(&mut found.companions), |rows, columns| {
+        stages.fill(found.windowed.iter_mut().chain(&mut found.companions), |rows, columns| {
             let (values, slopes) = columns.split_at_mut(windowed.len());
             for (regressor, (value, slope)) in values.iter_mut().zip(slopes).enumerate() {
                 self.add(windowed[regressor], rows.clone(), |lag| [self.lags[lag]; 2], value);
@@ -159,18 +159,20 @@ mod tests {
         for count in (1..8).map(|more| ROWS + more).chain([1, 2, 3, 7, ROWS]) {
             let column: Vec<f64> = (0..count).map(|row| (row as f64 * 0.7).sin()).collect();
             let mut watch = |_: usize, _: usize| true;
-            let mut run = Run::new(NonZeroUsize::MIN, 1, 1, &mut watch);
-            let found = covariance.correlated(&[&column], &[&column], 0.5, &mut run).expect("not cancelled");
+            let mut stages = Stages::new(NonZeroUsize::MIN, 1, 1, &mut watch);
+            let found = covariance.correlated(&[&column], &[&column], 0.5, &mut stages).expect("not cancelled");
             let at = |row: isize| usize::try_from(row).ok().and_then(|row| column.get(row)).copied().unwrap_or(0.0);
             for row in (0..count).rev().take(12) {
                 let lags = covariance.lags.iter().enumerate().skip(1);
-                let sides = lags.clone().map(|(lag, weight)| {
+                let neighbours = lags.clone().map(|(lag, weight)| {
                     let (row, lag) = (row.cast_signed(), lag.cast_signed());
                     [weight * at(row + lag), weight * at(row - lag)]
                 });
-                let value = column[row] + sides.clone().map(|[late, early]| late + early).sum::<f64>();
-                let slope =
-                    lags.zip(sides).map(|((lag, _), [late, early])| lag as f64 * 0.5 * (late - early)).sum::<f64>();
+                let value = column[row] + neighbours.clone().map(|[late, early]| late + early).sum::<f64>();
+                let slope = lags
+                    .zip(neighbours)
+                    .map(|((lag, _), [late, early])| lag as f64 * 0.5 * (late - early))
+                    .sum::<f64>();
                 let near = |a: f64, b: f64| (a - b).abs() < 20.0 * f64::EPSILON * 10.0;
                 assert!(
                     near(found.windowed[0][row], value) && near(found.companions[0][row], value + slope),

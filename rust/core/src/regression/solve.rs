@@ -6,24 +6,24 @@ use crate::simd::f64x8::Packet;
 
 /// Memory for [`solve`].
 #[derive(Clone, Debug)]
-pub(crate) struct Scratch {
+pub(crate) struct SolveScratch {
     /// `E`, then `W`, then `U`: square, row by row.
     square: Vec<Packet>,
     factor: Vec<Packet>,
-    side: Vec<Packet>,
+    rhs: Vec<Packet>,
     column: Vec<Packet>,
     inverse: Vec<Packet>,
     /// One over every pivot: divisions are what takes longest.
     pivots: Vec<Packet>,
 }
 
-impl Scratch {
+impl SolveScratch {
     pub(crate) fn new(layout: Layout) -> Self {
         let p = layout.regressors();
         Self {
             square: vec![Packet::ZERO; p * p],
             factor: vec![Packet::ZERO; p * p],
-            side: vec![Packet::ZERO; p],
+            rhs: vec![Packet::ZERO; p],
             column: vec![Packet::ZERO; p.max(1)],
             inverse: vec![Packet::ZERO; layout.local() * layout.local()],
             pivots: vec![Packet::ZERO; p],
@@ -38,18 +38,18 @@ pub(crate) fn solve(
     summary: &[Packet],
     noise: &RowNoise,
     variance: Option<f64>,
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     fields: &mut [Packet],
 ) {
     let (p, local) = (layout.regressors(), layout.local());
-    let Scratch { square, factor, side, column, inverse, pivots } = scratch;
+    let SolveScratch { square, factor, rhs, column, inverse, pivots } = scratch;
     // Lengths that the compiler sees.
     let (square, factor) = (&mut square[..p * p], &mut factor[..p * p]);
-    let (side, column, pivots) = (&mut side[..p], &mut column[..p.max(1)], &mut pivots[..p]);
+    let (rhs, column, pivots) = (&mut rhs[..p], &mut column[..p.max(1)], &mut pivots[..p]);
     let inverse = &mut inverse[..local * local];
     for i in 0..p {
         pivots[i] = summary[layout.entry(i, i)].inverse_or_zero();
-        side[i] = summary[layout.entry(i, p)];
+        rhs[i] = summary[layout.entry(i, p)];
         for j in i..p {
             factor[i * p + j] = summary[layout.entry(i, j)];
         }
@@ -57,14 +57,14 @@ pub(crate) fn solve(
     let last = summary[layout.entry(p, p)];
     let mut residual = last * last;
     if !noise.is_zero() {
-        correct(layout, summary, noise, square, factor, side, column, pivots, &mut residual);
+        correct(layout, summary, noise, square, factor, rhs, column, pivots, &mut residual);
     }
 
     let names = Fields { layout };
     // The local unknowns, for every constant and for the right-hand side.
     for c in 0..=layout.constant {
         for i in (0..local).rev() {
-            let mut value = if c < layout.constant { factor[i * p + local + c] } else { side[i] };
+            let mut value = if c < layout.constant { factor[i * p + local + c] } else { rhs[i] };
             for j in i + 1..local {
                 value -= factor[i * p + j] * fields[names.solution(j, c)];
             }
@@ -75,7 +75,7 @@ pub(crate) fn solve(
         for j in i..layout.constant {
             fields[names.left(i, j)] = factor[(local + i) * p + local + j];
         }
-        fields[names.left(i, layout.constant)] = side[local + i];
+        fields[names.left(i, layout.constant)] = rhs[local + i];
         let mut squared = Packet::ZERO;
         for k in 0..=local + i {
             let value = summary[layout.entry(k, local + i)];

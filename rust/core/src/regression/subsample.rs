@@ -37,8 +37,8 @@ pub(crate) fn thinned_rows(rows: &Rows, stretches: &[Range<usize>]) -> Rows {
     }
     Rows {
         regressors: rows.regressors.iter().map(regressor).collect(),
-        side: column(&rows.side),
-        side_noise: rows.side_noise.clone(),
+        rhs: column(&rows.rhs),
+        rhs_noise: rows.rhs_noise.clone(),
         usable: thinned_column(&rows.usable, stretches),
         jumps,
         period: rows.period,

@@ -14,7 +14,7 @@ use std::collections::VecDeque;
 use crate::equation::rows::{Regressor, Rows};
 use crate::error::Error;
 use crate::exec::pool::Piece;
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::regression::row_covariance::{RowCovariance, products};
 
 /// What is added to the variance of a row, so that frequencies that a test function lets next to nothing of through do not count.
@@ -70,11 +70,12 @@ impl Whitening {
     }
 
     /// Rows made white.
-    pub(crate) fn apply(&self, rows: &Rows, run: &mut Run<'_, '_>) -> Result<Rows, Error> {
-        let columns = rows.regressors.iter().map(|regressor| &regressor.value).chain([&rows.side]);
+    pub(crate) fn apply(&self, rows: &Rows, stages: &mut Stages<'_, '_>) -> Result<Rows, Error> {
+        let columns = rows.regressors.iter().map(|regressor| &regressor.value).chain([&rows.rhs]);
         let pieces = columns.map(|column| Piece { size: rows.len(), content: column });
-        let mut white = run.map(pieces.collect(), || (), |column: &Vec<f64>, (): &mut ()| self.column(rows, column))?;
-        let side = white.pop().unwrap_or_default();
+        let mut white =
+            stages.map(pieces.collect(), || (), |column: &Vec<f64>, (): &mut ()| self.column(rows, column))?;
+        let rhs = white.pop().unwrap_or_default();
         let roots = self.noise(rows);
         let mut roots = roots.into_iter();
         let mut root =
@@ -85,9 +86,9 @@ impl Whitening {
             noise: [root(&regressor.noise[0]), Vec::new()],
         });
         let regressors = regressors.collect();
-        let side_noise = root(&rows.side_noise);
+        let rhs_noise = root(&rows.rhs_noise);
         let (usable, jumps) = (rows.usable.clone(), rows.jumps.clone());
-        Ok(Rows { regressors, side, side_noise, usable, jumps, period: rows.period })
+        Ok(Rows { regressors, rhs, rhs_noise, usable, jumps, period: rows.period })
     }
 
     fn column(&self, rows: &Rows, column: &[f64]) -> Vec<f64> {
@@ -151,7 +152,7 @@ impl Factored {
 
 /// The kernels that the angle's noise enters by: of regressors, then of the right-hand side, as far as it does.
 fn kernels(rows: &Rows) -> Vec<&[f64]> {
-    let all = rows.regressors.iter().map(|regressor| &regressor.noise[0]).chain([&rows.side_noise]);
+    let all = rows.regressors.iter().map(|regressor| &regressor.noise[0]).chain([&rows.rhs_noise]);
     all.filter(|kernel| !kernel.is_empty()).map(Vec::as_slice).collect()
 }
 
@@ -216,16 +217,16 @@ mod tests {
         let regressors =
             (0..count).map(|one| Regressor { value: column(one), companion: Vec::new(), noise: noise(one) });
         let usable = (0..count).map(|row| !missing.contains(&row)).collect();
-        let mut rows = Rows { regressors: regressors.collect(), side: vec![0.0; count], usable, ..Rows::default() };
+        let mut rows = Rows { regressors: regressors.collect(), rhs: vec![0.0; count], usable, ..Rows::default() };
         rows.clear_unusable();
         (rows, covariance)
     }
 
     fn whitened(rows: &Rows, covariance: &RowCovariance) -> Rows {
         let mut watch = |_: usize, _: usize| true;
-        let mut run = Run::new(NonZeroUsize::MIN, 1, 1, &mut watch);
+        let mut stages = Stages::new(NonZeroUsize::MIN, 1, 1, &mut watch);
         let whitening = Whitening::new(covariance, rows, STRIDE).expect("a covariance");
-        whitening.apply(rows, &mut run).expect("not cancelled")
+        whitening.apply(rows, &mut stages).expect("not cancelled")
     }
 
     /// A number for every two rows by their distance, zero where either is missing or a gap lies between them.
@@ -279,7 +280,7 @@ mod tests {
     #[test]
     fn long_records_go_on_as_soon_as_rows_have_settled() {
         let (mut rows, covariance) = units(3, &[]);
-        rows.side.resize(4000, 0.0);
+        rows.rhs.resize(4000, 0.0);
         rows.usable.resize(4000, true);
         let whitening = Whitening::new(&covariance, &rows, STRIDE).expect("a covariance");
         assert!(whitening.factor.len() < 2000, "{}", whitening.factor.len());

@@ -8,8 +8,8 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::exec::pool::Piece;
-use crate::exec::stages::Run;
-use crate::regression::dyadic_windows::{Shape, solve_windows};
+use crate::exec::stages::Stages;
+use crate::regression::dyadic_windows::{WindowShape, solve_windows};
 use crate::regression::problem::Problem;
 use crate::regression::solved::Solved;
 use crate::simd::vectors::Instructions;
@@ -47,9 +47,9 @@ pub(crate) struct Scale {
 pub(crate) struct Cells {
     /// Windows on one side: that of cell `g` comes before its rows. They reach further than the cells, so that those that come after
     /// are there too.
-    pub(crate) sides: Solved,
+    pub(crate) one_sided: Solved,
     /// Both sides without what lies between.
-    pub(crate) hollow: Solved,
+    pub(crate) leave_gap_out: Solved,
     /// Everything.
     pub(crate) full: Solved,
 }
@@ -85,7 +85,7 @@ impl Scale {
     }
 
     /// Rows of a window on one side.
-    pub(crate) fn side(self) -> usize {
+    pub(crate) fn one_sided(self) -> usize {
         self.blocks * self.step
     }
 
@@ -96,7 +96,7 @@ impl Scale {
 
     /// Whether a window on one side is long enough to serve alone.
     pub(crate) fn stands_alone(self) -> bool {
-        self.side() >= SHORTEST_ALONE
+        self.one_sided() >= SHORTEST_ALONE
     }
 
     /// The cell that a row belongs to. Its windows need not exist.
@@ -107,7 +107,7 @@ impl Scale {
     /// The first row of cell 0.
     fn first_row(self) -> isize {
         let slack = (self.gap * self.step + 2 - 2 * self.reach - self.step) / 2;
-        (self.side() + self.reach + slack).cast_signed() - 1
+        (self.one_sided() + self.reach + slack).cast_signed() - 1
     }
 
     /// The window on one side that comes after the rows of a cell, as the number of its own cell.
@@ -116,9 +116,9 @@ impl Scale {
     }
 
     /// The rows of the window before a cell.
-    pub(crate) fn side_rows(self, cell: isize) -> Range<isize> {
+    pub(crate) fn one_sided_rows(self, cell: isize) -> Range<isize> {
         let first = cell * self.step.cast_signed();
-        first..first + self.side().cast_signed()
+        first..first + self.one_sided().cast_signed()
     }
 
     /// Cells whose full windows lie within the rows.
@@ -127,8 +127,8 @@ impl Scale {
     }
 
     /// Cells whose windows before them lie within the rows.
-    pub(crate) fn side_cells(self, rows: usize) -> Range<isize> {
-        0..((rows + self.step).saturating_sub(self.side()) / self.step).cast_signed()
+    pub(crate) fn one_sided_cells(self, rows: usize) -> Range<isize> {
+        0..((rows + self.step).saturating_sub(self.one_sided()) / self.step).cast_signed()
     }
 
     /// Rows whose cells have full windows.
@@ -140,7 +140,7 @@ impl Scale {
     /// The middle of a cell's windows, in rows: before it, and the full one, which is also that of both sides.
     pub(crate) fn centres(self, cell: isize) -> [f64; 2] {
         let first = (cell * self.step.cast_signed()) as f64;
-        [first + (self.side() as f64 - 1.0) / 2.0, first + (self.span() as f64 - 1.0) / 2.0]
+        [first + (self.one_sided() as f64 - 1.0) / 2.0, first + (self.span() as f64 - 1.0) / 2.0]
     }
 
     /// Solves the windows of some cells, in parallel.
@@ -149,7 +149,7 @@ impl Scale {
         problem: &Problem<'_>,
         cells: &Range<isize>,
         instructions: Instructions,
-        run: &mut Run<'_, '_>,
+        stages: &mut Stages<'_, '_>,
     ) -> Result<Cells, Error> {
         let shapes = self.shapes();
         let mut pieces = Vec::new();
@@ -161,7 +161,7 @@ impl Scale {
             first = next;
         }
         let work = |blocks: Range<isize>, (): &mut ()| self.part(problem, &shapes, cells, &blocks, instructions);
-        Ok(join(&run.map(pieces, || (), work)?))
+        Ok(join(&stages.map(pieces, || (), work)?))
     }
 
     /// Solves the full windows only, in parallel.
@@ -169,21 +169,21 @@ impl Scale {
         self,
         problem: &Problem<'_>,
         instructions: Instructions,
-        run: &mut Run<'_, '_>,
+        stages: &mut Stages<'_, '_>,
     ) -> Result<Solved, Error> {
         let [_, _, full] = self.shapes();
-        Ok(self.solve_shapes(problem, &[full], instructions, run)?.swap_remove(0))
+        Ok(self.solve_shapes(problem, &[full], instructions, stages)?.swap_remove(0))
     }
 
-    /// Solves the full windows and the same without what lies between both sides, in parallel: the hollow ones come first.
-    pub(crate) fn solve_hollow(
+    /// Solves the full windows and the same without what lies between both sides, in parallel: those that leave the gap out come first.
+    pub(crate) fn solve_leave_gap_out(
         self,
         problem: &Problem<'_>,
         instructions: Instructions,
-        run: &mut Run<'_, '_>,
+        stages: &mut Stages<'_, '_>,
     ) -> Result<(Solved, Solved), Error> {
-        let [_, hollow, full] = self.shapes();
-        let mut solved = self.solve_shapes(problem, &[hollow, full], instructions, run)?;
+        let [_, leave_gap_out, full] = self.shapes();
+        let mut solved = self.solve_shapes(problem, &[leave_gap_out, full], instructions, stages)?;
         let full = solved.swap_remove(1);
         Ok((solved.swap_remove(0), full))
     }
@@ -192,16 +192,16 @@ impl Scale {
     fn solve_shapes(
         self,
         problem: &Problem<'_>,
-        shapes: &[Shape],
+        shapes: &[WindowShape],
         instructions: Instructions,
-        run: &mut Run<'_, '_>,
+        stages: &mut Stages<'_, '_>,
     ) -> Result<Vec<Solved>, Error> {
         let cells = self.full_cells(problem.rows());
         let firsts = cells.clone().step_by(PIECE);
         let pieces = firsts.map(|first| first..(first + PIECE.cast_signed()).min(cells.end));
         let pieces = pieces.map(|blocks| Piece { size: blocks.len() * self.step, content: blocks });
         let work = |blocks: Range<isize>, (): &mut ()| solve_windows(problem, self.step, &blocks, shapes, instructions);
-        let solved = run.map(pieces.collect(), || (), work)?;
+        let solved = stages.map(pieces.collect(), || (), work)?;
         if solved.is_empty() {
             return Ok(vec![Solved::new(problem.layout, 0, 0); shapes.len()]);
         }
@@ -214,18 +214,18 @@ impl Scale {
     }
 
     /// Before the rows of a cell, on both sides of them, and everything.
-    fn shapes(self) -> [Shape; 3] {
+    fn shapes(self) -> [WindowShape; 3] {
         let (second, all) = (self.blocks + self.gap, 2 * self.blocks + self.gap);
-        let full = Shape::of(0..all, self.step);
-        let hollow = Shape { parts: vec![0..self.blocks, second..all], centre: full.centre };
-        [Shape::of(0..self.blocks, self.step), hollow, full]
+        let full = WindowShape::of(0..all, self.step);
+        let leave_gap_out = WindowShape { parts: vec![0..self.blocks, second..all], centre: full.centre };
+        [WindowShape::of(0..self.blocks, self.step), leave_gap_out, full]
     }
 
     /// Solves the windows from some blocks on. The windows that come after the last cells belong to no cell that is wanted.
     fn part(
         self,
         problem: &Problem<'_>,
-        shapes: &[Shape],
+        shapes: &[WindowShape],
         cells: &Range<isize>,
         blocks: &Range<isize>,
         instructions: Instructions,
@@ -234,8 +234,8 @@ impl Scale {
         let rest = whole.end..blocks.end;
         let mut solved = solve_windows(problem, self.step, &whole, shapes, instructions);
         if !rest.is_empty() {
-            let sides = solve_windows(problem, self.step, &rest, &shapes[..1], instructions);
-            solved[0] = Solved::join(&[&solved[0], &sides[0]]);
+            let one_sided = solve_windows(problem, self.step, &rest, &shapes[..1], instructions);
+            solved[0] = Solved::join(&[&solved[0], &one_sided[0]]);
         }
         solved
     }
@@ -243,7 +243,7 @@ impl Scale {
 
 /// Puts the parts of each shape together.
 fn join(parts: &[Vec<Solved>]) -> Cells {
-    Cells { sides: join_shape(parts, 0), hollow: join_shape(parts, 1), full: join_shape(parts, 2) }
+    Cells { one_sided: join_shape(parts, 0), leave_gap_out: join_shape(parts, 1), full: join_shape(parts, 2) }
 }
 
 fn join_shape(parts: &[Vec<Solved>], shape: usize) -> Solved {

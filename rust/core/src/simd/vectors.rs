@@ -101,7 +101,7 @@ pub(crate) trait Lanes: Simd {
 
     /// Looks up an entry of a table by whole numbers below 16.
     #[inline(always)]
-    fn look_up(self, table: &[f64; TABLE], index: Self::f64s) -> Self::f64s {
+    fn table_lookup(self, table: &[f64; TABLE], index: Self::f64s) -> Self::f64s {
         let mut values = [0.0; MOST_LANES];
         self.store(&mut values, 0, index);
         for value in &mut values[..Self::F64_LANES] {
@@ -280,7 +280,7 @@ impl Lanes for pulp::x86::V4 {
     }
 
     #[inline(always)]
-    fn look_up(self, table: &[f64; TABLE], index: Self::f64s) -> Self::f64s {
+    fn table_lookup(self, table: &[f64; TABLE], index: Self::f64s) -> Self::f64s {
         use pulp::bytemuck::cast;
         // Added to 2^52, a whole number stands in the low bits.
         let index = self.add_f64s(index, self.splat_f64s(4_503_599_627_370_496.0));

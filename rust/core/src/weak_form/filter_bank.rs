@@ -23,14 +23,14 @@ pub(crate) struct FilterBank {
 
 /// Memory of one thread.
 #[derive(Clone, Debug)]
-pub(crate) struct Scratch {
+pub(crate) struct FilterScratch {
     samples: Vec<f64>,
     /// Places in `samples` that cannot be used, in order.
     unusable: Vec<usize>,
     products: Mat<f64>,
 }
 
-impl Default for Scratch {
+impl Default for FilterScratch {
     fn default() -> Self {
         Self { samples: Vec::new(), unusable: Vec::new(), products: Mat::new() }
     }
@@ -60,7 +60,7 @@ impl FilterBank {
         first: usize,
         outputs: &mut [&mut [f64]],
         usable: &mut [bool],
-        scratch: &mut Scratch,
+        scratch: &mut FilterScratch,
     ) {
         assert_eq!(first % BLOCK, 0, "blocks lie on a grid of row numbers");
         for begin in (0..usable.len()).step_by(BLOCK) {
@@ -80,8 +80,8 @@ impl FilterBank {
     }
 
     /// All products of one block. What lies beyond the record counts as zero.
-    fn block(&self, channel: &dyn Samples, first: usize, scratch: &mut Scratch) {
-        let Scratch { samples, unusable, products } = scratch;
+    fn block(&self, channel: &dyn Samples, first: usize, scratch: &mut FilterScratch) {
+        let FilterScratch { samples, unusable, products } = scratch;
         let length = self.kernels.nrows();
         samples.resize((BLOCK - 1) * self.stride + length, 0.0);
         let begin = first * self.stride;

@@ -11,7 +11,7 @@ use faer::linalg::solvers::{DenseSolveCore, Llt, Solve};
 
 use crate::error::Error;
 use crate::exec::pool::Piece;
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::noise::spectrum::Transform;
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 
@@ -107,7 +107,7 @@ impl Candidates {
         widths: &[usize],
         exponent: Option<usize>,
         share: impl Fn(usize) -> f64 + Sync,
-        run: &mut Run<'_, '_>,
+        stages: &mut Stages<'_, '_>,
     ) -> Result<Self, Error> {
         let exponents = exponent.map_or_else(|| EXPONENTS.to_vec(), |exponent| vec![exponent]);
         let length = 2 * (evidence.power.len() - 1);
@@ -118,7 +118,7 @@ impl Candidates {
         let transform = Transform::new(length);
         let pieces = functions.map(|function| Piece { size: 1, content: function });
         let of = |function: TestFunction, (): &mut ()| Tried::new(function, &transform, share(function.half_width()));
-        let tried = run.map(pieces.collect(), || (), of)?;
+        let tried = stages.map(pieces.collect(), || (), of)?;
         Ok(Self { evidence, tried })
     }
 

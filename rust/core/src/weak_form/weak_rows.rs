@@ -15,7 +15,7 @@ use crate::error::Error;
 use crate::exec::pool::{self, Piece, Watch};
 use crate::record::derived::{Late, Scaled, Whole};
 use crate::record::samples::Samples;
-use crate::weak_form::filter_bank::{FilterBank, Scratch};
+use crate::weak_form::filter_bank::{FilterBank, FilterScratch};
 use crate::weak_form::test_function::{Kernels, TestFunction};
 
 /// Rows in a piece of work.
@@ -109,7 +109,8 @@ impl WeakRows {
                 }
             }
         }
-        let work = |(first, mut outputs, usable): (usize, Vec<&mut [f64]>, &mut [bool]), scratch: &mut Scratch| {
+        let work = |(first, mut outputs, usable): (usize, Vec<&mut [f64]>, &mut [bool]),
+                    scratch: &mut FilterScratch| {
             for task in &tasks {
                 task.bank.apply(&*task.channel, first, &mut outputs[task.columns.clone()], usable, scratch);
             }
@@ -117,7 +118,7 @@ impl WeakRows {
                 output.iter_mut().zip(&*usable).filter(|(_, usable)| !**usable).for_each(|(value, _)| *value = 0.0);
             }
         };
-        pool::run(pieces, workers, Scratch::default, work, watch)?;
+        pool::run(pieces, workers, FilterScratch::default, work, watch)?;
         let torque = late.values[2].clone();
         let mut rows = Self {
             function,
@@ -141,7 +142,7 @@ impl WeakRows {
             let noise = [self.kernels.values[index].clone(), self.kernels.slopes[index].clone()];
             self.rows.regressors.push(Regressor { value, companion, noise });
         }
-        self.rows.side = next();
+        self.rows.rhs = next();
         for term in &record.terms {
             let (value, companion) = match term {
                 TermSamples::One => (
@@ -160,12 +161,12 @@ impl WeakRows {
                 Coefficient::Number(number) => {
                     known = number;
                     let column = &self.rows.regressors[index].value;
-                    self.rows.side.iter_mut().zip(column).for_each(|(side, value)| *side -= number * value);
+                    self.rows.rhs.iter_mut().zip(column).for_each(|(rhs, value)| *rhs -= number * value);
                 }
                 Coefficient::Record(_) => {
                     // Its parts by derivative: as many as integrations by parts, and one.
                     for _ in index..3 {
-                        self.rows.side.iter_mut().zip(next()).for_each(|(side, value)| *side -= value);
+                        self.rows.rhs.iter_mut().zip(next()).for_each(|(rhs, value)| *rhs -= value);
                     }
                 }
             }
@@ -173,8 +174,8 @@ impl WeakRows {
                 known = mean(record);
             }
             if known != 0.0 {
-                self.rows.side_noise.resize(noise.len(), 0.0);
-                self.rows.side_noise.iter_mut().zip(noise).for_each(|(sum, value)| *sum -= known * value);
+                self.rows.rhs_noise.resize(noise.len(), 0.0);
+                self.rows.rhs_noise.iter_mut().zip(noise).for_each(|(sum, value)| *sum -= known * value);
             }
         }
     }

@@ -10,7 +10,7 @@ use crate::equation::motion::{Coefficient, Motion, Term, unknowns};
 use crate::equation::rows::{Regressor, Rows};
 use crate::error::Error;
 use crate::exec::pool::Watch;
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::identify::results::{RowResults, SampleResults};
 use crate::identify::strong::scatter::{Track, scatter_of, slices};
 use crate::identify::weak::session::{Constant, Kind};
@@ -86,18 +86,18 @@ pub fn identify_strong(
     watch: &mut Watch<'_>,
 ) -> Result<StrongIdentified, Error> {
     let samples = motion.angle.len();
-    let mut run = Run::new(workers, samples, STAGES, watch);
-    let differentiated = differentiate(derivatives, motion, options, &mut run)?;
+    let mut stages = Stages::new(workers, samples, STAGES, watch);
+    let differentiated = differentiate(derivatives, motion, options, &mut stages)?;
     let rows = rows(derivatives, motion, mask, options, &differentiated);
     let kinds = options.kinds.iter();
     let windowed = kinds.map(|kind| *kind == Kind::Windowed);
     let model = Model::new(&unknowns(&motion.coefficients, motion.terms.len()), windowed, options.linear);
     let instructions = derivatives.options().instructions;
-    let mut problem = model.problem(&rows, &rows.side, 0.0, None);
+    let mut problem = model.problem(&rows, &rows.rhs, 0.0, None);
     // All residuals are taken to be of one variance, which ordinary least squares reads off them.
     let any = Expected::UNKNOWN;
     let fit = if model.windowed.is_empty() {
-        Fit::new(&problem, None, any, instructions, &mut run)?
+        Fit::new(&problem, None, any, instructions, &mut stages)?
     } else {
         Fit::in_rows(&problem, options.equations, any, instructions)
     };
@@ -114,7 +114,7 @@ pub fn identify_strong(
     let reach = derivatives.options().window_length / 2;
     let sandwich = |rows: &RowCovariance| sandwich(&columns, &fit.pooled.inverse, rows);
     let ordinary = sandwich(&RowCovariance { lags: vec![variance] });
-    let shown = row_covariance(&problem, &fit, reach, variance, &mut run)?;
+    let shown = row_covariance(&problem, &fit, reach, variance, &mut stages)?;
     let covariance = at_least(sandwich(&shown), &ordinary, count);
     problem.constants.truncate(count);
     let mut results = RowResults { stride: 1.0, ..RowResults::default() };
@@ -132,7 +132,7 @@ pub fn identify_strong(
     } else {
         let range = 0..samples.cast_signed();
         let (ill, window) = (HARDLY_TOLD_APART, options.equations);
-        let found = every_window(&problem, window, range, &constants, ill, instructions, &mut run)?;
+        let found = every_window(&problem, window, range, &constants, ill, instructions, &mut stages)?;
         let windowed = model.windowed.len();
         let own = |one, other, row: usize| found.covariances[crate::regression::layout::symmetric(one, other)][row];
         let errors: Vec<Vec<f64>> =
@@ -166,13 +166,13 @@ pub fn identify_strong(
     for (one, other) in results.status.iter_mut().zip(&differentiated.status) {
         *one |= other & !Status::INVALID.bits() | ill.bits();
     }
-    run.finish()?;
+    stages.finish()?;
     Ok(StrongIdentified {
         constants: listed(&model, &constants, &covariance),
         condition: fit.pooled.condition,
         changing,
         pairs,
-        results: results.at_samples(samples, options.step, &mut run)?,
+        results: results.at_samples(samples, options.step, &mut stages)?,
         order,
     })
 }
@@ -208,9 +208,9 @@ fn row_covariance(
     fit: &Fit,
     reach: usize,
     variance: f64,
-    run: &mut Run<'_, '_>,
+    stages: &mut Stages<'_, '_>,
 ) -> Result<RowCovariance, Error> {
-    let (left, usable) = residuals(problem, fit, run)?;
+    let (left, usable) = residuals(problem, fit, stages)?;
     let stretches = stretches_of_rows(left.len());
     let stretches = stretches.filter(|stretches| stretches.iter().all(|part| part.len() > 4 * reach));
     let mut stretched = Stretched::new(1, reach);
@@ -227,7 +227,7 @@ fn row_covariance(
 
 /// By how much standard errors of what is windowed exceed those of ordinary least squares, where all is taken as constant.
 fn redundancies(problem: &Problem<'_>, reach: usize) -> Option<Vec<f64>> {
-    let columns = problem.windowed.iter().chain(&problem.constants).chain([&problem.side]);
+    let columns = problem.windowed.iter().chain(&problem.constants).chain([&problem.rhs]);
     let columns: Vec<Vec<f64>> = columns.map(|column| column.to_vec()).collect();
     let mut stretched = Stretched::new(columns.len(), reach);
     stretched.push(&columns, |row| problem.usable[row]);
@@ -261,7 +261,7 @@ fn differentiate(
     plan: &LocalPolynomials,
     motion: &Motion<'_>,
     options: &StrongOptions,
-    run: &mut Run<'_, '_>,
+    stages: &mut Stages<'_, '_>,
 ) -> Result<Differentiated, Error> {
     let samples = motion.angle.len();
     let mut found = Differentiated {
@@ -270,9 +270,9 @@ fn differentiate(
         order: vec![0; samples],
         status: vec![0; samples],
     };
-    let workers = run.workers;
+    let workers = stages.workers;
     let elements = Elements { first: 0, step: 1 };
-    run.stage(|watch| {
+    stages.stage(|watch| {
         let estimates = Estimates {
             elements,
             derivatives: found.derivatives.iter_mut().map(Vec::as_mut_slice).collect(),
@@ -293,7 +293,7 @@ fn differentiate(
         for order in orders {
             let options = Options { order: Order::Fixed(order.into()), derivatives: vec![0], ..plan.options().clone() };
             let fixed = LocalPolynomials::new(options)?;
-            run.stage(|watch| {
+            stages.stage(|watch| {
                 let estimates = Estimates {
                     elements,
                     derivatives: vec![&mut smoothed],
@@ -329,16 +329,16 @@ fn rows(
             Term::Record(record) => whole(*record),
         });
     }
-    let mut side = differentiated.torque.clone();
+    let mut rhs = differentiated.torque.clone();
     for (coefficient, column) in motion.coefficients.iter().zip(&columns) {
         match coefficient {
             Coefficient::Unknown => {}
             Coefficient::Number(number) => {
-                side.iter_mut().zip(column).for_each(|(side, factor)| *side -= number * factor);
+                rhs.iter_mut().zip(column).for_each(|(rhs, factor)| *rhs -= number * factor);
             }
             Coefficient::Record(record) => {
                 let known = whole(*record).into_iter().zip(column);
-                side.iter_mut().zip(known).for_each(|(side, (known, factor))| *side -= known * factor);
+                rhs.iter_mut().zip(known).for_each(|(rhs, (known, factor))| *rhs -= known * factor);
             }
         }
     }
@@ -348,10 +348,10 @@ fn rows(
         .map(|row| {
             equations.contains(&row)
                 && mask.is_none_or(|mask| mask[row])
-                && columns.iter().chain([&side]).all(|column| is_usable(column[row]))
+                && columns.iter().chain([&rhs]).all(|column| is_usable(column[row]))
         })
         .collect();
-    for column in columns.iter_mut().chain([&mut side]) {
+    for column in columns.iter_mut().chain([&mut rhs]) {
         column.iter_mut().zip(&usable).filter(|(_, usable)| !**usable).for_each(|(value, _)| *value = 0.0);
     }
     let companion = || if options.linear { vec![0.0; samples] } else { Vec::new() };
@@ -359,8 +359,8 @@ fn rows(
         columns.into_iter().map(|value| Regressor { value, companion: companion(), noise: Default::default() });
     Rows {
         regressors: regressors.collect(),
-        side,
-        side_noise: Vec::new(),
+        rhs,
+        rhs_noise: Vec::new(),
         usable,
         jumps: Vec::new(),
         period: plan.options().delta,

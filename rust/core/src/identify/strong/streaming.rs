@@ -50,7 +50,7 @@ pub(crate) struct Chunk {
     known: Vec<f64>,
     /// Unknowns, then the right-hand side.
     pub(crate) columns: Vec<Vec<f64>>,
-    polynomials: crate::local_polynomials::plan::Scratch,
+    polynomials: crate::local_polynomials::plan::PolynomialScratch,
 }
 
 /// One column of a chunk, known by absolute sample numbers. Beyond the chunk, where no window that is wanted reaches, it is zero.
@@ -173,7 +173,7 @@ pub(crate) fn identify_parts(
     let scratch = || (Chunk::new(derivatives, least_squares.columns()), least_squares.scratch());
     let failed = Mutex::new(None);
     let work = |(motion, samples, mut part): (&Motion<'_>, Range<usize>, Identified<'_>),
-                (chunk, scratch): &mut (Chunk, crate::least_squares::rolling::Scratch),
+                (chunk, scratch): &mut (Chunk, crate::least_squares::rolling::RollingScratch),
                 go_on: &GoOn<'_>| {
         let needed = least_squares.rows_needed(samples.clone(), motion.angle.len());
         if let Err(error) = chunk.fill(derivatives, motion, needed) {

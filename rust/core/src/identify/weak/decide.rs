@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use crate::equation::rows::Rows;
 use crate::error::Error;
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::identify::weak::session::{Chosen, Kind, Session};
 use crate::inference::constancy::{self, Test, chi_squared_beyond};
 use crate::inference::cross_validation::{Validated, best, validate};
-use crate::inference::jumps::jump::{Jump, Search};
+use crate::inference::jumps::jump::{Jump, JumpSearch};
 use crate::inference::jumps::search;
 use crate::inference::slowly_varying;
 use crate::record::derived::{Ones, Whole};
@@ -95,21 +95,21 @@ impl Decided {
     }
 
     /// Other rows of the record, made as white as those that the fit was made with.
-    pub(crate) fn as_white(&self, rows: Rows, run: &mut Run<'_, '_>) -> Result<Rows, Error> {
+    pub(crate) fn as_white(&self, rows: Rows, stages: &mut Stages<'_, '_>) -> Result<Rows, Error> {
         match &self.white {
-            Some((_, whitening)) => whitening.apply(&rows, run),
+            Some((_, whitening)) => whitening.apply(&rows, stages),
             None => Ok(rows),
         }
     }
 
     /// The right-hand side without what changes slowly.
-    pub(crate) fn side<'a>(&'a self, rows: &'a Rows) -> &'a [f64] {
-        self.found.as_ref().map_or(&rows.side, |found| &found.side)
+    pub(crate) fn rhs<'a>(&'a self, rows: &'a Rows) -> &'a [f64] {
+        self.found.as_ref().map_or(&rows.rhs, |found| &found.rhs)
     }
 
     /// The equations for what does not change slowly. `noise` is the variance of the angle's.
     fn problem<'a>(&'a self, rows: &'a Rows, noise: f64) -> Problem<'a> {
-        self.model.problem(rows, self.side(rows), noise, self.correlated.as_ref())
+        self.model.problem(rows, self.rhs(rows), noise, self.correlated.as_ref())
     }
 
     /// The model with what changes slowly before the other constants.
@@ -189,7 +189,7 @@ impl Session<'_, '_, '_> {
         let (expected, inflation) = (decided.expected, decided.error.max(1.0));
         let instructions = self.options.instructions;
         let results =
-            constancy::test(&problem, fit, expected, &decided.covariance, inflation, instructions, &mut self.run)?;
+            constancy::test(&problem, fit, expected, &decided.covariance, inflation, instructions, &mut self.stages)?;
         // Tests of what was set free before stand as they were.
         decided.tests.retain(|(one, _)| decided.slow.contains(one));
         let constants = decided.model.constant.iter().zip(results);
@@ -235,11 +235,11 @@ impl Session<'_, '_, '_> {
         if model.windowed.is_empty() || !self.options.average {
             let window = wanted.unwrap_or(rows.len()).min(rows.len());
             for last in [false, true] {
-                let correlated = model.correlated(rows, &decided.covariance, &mut self.run)?;
-                let problem = model.problem(rows, &rows.side, self.noise[0], Some(&correlated));
+                let correlated = model.correlated(rows, &decided.covariance, &mut self.stages)?;
+                let problem = model.problem(rows, &rows.rhs, self.noise[0], Some(&correlated));
                 decided.correlated = Some(correlated);
                 decided.fit = if model.windowed.is_empty() {
-                    Fit::new(&problem, None, decided.expected, instructions, &mut self.run)?
+                    Fit::new(&problem, None, decided.expected, instructions, &mut self.stages)?
                 } else {
                     Fit::in_rows(&problem, window, decided.expected, instructions)
                 };
@@ -273,10 +273,10 @@ impl Session<'_, '_, '_> {
         let scale = best.fit.scale;
         decided.first = scale;
         drop(validated);
-        let correlated = model.correlated(rows, &decided.covariance, &mut self.run)?;
-        let problem = model.problem(rows, &rows.side, self.noise[0], Some(&correlated));
+        let correlated = model.correlated(rows, &decided.covariance, &mut self.stages)?;
+        let problem = model.problem(rows, &rows.rhs, self.noise[0], Some(&correlated));
         decided.correlated = Some(correlated);
-        decided.fit = Fit::new(&problem, scale, decided.expected, instructions, &mut self.run)?;
+        decided.fit = Fit::new(&problem, scale, decided.expected, instructions, &mut self.stages)?;
         Ok(())
     }
 
@@ -287,15 +287,15 @@ impl Session<'_, '_, '_> {
         if self.explained(weak, decided)?.is_none() {
             return Ok(());
         }
-        let expected = Expected { variance: 1.0, torque: 1.0, redundancy: 1.0 };
+        let expected = Expected { variance: 1.0, torque: 1.0, variance_inflation: 1.0 };
         let mut white = Decided { covariance: RowCovariance::white(), expected, correlated: None, ..decided.clone() };
         for _ in 0..WHITENINGS {
             let Some(fit) = &white.fit else { return Ok(()) };
             let (covariance, _) = self.covariance(weak, self.parameters(&white.model, fit));
             let Some(whitening) = Whitening::new(&covariance, rows, weak.stride) else { return Ok(()) };
-            let made = whitening.apply(rows, &mut self.run)?;
-            let problem = white.model.problem(&made, &made.side, self.noise[0], None);
-            white.fit = Fit::new(&problem, None, expected, instructions, &mut self.run)?;
+            let made = whitening.apply(rows, &mut self.stages)?;
+            let problem = white.model.problem(&made, &made.rhs, self.noise[0], None);
+            white.fit = Fit::new(&problem, None, expected, instructions, &mut self.stages)?;
             white.white = Some((made, whitening));
         }
         if self.is_white(weak, &white)? && self.agree(rows, decided, &white)? {
@@ -326,7 +326,7 @@ impl Session<'_, '_, '_> {
         for one in [alike, white] {
             let Some(fit) = &one.fit else { return Ok(false) };
             let problem = one.problem(one.rows(rows), self.noise[0]);
-            variances.push((fit.covariance(&problem, &one.covariance, &mut self.run)?, &fit.pooled.values));
+            variances.push((fit.covariance(&problem, &one.covariance, &mut self.stages)?, &fit.pooled.values));
         }
         let count = alike.model.constant.len();
         let [(all, values), (least, others)] = &variances[..] else { return Ok(false) };
@@ -343,9 +343,9 @@ impl Session<'_, '_, '_> {
     fn validate(&mut self, rows: &Rows, decided: &Decided, scales: &[Scale]) -> Result<Vec<Validated>, Error> {
         let (instructions, expected) = (self.options.instructions, decided.expected);
         let mut validated = |rows: &Rows, scales: &[Scale]| {
-            let correlated = decided.model.correlated(rows, &decided.covariance, &mut self.run)?;
-            let problem = decided.model.problem(rows, &rows.side, self.noise[0], Some(&correlated));
-            validate(&problem, scales, expected, instructions, &mut self.run)
+            let correlated = decided.model.correlated(rows, &decided.covariance, &mut self.stages)?;
+            let problem = decided.model.problem(rows, &rows.rhs, self.noise[0], Some(&correlated));
+            validate(&problem, scales, expected, instructions, &mut self.stages)
         };
         let Some(stretches) = stretches_of_rows(rows.len()).filter(|_| scales.len() > 1) else {
             return validated(rows, scales);
@@ -378,21 +378,21 @@ impl Session<'_, '_, '_> {
         let signals: Vec<&dyn Samples> = signals.iter().map(|signal| &**signal).collect();
         let (constants, noise) = (&fit.pooled.values, self.noise[0]);
         let problem = decided.problem(&weak.rows, noise);
-        let rest_side = without_constants(&problem, constants);
-        let rest = decided.model.without_constants(&weak.rows, &problem, &rest_side, constants, noise);
+        let rest_rhs = without_constants(&problem, constants);
+        let rest = decided.model.without_constants(&weak.rows, &problem, &rest_rhs, constants, noise);
         let whole = whole.unwrap_or(&weak.rows);
-        let side = match &decided.found {
+        let rhs = match &decided.found {
             Some(found) => slowly_varying::without(whole, &decided.slow, &found.varying),
-            None => whole.side.clone(),
+            None => whole.rhs.clone(),
         };
-        let whole = decided.model.problem(whole, &side, noise, None);
+        let whole = decided.model.problem(whole, &rhs, noise, None);
         let best = decided.scales.iter().position(|scale| Some(*scale) == fit.scale).unwrap_or(0);
         let alone = decided.scales[best..].iter().filter(|scale| scale.stands_alone());
         let lengths: Vec<Scale> = alone.step_by(2).take(JUMP_SCALES).copied().collect();
-        let search = Search {
+        let search = JumpSearch {
             problem: &rest,
             whole: &whole,
-            side: &without_constants(&whole, constants),
+            rhs: &without_constants(&whole, constants),
             signals: &signals,
             function: &weak.kernels.values[2],
             first: weak.first,
@@ -403,7 +403,7 @@ impl Session<'_, '_, '_> {
             lengths: &lengths,
             instructions: self.options.instructions,
         };
-        search.find(&residuals(&problem, fit, &mut self.run)?.0, known, &mut self.run)
+        search.find(&residuals(&problem, fit, &mut self.stages)?.0, known, &mut self.stages)
     }
 
     /// Finds what changes slowly, and the other constants beside it.
@@ -414,7 +414,7 @@ impl Session<'_, '_, '_> {
         decided.model = Model { constant: rest, ..model.clone() };
         let ordered = decided.ordered();
         let slow = decided.slow.len();
-        let search = slowly_varying::Search {
+        let search = slowly_varying::SlowSearch {
             rows,
             model: &ordered,
             coefficients: slow,
@@ -423,12 +423,12 @@ impl Session<'_, '_, '_> {
             scales: &decided.scales,
             instructions,
         };
-        decided.found = slowly_varying::find(&search, first, &mut self.run)?;
+        decided.found = slowly_varying::find(&search, first, &mut self.stages)?;
         decided.fit = None;
         if let Some(found) = &decided.found {
             let problem = decided.problem(rows, self.noise[0]);
             let (scale, expected) = (Some(found.scale), decided.expected);
-            let fit = Fit::new(&problem, scale, expected, instructions, &mut self.run)?;
+            let fit = Fit::new(&problem, scale, expected, instructions, &mut self.stages)?;
             (decided.error, decided.fit) = (found.error, fit);
         }
         Ok(())

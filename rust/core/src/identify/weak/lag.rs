@@ -12,7 +12,7 @@ use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::identify::weak::decide::Decided;
 use crate::identify::weak::session::{Chosen, Session};
-use crate::inference::missing_terms::Judged;
+use crate::inference::missing_terms::JudgedTerm;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
@@ -113,15 +113,15 @@ impl Session<'_, '_, '_> {
         fit: &Fit,
     ) -> Result<Option<(f64, f64)>, Error> {
         // What changes slowly depends on the angle only, so what it took off the right-hand side is the same for every lag.
-        let (before, without) = (&chosen.weak.rows.side, decided.side(&chosen.weak.rows));
-        let slow = before.iter().zip(without).map(|(side, without)| side - without);
-        let side = weak.rows.side.iter().zip(slow).map(|(side, slow)| side - slow).collect();
-        let rows = decided.as_white(Rows { side, ..weak.rows.clone() }, &mut self.run)?;
-        let correlated = decided.model.correlated(&rows, &decided.covariance, &mut self.run)?;
-        let judged = Judged {
+        let (before, without) = (&chosen.weak.rows.rhs, decided.rhs(&chosen.weak.rows));
+        let slow = before.iter().zip(without).map(|(rhs, without)| rhs - without);
+        let rhs = weak.rows.rhs.iter().zip(slow).map(|(rhs, slow)| rhs - slow).collect();
+        let rows = decided.as_white(Rows { rhs, ..weak.rows.clone() }, &mut self.stages)?;
+        let correlated = decided.model.correlated(&rows, &decided.covariance, &mut self.stages)?;
+        let judged = JudgedTerm {
             rows: &rows,
             model: &decided.model,
-            side: &rows.side,
+            rhs: &rows.rhs,
             noise: self.noise[0],
             fit,
             covariance: &decided.covariance,
@@ -130,7 +130,7 @@ impl Session<'_, '_, '_> {
             inflation: decided.error.max(1.0),
             instructions: self.options.instructions,
         };
-        let found = judged.factor(self.rate(), &mut self.run)?;
+        let found = judged.factor(self.rate(), &mut self.stages)?;
         let period = self.options.delta;
         Ok(found.map(|(value, error)| (-value / period, error / period)))
     }
@@ -145,7 +145,7 @@ impl Session<'_, '_, '_> {
         &mut self,
         rows: &Rows,
         model: &Model,
-        side: &[f64],
+        rhs: &[f64],
         fit: &Fit,
         expected: Expected,
         (covariance, correlated): (&RowCovariance, &Arc<Correlated>),
@@ -155,11 +155,11 @@ impl Session<'_, '_, '_> {
         }
         let mut model = model.clone();
         model.constant.push(self.rate());
-        let problem = model.problem(rows, side, self.noise[0], Some(correlated));
-        let Some(all) = fit.again(&problem, expected, self.options.instructions, &mut self.run)? else {
+        let problem = model.problem(rows, rhs, self.noise[0], Some(correlated));
+        let Some(all) = fit.again(&problem, expected, self.options.instructions, &mut self.stages)? else {
             return Ok(None);
         };
-        let both = all.covariance(&problem, covariance, &mut self.run)?;
+        let both = all.covariance(&problem, covariance, &mut self.stages)?;
         let count = problem.layout.constant;
         let rows = both.chunks_exact(count).take(count - 1);
         Ok(Some(rows.flat_map(|row| row[..count - 1].to_vec()).collect()))

@@ -55,8 +55,8 @@ impl Session<'_, '_, '_> {
             return Ok(None);
         }
         let record = Record { mask: None, ..self.record.clone() };
-        let (function, delta, workers) = (weak.function, self.options.delta, self.run.workers);
-        let mut rows = self.run.stage(|watch| WeakRows::build(&record, function, delta, None, workers, watch))?.rows;
+        let (function, delta, workers) = (weak.function, self.options.delta, self.stages.workers);
+        let mut rows = self.stages.stage(|watch| WeakRows::build(&record, function, delta, None, workers, watch))?.rows;
         // Rows over a jump are inside all the same.
         let within = &inside.decided.whole.as_ref().unwrap_or(&weak.rows).usable;
         rows.usable.iter_mut().zip(within).for_each(|(usable, inside)| *usable &= !inside);
@@ -67,16 +67,16 @@ impl Session<'_, '_, '_> {
         }
         let Inside { decided, fit, constants, variances, covariance, expected, inflation } = *inside;
         if let Some(found) = &decided.found {
-            rows.side = slowly_varying::without(&rows, &decided.slow, &found.varying);
+            rows.rhs = slowly_varying::without(&rows, &decided.slow, &found.varying);
         }
         rows.clear_unusable();
-        let rows = decided.as_white(rows, &mut self.run)?;
+        let rows = decided.as_white(rows, &mut self.stages)?;
         let model = &decided.model;
-        let correlated = model.correlated(&rows, covariance, &mut self.run)?;
-        let problem = model.problem(&rows, &rows.side, self.noise[0], Some(&correlated));
+        let correlated = model.correlated(&rows, covariance, &mut self.stages)?;
+        let problem = model.problem(&rows, &rows.rhs, self.noise[0], Some(&correlated));
         let left = model.windowed.is_empty().then(|| {
             let inner = decided.rows(&weak.rows);
-            let inner = model.problem(inner, decided.side(inner), self.noise[0], None);
+            let inner = model.problem(inner, decided.rhs(inner), self.noise[0], None);
             let square = |problem: &crate::regression::problem::Problem<'_>| {
                 let count = problem.usable.iter().filter(|usable| **usable).count() as f64;
                 let left = crate::regression::predictor::without_constants(problem, constants);
@@ -85,8 +85,8 @@ impl Session<'_, '_, '_> {
             square(&problem) / square(&inner)
         });
         let mut differing = Vec::new();
-        if let Some(other) = fit.again(&problem, expected, self.options.instructions, &mut self.run)? {
-            let own = other.covariance(&problem, covariance, &mut self.run)?;
+        if let Some(other) = fit.again(&problem, expected, self.options.instructions, &mut self.stages)? {
+            let own = other.covariance(&problem, covariance, &mut self.stages)?;
             let count = model.constant.len();
             for (place, &unknown) in model.constant.iter().enumerate() {
                 let value = other.pooled.values[place];

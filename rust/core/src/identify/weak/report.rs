@@ -4,16 +4,16 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::error::Error;
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::identify::results::{RowResults, SampleResults};
 use crate::identify::weak::decide::{Decided, rows_of};
 use crate::identify::weak::outside_mask::{Inside, Outside};
 use crate::identify::weak::session::{Chosen, Constant, Session, WeakIdentified};
 use crate::inference::constancy::NO_CHANCE;
 use crate::inference::identifiability::is_mostly_noise;
-use crate::inference::missing_terms::{Judged, Missing, Suspect};
+use crate::inference::missing_terms::{JudgedTerm, Missing, Suspect};
 use crate::inference::window_averaging::average;
-use crate::record::derived::{Cubed, Direction};
+use crate::record::derived::{Cubed, VelocitySign};
 use crate::regression::centred_windows::every_window;
 use crate::regression::constants::{Expected, weakest};
 use crate::regression::fit::Fit;
@@ -104,17 +104,17 @@ impl Session<'_, '_, '_> {
         let rows = decided.rows(&weak.rows);
         let correlated = match &decided.correlated {
             Some(correlated) if errors.covariance == decided.covariance => Arc::clone(correlated),
-            _ => ordered.correlated(rows, &errors.covariance, &mut self.run)?,
+            _ => ordered.correlated(rows, &errors.covariance, &mut self.stages)?,
         };
-        let problem = ordered.problem(rows, decided.side(rows), self.noise[0], Some(&correlated));
+        let problem = ordered.problem(rows, decided.rhs(rows), self.noise[0], Some(&correlated));
         let all = self.all_unknowns(&problem, decided, fit, &errors)?;
         let Some(all) = all.as_deref() else { return Ok(self.undetermined(found, decided)) };
         found.condition = all.pooled.condition;
         found.weakest = weakest(&all.full, &all.pooled.weights);
-        found.covariance = all.covariance(&problem, &errors.covariance, &mut self.run)?;
-        let (side, expected) = (decided.side(rows), errors.expected);
+        found.covariance = all.covariance(&problem, &errors.covariance, &mut self.stages)?;
+        let (rhs, expected) = (decided.rhs(rows), errors.expected);
         if let Some(covariance) =
-            self.covariance_beside_lag(rows, &ordered, side, fit, expected, (&errors.covariance, &correlated))?
+            self.covariance_beside_lag(rows, &ordered, rhs, fit, expected, (&errors.covariance, &correlated))?
         {
             found.covariance = covariance;
         }
@@ -140,7 +140,7 @@ impl Session<'_, '_, '_> {
         }
         let weakest = &found.weakest;
         let noise = self.noise[0];
-        found.mostly_noise = is_mostly_noise(&problem, rows, &ordered, all, weakest, noise, &mut self.run)?;
+        found.mostly_noise = is_mostly_noise(&problem, rows, &ordered, all, weakest, noise, &mut self.stages)?;
         if found.condition > HARDLY_TOLD_APART || found.mostly_noise {
             status |= Status::ILL_CONDITIONED;
         }
@@ -164,12 +164,12 @@ impl Session<'_, '_, '_> {
         let results = self.rows_results(&weak, &problem, decided, all, &errors, tracks, &found.covariance, &values)?;
         let (results, pairs) = results;
         found.pairs = pairs;
-        let side = decided.side(&weak.rows).to_vec();
-        found.suspects = self.suspects(&mut weak, decided, fit, &side, &errors)?;
+        let rhs = decided.rhs(&weak.rows).to_vec();
+        found.suspects = self.suspects(&mut weak, decided, fit, &rhs, &errors)?;
         for suspect in found.suspects.iter().filter(|suspect| suspect.is_conspicuous()) {
             status |= if suspect.missing == Missing::Lag { Status::LAG_SUSPECTED } else { Status::TERM_SUSPECTED };
         }
-        found.results = results.at_samples(self.record.angle.len(), self.options.step, &mut self.run)?;
+        found.results = results.at_samples(self.record.angle.len(), self.options.step, &mut self.stages)?;
         found.results.status.iter_mut().for_each(|one| *one |= status.bits());
         Ok(found)
     }
@@ -186,7 +186,7 @@ impl Session<'_, '_, '_> {
         if decided.slow.is_empty() && errors.covariance == decided.covariance {
             return Ok(Some(Cow::Borrowed(fit)));
         }
-        let again = fit.again(problem, errors.expected, self.options.instructions, &mut self.run)?;
+        let again = fit.again(problem, errors.expected, self.options.instructions, &mut self.stages)?;
         Ok(again.map(Cow::Owned))
     }
 
@@ -235,8 +235,8 @@ impl Session<'_, '_, '_> {
         fit: &Fit,
     ) -> Result<(RowCovariance, bool), Error> {
         let rows = decided.rows(&weak.rows);
-        let problem = decided.model.problem(rows, decided.side(rows), self.noise[0], None);
-        let (residuals, usable) = residuals(&problem, fit, &mut self.run)?;
+        let problem = decided.model.problem(rows, decided.rhs(rows), self.noise[0], None);
+        let (residuals, usable) = residuals(&problem, fit, &mut self.stages)?;
         let reach = 2 * weak.reach();
         let shown = RowCovariance::of_residuals(&residuals, &usable, 2 * reach);
         let coloured = shown.is_coloured(reach, COLOURED, usable.iter().filter(|usable| **usable).count());
@@ -272,9 +272,9 @@ impl Session<'_, '_, '_> {
             // Rows that would lie before and after the record have windows too, as long as half of them is there.
             let beyond = weak.first.div_ceil(weak.stride).cast_signed();
             let range = -beyond..rows.len().cast_signed() + beyond + 1;
-            let (ill, run) = (HARDLY_TOLD_APART, &mut self.run);
+            let (ill, stages) = (HARDLY_TOLD_APART, &mut self.stages);
             let window = self.options.equations.map_or(fit.span, |samples| rows_of(samples, weak.stride));
-            let found = every_window(problem, window, range.clone(), constants, ill, instructions, run)?;
+            let found = every_window(problem, window, range.clone(), constants, ill, instructions, stages)?;
             let slopes = found.values.iter().map(|column| vec![0.0; column.len()]).collect();
             return Ok(Tracks {
                 first: range.start,
@@ -288,18 +288,18 @@ impl Session<'_, '_, '_> {
         }
         let stretches = stretches_of_rows(rows.len());
         let thinned =
-            stretches.map(|stretches| (thinned_rows(rows, &stretches), thinned_column(decided.side(rows), &stretches)));
+            stretches.map(|stretches| (thinned_rows(rows, &stretches), thinned_column(decided.rhs(rows), &stretches)));
         let ordered = decided.ordered();
-        let thinned = thinned.as_ref().map(|(rows, side)| (rows, ordered.problem(rows, side, self.noise[0], None)));
-        let thinned_side = thinned.as_ref().map_or_else(Vec::new, |(_, problem)| without_constants(problem, constants));
+        let thinned = thinned.as_ref().map(|(rows, rhs)| (rows, ordered.problem(rows, rhs, self.noise[0], None)));
+        let thinned_rhs = thinned.as_ref().map_or_else(Vec::new, |(_, problem)| without_constants(problem, constants));
         let noise = self.noise[0];
         let thinned = thinned
             .as_ref()
-            .map(|(rows, problem)| ordered.without_constants(rows, problem, &thinned_side, constants, noise));
-        let side = without_constants(problem, constants);
-        let rest = ordered.without_constants(rows, problem, &side, constants, noise);
-        let (judged, run) = ((expected, fit.span), &mut self.run);
-        let averages = average(&rest, thinned.as_ref(), &decided.scales, judged, instructions, run)?;
+            .map(|(rows, problem)| ordered.without_constants(rows, problem, &thinned_rhs, constants, noise));
+        let rhs = without_constants(problem, constants);
+        let rest = ordered.without_constants(rows, problem, &rhs, constants, noise);
+        let (judged, stages) = ((expected, fit.span), &mut self.stages);
+        let averages = average(&rest, thinned.as_ref(), &decided.scales, judged, instructions, stages)?;
         let names = fit.full.fields;
         let condition = fit.full.field(names.condition());
         let usable = &decided.whole.as_ref().unwrap_or(rows).usable;
@@ -331,7 +331,7 @@ impl Session<'_, '_, '_> {
                 .map(|column| column.iter().map(|slope| slope * rows.period).collect())
                 .collect(),
             values: averages.values,
-            sensitivities: sensitivities(problem, all, &mut self.run)?,
+            sensitivities: sensitivities(problem, all, &mut self.stages)?,
             condition: (0..rows.len()).map(|row| condition[fit.nearest(row)]).collect(),
             status,
         })
@@ -356,9 +356,9 @@ impl Session<'_, '_, '_> {
         let row_of = |place: usize| (tracks.first + place.cast_signed()) as f64;
         // Residuals are those of the rows as they are, whose unit is the torque's.
         let (ordered, rows) = (decided.ordered(), &weak.rows);
-        let plain = decided.white.as_ref().map(|_| ordered.problem(rows, &rows.side, self.noise[0], None));
+        let plain = decided.white.as_ref().map(|_| ordered.problem(rows, &rows.rhs, self.noise[0], None));
         let plain = plain.as_ref().unwrap_or(problem);
-        let deviation = deviation(plain, &tracks, constants, all.span, &mut self.run)?;
+        let deviation = deviation(plain, &tracks, constants, all.span, &mut self.stages)?;
         // A slow coefficient is taken from a part of the record only, so its error is larger.
         let share = |constant: usize, place: usize| match &decided.found {
             Some(found) if constant < slow => {
@@ -381,7 +381,7 @@ impl Session<'_, '_, '_> {
         };
         let mut slowly = vec![column(); 2 * slow];
         if let Some(found) = &decided.found {
-            self.run.fill(&mut slowly, |places, columns| {
+            self.stages.fill(&mut slowly, |places, columns| {
                 let (values, slopes) = columns.split_at_mut(slow);
                 for (coefficient, (values, slopes)) in values.iter_mut().zip(slopes).enumerate() {
                     for (place, (value, slope)) in places.clone().zip(values.iter_mut().zip(slopes.iter_mut())) {
@@ -398,7 +398,7 @@ impl Session<'_, '_, '_> {
         let wanted = |&(one, other): &(usize, usize)| other < changing && names[one] < 3 && names[other] < 3;
         let pairs: Vec<_> = all_pairs.filter(wanted).collect();
         let (mut standard, mut covariances) = (vec![column(); changing], vec![column(); pairs.len()]);
-        self.run.fill(standard.iter_mut().chain(&mut covariances), |places, columns| {
+        self.stages.fill(standard.iter_mut().chain(&mut covariances), |places, columns| {
             let (errors, covariances) = columns.split_at_mut(changing);
             for (one, errors) in errors.iter_mut().enumerate() {
                 for (place, error) in places.clone().zip(errors.iter_mut()) {
@@ -436,7 +436,7 @@ impl Session<'_, '_, '_> {
         weak: &mut WeakRows,
         decided: &Decided,
         fit: &Fit,
-        side: &[f64],
+        rhs: &[f64],
         errors: &Errors,
     ) -> Result<Vec<Suspect>, Error> {
         if !self.options.diagnose {
@@ -444,7 +444,7 @@ impl Session<'_, '_, '_> {
         }
         let (velocity, samples) = (weak.rows.regressors[1].value.clone(), self.record.angle.len());
         let cubed = Cubed(self.record.angle);
-        let direction = Direction { velocity: &velocity, first: weak.first, stride: weak.stride, samples };
+        let direction = VelocitySign { velocity: &velocity, first: weak.first, stride: weak.stride, samples };
         let all = [
             (Missing::Offset, TermSamples::One),
             (Missing::Coulomb, TermSamples::Given(&direction)),
@@ -454,28 +454,28 @@ impl Session<'_, '_, '_> {
         let terms: Vec<_> =
             all.into_iter().filter(|(missing, _)| !self.options.not_missing.contains(missing)).collect();
         let record = Record { terms: terms.iter().map(|(_, samples)| *samples).collect(), ..self.record.clone() };
-        let (function, delta, workers) = (weak.function, self.options.delta, self.run.workers);
+        let (function, delta, workers) = (weak.function, self.options.delta, self.stages.workers);
         let stretches = stretches_of_rows(weak.rows.len()).filter(|_| fit.scale.is_some_and(holds));
-        let mut side = side.to_vec();
+        let mut rhs = rhs.to_vec();
         if let Some(stretches) = &stretches {
-            (weak.rows, side) = (thinned_rows(&weak.rows, stretches), thinned_column(&side, stretches));
+            (weak.rows, rhs) = (thinned_rows(&weak.rows, stretches), thinned_column(&rhs, stretches));
         }
         let stretches = stretches.as_deref();
-        let more = self.run.stage(|watch| WeakRows::build(&record, function, delta, stretches, workers, watch))?;
+        let more = self.stages.stage(|watch| WeakRows::build(&record, function, delta, stretches, workers, watch))?;
         let first = weak.rows.regressors.len();
         weak.rows.regressors.extend(more.rows.regressors.into_iter().skip(3));
         weak.rows.clear_unusable();
         if decided.white.is_some() {
-            weak.rows = decided.as_white(std::mem::take(&mut weak.rows), &mut self.run)?;
-            side.clone_from(&weak.rows.side);
+            weak.rows = decided.as_white(std::mem::take(&mut weak.rows), &mut self.stages)?;
+            rhs.clone_from(&weak.rows.rhs);
         }
-        let correlated = decided.model.correlated(&weak.rows, &errors.covariance, &mut self.run)?;
+        let correlated = decided.model.correlated(&weak.rows, &errors.covariance, &mut self.stages)?;
         let mut suspects = Vec::new();
         for (place, (missing, _)) in terms.iter().enumerate() {
-            let judged = Judged {
+            let judged = JudgedTerm {
                 rows: &weak.rows,
                 model: &decided.model,
-                side: &side,
+                rhs: &rhs,
                 noise: self.noise[0],
                 fit,
                 covariance: &errors.covariance,
@@ -484,7 +484,7 @@ impl Session<'_, '_, '_> {
                 inflation: errors.inflation,
                 instructions: self.options.instructions,
             };
-            if let Some((value, error)) = judged.factor(first + place, &mut self.run)? {
+            if let Some((value, error)) = judged.factor(first + place, &mut self.stages)? {
                 let unit = if *missing == Missing::Lag { -1.0 / self.options.delta } else { 1.0 };
                 suspects.push(Suspect { missing: *missing, value: unit * value, error: unit.abs() * error });
             }
@@ -500,7 +500,7 @@ fn pairs_of(constants: &[usize], slow: usize, covariance: &[f64]) -> Vec<(usize,
 }
 
 /// How what is windowed changes with each constant, row by row: what the window nearest to a row says.
-fn sensitivities(problem: &Problem<'_>, all: &Fit, run: &mut Run<'_, '_>) -> Result<Vec<Vec<f64>>, Error> {
+fn sensitivities(problem: &Problem<'_>, all: &Fit, stages: &mut Stages<'_, '_>) -> Result<Vec<Vec<f64>>, Error> {
     let layout = problem.layout;
     let determined: Vec<usize> = (0..all.full.len()).filter(|&window| is_determined(&all.full, window)).collect();
     let beside = |wanted: usize| {
@@ -510,7 +510,7 @@ fn sensitivities(problem: &Problem<'_>, all: &Fit, run: &mut Run<'_, '_>) -> Res
         around.min_by_key(|place| place.abs_diff(wanted)).unwrap_or(wanted)
     };
     let mut columns = vec![vec![0.0; problem.rows()]; layout.windowed * layout.constant];
-    run.fill(&mut columns, |rows, columns| {
+    stages.fill(&mut columns, |rows, columns| {
         for (index, row) in rows.enumerate() {
             let wanted = all.nearest(row);
             let place = if is_determined(&all.full, wanted) { wanted } else { beside(wanted) };
@@ -530,10 +530,10 @@ fn deviation(
     tracks: &Tracks,
     constants: &[f64],
     span: usize,
-    run: &mut Run<'_, '_>,
+    stages: &mut Stages<'_, '_>,
 ) -> Result<Vec<f64>, Error> {
     let mut errors = without_constants(problem, constants);
-    run.fill([&mut errors], |rows, columns| {
+    stages.fill([&mut errors], |rows, columns| {
         for (row, error) in rows.zip(&mut *columns[0]) {
             let place = (row.cast_signed() - tracks.first).unsigned_abs();
             for unknown in 0..problem.layout.windowed {
@@ -554,7 +554,7 @@ fn deviation(
         [sum, count]
     }));
     let mut deviation = vec![f64::NAN; tracks.status.len()];
-    run.fill([&mut deviation], |places, columns| {
+    stages.fill([&mut deviation], |places, columns| {
         for (place, deviation) in places.zip(&mut *columns[0]) {
             let row = (tracks.first + place.cast_signed()).max(0).unsigned_abs();
             let rows = errors.len();

@@ -5,7 +5,7 @@ use std::num::NonZeroUsize;
 use crate::equation::motion::{Coefficient, Motion, Term, unknowns};
 use crate::error::Error;
 use crate::exec::pool::{Piece, Watch};
-use crate::exec::stages::Run;
+use crate::exec::stages::Stages;
 use crate::identify::results::SampleResults;
 use crate::identify::weak::lag::Lag;
 use crate::identify::weak::outside_mask::Outside;
@@ -163,7 +163,7 @@ pub(crate) struct Session<'a, 'b, 'c> {
     pub(crate) record: Record<'a>,
     pub(crate) options: &'a WeakOptions,
     pub(crate) noise: [f64; 2],
-    pub(crate) run: Run<'b, 'c>,
+    pub(crate) stages: Stages<'b, 'c>,
 }
 
 /// Identifies one record in weak form.
@@ -248,18 +248,18 @@ fn identify(
     watch: &mut Watch<'_>,
 ) -> Result<WeakIdentified, Error> {
     let samples = record.angle.len();
-    let mut run = Run::new(workers, samples, STAGES, watch);
+    let mut stages = Stages::new(workers, samples, STAGES, watch);
     let channels = [(record.angle, options.noise[0], options.quantisation), (record.torque, options.noise[1], None)];
     let pieces = channels.map(|channel| Piece { size: samples, content: channel });
     let level = |(channel, given, step): (_, Option<f64>, _), (): &mut ()| {
         given.unwrap_or_else(|| channel_variance(channel, step, options.instructions))
     };
-    let levels = run.map(pieces.into(), || (), level)?;
-    let mut session = Session { record, options, noise: [levels[0], levels[1]], run };
+    let levels = stages.map(pieces.into(), || (), level)?;
+    let mut session = Session { record, options, noise: [levels[0], levels[1]], stages };
     let model = session.model();
     let (chosen, decided, lag) = session.choose_and_decide(&model)?;
     let mut found = session.report(chosen, &decided)?;
-    session.run.finish()?;
+    session.stages.finish()?;
     found.lag = lag;
     Ok(found)
 }
@@ -300,7 +300,7 @@ impl Session<'_, '_, '_> {
 
     /// A first estimate, in windows of a few test functions.
     fn pilot(&mut self, weak: &WeakRows, model: &Model) -> Result<[f64; 3], Error> {
-        let problem = model.problem(&weak.rows, &weak.rows.side, self.noise[0], None);
+        let problem = model.problem(&weak.rows, &weak.rows.rhs, self.noise[0], None);
         let scales = Scale::all(weak.rows.len(), weak.reach());
         let wanted = PILOT_WINDOW * weak.function.half_width() / weak.stride;
         let scale = if model.windowed.is_empty() {
@@ -309,7 +309,7 @@ impl Session<'_, '_, '_> {
             Some(scales[Scale::nearest(&scales, wanted).ok_or(self.too_short())?])
         };
         let any = Expected::UNKNOWN;
-        let fit = Fit::new(&problem, scale, any, self.options.instructions, &mut self.run)?;
+        let fit = Fit::new(&problem, scale, any, self.options.instructions, &mut self.stages)?;
         Ok(fit.map_or([0.0; 3], |fit| self.parameters(model, &fit)))
     }
 
@@ -328,12 +328,12 @@ impl Session<'_, '_, '_> {
     }
 
     pub(crate) fn rows(&mut self, function: TestFunction) -> Result<WeakRows, Error> {
-        let (delta, workers) = (self.options.delta, self.run.workers);
+        let (delta, workers) = (self.options.delta, self.stages.workers);
         let mut record = self.record.clone();
         if self.options.lag.is_none() {
             record.terms.push(TermSamples::TorqueRate);
         }
-        self.run.stage(|watch| WeakRows::build(&record, function, delta, None, workers, watch))
+        self.stages.stage(|watch| WeakRows::build(&record, function, delta, None, workers, watch))
     }
 
     /// The rows in stretches of a long record; nothing where all of it is as good. `widest` is the half-width of the widest test function.
@@ -345,14 +345,14 @@ impl Session<'_, '_, '_> {
         }
         let most = PILOT_STRETCHES * length / function.stride();
         let stretches = stretches_of_blocks(WeakRows::count(function, samples), most, PILOT_STRETCHES);
-        let (record, delta, workers) = (&self.record, self.options.delta, self.run.workers);
-        self.run.stage(|watch| WeakRows::build(record, function, delta, Some(&stretches), workers, watch)).map(Some)
+        let (record, delta, workers) = (&self.record, self.options.delta, self.stages.workers);
+        self.stages.stage(|watch| WeakRows::build(record, function, delta, Some(&stretches), workers, watch)).map(Some)
     }
 
     /// What the choice of a test function is made from, with spectra of some length.
     fn evidence(&mut self, length: usize) -> Result<Evidence, Error> {
         Ok(Evidence {
-            power: power_in_pieces(self.record.angle, length, &mut self.run)?,
+            power: power_in_pieces(self.record.angle, length, &mut self.stages)?,
             samples: self.record.angle.len(),
             noise: self.noise,
             delta: self.options.delta,
@@ -379,7 +379,7 @@ impl Session<'_, '_, '_> {
         let usable = Usable::new(&self.record);
         let share = |half: usize| usable.share(half);
         let evidence = self.evidence(spectrum_length(samples, widest))?;
-        let candidates = Candidates::new(evidence, &widths, exponent, share, &mut self.run)?;
+        let candidates = Candidates::new(evidence, &widths, exponent, share, &mut self.stages)?;
         let start = width.unwrap_or_else(|| usable.widest(typical.max(LEAST_HALF_WIDTH), &widths));
         let mut current = TestFunction::new(start, exponent.unwrap_or(9), delta)?;
         let mut seen = Vec::new();

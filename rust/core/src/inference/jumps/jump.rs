@@ -20,12 +20,12 @@ pub(crate) struct Jump {
 }
 
 /// What jumps are looked for in.
-pub(crate) struct Search<'a> {
+pub(crate) struct JumpSearch<'a> {
     /// Rows once the constants are known.
     pub(crate) problem: &'a Problem<'a>,
     /// All rows, also those over jumps that are known, and their right-hand side without constants.
     pub(crate) whole: &'a Problem<'a>,
-    pub(crate) side: &'a [f64],
+    pub(crate) rhs: &'a [f64],
     /// What the windowed coefficients multiply, sample by sample.
     pub(crate) signals: &'a [&'a dyn Samples],
     /// The test function at its samples.

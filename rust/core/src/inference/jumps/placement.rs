@@ -2,13 +2,13 @@
 
 use std::ops::Range;
 
-use crate::inference::jumps::jump::{Lines, Search};
+use crate::inference::jumps::jump::{JumpSearch, Lines};
 use crate::record::samples::all_usable;
 use crate::simd::f64x8::{Packet, WIDTH};
 use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
 /// Where a jump is sought: a line before it, which counts from a row, and one after it, which counts from the row before.
-pub(crate) struct Place<'a> {
+pub(crate) struct JumpPlace<'a> {
     pub(crate) lines: &'a [Lines; 2],
     pub(crate) row: usize,
     /// Rows that it is judged by.
@@ -17,9 +17,9 @@ pub(crate) struct Place<'a> {
     pub(crate) candidates: &'a Range<usize>,
 }
 
-impl Search<'_> {
+impl JumpSearch<'_> {
     /// The sums of squares that jumps before each candidate leave in the rows; nothing where too few of them can be used.
-    pub(crate) fn left(&self, place: &Place<'_>) -> Option<Vec<f64>> {
+    pub(crate) fn left(&self, place: &JumpPlace<'_>) -> Option<Vec<f64>> {
         let (length, over) = (self.function.len(), place.over);
         let begin = self.begin(over.start);
         let present = (over.len() - 1) * self.stride + length;
@@ -38,7 +38,7 @@ impl Search<'_> {
         if 2 * used.clone().count() < over.len() || !used.clone().all(usable) {
             return None;
         }
-        Some(dispatch(self.instructions, Work { search: self, place, signals: &signals }))
+        Some(dispatch(self.instructions, PlacementKernel { search: self, place, signals: &signals }))
     }
 
     /// The first sample of a row.
@@ -47,18 +47,18 @@ impl Search<'_> {
     }
 }
 
-struct Work<'a, 'b> {
-    search: &'a Search<'b>,
-    place: &'a Place<'a>,
+struct PlacementKernel<'a, 'b> {
+    search: &'a JumpSearch<'b>,
+    place: &'a JumpPlace<'a>,
     signals: &'a [Vec<f64>],
 }
 
-impl Kernel for Work<'_, '_> {
+impl Kernel for PlacementKernel<'_, '_> {
     type Output = Vec<f64>;
 
     #[inline(always)]
     fn run<S: Lanes>(self, _simd: S) -> Vec<f64> {
-        let Self { search, place: Place { lines: [before, after], row, over, candidates }, signals } = self;
+        let Self { search, place: JumpPlace { lines: [before, after], row, over, candidates }, signals } = self;
         let (function, stride) = (search.function, search.stride);
         let length = function.len();
         let per_sample = 1.0 / stride as f64;
@@ -87,7 +87,7 @@ impl Kernel for Work<'_, '_> {
                     *error += weight * (change[0] + now * change[1]);
                 }
             }
-            errors[0] = Packet::gather(search.side, first.cast_signed(), 1) - total;
+            errors[0] = Packet::gather(search.rhs, first.cast_signed(), 1) - total;
             let mut sum = Packet::ZERO;
             for error in &mut errors {
                 sum += *error;

@@ -16,9 +16,9 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::exec::pool::Piece;
-use crate::exec::stages::Run;
-use crate::inference::jumps::jump::{Jump, Lines, Search, UNLIKELY};
-use crate::inference::jumps::placement::Place;
+use crate::exec::stages::Stages;
+use crate::inference::jumps::jump::{Jump, JumpSearch, Lines, UNLIKELY};
+use crate::inference::jumps::placement::JumpPlace;
 use crate::inference::windows_around::Around;
 use crate::regression::window_length::{Cells, SHORTEST_ALONE, Scale};
 
@@ -40,17 +40,17 @@ const ROUNDS: usize = 4;
 /// The part of a test function that may reach over a jump unnoticed.
 const UNNOTICED: f64 = 1e-4;
 
-impl Search<'_> {
+impl JumpSearch<'_> {
     /// The jumps of the record, in order: those that are known placed again, and new ones. `errors` are what is left of the rows.
-    pub(crate) fn find(&self, errors: &[f64], known: &[Jump], run: &mut Run<'_, '_>) -> Result<Vec<Jump>, Error> {
+    pub(crate) fn find(&self, errors: &[f64], known: &[Jump], stages: &mut Stages<'_, '_>) -> Result<Vec<Jump>, Error> {
         let room = self.apart() * self.stride;
         let samples = self.first * 2 + (self.problem.rows() - 1) * self.stride;
         let pieces = known.iter().map(|jump| Piece { size: room, content: jump });
-        let again = run.map(pieces.collect(), || (), |jump: &Jump, (): &mut ()| self.again(jump, room))?;
+        let again = stages.map(pieces.collect(), || (), |jump: &Jump, (): &mut ()| self.again(jump, room))?;
         let mut jumps: BTreeMap<usize, Jump> = again.into_iter().map(|jump| (jump.sample, jump)).collect();
         let conspicuous = self.conspicuous(errors).into_iter();
         let pieces = conspicuous.map(|rows| Piece { size: rows.len() * self.stride, content: rows });
-        let new = run.map(pieces.collect(), || (), |rows: Range<usize>, (): &mut ()| self.within(&rows))?;
+        let new = stages.map(pieces.collect(), || (), |rows: Range<usize>, (): &mut ()| self.within(&rows))?;
         for jump in new.into_iter().flatten() {
             let near = jump.sample.saturating_sub(room)..jump.sample + room;
             if jumps.range(near).next().is_none() && jump.sample >= room && jump.sample + room <= samples {
@@ -112,7 +112,7 @@ impl Search<'_> {
     /// Windows of every length around some rows.
     fn solve(&self, rows: &Range<usize>) -> Vec<(Scale, Cells)> {
         let solve = |&scale: &Scale| {
-            let all = scale.side_cells(self.problem.rows());
+            let all = scale.one_sided_cells(self.problem.rows());
             let reach = self.function.len() / self.stride;
             let first = scale.cell(rows.start.saturating_sub(reach)).max(all.start).min(all.end);
             let end = (scale.cell(rows.end + reach) + 1).min(all.end).max(first);
@@ -149,8 +149,8 @@ impl Search<'_> {
     /// The squared difference between what the windows before and after a row say of it, over its variance: that of the coefficient that
     /// differs most.
     fn differs(&self, windows: &Around<'_>, row: usize) -> Option<f64> {
-        let before = windows.seen(self.problem, row, 0)?;
-        let after = windows.seen(self.problem, row, 2)?;
+        let before = windows.at_row(self.problem, row, 0)?;
+        let after = windows.at_row(self.problem, row, 2)?;
         let squared = (0..self.problem.layout.windowed).map(|unknown| {
             let difference = after.value(unknown) - before.value(unknown);
             difference * difference / (self.inflation * (after.variance(unknown) + before.variance(unknown)))
@@ -173,10 +173,10 @@ impl Search<'_> {
         loop {
             // The first row after the jump.
             let row = tau.saturating_sub(self.first).div_ceil(self.stride).clamp(1, rows - 1);
-            let sides = [self.lines(windows, row, 0)?, self.lines(windows, row - 1, 2)?];
+            let lines = [self.lines(windows, row, 0)?, self.lines(windows, row - 1, 2)?];
             let candidates = tau.saturating_sub(half)..tau + half + 1;
             let over = row.saturating_sub(2 * reach)..(row + 2 * reach).min(rows);
-            let left = self.left(&Place { lines: &sides, row, over: &over, candidates: &candidates })?;
+            let left = self.left(&JumpPlace { lines: &lines, row, over: &over, candidates: &candidates })?;
             let best = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]))?;
             let next = candidates.start + best;
             if next.abs_diff(tau) <= self.stride / 2 || round == ROUNDS {
@@ -189,8 +189,8 @@ impl Search<'_> {
 
     /// What the windows on one side say at a row.
     fn lines(&self, windows: &Around<'_>, row: usize, which: usize) -> Option<Lines> {
-        let seen = windows.seen(self.problem, row, which)?;
-        let line = |unknown| [seen.value(unknown), seen.slope(unknown) * self.problem.period];
+        let window = windows.at_row(self.problem, row, which)?;
+        let line = |unknown| [window.value(unknown), window.slope(unknown) * self.problem.period];
         Some((0..self.problem.layout.windowed).map(line).collect())
     }
 
@@ -212,7 +212,7 @@ impl Search<'_> {
 
     /// The sum of squares that windows of one length leave in rows between them; nothing where they do not reach all of them.
     fn without(&self, scale: Scale, over: &Range<usize>, rows: &[usize]) -> Option<f64> {
-        let all = scale.side_cells(self.problem.rows());
+        let all = scale.one_sided_cells(self.problem.rows());
         let cells = scale.cell(over.start).max(all.start)..(scale.cell(over.end) + 1).min(all.end);
         if cells.is_empty() {
             return None;
@@ -220,15 +220,15 @@ impl Search<'_> {
         let cells = scale.solve_here(self.problem, &cells, self.instructions);
         let windows = Around::new(scale, &cells, &[]);
         let error = |&row: &usize| {
-            let seen = windows.seen(self.problem, row, 1)?;
-            Some((self.side[row] - seen.predict(self.whole, row)).powi(2))
+            let window = windows.at_row(self.problem, row, 1)?;
+            Some((self.rhs[row] - window.predict(self.whole, row)).powi(2))
         };
         rows.iter().map(error).sum()
     }
 
     /// The variance of the sum of squares of rows that stand for one independent row, at least that of the noise.
     fn noise(&self, left: f64, count: f64) -> f64 {
-        self.expected.redundancy * (self.inflation * self.expected.variance).max(left / count)
+        self.expected.variance_inflation * (self.inflation * self.expected.variance).max(left / count)
     }
 
     /// A jump with the probability of every place of it.
