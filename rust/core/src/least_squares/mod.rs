@@ -1,8 +1,11 @@
 //! Least squares of rows that are given: in sliding windows, and over a whole record.
 
 pub(crate) mod givens_factor;
+pub(crate) mod kernel;
+pub(crate) mod plan;
 pub(crate) mod rolling;
+pub(crate) mod side_by_side;
 pub(crate) mod stacked_qr;
 
-pub use rolling::{Equations, HALF_OF_THE_DIGITS, Regressions, RollingLeastSquares};
+pub use plan::{Equations, HALF_OF_THE_DIGITS, Regressions, RollingLeastSquares};
 pub use stacked_qr::SharedParameters;

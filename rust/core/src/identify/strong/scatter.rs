@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::exec::pool::Watch;
 use crate::identify::strong::streaming::{Chunk, Identified, equations, identify_parts, redundancies};
 use crate::lanes::output::Elements;
-use crate::least_squares::rolling::{Regressions, RollingLeastSquares};
+use crate::least_squares::plan::{Regressions, RollingLeastSquares};
 use crate::local_polynomials::plan::LocalPolynomials;
 use crate::record::subsample::stretches;
 

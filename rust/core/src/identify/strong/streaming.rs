@@ -8,7 +8,7 @@ use crate::equation::motion::Motion;
 use crate::error::Error;
 use crate::exec::pool::{self, GoOn, Piece, Watch};
 use crate::lanes::output::{Elements, split_off};
-use crate::least_squares::rolling::{Equations, Regressions, RollingLeastSquares};
+use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares};
 use crate::least_squares::stacked_qr::{SharedParameters, Summary};
 use crate::local_polynomials::estimates::Estimates;
 use crate::local_polynomials::plan::LocalPolynomials;
@@ -173,7 +173,7 @@ pub(crate) fn identify_parts(
     let scratch = || (Chunk::new(derivatives, least_squares.columns()), least_squares.scratch());
     let failed = Mutex::new(None);
     let work = |(motion, samples, mut part): (&Motion<'_>, Range<usize>, Identified<'_>),
-                (chunk, scratch): &mut (Chunk, crate::least_squares::rolling::RollingScratch),
+                (chunk, scratch): &mut (Chunk, crate::least_squares::side_by_side::RollingScratch),
                 go_on: &GoOn<'_>| {
         let needed = least_squares.rows_needed(samples.clone(), motion.angle.len());
         if let Err(error) = chunk.fill(derivatives, motion, needed) {

@@ -1,0 +1,208 @@
+//! Least squares in blocks of windows side by side.
+//!
+//! A window of `w` rows that begins in one block of `w` rows and ends in the next is a suffix of the one and a prefix of the other. So
+//! every window's factor is one merge of two factors that were built by appending rows only (see `givens_factor`): a row enters once and
+//! leaves with its block, and nothing is subtracted.
+
+use std::ops::Range;
+
+use crate::exec::pool::GoOn;
+use crate::lanes::output::Outputs;
+use crate::lanes::store::Write;
+use crate::least_squares::givens_factor::{
+    Dimensions, append, covariance, empty, invert, load, merge, solve, squared_norm, store,
+};
+use crate::least_squares::plan::{Equations, Slots};
+use crate::least_squares::side_by_side::{RollingRun, RollingScratch, SEGMENT};
+use crate::simd::vectors::{Kernel, Lanes, MOST_LANES};
+use crate::status::Status;
+
+/// Rows of every lane between two questions whether to go on: with 16 regressors some 10 ms.
+pub(crate) const ASK: usize = 256;
+
+/// The kernel of a run.
+pub(crate) struct RollingKernel<'a, 'b, 'c, H: Dimensions> {
+    pub(crate) run: RollingRun<'a>,
+    pub(crate) shape: H,
+    pub(crate) equations: &'a Equations<'a>,
+    pub(crate) scratch: &'b mut RollingScratch,
+    pub(crate) outputs: &'b mut Outputs<'c>,
+    pub(crate) go_on: &'b GoOn<'b>,
+}
+
+impl<H: Dimensions> Kernel for RollingKernel<'_, '_, '_, H> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(mut self, simd: S) {
+        self.run.load(simd, self.equations, self.scratch);
+        let window = self.run.plan.window;
+        let size = self.shape.size() * S::F64_LANES;
+        let segments = window.div_ceil(SEGMENT);
+        let mut row = self.shape.factor(simd.splat_f64s(0.0));
+        let mut suffix = empty(simd, self.shape);
+        for segment in (1..segments).rev() {
+            let rows = segment * SEGMENT..window.min((segment + 1) * SEGMENT);
+            for offset in rows.rev() {
+                if offset % ASK == 0 && !(self.go_on)() {
+                    return;
+                }
+                self.append(simd, &mut suffix, offset, 0, &mut row);
+            }
+            store(simd, self.shape, &mut self.scratch.checkpoints[(segment - 1) * size..], &suffix);
+        }
+        let full = self.run.is_full(S::F64_LANES);
+        let places = self.scratch.tile.places();
+        let mut prefix = empty(simd, self.shape);
+        for segment in 0..segments {
+            let rows = segment * SEGMENT..window.min((segment + 1) * SEGMENT);
+            suffix = empty(simd, self.shape);
+            if segment + 1 < segments {
+                load(simd, self.shape, &self.scratch.checkpoints[segment * size..], &mut suffix);
+            }
+            for offset in rows.clone().rev() {
+                if offset % ASK == 0 && !(self.go_on)() {
+                    return;
+                }
+                self.append(simd, &mut suffix, offset, 0, &mut row);
+                store(simd, self.shape, &mut self.scratch.suffixes[(offset - rows.start) * size..], &suffix);
+            }
+            // Merging waits for the step before, solving for nothing: apart, each keeps the processor busy.
+            let mut first = rows.start;
+            while first < rows.end {
+                if first % ASK == 0 && !(self.go_on)() {
+                    return;
+                }
+                let some = first..rows.end.min(first - first % places + places);
+                for offset in some.clone() {
+                    let place = (offset - rows.start) * size;
+                    load(simd, self.shape, &self.scratch.suffixes[place..], &mut suffix);
+                    merge(simd, self.shape, &mut suffix, &prefix, &mut row);
+                    store(simd, self.shape, &mut self.scratch.suffixes[place..], &suffix);
+                    self.append(simd, &mut prefix, offset, 1, &mut row);
+                }
+                for offset in some.clone() {
+                    load(simd, self.shape, &self.scratch.suffixes[(offset - rows.start) * size..], &mut suffix);
+                    self.finish(simd, &suffix, offset, full, &mut row);
+                }
+                // The last windows are written together with some that were written before, to fill the vectors.
+                if some.end % places == 0 || some.end == window {
+                    self.write(simd, some.end.saturating_sub(places)..some.end);
+                }
+                first = some.end;
+            }
+        }
+        self.run.mark(&self.scratch.unusable, full, self.outputs);
+    }
+}
+
+impl<H: Dimensions> RollingKernel<'_, '_, '_, H> {
+    /// Appends the row at an offset of each lane's block, or of the block after it.
+    #[inline(always)]
+    fn append<S: Lanes>(
+        &self,
+        simd: S,
+        factor: &mut H::Factor<S::f64s>,
+        offset: usize,
+        block: usize,
+        row: &mut H::Factor<S::f64s>,
+    ) {
+        for column in 0..self.shape.regressors() + self.shape.rhs_count() {
+            row[column] = self.scratch.strips[column].in_block(simd, offset, block);
+        }
+        append(simd, self.shape, factor, row, 0, simd.splat_f64s(1.0));
+    }
+
+    /// Solves each lane's window.
+    #[inline(always)]
+    fn finish<S: Lanes>(
+        &mut self,
+        simd: S,
+        factor: &H::Factor<S::f64s>,
+        offset: usize,
+        full: bool,
+        values: &mut H::Factor<S::f64s>,
+    ) {
+        let (shape, plan) = (self.shape, self.run.plan);
+        let (p, q) = (shape.regressors(), shape.rhs_count());
+        let slots = Slots::of(plan);
+        let freedom = self.freedom(simd, offset, full);
+        let tile = &mut self.scratch.tile;
+        // The squared condition number comes first: where it has no digits nothing has.
+        invert(simd, shape, factor, values);
+        let mut squares = simd.splat_f64s(0.0);
+        for i in 0..p {
+            let variance = covariance(simd, shape, values, i, i);
+            squares = simd.mul_add_f64s(squared_norm(simd, shape, factor, i), variance, squares);
+        }
+        let condition = simd.sqrt_f64s(simd.mul_f64s(squares, simd.splat_f64s(p as f64)));
+        let greatest = simd.splat_f64s(1.0 / (f64::EPSILON * plan.window as f64));
+        let determined = simd.less_than_f64s(condition, greatest);
+        let ill = simd.greater_than_f64s(condition, simd.splat_f64s(plan.ill_conditioned));
+        let flags = simd.select_f64s(ill, code(simd, Status::ILL_CONDITIONED), simd.splat_f64s(0.0));
+        let deficient = code(simd, Status::INVALID | Status::RANK_DEFICIENT);
+        let condition = simd.select_f64s(determined, condition, simd.splat_f64s(f64::INFINITY));
+        tile.put(simd, slots.condition, offset, condition);
+        tile.put(simd, slots.condition + 1, offset, simd.select_f64s(determined, flags, deficient));
+
+        let nothing = simd.select_f64s(determined, simd.splat_f64s(0.0), simd.splat_f64s(f64::NAN));
+        for rhs in 0..q {
+            let residual = simd.add_f64s(factor[shape.row(p) + rhs], nothing);
+            let variance = simd.mul_f64s(residual, freedom);
+            tile.put(simd, slots.residuals + rhs, offset, residual);
+            for (pair, &(i, j)) in plan.covariances.iter().enumerate() {
+                let one = covariance(simd, shape, values, i.min(j), i.max(j));
+                tile.put(simd, slots.covariances + pair * q + rhs, offset, simd.mul_f64s(one, variance));
+            }
+            let deviation = simd.sqrt_f64s(variance);
+            tile.put(simd, slots.deviations + rhs, offset, deviation);
+            for i in 0..p {
+                let error = simd.mul_f64s(simd.sqrt_f64s(covariance(simd, shape, values, i, i)), deviation);
+                tile.put(simd, slots.errors + i * q + rhs, offset, error);
+            }
+        }
+        for rhs in 0..q {
+            solve(simd, shape, factor, rhs, values);
+            for i in 0..p {
+                tile.put(simd, i * q + rhs, offset, simd.add_f64s(values[i], nothing));
+            }
+        }
+    }
+
+    /// One over the degrees of freedom of each lane's window.
+    #[inline(always)]
+    fn freedom<S: Lanes>(&self, simd: S, offset: usize, full: bool) -> S::f64s {
+        let (plan, p) = (self.run.plan, self.shape.regressors());
+        if full {
+            return simd.splat_f64s(1.0 / (plan.window - p) as f64);
+        }
+        let mut freedom = [0.0; MOST_LANES];
+        for (lane, freedom) in freedom[..S::F64_LANES].iter_mut().enumerate() {
+            *freedom = 1.0 / self.run.count(self.run.first(lane) + offset).saturating_sub(p) as f64;
+        }
+        simd.load(&freedom, 0)
+    }
+
+    /// Writes out the windows at some offsets of each lane's block.
+    #[inline(always)]
+    fn write<S: Lanes>(&mut self, simd: S, rows: Range<usize>) {
+        let plan = self.run.plan;
+        let write = Write {
+            tile: &self.scratch.tile,
+            rows,
+            base: self.run.base.cast_signed(),
+            block: plan.window,
+            windows: self.run.windows.clone(),
+            ahead: (plan.window / 2).cast_signed() - plan.window.cast_signed(),
+            fixed_order: None,
+            outputs: &mut *self.outputs,
+        };
+        write.run(simd);
+    }
+}
+
+/// Flags as the tile holds them.
+#[inline(always)]
+pub(crate) fn code<S: Lanes>(simd: S, status: Status) -> S::f64s {
+    simd.splat_f64s(256.0 * f64::from(status.bits()))
+}
