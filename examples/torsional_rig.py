@@ -17,11 +17,11 @@ print(found.summary(), end="\n\n")
 print(f"by default:                      stiffness within {error(found):.1%}")
 
 # The paper takes all three as constant within 0.2 s. Over one cycle of vibration inertia and stiffness look alike.
-paper = tvident.identify(rig.angle, rig.torque, sample_rate=rig.sample_rate, preset="paper")
+paper = tvident.identify(rig.angle, rig.torque, sample_rate=rig.sample_rate, method="paper")
 print(f"as in the paper:                 stiffness within {error(paper):.1%}")
 
 # A disk can be weighed: give its inertia.
-known = tvident.identify(rig.angle, rig.torque, sample_rate=rig.sample_rate, preset="paper", inertia=0.0123)
+known = tvident.identify(rig.angle, rig.torque, sample_rate=rig.sample_rate, method="paper", inertia=0.0123)
 print(f"as in the paper, inertia known:  stiffness within {error(known):.1%}")
 
 frequency, deviation = found.natural_frequency, found.stderr["natural_frequency"]

@@ -1,9 +1,10 @@
-"""What nothing chosen by hand costs: the time of the automatic preset over that of the paper's, on an hour at 1 kHz."""
+"""What nothing chosen by hand costs: the time of the automatic method over that of the paper's, on an hour at 1 kHz."""
 
 from __future__ import annotations
 
 import os
 import time
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -11,12 +12,14 @@ import tvident
 from accuracy import report
 from accuracy.cases import Case
 
-HEADING = "Cost of the automatic preset"
+HEADING = "Cost of the automatic method"
 _NOISES = (1e-6, 1e-2, 1e-1)
+_Method: TypeAlias = Literal["paper", "auto"]
+_METHODS: tuple[_Method, ...] = ("paper", "auto")
 
 
 def measure(seconds: float, repeats: int) -> list[str]:
-    """Time both presets in turns and return the section of the report."""
+    """Time both methods in turns and return the section of the report."""
     rows, refusal = [], ""
     for noise in _NOISES:
         case = Case(angle_noise=noise, duration=seconds)
@@ -43,27 +46,22 @@ def measure(seconds: float, repeats: int) -> list[str]:
 
 
 def _ratios(recording: tvident.Recording, repeats: int, workers: int) -> tuple[list[float], float, str]:
-    """Return the ratios of time, the median time of the paper's preset in s, and what was chosen."""
+    """Return the ratios of time, the median time of the paper's method in s, and what was chosen."""
     chosen = _identify(recording, "auto", workers).settings
     _identify(recording, "paper", workers)
     papers, ratios = [], []
     for _ in range(repeats):
         times = {}
-        for preset in ("paper", "auto"):
+        for method in _METHODS:
             start = time.perf_counter()
-            _identify(recording, preset, workers)
-            times[preset] = time.perf_counter() - start
+            _identify(recording, method, workers)
+            times[method] = time.perf_counter() - start
         papers.append(times["paper"])
         ratios.append(times["auto"] / times["paper"])
-    return ratios, float(np.median(papers)), f"{chosen.get('form', 'strong')}, {chosen['window_length']}"
+    return ratios, float(np.median(papers)), f"{chosen['form']}, {chosen['window_length']}"
 
 
-def _identify(recording: tvident.Recording, preset: str, workers: int) -> tvident.Identification:
-    options: dict[str, str] = {"preset": preset}
+def _identify(recording: tvident.Recording, method: _Method, workers: int) -> tvident.Identification:
     return tvident.identify(
-        recording.angle,
-        recording.torque,
-        sample_rate=recording.sample_rate,
-        workers=workers,
-        **options,  # type: ignore[arg-type]
+        recording.angle, recording.torque, sample_rate=recording.sample_rate, method=method, workers=workers
     )

@@ -145,10 +145,10 @@ def _bound(case: Case, recording: tvident.Recording) -> Values:
 
 METHODS: dict[str, Method] = {
     "bound": Method("Cramér-Rao bound, pattern known", _bound, (bound,), ("scipy",)),
-    "ours": _ours('ours: `preset="auto"`', ours.automatic),
+    "ours": _ours('ours: `method="auto"`', ours.automatic),
     "ours-constants": _ours("ours, all constant", ours.automatic_constants),
     "best": _ours("ours, best setting known afterwards", ours.best_setting),
-    "paper": _ours('paper: `preset="paper"`', ours.paper),
+    "paper": _ours('paper: `method="paper"`', ours.paper),
     "kalman": _kalman("rule"),
     "kalman-truth": _kalman("truth"),
     **{name: _peer(name, "rule") for name in peers.DIFFERENTIATORS},

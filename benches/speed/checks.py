@@ -54,7 +54,7 @@ def local_polynomials(y: Array, window_length: int, fit: tvident.LocalPolynomial
 
 def identification(angle: Array, torque: Array, result: Any, window_length: int, rate: float) -> None:
     """Compare parameters with the reference in some windows: derivatives, equations and least squares in NumPy."""
-    half, equations = window_length // 2, int(result.settings["equations"])
+    half, equations = window_length // 2, int(result.settings["regression_window"])
     margin = half + equations
     for i in np.linspace(margin, angle.size - 1 - margin, _PLACES).astype(int):
         rows = window_rows(int(i), equations, angle.size)

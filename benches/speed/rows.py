@@ -126,12 +126,12 @@ def _identification(share: float) -> Duel:
     angle, torque = signals.recording(_length(3_600_000, share, 10_000))
 
     def check() -> None:
-        result = tvident.identify(angle, torque, sample_rate=signals.RATE, preset="paper")
+        result = tvident.identify(angle, torque, sample_rate=signals.RATE, method="paper")
         checks.identification(angle, torque, result, 201, signals.RATE)
 
     return Duel(
         [
-            lambda: tvident.identify(angle, torque, sample_rate=signals.RATE, preset="paper", workers=1),
+            lambda: tvident.identify(angle, torque, sample_rate=signals.RATE, method="paper", workers=1),
             lambda: [savgol_filter(angle, 201, 5, deriv=d, delta=1 / signals.RATE) for d in range(3)],
         ],
         check,
@@ -207,7 +207,7 @@ def _least_squares_by(samples: int, share: float) -> tuple[Callable[[int], Any],
 def _identification_by(samples: int, share: float) -> tuple[Callable[[int], Any], int]:
     angle, torque = signals.recording(_length(samples, share, 100_000))
     return lambda workers: tvident.identify(
-        angle, torque, sample_rate=signals.RATE, preset="paper", workers=workers
+        angle, torque, sample_rate=signals.RATE, method="paper", workers=workers
     ), angle.size
 
 
@@ -281,7 +281,7 @@ ROWS = [
     ),
     Row(
         "identify",
-        '`identify(preset="paper")`, 3.6 million samples',
+        '`identify(method="paper")`, 3.6 million samples',
         "three passes of `savgol_filter(y, 201, 5)`",
         _identification,
         most=0.30,
@@ -328,7 +328,7 @@ ROWS = [
     ),
     Row(
         "two-workers-identify",
-        '`identify(preset="paper")`, two threads',
+        '`identify(method="paper")`, two threads',
         "one thread",
         _workers(_identification_by, "inertia", "damping", "stiffness", "condition", "status"),
         most=_TWO,

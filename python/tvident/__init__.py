@@ -2,7 +2,7 @@
 
 from tvident._derivatives import LocalPolynomialFit, fit_local_polynomials, savgol_filter
 from tvident._equation import Term
-from tvident._identify import identify
+from tvident._identify import StrongForm, WeakForm, identify
 from tvident._regression import RollingRegression, rolling_least_squares
 from tvident._results import Identification
 from tvident._simulate import Recording, simulate_torsional_rig
@@ -14,7 +14,9 @@ __all__ = [
     "Recording",
     "RollingRegression",
     "Status",
+    "StrongForm",
     "Term",
+    "WeakForm",
     "fit_local_polynomials",
     "identify",
     "rolling_least_squares",

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import calls
 import tvident
 from tvident import recordings
 
@@ -68,9 +69,9 @@ def test_info_lists_the_channels(recording: Path) -> None:
 def test_results_are_the_librarys_with_names_and_units(recording: Path, tmp_path: Path, ending: str) -> None:
     output, picture = tmp_path / f"result.{ending}", tmp_path / "result.png"
     done = run(
-        *("identify", recording, "--angle", "angle", "--torque", "torque", "--time", "time", "--equations", "0.3 s"),
+        *("identify", recording, "--angle", "angle", "--torque", "torque", "--time", "time"),
         *("--window-length", 101, "--damping", 0, "--term", "offset", "-o", output, "--plot", picture),
-        *("--preset", "paper"),
+        *("--method", "strong", "--regression-window", "0.3 s", "--inertia", "windowed", "--quantisation", 0),
     )
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
@@ -80,17 +81,15 @@ def test_results_are_the_librarys_with_names_and_units(recording: Path, tmp_path
         channels["angle [rad]"],
         channels["torque [N m]"],
         t=channels["time [s]"],
-        preset="paper",
-        window_length=101,
-        equations=300,
-        damping=0,
-        terms=["offset"],
+        **calls.paper(window_length=101, regression_window=300, damping=0, terms=["offset"]),
     )
     found = recordings.read(output)
     np.testing.assert_array_equal(found["stiffness [N m/rad]"], expected.stiffness)
     np.testing.assert_array_equal(found["stiffness_stderr [N m/rad]"], expected.stderr["stiffness"])
     np.testing.assert_array_equal(found["offset [N m]"], expected.terms["offset"])
     np.testing.assert_array_equal(found["status"], expected.status)
+    np.testing.assert_array_equal(found["record_status"], np.full(expected.time.size, expected.record_status))
+    np.testing.assert_array_equal(found["trusted"], expected.trusted)
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
@@ -163,7 +162,7 @@ def test_every_setting_has_an_option_and_may_be_kept_in_a_file(recording: Path, 
     done = run(
         *(
             *common,
-            "--form",
+            "--method",
             "weak",
             "--exponent",
             8,
@@ -175,10 +174,9 @@ def test_every_setting_has_an_option_and_may_be_kept_in_a_file(recording: Path, 
             0.0005,
         ),
         *(
-            "--equations",
+            "--regression-window",
             900,
-            "--selection",
-            "window",
+            "--no-averaging",
             "--mask",
             "usable.npy",
             "--term",
@@ -194,16 +192,17 @@ def test_every_setting_has_an_option_and_may_be_kept_in_a_file(recording: Path, 
         angle,
         torque,
         sample_rate=1000,
-        form="weak",
-        exponent=8,
-        window_length=161,
-        variation="constant",
-        lag=0.0005,
-        equations=900,
-        selection="window",
-        mask=usable,
-        terms=(),
-        inertia="varying",
+        **calls.weak(
+            exponent=8,
+            window_length=161,
+            variation="constant",
+            regression_window=900,
+            averaging=False,
+            lag=0.0005,
+            mask=usable,
+            terms=(),
+            inertia="varying",
+        ),
     )
     found = recordings.read(tmp_path / "one.npz")
     np.testing.assert_array_equal(found["stiffness [N m/rad]"], expected.stiffness)
@@ -213,18 +212,14 @@ def test_every_setting_has_an_option_and_may_be_kept_in_a_file(recording: Path, 
     assert again.returncode == 0, again.stderr
     np.testing.assert_array_equal(recordings.read(tmp_path / "two.npz")["stiffness [N m/rad]"], expected.stiffness)
 
-    strong = ("--preset", "paper", "--filter-torque", "--selection", "pooled", "--max-order", 9, "--criterion", "bic")
+    strong = ("--method", "strong", "--filter-torque", "--selection", "pooled", "--max-order", 9, "--criterion", "bic")
     done = run(*common, *strong, "-o", "three.npz", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     smoothed = tvident.identify(
         angle,
         torque,
         sample_rate=1000,
-        preset="paper",
-        filter_torque=True,
-        selection="pooled",
-        max_order=9,
-        criterion="bic",
+        **calls.strong(filter_torque=True, selection="pooled", max_order=9, criterion="bic"),
     )
     found = recordings.read(tmp_path / "three.npz")
     np.testing.assert_array_equal(found["inertia [kg m^2]"], smoothed.inertia)
@@ -265,16 +260,39 @@ GOOD = ("--angle", "angle", "--torque", "torque", "--sample-rate", "1000")
             2,
             "has no channel 'angel'; it has time [s], angle [rad]",
         ),
-        (("identify", "FILE", *GOOD, "--term", "friction"), 2, "a term must be 'offset', 'coulomb' or 'cubic'"),
+        (
+            ("identify", "FILE", *GOOD, "--term", "friction"),
+            2,
+            "a term must be 'offset', 'coulomb', 'cubic' or 'gravity'",
+        ),
         (("identify", "FILE", *GOOD, "--stiffness", "nonsense"), 2, "has no channel 'nonsense'"),
         (("identify", "FILE", *GOOD, "-o", "result.xlsx"), 2, "files that end in .csv or .npz"),
         (("identify", "FILE", *GOOD, "--plot", "result.gif"), 2, "--plot must end in .png, .pdf or .svg"),
-        (("identify", "FILE", *GOOD, "--preset", "magic"), 2, "'magic' is not"),
+        (("identify", "FILE", *GOOD, "--method", "magic"), 2, "'magic' is not"),
         (("identify", "FILE", *GOOD, "--no-such-option"), 2, "No such option"),
         (("identify", "FILE", *GOOD, "--settings", "broken.npz"), 1, "broken.npz: holds no settings"),
-        (("identify", "FILE", *GOOD, "--settings", "few.npz", "--preset", "paper"), 2, "--settings hold a preset"),
+        (("identify", "FILE", *GOOD, "--settings", "few.npz", "--method", "paper"), 2, "--settings hold a method"),
         (("identify", "FILE", *GOOD, "--settings-output", "no/such/s.json"), 1, "no/such: there is no such folder"),
-        (("identify", "FILE", *GOOD, "--filter-torque"), 2, "filter_torque belongs to the strong form; got True"),
+        (
+            ("identify", "FILE", *GOOD, "--settings", "few.npz", "--exponent", "7"),
+            2,
+            "hold a method; got --exponent too",
+        ),
+        (
+            ("identify", "FILE", *GOOD, "--filter-torque"),
+            2,
+            "--filter-torque belongs to --method strong; got it with weak",
+        ),
+        (
+            ("identify", "FILE", *GOOD, "--method", "strong", "--exponent", "7"),
+            2,
+            "--exponent belongs to --method weak",
+        ),
+        (
+            ("identify", "FILE", *GOOD, "--method", "paper", "--max-order", "7"),
+            2,
+            "--method paper has all its settings",
+        ),
         (("identify", "FILE", *GOOD, "--lag", "soon"), 2, "such as '2 ms', or 'auto'; got 'soon'"),
         (("identify", *GOOD), 2, "channel 'angle' needs a FILE"),
         (("identify", "missing.csv", *GOOD), 1, "missing.csv: there is no such file"),
@@ -400,7 +418,7 @@ def test_an_interrupt_stops_at_once_and_leaves_no_half_written_file(tmp_path: Pa
         "t.npy",
         "--sample-rate",
         "1000",
-        "--preset",
+        "--method",
         "paper",
         "-o",
         "r.csv",

@@ -33,7 +33,7 @@ def test_the_papers_figures_on_the_default_recording() -> None:
         figure = figures.plot_window(y, middle, 201, sample_rate=1000)
         assert f"n = {order}" in [text.get_text() for text in figure.axes[1].texts]
 
-    result = tvident.identify(recording.angle, recording.torque, sample_rate=1000, preset="paper")
+    result = tvident.identify(recording.angle, recording.torque, sample_rate=1000, method="paper")
     figure = figures.plot_identification(result, recording)
     assert [ax.get_ylabel() for ax in figure.axes] == ["kg·m²", "N·m·s/rad", "N·m/rad"]
     figure.savefig("/dev/null", format="png")
@@ -42,7 +42,7 @@ def test_the_papers_figures_on_the_default_recording() -> None:
 def test_known_parameters_are_not_drawn_and_terms_are() -> None:
     recording = tvident.simulate_torsional_rig(2.0)
     result = tvident.identify(
-        recording.angle, recording.torque, sample_rate=1000, preset="paper", damping=0, terms=["offset"]
+        recording.angle, recording.torque, sample_rate=1000, method="paper", damping=0, terms=["offset"]
     )
     assert [ax.get_title(loc="left") for ax in result.plot().axes] == ["Inertia $I$", "Stiffness $K$", "Offset"]
 
@@ -50,7 +50,7 @@ def test_known_parameters_are_not_drawn_and_terms_are() -> None:
 def test_a_batch_cannot_be_drawn() -> None:
     recording = tvident.simulate_torsional_rig(2.0)
     angle, torque = np.tile(recording.angle, (2, 1)), np.tile(recording.torque, (2, 1))
-    result = tvident.identify(angle, torque, sample_rate=1000, preset="paper")
+    result = tvident.identify(angle, torque, sample_rate=1000, method="paper")
     with pytest.raises(ValueError, match="only a single record can be drawn"):
         result.plot()
 

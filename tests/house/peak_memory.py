@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 import tvident
+from calls import paper
 
 Array = npt.NDArray[np.float64]
 
@@ -21,8 +22,8 @@ STEP = 1000
 """Results of every so manieth sample are next to nothing: what is left is scratch."""
 
 CALLS: dict[str, Callable[[Array, Array, int, int], object]] = {
-    "the paper's preset": lambda angle, torque, _window, workers: tvident.identify(
-        angle, torque, sample_rate=1000, preset="paper", workers=workers
+    "the paper's method": lambda angle, torque, _window, workers: tvident.identify(
+        angle, torque, sample_rate=1000, method="paper", workers=workers
     ),
     "fit_local_polynomials": lambda angle, _torque, window, workers: tvident.fit_local_polynomials(
         angle, window | 1, step=STEP, workers=workers
@@ -31,10 +32,10 @@ CALLS: dict[str, Callable[[Array, Array, int, int], object]] = {
         np.lib.stride_tricks.sliding_window_view(angle, 3), torque[:-2], window, step=STEP, workers=workers
     ),
     "identify, window": lambda angle, torque, window, workers: tvident.identify(
-        angle, torque, sample_rate=1000, preset="paper", window_length=window | 1, step=STEP, workers=workers
+        angle, torque, sample_rate=1000, **paper(window_length=window | 1, step=STEP, workers=workers)
     ),
-    "identify, equations": lambda angle, torque, window, workers: tvident.identify(
-        angle, torque, sample_rate=1000, preset="paper", equations=window, step=STEP, workers=workers
+    "identify, regression window": lambda angle, torque, window, workers: tvident.identify(
+        angle, torque, sample_rate=1000, **paper(regression_window=window, step=STEP, workers=workers)
     ),
 }
 

@@ -28,7 +28,7 @@ def test_a_result_goes_when_it_is_let_go(name: str) -> None:
     calls: dict[str, Callable[[], object]] = {
         "fit_local_polynomials": lambda: tvident.fit_local_polynomials(y, 51),
         "rolling_least_squares": lambda: tvident.rolling_least_squares(y, y + 1, 51),
-        "identify": lambda: tvident.identify(y, y + 1, sample_rate=1000, preset="paper"),
+        "identify": lambda: tvident.identify(y, y + 1, sample_rate=1000, method="paper"),
     }
     gc.disable()
     try:
@@ -52,13 +52,13 @@ def risen_by(name: str, samples: int, window: int, workers: int) -> int:
 
 
 def test_an_hour_fits_into_400_mib_with_all_its_results() -> None:
-    assert risen_by("the paper's preset", HOUR, 201, workers=2) < HELD_FOR_AN_HOUR
+    assert risen_by("the paper's method", HOUR, 201, workers=2) < HELD_FOR_AN_HOUR
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 @pytest.mark.parametrize("window", [201, 3000, LONGEST])
 @pytest.mark.parametrize(
-    "name", ["fit_local_polynomials", "rolling_least_squares", "identify, window", "identify, equations"]
+    "name", ["fit_local_polynomials", "rolling_least_squares", "identify, window", "identify, regression window"]
 )
 def test_scratch_of_a_thread_stays_small(name: str, window: int, workers: int) -> None:
     samples = 320_000  # four rounds of 10 000 windows in the lanes of the widest vectors: work for two threads

@@ -13,6 +13,7 @@ import numpy.typing as npt
 import pytest
 
 import tvident
+from calls import paper
 
 Work = Callable[[], object]
 Prepare = Callable[[npt.NDArray[np.float64], int], Work]
@@ -29,7 +30,7 @@ def errors_of_a_fit(y: npt.NDArray[np.float64], workers: int) -> Work:
 
 
 def columns_of_a_result(y: npt.NDArray[np.float64], workers: int) -> Work:
-    result = tvident.identify(y, y, sample_rate=1000, preset="paper", workers=workers)
+    result = tvident.identify(y, y, sample_rate=1000, method="paper", workers=workers)
     return result.columns
 
 
@@ -65,12 +66,12 @@ WORKS: dict[str, tuple[int, Prepare]] = {
     ),
     "identify": (
         3_000_000,
-        lambda y, workers: lambda: tvident.identify(y, y, sample_rate=1000, preset="paper", workers=workers),
+        lambda y, workers: lambda: tvident.identify(y, y, sample_rate=1000, method="paper", workers=workers),
     ),
     "identify, long windows": (
         3_000_000,
         lambda y, workers: (
-            lambda: tvident.identify(y, y, sample_rate=1000, preset="paper", equations=10_000, workers=workers)
+            lambda: tvident.identify(y, y, sample_rate=1000, **paper(regression_window=10_000, workers=workers))
         ),
     ),
     "identify, constant": (
@@ -80,7 +81,7 @@ WORKS: dict[str, tuple[int, Prepare]] = {
                 y,
                 y,
                 sample_rate=1000,
-                preset="paper",
+                method="paper",
                 workers=workers,
                 inertia="constant",
                 damping="constant",
@@ -95,7 +96,7 @@ WORKS: dict[str, tuple[int, Prepare]] = {
                 y,
                 y,
                 sample_rate=1000,
-                preset="paper",
+                method="paper",
                 workers=workers,
                 terms=[tvident.Term("drag", lambda _t, _angle, velocity: velocity)],
             )
@@ -140,7 +141,7 @@ def test_ctrl_c_is_raised_within_a_tenth_of_a_second(name: str, workers: int, mo
 
 def everything(y: npt.NDArray[np.float64]) -> dict[str, npt.NDArray[np.float64]]:
     """Call every function that has threads, and give some of what it returned."""
-    result = tvident.identify(y, np.roll(y, 3), sample_rate=1000, preset="paper", workers=2)
+    result = tvident.identify(y, np.roll(y, 3), sample_rate=1000, method="paper", workers=2)
     return {
         "fit_local_polynomials": tvident.fit_local_polynomials(y, 51, workers=2).derivatives,
         "rolling_least_squares": tvident.rolling_least_squares(y, np.roll(y, 3), 51, workers=2).params,

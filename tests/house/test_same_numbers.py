@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import tvident
+from calls import paper
 from reference.exact import Window, gains
 from signals import signal
 from tvident import Status, _core
@@ -81,28 +82,19 @@ WORKS: dict[str, Work] = {
         workers=workers,
     ),
     "identify": lambda y, window, workers: tvident.identify(
-        y, np.roll(y, 5), sample_rate=1000, preset="paper", window_length=window, equations=window + 3, workers=workers
+        y, np.roll(y, 5), sample_rate=1000, **paper(window_length=window, regression_window=window + 3, workers=workers)
     ),
     "identify, further terms": lambda y, window, workers: tvident.identify(
         y,
         np.roll(y, 5),
         sample_rate=1000,
-        preset="paper",
-        window_length=window,
-        terms=["offset", "coulomb"],
-        damping=0,
-        workers=workers,
+        **paper(window_length=window, terms=["offset", "coulomb"], damping=0, workers=workers),
     ),
     "identify, constant": lambda y, window, workers: tvident.identify(
         y,
         np.roll(y, 5),
         sample_rate=1000,
-        preset="paper",
-        window_length=window,
-        inertia="constant",
-        damping="constant",
-        stiffness="constant",
-        workers=workers,
+        **paper(window_length=window, inertia="constant", damping="constant", stiffness="constant", workers=workers),
     ),
 }
 
@@ -226,7 +218,7 @@ def test_every_path_identifies_alike(seed: int, half: int, equations: int) -> No
         with instructions(path):
             found.append(
                 tvident.identify(
-                    angle, torque, sample_rate=1000, preset="paper", window_length=2 * half + 1, equations=equations
+                    angle, torque, sample_rate=1000, **paper(window_length=2 * half + 1, regression_window=equations)
                 )
             )
     first = found[0]

@@ -115,7 +115,7 @@ def test_an_encoder_that_comes_to_rest_takes_the_lowest_order_there() -> None:
 
 
 def test_nothing_moves_and_nothing_is_identified() -> None:
-    result = tvident.identify(np.zeros(2000), np.zeros(2000), sample_rate=1000, preset="paper")
+    result = tvident.identify(np.zeros(2000), np.zeros(2000), sample_rate=1000, method="paper")
     flags = Status.INVALID | Status.RANK_DEFICIENT
     assert (result.status[100:-100] & flags == flags).all()
     assert np.isnan(result.stiffness).all()
@@ -130,7 +130,7 @@ def test_steps_of_an_encoder_are_noise_of_a_known_size() -> None:
     assert np.median(fit.sigma) == pytest.approx(count / np.sqrt(12), rel=0.05)
 
     def error(recording: tvident.Recording) -> float:
-        result = tvident.identify(recording.angle, recording.torque, sample_rate=1000, preset="paper")
+        result = tvident.identify(recording.angle, recording.torque, sample_rate=1000, method="paper")
         return float(np.sqrt(np.nanmean((result.stiffness - recording.stiffness) ** 2)) / recording.stiffness.mean())
 
     # The steps are 0.4 % of the angle's standard deviation: noise of 1 % adds 2 % to the error, in the documented table.
@@ -190,7 +190,7 @@ import tvident
 n = 2_000_000
 generator = np.random.default_rng(0)
 angle, torque = np.cumsum(generator.standard_normal((2, n)), axis=1)
-call = dict(sample_rate=1000.0, preset="paper", step=1000, workers=2)
+call = dict(sample_rate=1000.0, method="paper", step=1000, workers=2)
 tvident.identify(angle[:100_000], torque[:100_000], **call)
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 tvident.identify(angle, torque, **call)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 import tvident
+from calls import paper
 from reference.identification import derivatives, windowed
 from reference.local_polynomials import fit_window
 from reference.regression import solve, window_rows
@@ -138,11 +139,10 @@ def test_identification_of_a_record_that_holds_hardly_an_equation(more: int, wor
     angle, torque = samples(0, n), samples(1, n)
     call: dict[str, Any] = {
         "sample_rate": 1.0,
-        "preset": "paper",
         "window_length": 2 * half + 1,
-        "equations": equations,
+        "regression_window": equations,
     }
-    result = tvident.identify(angle, torque, workers=workers, **call)
+    result = tvident.identify(angle, torque, **paper(workers=workers, **call))
     theta, velocity, acceleration = derivatives(angle, half, 1.0, result.order)
     expected = windowed(np.stack([acceleration, velocity, theta], axis=1), torque, equations)
     assert result.inertia.shape == (n,)

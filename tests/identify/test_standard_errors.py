@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tvident
+from calls import weak
 
 RUNS = 150
 # A standard deviation of so many draws scatters by 1/√(2 · 150) = 6 %; three of these, and 5 % for what the delta method leaves out.
@@ -18,8 +19,8 @@ KINDS = ("inertia", "damping", "stiffness")
 @pytest.mark.parametrize(
     "call",
     [
-        {"equations": 1500},
-        {"equations": 1500, "inertia": "constant", "damping": "constant"},
+        {"regression_window": 1500},
+        {"regression_window": 1500, "inertia": "constant", "damping": "constant"},
         {"inertia": "constant", "damping": "constant", "stiffness": "constant"},
     ],
     ids=["tested", "windowed", "constant"],
@@ -32,7 +33,9 @@ def test_errors_of_frequency_and_damping_ratio_are_those_of_many_recordings(call
     found: dict[str, list[tuple[float, float]]] = {"natural_frequency": [], "damping_ratio": []}
     for _ in range(RUNS):
         torque = clean.torque + level * generator.standard_normal(clean.torque.size)
-        result = tvident.identify(clean.angle, torque, sample_rate=1000, step=at, window_length=81, exponent=8, **call)
+        result = tvident.identify(
+            clean.angle, torque, sample_rate=1000, **weak(window_length=81, exponent=8, step=at, **call)
+        )
         for name, pairs in found.items():
             pairs.append((float(getattr(result, name)[1]), float(result.stderr[name][1])))
     for name, pairs in found.items():
@@ -45,7 +48,7 @@ def test_errors_of_frequency_and_damping_ratio_are_those_of_many_recordings(call
 def test_errors_do_not_depend_on_the_way_the_equations_took() -> None:
     rig = tvident.simulate_torsional_rig(4.0, pattern="constant")
     kinds: dict[str, Any] = {"inertia": "constant", "damping": "constant", "stiffness": "constant"}
-    call: dict[str, Any] = {"sample_rate": 1000, "preset": "paper", **kinds}
+    call: dict[str, Any] = {"sample_rate": 1000, "method": "paper", **kinds}
     # A mask, even one that leaves nothing out, is what rows are made one by one for.
     plain = tvident.identify(rig.angle, rig.torque, **call)
     masked = tvident.identify(rig.angle, rig.torque, mask=np.ones(rig.angle.size, dtype=bool), **call)
@@ -67,7 +70,7 @@ def test_errors_of_windows_in_strong_form_hold_that_equations_share_samples(
     inside: dict[str, list[float]] = {"inertia": [], "damping": [], "stiffness": [], "natural_frequency": []}
     for seed in range(12):
         rig = tvident.simulate_torsional_rig(10.0, seed=seed, pattern=pattern, angle_noise=angle_noise)
-        result = tvident.identify(rig.angle, rig.torque, sample_rate=1000, preset="paper", step=50)
+        result = tvident.identify(rig.angle, rig.torque, sample_rate=1000, method="paper", step=50)
         frequency = np.sqrt(rig.stiffness / rig.inertia) / (2 * np.pi)
         truth = {
             "inertia": rig.inertia,
@@ -87,7 +90,7 @@ def test_errors_of_windows_in_strong_form_hold_that_equations_share_samples(
 @pytest.mark.parametrize("seconds", [0.7, 10.0], ids=["too short for differences", "long enough"])
 def test_errors_do_not_depend_on_the_step(seconds: float) -> None:
     rig = tvident.simulate_torsional_rig(seconds, angle_noise=1e-2)
-    call: dict[str, Any] = {"sample_rate": 1000, "preset": "paper"}
+    call: dict[str, Any] = {"sample_rate": 1000, "method": "paper"}
     every = tvident.identify(rig.angle, rig.torque, **call)
     some = tvident.identify(rig.angle, rig.torque, step=7, **call)
     for name in every.stderr:
@@ -98,7 +101,7 @@ def test_errors_of_constants_in_strong_form_hold_that_equations_share_samples() 
     clean = tvident.simulate_torsional_rig(4.0, pattern="constant", torque_snr_db=200, angle_noise=1e-12)
     generator = np.random.default_rng(1)
     level = 0.01 * float(clean.angle.std())
-    call: dict[str, Any] = {"sample_rate": 1000, "preset": "paper", **dict.fromkeys(KINDS, "constant")}
+    call: dict[str, Any] = {"sample_rate": 1000, "method": "paper", **dict.fromkeys(KINDS, "constant")}
     found = []
     for _ in range(RUNS // 3):
         angle = clean.angle + level * generator.standard_normal(clean.angle.size)

@@ -2,10 +2,8 @@
 
 from tvident._advice.strong import ExplainedStrong
 from tvident._advice.weak import Explained
-from tvident._advice.words import Words
 
 __all__ = [
     "Explained",
     "ExplainedStrong",
-    "Words",
 ]

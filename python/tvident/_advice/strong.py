@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
-from tvident._advice.words import Words, listed
+from tvident._advice.lists import listed
 from tvident._equation import COEFFICIENTS
+from tvident._results import Estimates, Words
 from tvident._status import Status
 
 _LOOKED_AT = 1 << 10
@@ -46,35 +47,29 @@ class ExplainedStrong:
 
     Parameters
     ----------
-    values, errors : mapping of str to ndarray, shape (\*, n)
-        Unknowns and their standard errors before `factors`.
-    covariances : mapping of frozenset to ndarray, shape (\*, n)
-        Of pairs of coefficients.
-    factors : mapping of str to ndarray, shape (\*, 1)
-        What standard errors are multiplied by.
+    found : Estimates
+        Of all records.
     kinds : mapping of str to str
         The kind of every unknown.
     untested : list of str
         Unknowns that the record was to decide upon, which nothing does here.
-    condition : ndarray, shape (\*, n)
-    order, status : ndarray, shape (\*, n)
     settings : mapping
         What was used.
-    mask : ndarray of bool, shape (n,), optional
+    mask : ndarray of bool, shape (\*, n), optional
         Where a sample may be the centre of an equation.
     """
 
-    values: Mapping[str, Array]
-    errors: Mapping[str, Array]
-    covariances: Mapping[frozenset[str], Array]
-    factors: Mapping[str, Array]
+    found: Estimates
     kinds: Mapping[str, str]
     untested: list[str]
-    condition: Array
-    order: npt.NDArray[np.uint8]
-    status: npt.NDArray[np.uint16]
     settings: Mapping[str, Any]
     mask: npt.NDArray[np.bool_] | None = None
+
+    @cached_property
+    def status(self) -> npt.NDArray[np.uint16]:
+        """Flags of every sample and those of its record together."""
+        records = np.asarray(self.found.record_status, dtype=np.uint16)
+        return self.found.status | records[..., np.newaxis] if records.any() else self.found.status
 
     def words(self) -> Words:
         """Return what there is to say."""
@@ -112,7 +107,7 @@ class ExplainedStrong:
         return float(np.mean(self._flags & flag != 0))
 
     def _orders(self) -> list[str]:
-        order = self._some(self.order)[self._flags & Status.INVALID == 0]
+        order = self._some(self.found.order)[self._flags & Status.INVALID == 0]
         if not order.size:
             return []
         low, middle, high = (round(float(one)) for one in np.percentile(order, [5, 50, 95]))
@@ -127,10 +122,10 @@ class ExplainedStrong:
     def _kinds(self) -> list[str]:
         if not self.untested:
             return []
-        return [f"{listed(self.untested)} constant: the strong form does not test it; form='weak' does"]
+        return [f"{listed(self.untested)} constant: the strong form does not test it; WeakForm does"]
 
     def _errors(self) -> list[str]:
-        factors = {name: float(np.median(factor)) for name, factor in self.factors.items()}
+        factors = {name: float(np.median(factor)) for name, factor in self.found.factors.items()}
         large = [f"{factor:.1f} ({name})" for name, factor in factors.items() if factor > _COMMON_FACTOR]
         if not large:
             return []
@@ -161,7 +156,7 @@ class ExplainedStrong:
             (
                 f"{share:.0%} of the windows do not determine {listed(list(self.kinds))}: nothing moves there, or one "
                 "term looks like another "
-                "as long as the motion keeps its direction: make equations longer, take terms as constant, or leave "
+                "as long as the motion keeps its direction: make regression_window longer, take terms as constant, or leave "
                 "such parts out with mask="
             )
         ]
@@ -174,13 +169,13 @@ class ExplainedStrong:
         if share >= _OFTEN:
             names = self._alike(ill)
             told = listed(names) if names else "the parameters"
-            condition = float(np.median(self._some(self.condition)[ill]))
+            condition = float(np.median(self._some(self.found.condition)[ill]))
             # What is flagged may be constants, whose condition number is not that of the windows.
             number = f" (condition {condition:.3g}, the median there)" if condition > _core.HARDLY_TOLD_APART else ""
             return [
                 (
                     f"{told} are hardly told apart in {share:.0%} of the record{number}: under a single "
-                    "frequency they look alike; excite two or more, make windows of equations longer, or give one of them as known"
+                    "frequency they look alike; excite two or more, make regression_window longer, or give one of them as known"
                 )
             ]
         names = [name for name in self._alike(good) if self.kinds[name] == "windowed"]
@@ -195,8 +190,8 @@ class ExplainedStrong:
         ]
 
     def _relative(self, name: str, where: npt.NDArray[np.bool_]) -> float:
-        value, error = (self._some(np.asarray(one[name]))[where] for one in (self.values, self.errors))
-        factor = float(np.median(self.factors[name])) if name in self.factors else 1.0
+        value, error = (self._some(np.asarray(one[name]))[where] for one in (self.found.values, self.found.errors))
+        factor = float(np.median(self.found.factors[name])) if name in self.found.factors else 1.0
         middle = abs(float(np.median(value)))
         return factor * float(np.median(error)) / middle if middle > 0 else np.inf
 
@@ -205,9 +200,9 @@ class ExplainedStrong:
         unknown = [name for name in COEFFICIENTS if name in self.kinds]
         found: dict[tuple[str, str], float] = {}
         for one, other in combinations(unknown, 2):
-            errors = self._some(np.asarray(self.errors[one])) * self._some(np.asarray(self.errors[other]))
+            errors = self._some(np.asarray(self.found.errors[one])) * self._some(np.asarray(self.found.errors[other]))
             with np.errstate(invalid="ignore", divide="ignore"):
-                correlation = self._some(self.covariances[frozenset((one, other))]) / errors
+                correlation = self._some(self.found.covariances[frozenset((one, other))]) / errors
             correlation = np.abs(correlation[where])
             if np.isfinite(correlation).any():
                 found[one, other] = float(np.nanmedian(correlation))
@@ -219,7 +214,7 @@ class ExplainedStrong:
         highest, lowest = self._share(Status.HIGHEST_ORDER), self._share(Status.LOWEST_ORDER)
         length, most = self.settings["window_length"], self.settings["max_order"]
         if highest >= _OFTEN:
-            reached = int(self._some(self.order).max())
+            reached = int(self._some(self.found.order).max())
             if reached < most:
                 cure = f"{reached} is all that so few samples can judge: make window_length longer"
             elif most < _HIGHEST_OF_ALL:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from tvident import _core
-from tvident._advice.words import Words, listed
-from tvident._equation import COEFFICIENTS, UNITS
+from tvident._advice.lists import listed
+from tvident._equation import BUILT_IN, COEFFICIENTS
+from tvident._results import Words
 from tvident._status import Status
 
 _SHOWN = 6
@@ -25,13 +26,6 @@ _WEAK = (
 )
 """Why nothing else is chosen; measured as docs/automatic.md says."""
 
-_SUSPECTED = {
-    "offset": "a constant torque of {amount} seems to act: give {terms}",
-    "coulomb": "dry friction of {amount} seems to act: give {terms}",
-    "cubic": "the spring seems to harden or soften, by {amount}: give {terms}",
-    "lag": "the torque seems to be recorded {amount} late: give lag={lag:.3g} (seconds), or align the channels",
-}
-
 
 @dataclass(frozen=True)
 class Explained:
@@ -39,9 +33,9 @@ class Explained:
 
     Parameters
     ----------
-    found : mapping
+    found : Identified
         What the core returned.
-    names : mapping of int to str
+    names : sequence of str
         What the core's unknowns are called.
     chosen : collection of str
         Settings that were chosen from the record.
@@ -51,22 +45,22 @@ class Explained:
         Seconds from one sample to the next.
     """
 
-    found: Mapping[str, Any]
-    names: Mapping[int, str]
+    found: Any
+    names: Sequence[str]
     chosen: Collection[str]
     tested: Collection[str]
     period: float
 
-    def words(self, *, form_chosen: bool = False) -> Words:
+    def words(self, *, method_chosen: bool = False) -> Words:
         """Return what there is to say, with the reason for the weak form where nobody asked for it."""
         words = self._words()
-        return Words((_WEAK, *words.reasons), words.advice) if form_chosen else words
+        return Words((_WEAK, *words.reasons), words.advice) if method_chosen else words
 
     def _words(self) -> Words:
-        common = Status(int(np.bitwise_and.reduce(self.found["status"])))
-        if Status.RANK_DEFICIENT in common:
+        flags = Status(self.found.record_status)
+        if Status.RANK_DEFICIENT in flags:
             undetermined = (
-                f"the record does not determine {listed(list(self.names.values()))}: nothing moves, or a single frequency does not tell "
+                f"the record does not determine {listed(list(self.names))}: nothing moves, or a single frequency does not tell "
                 "inertia from stiffness: check that angle and torque are the right channels, excite two or more frequencies, leave a "
                 "term out, or give what is known"
             )
@@ -80,16 +74,26 @@ class Explained:
             *self._kinds(),
             *self._jumps(),
         )
-        advice = (*self._misfit(common), *self._outside(), *self._suspects(), *self._contradictions())
-        advice = (*advice, *self._told_apart(common))
-        return Words(reasons, (*advice, *self._limits(common)))
+        advice = (*self._misfit(flags), *self._outside(), *self._suspects(), *self._contradictions())
+        advice = (*advice, *self._told_apart(flags))
+        return Words(reasons, (*advice, *self._limits(flags)))
+
+    def _constants(self) -> list[tuple[str, Any]]:
+        """Return the constants by name."""
+        return [
+            (name, one) for name, one in zip(self.names, self.found.unknowns, strict=True) if one.kind == "constant"
+        ]
+
+    def _changing(self) -> list[str]:
+        """Return the names of what is no constant."""
+        return [name for name, one in zip(self.names, self.found.unknowns, strict=True) if one.kind != "constant"]
 
     def _noise(self) -> str:
-        angle, torque = np.sqrt(self.found["noise"])
+        angle, torque = np.sqrt(self.found.noise)
         return f"noise, taken to be white: {angle:.2g} rad in the angle, {torque:.2g} N m in the torque"
 
     def _test_function(self) -> str:
-        words = f"test function of {2 * self.found['half_width'] + 1} samples, exponent {self.found['exponent']}"
+        words = f"test function of {self.found.window_length} samples, exponent {self.found.exponent}"
         if not {"window_length", "exponent"} & set(self.chosen):
             return f"{words}: as given"
         return f"{words}: with the angle's spectrum and this noise it should leave the smallest errors"
@@ -97,15 +101,15 @@ class Explained:
     def _lag(self) -> list[str]:
         if "lag" not in self.chosen:
             return []
-        if self.found["lag"] is None:
+        if self.found.lag is None:
             return [
                 "the record does not tell a lag of the torque from damping: none is taken; excite more frequencies, or give it"
             ]
-        value, error = self.found["lag"]
+        value, error = self.found.lag
         return [f"the torque comes {value:.3f} ± {error:.1g} samples late: there its rate explains nothing more"]
 
     def _jumps(self) -> list[str]:
-        jumps = self.found["jumps"]
+        jumps = self.found.jumps
         if not jumps:
             return []
         shown = ", ".join(f"{jump * self.period:.6g}" for jump in jumps[:_SHOWN]) + (
@@ -115,24 +119,24 @@ class Explained:
         return [f"what is windowed jumps {many} {shown} s: windows end there"]
 
     def _outside(self) -> list[str]:
-        if self.found["outside_mask"] is None:
+        if self.found.outside_mask is None:
             return []
-        differing, left = self.found["outside_mask"]
-        inside = {number: value for number, value, *_ in self.found["constants"]}
+        outside = self.found.outside_mask
         parts = [
-            f"{self.names[number]} {value:.4g} ± {error:.1g} instead of {inside[number]:.4g}"
-            for number, value, error in differing
+            f"{self.names[place]} {value:.4g} ± {error:.1g} instead of {self.found.unknowns[place].values[0]:.4g}"
+            for place, value, error in outside.differing
         ]
+        left = outside.residual_ratio
         if left is not None and left > _core.NOISE_MODEL_FAILS:
             parts.append(f"{left:.1f} times the mean square left")
         return [f"outside the mask the model fails: {', '.join(parts)}"]
 
     def _windows(self) -> list[str]:
-        if not self.found["lengths"]:
+        if not self.found.lengths:
             return []
-        words, error = f"windows of {self.found['equations']} samples", self.found["prediction_error"]
+        words, error = f"windows of {self.found.regression_window} samples", self.found.prediction_error
         left = f"torque that they have not seen is predicted with {error:.2f} times the variance of the noise (1 is perfect)"
-        why = "best of all lengths" if "equations" in self.chosen else "as given"
+        why = "best of all lengths" if "regression_window" in self.chosen else "as given"
         return [
             f"{words}: {why}; {left}",
             "longer, shorter and one-sided windows are averaged with them wherever they predict better",
@@ -143,10 +147,10 @@ class Explained:
             "all unknowns are constant, so equations are weighted by the inverse of their noise's covariance, as maximum likelihood "
             "does"
         )
-        return [weighted] if self.found["weighted"] else []
+        return [weighted] if self.found.weighted else []
 
     def _kinds(self) -> list[str]:
-        tests = {self.names[number]: test for number, _, _, test in self.found["constants"] if test is not None}
+        tests = {name: one.test for name, one in self._constants() if one.test is not None}
         agreeing = {name: probability for name, (probability, _) in tests.items() if probability >= _core.NO_CHANCE}
         words = []
         if agreeing:
@@ -154,25 +158,24 @@ class Explained:
             words.append(
                 f"{listed(list(agreeing))} constant: eight parts of the record differ no more than noise makes them (p = {chances})"
             )
-        if self.found["pooling"] is not None:
-            slow = [self.names[number] for number in self.found["changing"]]
-            slow = [name for name in slow if name in {"inertia", "damping"}]
+        if self.found.pooling is not None:
+            slow = [name for name in ("inertia", "damping") if name in self._changing()]
             why = "parts of the record differ by more than noise" if set(slow) <= set(self.tested) else "as given"
-            seconds = self.found["pooling"] * self.period
+            seconds = self.found.pooling * self.period
             words.append(
                 f"{listed(slow)} varying: {why}; followed by quadratics in time over {seconds:.3g} s, which predict best"
             )
         return words
 
-    def _misfit(self, common: Status) -> list[str]:
+    def _misfit(self, flags: Status) -> list[str]:
         words = []
-        if Status.NOISE_MODEL in common:
+        if Status.NOISE_MODEL in flags:
             words.append(
-                f"torque is predicted with {self.found['prediction_error']:.1f} times the variance of the noise: is a term missing, was "
+                f"torque is predicted with {self.found.prediction_error:.1f} times the variance of the noise: is a term missing, was "
                 "the torque recorded late, or is the noise not white, since a channel was filtered or drifts? Standard errors are taken "
                 "from what is left over instead, and may be too small"
             )
-        if Status.COLOURED in common:
+        if Status.COLOURED in flags:
             words.append(
                 "what is left over is correlated for longer than a test function: look for a drift, a disturbance or a sudden change, "
                 "near which errors are larger than stated"
@@ -180,27 +183,33 @@ class Explained:
         return words
 
     def _suspects(self) -> list[str]:
-        found = [suspect for suspect in self.found["suspects"] if suspect[3]]
-        found.sort(key=lambda suspect: -abs(suspect[1]) / suspect[2])
+        found = [suspect for suspect in self.found.suspects if suspect.conspicuous]
+        found.sort(key=lambda suspect: -abs(suspect.value) / suspect.stderr)
         words = []
-        for name, value, error, _ in found:
-            amount = f"{value:.3g} ± {error:.1g} {'samples' if name == 'lag' else UNITS[name]}"
-            terms = [one for one in self.names.values() if one not in COEFFICIENTS] + [name]
-            words.append(_SUSPECTED[name].format(amount=amount, terms=f"terms={terms}", lag=value * self.period))
+        for one in found:
+            amount = f"{one.value:.3g} ± {one.stderr:.1g}"
+            if one.name == "lag":
+                words.append(
+                    f"the torque seems to be recorded {amount} samples late: give lag={one.value * self.period:.3g} (seconds), "
+                    "or align the channels"
+                )
+            else:
+                term = BUILT_IN[one.name]
+                terms = [name for name in self.names if name not in COEFFICIENTS] + [one.name]
+                words.append(f"{term.suspicion.format(amount=f'{amount} {term.unit}')}: give terms={terms}")
         if len(words) > 1:
             words.append("begin with the first of these: the others may be gone then")
         return words
 
     def _contradictions(self) -> list[str]:
         words = []
-        for number, _, _, test in self.found["constants"]:
-            if test is None or test[0] >= _core.NO_CHANCE:
+        for name, one in self._constants():
+            if one.test is None or one.test[0] >= _core.NO_CHANCE:
                 continue
-            name = self.names[number]
             if name in COEFFICIENTS:
                 kind = "windowed" if name == "stiffness" else "auto"
                 words.append(
-                    f"{name} was given as constant, but parts of the record differ by {test[1]:.0%}: give {name}={kind!r}, or cut "
+                    f"{name} was given as constant, but parts of the record differ by {one.test[1]:.0%}: give {name}={kind!r}, or cut "
                     "the record"
                 )
             else:
@@ -209,35 +218,35 @@ class Explained:
                 )
         return words
 
-    def _told_apart(self, common: Status) -> list[str]:
-        if Status.ILL_CONDITIONED not in common:
+    def _told_apart(self, flags: Status) -> list[str]:
+        if Status.ILL_CONDITIONED not in flags:
             return []
-        constants = [self.names[number] for number, *_ in self.found["constants"]]
+        constants = [name for name, _ in self._constants()]
         # What varies slowly comes first among the shares.
-        shares = self.found["weakest"][len(self.found["weakest"]) - len(constants) :]
+        shares = self.found.weakest[len(self.found.weakest) - len(constants) :]
         parts = [name for name, part in zip(constants, shares, strict=True) if abs(part) > _TAKES_PART]
-        if len(parts) == 1 and "stiffness" in (self.names[number] for number in self.found["changing"]):
+        if len(parts) == 1 and "stiffness" in self._changing():
             parts.append("stiffness")
         told = listed(parts) if len(parts) > 1 else "the parameters"
-        noise = ", but by the noise of the angle" if self.found["mostly_noise"] else ""
+        noise = ", but by the noise of the angle" if self.found.mostly_noise else ""
         words = (
-            f"{told} are hardly told apart{noise} (condition {self.found['condition']:.0f}): under a single frequency they look "
+            f"{told} are hardly told apart{noise} (condition {self.found.constants_condition:.0f}): under a single frequency they look "
             "alike; excite two or more, or give one of them as known"
         )
         return [words]
 
-    def _limits(self, common: Status) -> list[str]:
-        if Status.WINDOW_LIMIT not in common:
+    def _limits(self, flags: Status) -> list[str]:
+        if Status.WINDOW_LIMIT not in flags:
             return []
-        lengths = [length for length, _ in self.found["lengths"]]
-        if lengths and self.found["equations"] <= min(lengths):
+        lengths = [length for length, _ in self.found.lengths]
+        if lengths and self.found.regression_window <= min(lengths):
             words = (
-                f"windows of {self.found['equations']} samples are the shortest that were tried: what is windowed changes faster than it "
-                "can be followed, or the record is too short: record ten cycles or more, and excite higher frequencies"
+                f"windows of {self.found.regression_window} samples are the shortest that were tried: what is windowed changes faster than "
+                "it can be followed, or the record is too short: record ten cycles or more, and excite higher frequencies"
             )
         else:
             words = (
-                f"a test function of {2 * self.found['half_width'] + 1} samples is the narrowest or widest that was tried: record ten "
+                f"a test function of {self.found.window_length} samples is the narrowest or widest that was tried: record ten "
                 "cycles or more, at 20 samples a cycle or more; do not trust these numbers otherwise"
             )
         return [words]

@@ -3,7 +3,7 @@
 from tvident._arguments.arrays import NanPolicy, RowPolicy, along_axis, check_nan, mask, real_array
 from tvident._arguments.numbers import finite_number, one_of, positive_number, whole_number
 from tvident._arguments.progress import Progress, reporter
-from tvident._arguments.sampling import check_window, sample_period, seconds, window_length
+from tvident._arguments.sampling import check_window, length_given, sample_period, seconds, window_length
 from tvident._arguments.workers import worker_count
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "check_nan",
     "check_window",
     "finite_number",
+    "length_given",
     "mask",
     "one_of",
     "positive_number",

@@ -89,6 +89,15 @@ def window_length(name: str, value: int | str, period: float, *, odd: bool) -> i
     return length
 
 
+def length_given(name: str, value: object, *, odd: bool = False, least: int = 1) -> int | str:
+    """Return a length as it was given, a number of samples or a duration, checked as far as it can be without a sample period."""
+    if isinstance(value, str):
+        seconds(name, value)
+        return value
+    length = whole_number(name, value, least=least)
+    return window_length(name, length, 1.0, odd=odd)
+
+
 def check_window(name: str, length: int, samples: int, *, least: int = 1) -> None:
     """Check that a window is long enough to be one and fits into the record."""
     if length < least:

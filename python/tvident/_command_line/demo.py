@@ -30,13 +30,13 @@ def demo(folder: Path, seed: int) -> None:
     recording = tvident.simulate_torsional_rig(seed=seed)
     call: dict[str, Any] = {"sample_rate": recording.sample_rate}
     result = tvident.identify(recording.angle, recording.torque, **call)
-    paper = tvident.identify(recording.angle, recording.torque, preset="paper", **call)
+    paper = tvident.identify(recording.angle, recording.torque, method="paper", **call)
     click.echo(
         f"Simulated rig: {recording.time.size} samples at {recording.sample_rate:g} Hz, a slider changes the stiffness.\n"
     )
     click.echo(result.summary() + "\n")
     rows: list[tuple[str, ...]] = [
-        ("parameter", "unit", "true (median)", "identified (median)", "rms error", "with --preset paper")
+        ("parameter", "unit", "true (median)", "identified (median)", "rms error", "with --method paper")
     ]
     for name in ("inertia", "damping", "stiffness"):
         medians = [f"{np.nanmedian(getattr(one, name)):.5g}" for one in (recording, result)]

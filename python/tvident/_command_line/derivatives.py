@@ -20,6 +20,7 @@ from tvident._derivatives import Selection
 from tvident._status import describe
 
 
+# Every option is a parameter: so click passes them.
 @main.command(epilog="Example: tvident derivatives rig.csv --channel angle --time time -o derivatives.csv")
 @click.argument("file", type=click.Path())
 @click.option("--channel", required=True, metavar="NAME", help="Channel to differentiate.")

@@ -13,14 +13,14 @@ from tvident import _arguments as arguments
 from tvident import recordings
 from tvident._command_line.channels import channel_of, mask_of, scaled, source_of
 from tvident._command_line.group import main
-from tvident._command_line.options import CRITERION, RUN, TIME, check_output, check_time, given, length, wanted_progress
+from tvident._command_line.method import METHOD, NAMES, method_of
+from tvident._command_line.options import RUN, TIME, check_output, check_time, given, wanted_progress
 from tvident._command_line.output import give, save_figure
-from tvident._equation import COEFFICIENTS, UNITS, Kind
+from tvident._equation import COEFFICIENTS, TERM_NAMES, UNITS, Kind
 from tvident._files import check_folder, replaced
-from tvident._identify import Form, Preset, Variation
-from tvident._identify import Selection as HowToSelect
 
 
+# Every option is a parameter: so click passes them.
 @main.command(epilog="Example: tvident identify rig.csv --angle angle --torque torque --time time -o result.csv")
 @click.argument("file", type=click.Path(), required=False)
 @click.option("--angle", required=True, metavar="NAME", help="Channel of the angle, or a file that holds it alone.")
@@ -28,11 +28,7 @@ from tvident._identify import Selection as HowToSelect
 @click.option("--angle-scale", metavar="SCALE", help="Number or variable to multiply the angle by.")
 @click.option("--torque-scale", metavar="SCALE", help="Number or variable to multiply the torque by.")
 @TIME
-@click.option(
-    "--preset",
-    type=click.Choice(get_args(Preset)),
-    help="Where what is not given comes from: the recording (auto, the default), or the paper.",
-)
+@METHOD
 @click.option("--inertia", metavar="KIND", help="auto, constant, windowed, varying, a known number, or a channel.")
 @click.option("--damping", metavar="KIND", help="The same for damping; 0 leaves it out.")
 @click.option("--stiffness", metavar="KIND", help="The same for stiffness.")
@@ -41,30 +37,13 @@ from tvident._identify import Selection as HowToSelect
     "terms",
     multiple=True,
     metavar="TERM[:KIND]",
-    help="offset, coulomb or cubic; may be repeated; none leaves out the offset of --preset auto.",
+    help=f"{', '.join(TERM_NAMES)}; may be repeated; none leaves out the offset that stands there by default.",
 )
 @click.option("--lag", metavar="TIME", help="By how much the torque was recorded late: seconds, '2 ms', or auto.")
 @click.option(
     "--quantisation", type=float, help="Step that the angle was rounded to; looked for if not given; 0: none."
 )
 @click.option("--mask", metavar="NAME", help="Channel, or file, that is not zero where a sample may be used.")
-@click.option("--form", type=click.Choice(get_args(Form)), help="Test functions (weak) or derivatives (strong).")
-@click.option(
-    "--window-length", metavar="LENGTH", help="Test function, or window of the polynomials: samples, odd, or '0.2 s'."
-)
-@click.option("--exponent", metavar="NUMBER", help="Of the test function: 3 to 20, or auto.")
-@click.option("--equations", metavar="LENGTH", help="Samples solved together: a number, '0.2 s', or auto.")
-@click.option("--variation", type=click.Choice(get_args(Variation)), help="Of parameters within a window.")
-@click.option(
-    "--selection",
-    type=click.Choice(get_args(HowToSelect)),
-    help="Strong form: of orders. Weak form: one window around a sample, or an average of many.",
-)
-@click.option("--max-order", type=int, help="Strong form: highest candidate order.")
-@CRITERION
-@click.option(
-    "--filter-torque/--no-filter-torque", default=None, help="Strong form: smooth the torque as the angle is."
-)
 @click.option(
     "--settings", type=click.Path(), help="What an earlier run chose: a JSON file that --settings-output wrote."
 )
@@ -84,6 +63,7 @@ def identify(
     angle_scale: str | None,
     torque_scale: str | None,
     time_channel: str | None,
+    method: str | None,
     terms: tuple[str, ...],
     lag: str | None,
     mask: str | None,
@@ -103,19 +83,24 @@ def identify(
         check_folder(Path(settings_output))
     if not check_time(options["sample_rate"], options["delta"], time_channel):
         raise click.UsageError("identify needs the sample period; got none; give --sample-rate, --delta or --time")
-    if settings is not None and options["preset"] is not None:
-        raise click.UsageError("--settings hold a preset; got --preset too; drop one of them")
+    of_method = {name: value for name, value in given(options).items() if name in NAMES}
+    form = method_of(method, of_method, has_settings=settings is not None)
     channels = {} if file is None else recordings.read(file)
     result = tvident.identify(
         scaled(source_of(channels, angle, file), angle_scale, channels, file),
         scaled(source_of(channels, torque, file), torque_scale, channels, file),
+        method=form,
         t=None if time_channel is None else channel_of(channels, time_channel, file),
         lag=None if lag is None else _lag(lag),
         mask=None if mask is None else mask_of(source_of(channels, mask, file)),
         settings=None if settings is None else _read_settings(settings),
         terms=_terms(terms),
         progress=wanted_progress(progress),
-        **{name: _understood(name, value, channels, file) for name, value in given(options).items()},
+        **{
+            name: _parameter(value, channels, file) if name in COEFFICIENTS else value
+            for name, value in given(options).items()
+            if name not in NAMES
+        },
     )
     if settings_output is not None:
         with replaced(Path(settings_output)) as written:
@@ -126,13 +111,6 @@ def identify(
     give(result.columns(), UNITS, "\n".join(words), output)
     if plot is not None:
         save_figure(result.plot(), Path(plot))
-
-
-def _understood(name: str, value: Any, channels: recordings.Channels, file: str | None) -> Any:
-    """Return the argument that an option stands for."""
-    if name in COEFFICIENTS:
-        return _parameter(value, channels, file)
-    return length(value) if name in {"window_length", "equations", "exponent"} else value
 
 
 def _parameter(value: str, channels: recordings.Channels, file: str | None) -> Any:

@@ -16,7 +16,7 @@ from tvident._files import check_folder, check_place
 Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 
 
-def _options(*options: Callable[[Decorated], Decorated]) -> Callable[[Decorated], Decorated]:
+def options_of(*options: Callable[[Decorated], Decorated]) -> Callable[[Decorated], Decorated]:
     def decorate(function: Decorated) -> Decorated:
         for option in reversed(options):
             function = option(function)
@@ -25,13 +25,13 @@ def _options(*options: Callable[[Decorated], Decorated]) -> Callable[[Decorated]
     return decorate
 
 
-TIME = _options(
+TIME = options_of(
     click.option("--sample-rate", type=float, help="Samples per second."),
     click.option("--delta", type=float, help="Sample period in seconds."),
     click.option("--time", "time_channel", metavar="NAME", help="Channel that holds the time in seconds."),
 )
 
-RUN = _options(
+RUN = options_of(
     click.option("--step", type=int, default=1, show_default=True, help="Every how many samples a result is wanted."),
     click.option("--workers", type=int, help="Threads; by default all processors."),
     click.option("--progress/--no-progress", default=None, help="Show progress; by default on a terminal."),

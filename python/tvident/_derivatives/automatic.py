@@ -12,6 +12,7 @@ from tvident import _core
 from tvident._derivatives.found import Found
 
 
+# What users give to fit_local_polynomials comes here as it is.
 def choose(
     samples: npt.NDArray[Any],
     plan_of_window: Callable[[int], _core.LocalPolynomials],

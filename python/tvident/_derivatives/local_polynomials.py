@@ -11,11 +11,10 @@ from tvident import _core
 from tvident._derivatives.automatic import choose
 from tvident._derivatives.fit import LocalPolynomialFit
 from tvident._derivatives.found import Found
-from tvident._derivatives.plans import HIGHEST_ORDER, Criterion, Selection, plan, quantisation_step
-
-_SHORTEST_WINDOW = 5
+from tvident._derivatives.plans import HIGHEST_ORDER, SHORTEST_WINDOW, Criterion, Selection, plan, quantisation_step
 
 
+# All but the data are options, as users call it.
 def fit_local_polynomials(
     y: npt.ArrayLike,
     window_length: int | str,
@@ -163,7 +162,7 @@ def fit_local_polynomials(
         _check_left_to_the_rule(criterion, selection)
     else:
         length = arguments.window_length("window_length", window_length, period, odd=True)
-        arguments.check_window("window_length", length, count, least=_SHORTEST_WINDOW)
+        arguments.check_window("window_length", length, count, least=SHORTEST_WINDOW)
     step_of_rounding = quantisation_step(samples, quantisation)
 
     def plan_of_window(length: int) -> _core.LocalPolynomials:

@@ -17,7 +17,11 @@ Selection: TypeAlias = Literal["window", "pooled", "average"]
 HIGHEST_ORDER = 15
 """No polynomial order above this is offered."""
 
+SHORTEST_WINDOW = 5
+"""Samples; fewer leave no choice of order."""
 
+
+# All that tables depend on: the key of the cache.
 @lru_cache(maxsize=8)
 def _plan(
     window_length: int,
@@ -36,6 +40,7 @@ def _plan(
     )
 
 
+# All that tables depend on.
 def plan(
     window_length: int,
     *,

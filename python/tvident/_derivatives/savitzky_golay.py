@@ -20,6 +20,7 @@ _PART = 1 << 18
 _PADDING: dict[str, Literal["reflect", "edge", "wrap"]] = {"mirror": "reflect", "nearest": "edge", "wrap": "wrap"}
 
 
+# SciPy's parameters.
 def savgol_filter(
     x: npt.ArrayLike,
     window_length: int,

@@ -1,16 +1,19 @@
 """Says what stands in the equation of motion: coefficients of a kind, terms, their units."""
 
+from tvident._equation.built_in import BUILT_IN, TERM_NAMES
 from tvident._equation.kinds import COEFFICIENTS, Kind, Parameter, parameter
-from tvident._equation.terms import Term, TermName, Unknown, all_terms
+from tvident._equation.terms import GivenTerm, Term, Unknown, all_terms
 from tvident._equation.units import UNITS
 
 __all__ = [
+    "BUILT_IN",
     "COEFFICIENTS",
+    "TERM_NAMES",
     "UNITS",
+    "GivenTerm",
     "Kind",
     "Parameter",
     "Term",
-    "TermName",
     "Unknown",
     "all_terms",
     "parameter",

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident._equation.built_in import TERM_NAMES
 from tvident._equation.kinds import COEFFICIENTS, Kind
-
-TermName: TypeAlias = Literal["offset", "coulomb", "cubic"]
 
 
 @dataclass(frozen=True)
@@ -62,6 +61,10 @@ class Term:
         return arguments.real_array(f"term {self.name!r}", values)
 
 
+GivenTerm: TypeAlias = str | Term | tuple[str | Term, Kind]
+"""The name of a built-in term, a term of one's own, or a pair of one of these and its kind."""
+
+
 @dataclass(frozen=True)
 class Unknown:
     """A column of the equations: its name, its kind and, for a term of the user's own, the term."""
@@ -71,16 +74,17 @@ class Unknown:
     own: Term | None = None
 
 
-def all_terms(terms: Sequence[object], default: Kind) -> list[Unknown]:
+def all_terms(terms: Sequence[Any], default: Kind) -> list[Unknown]:
     """Return every further term with its name and kind."""
     if isinstance(terms, str | Term):
         raise TypeError(f"terms must be a sequence of terms; got {terms!r}; write ({terms!r},)")
     found: list[Unknown] = []
     for given in terms:
-        term, kind = given if isinstance(given, tuple) and len(given) == 2 else (given, default)  # noqa: PLR2004 - a pair
+        pair = isinstance(given, tuple | list) and len(given) == 2  # noqa: PLR2004 - a term and its kind
+        term, kind = given if pair else (given, default)
         arguments.one_of("the kind of a term", kind, ("windowed", "constant"))
         own = term if isinstance(term, Term) else None
-        name = arguments.one_of("a term", term, get_args(TermName)) if own is None else own.name
+        name = arguments.one_of("a term", term, TERM_NAMES) if own is None else own.name
         if any(name == other.name for other in found) or name in COEFFICIENTS:
             raise ValueError(f"every term must have a name of its own; {name!r} comes twice; drop or rename one")
         found.append(Unknown(name, kind, own))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from tvident._equation.built_in import BUILT_IN
+
 UNITS = {
     "time": "s",
     "inertia": "kg m^2",
@@ -9,10 +11,7 @@ UNITS = {
     "stiffness": "N m/rad",
     "natural_frequency": "Hz",
     "damping_ratio": "1",
-    "offset": "N m",
-    "coulomb": "N m",
-    "cubic": "N m/rad^3",
     "condition": "1",
     "residual_std": "N m",
-}
+} | {term.name: term.unit for term in BUILT_IN.values()}
 """Units of results for an angle in rad and a torque in N m."""

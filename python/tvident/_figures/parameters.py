@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from tvident._figures.style import FAINT, TRUTH, draw_parameter, style, unit_of
 from tvident._simulate import Recording
-from tvident._status import Status
+from tvident._status import DOUBTFUL, Status
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -28,6 +28,7 @@ class Identified(Protocol):
     terms: dict[str, Array]
     constants: dict[str, tuple[Any, Any]]
     status: npt.NDArray[np.uint16]
+    record_status: Status | npt.NDArray[np.uint16]
     settings: dict[str, Any]
 
     @property
@@ -78,7 +79,7 @@ def plot_identification(result: Identified, truth: Recording | None = None) -> F
         for ax, name in zip(axes[:, 0], shown, strict=True):
             values = result.terms[name] if name in result.terms else getattr(result, name)
             title = _SYMBOLS.get(name, name.capitalize())
-            _draw_flags(ax, result.time, result.status)
+            _draw_flags(ax, result)
             draw_parameter(ax, result.time, values, result.stderr[name])
             if truth is not None and hasattr(truth, name):
                 ax.plot(truth.time, getattr(truth, name), color=TRUTH, linewidth=1.2, label="truth")
@@ -92,24 +93,24 @@ def plot_identification(result: Identified, truth: Recording | None = None) -> F
         # Beside the first title, where no line runs through it.
         place: Any = {"loc": "lower right", "bbox_to_anchor": (1, 0.97), "borderaxespad": 0.2}
         axes[0, 0].legend(ncols=4, handlelength=1.4, columnspacing=1.4, **place)
-        everywhere = ", ".join(flag.name or "" for flag in _everywhere(result.status))
+        everywhere = ", ".join(flag.name or "" for flag in _everywhere(result))
         axes[-1, 0].set_xlabel("time (s)" + (f"\nwhole record: {everywhere}" if everywhere else ""))
         figure.align_ylabels()
         return figure
 
 
-def _everywhere(status: npt.NDArray[np.uint16]) -> list[Status]:
-    """Return the flags that all samples have, or all but those near the ends."""
-    common = int(np.bitwise_and.reduce(status)) if status.size else 0
-    return [flag for flag in Status if common & flag]
+def _everywhere(result: Identified) -> list[Status]:
+    """Return the flags of the record, and those that all samples have."""
+    common = int(np.bitwise_and.reduce(result.status)) if result.status.size else 0
+    return [flag for flag in Status if (common | int(result.record_status)) & flag]
 
 
-def _draw_flags(ax: Axes, time: npt.NDArray[np.float64], status: npt.NDArray[np.uint16]) -> None:
-    """Shade samples whose numbers deserve a second look; what holds for the whole record is said elsewhere."""
-    doubtful = Status.INVALID | Status.GAP | Status.RANK_DEFICIENT | Status.ILL_CONDITIONED
-    for flag in _everywhere(status):
+def _draw_flags(ax: Axes, result: Identified) -> None:
+    """Shade samples whose numbers deserve a second look; what holds at all samples is said elsewhere."""
+    time, doubtful = result.time, DOUBTFUL | Status.GAP
+    for flag in _everywhere(result):
         doubtful &= ~flag
-    flagged = status & doubtful != 0
+    flagged = result.status & doubtful != 0
     if not flagged.any():
         return
     edges = np.flatnonzero(np.diff(flagged.astype(np.int8), prepend=0, append=0))

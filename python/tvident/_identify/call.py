@@ -1,4 +1,4 @@
-"""Identification of a second-order system whose parameters change."""
+"""The call that users make: arguments are read and checked, and one task is made of them."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._derivatives import Criterion, quantisation_step
-from tvident._equation import COEFFICIENTS, Kind, Parameter, Term, TermName, parameter
-from tvident._identify.missing import missing
-from tvident._identify.settings import Form, Preset, Selection, Variation, resolve
-from tvident._identify.task import Task
+from tvident._equation import GivenTerm, Parameter
+from tvident._identify.methods import Method
+from tvident._identify.settings import resolve
+from tvident._identify.task import Data, Task
 from tvident._results import Identification
 
 
+# All but the data are options, as users call it.
 def identify(
     angle: npt.ArrayLike,
     torque: npt.ArrayLike,
@@ -24,25 +24,16 @@ def identify(
     sample_rate: float | None = None,
     delta: float | None = None,
     t: npt.ArrayLike | None = None,
-    preset: Preset = "auto",
-    window_length: int | str | None = None,
-    max_order: int | None = None,
-    criterion: Criterion | None = None,
-    selection: Selection | None = None,
-    form: Form | None = None,
-    exponent: int | str | None = None,
-    equations: int | str | None = None,
-    variation: Variation | None = None,
+    method: Method = "auto",
     inertia: Parameter | None = None,
     damping: Parameter | None = None,
     stiffness: Parameter | None = None,
-    terms: Sequence[TermName | Term | tuple[TermName | Term, Kind]] | None = None,
-    filter_torque: bool | None = None,
+    terms: Sequence[GivenTerm] | None = None,
     lag: float | Literal["auto"] | None = None,
     quantisation: float | None = None,
     mask: npt.ArrayLike | None = None,
-    step: int = 1,
     nan_policy: arguments.RowPolicy = "omit",
+    step: int = 1,
     settings: Mapping[str, Any] | None = None,
     workers: int | None = None,
     progress: arguments.Progress = None,
@@ -54,8 +45,8 @@ def identify(
     the equations is taken off, and whatever is not given is chosen from the record: ``summary()`` says what and why.
 
     In strong form, the paper's, the angle is fitted by polynomials of every order in a window around every sample, Akaike's criterion
-    chooses one (equations (2), (8) and (9) of the paper) and gives θ̇ and θ̈; in another window of 200 such equations the unknowns are
-    solved for by least squares ((3) and (4)).
+    chooses one (equations (2), (8) and (9) of the paper) and gives θ̇ and θ̈; in another window of 200 such equations, the
+    regression window, the unknowns are solved for by least squares ((3) and (4)).
 
     Parameters
     ----------
@@ -69,51 +60,29 @@ def identify(
         Sample period in seconds.
     t : array_like, shape (n,)
         Time of every sample in seconds, uniform to a thousandth of the sample period.
-    preset : {"auto", "paper"}, optional
-        What is used where nothing is given. ``"auto"``: weak form, everything chosen from the record, inertia and damping constant
-        unless it says otherwise, an offset of the torque. ``"paper"``: the paper's method, windows of 201 samples and 200 equations.
-    window_length : int or str, optional
-        Samples of the test function, or in strong form of the window of the polynomials: odd, a duration such as ``"0.2 s"``, or
-        ``"auto"`` in weak form; 201 in the paper.
-    max_order : int, optional
-        Highest candidate order of the strong form; 15 in the paper.
-    criterion : {"aicc", "aicc-textbook", "aic", "bic"}, optional
-        What chooses the order in strong form, as in :func:`tvident.fit_local_polynomials`.
-    selection : {"auto", "window", "pooled", "average"}, optional
-        In strong form, how orders are chosen, as in :func:`tvident.fit_local_polynomials`: each window's own (the paper), one for
-        neighbouring windows together (``"auto"``), or all of them averaged. In weak form, where what is windowed comes from:
-        ``"window"`` takes one window of `equations` around each sample; ``"average"`` (``"auto"``) averages windows of many lengths
-        before, around and after it by how well each predicts nearby, and ends them at jumps; giving `equations` means
-        ``"window"``. Where nothing is windowed, ``"window"`` means ordinary least squares, and ``"average"`` those weighted by the
-        inverse of the noise's covariance, unless that fails to explain what is left.
-    form : {"strong", "weak", "auto"}, optional
-        The paper's equations, or those of the test function. ``"auto"`` always takes the latter: with the same kinds of parameters
-        it was the more accurate in every case measured, 1.4 to 55 times for stiffness and 2.8 to 78 times for inertia.
-    exponent : int or str, optional
-        Exponent p of the test function, 3 to 20, or ``"auto"``; 8 with the paper's preset.
-    equations : int or str, optional
-        Samples whose equations are solved together, a duration, or ``"auto"`` in weak form: the length of windows that predicts best
-        what they have not seen; 200 in the paper.
-    variation : {"constant", "linear"}, optional
-        How what is windowed may change within a window.
+    method : {"auto", "paper"}, WeakForm or StrongForm, optional
+        ``"auto"``: weak form, everything chosen from the record, inertia and damping constant unless it says otherwise, an offset of the
+        torque. ``"paper"``: the paper's method: strong form, polynomials in windows of 201 samples, regression windows of 200, all
+        parameters windowed, no further terms. A :class:`WeakForm` or :class:`StrongForm` holds settings of one's own; parameters and
+        terms are then as with ``"auto"`` (where nothing is tested, in strong form, inertia and damping are constant). ``"auto"`` always
+        takes the weak form: with the same kinds of parameters it was the more accurate in every case measured, 1.4 to 55 times for
+        stiffness and 2.8 to 78 times for inertia.
     inertia, damping, stiffness : {"windowed", "constant", "auto", "varying"}, float or array_like, optional
         ``"windowed"``: unknown, one value for every sample. ``"constant"``: unknown, one value for the record. ``"auto"``: constant unless
         the record says otherwise (windowed, for stiffness). ``"varying"``: changes more slowly than what is windowed (weak form). A
         number or an array of the angle's shape: known; 0 leaves it out.
     terms : sequence, optional
         What else stands on the left-hand side, with an unknown factor: ``"offset"``, ``"coulomb"`` (the sign of the velocity), ``"cubic"``
-        (the cube of the angle) or a :class:`Term` of one's own; or a pair of one of these and its kind. Without a kind a term is
-        windowed where all unknown parameters are, and constant otherwise.
-    filter_torque : bool, optional
-        In strong form: smooth the torque with polynomials of the orders chosen for the angle.
+        (the cube of the angle), ``"gravity"`` (the sine of the angle) or a :class:`Term` of one's own; or a pair of one of these and its
+        kind. Without a kind a term is windowed where all unknown parameters are, and constant otherwise.
     lag : float or "auto", optional
         Seconds by which the torque was recorded late; fractions of a sample count. ``"auto"``, in weak form: the lag nearest to none at
         which the torque's rate explains nothing more, with its standard error in ``settings["lag_stderr"]``; none where the record does
         not tell it from the damping, as with motion at a single frequency.
     quantisation : float, optional
         Step to which the angle was rounded, in rad: an encoder's count. In strong form no residual is taken to be smaller than it
-        leaves, in weak form no noise. By default it is looked for in the samples, as in :func:`tvident.fit_local_polynomials`, but not in
-        strong form with the paper's preset, whose criterion has no such bound. 0 means none.
+        leaves, in weak form no noise. By default it is looked for in the samples, as in :func:`tvident.fit_local_polynomials`, but not
+        with ``method="paper"``, whose criterion has no such bound. 0 means none.
     mask : array_like of bool, shape (n,) or the angle's, optional
         True where a sample may be the centre of an equation.
     step : int, optional
@@ -123,8 +92,9 @@ def identify(
         around them are taken from the other equations of their window and flagged GAP. ``"propagate"``: what is windowed is NaN where
         its window holds one. ``"raise"``: refuse them.
     settings : mapping, optional
-        Settings of an earlier result: what it chose is used again. What is given beside them wins. `mask`, `step` and what was known
-        at every sample are not among them.
+        Settings of an earlier result, as they are or read from JSON: what it chose is used again. What is given beside them wins, a
+        `method` other than ``"auto"`` as a whole. `mask`, `step`, what was known at every sample and functions of terms of one's own
+        are not among them.
     workers : int, optional
         Threads; by default ``TVIDENT_WORKERS`` or all processors that this process may use. The numbers do not depend on it.
     progress : bool or callable, optional
@@ -133,13 +103,12 @@ def identify(
     Returns
     -------
     Identification
-        ``inertia``, ``damping``, ``stiffness``, ``stderr``, ``condition``, ``status`` and more; ``summary()`` says it in words.
+        ``inertia``, ``damping``, ``stiffness``, ``stderr``, ``status``, ``trusted`` and more; ``summary()`` says it in words.
 
     Raises
     ------
     ValueError
-        If shapes differ, a window is even or does not fit, `t` is not uniform, nothing is unknown, a name is unknown, or a setting
-        belongs to the other form.
+        If shapes differ, a window does not fit, `t` is not uniform, nothing is unknown, or a name is unknown.
     TypeError
         If an array is complex or holds no numbers, or there is no sample period.
 
@@ -156,6 +125,12 @@ def identify(
     that of the results, but for terms of one's own, which need the derivatives of the whole record. In weak form and where kinds are
     mixed it is some 1 to 15 µs a sample, the most where it jumps, and the equations of the whole record are kept.
 
+    See Also
+    --------
+    WeakForm, StrongForm : settings of the two forms.
+    fit_local_polynomials : the derivatives that the strong form takes.
+    rolling_least_squares : least squares in windows alone.
+
     References
     ----------
     M. Ruzek, S. Chesné, D. Rémond: identification of a time-varying mechanical system using the Akaike information criterion.
@@ -171,7 +146,7 @@ def identify(
     >>> result = tvident.identify(angle, torque, sample_rate=1000)
     >>> bool(abs(result.stiffness[2000] - 15) < 0.01)
     True
-    >>> paper = tvident.identify(angle, torque, sample_rate=1000, preset="paper")
+    >>> paper = tvident.identify(angle, torque, sample_rate=1000, method="paper")
     >>> bool(abs(paper.stiffness[2000] - 15) < 0.01)
     True
     """
@@ -186,47 +161,25 @@ def identify(
         raise TypeError("identify needs the sample period; got none; give sample_rate=, delta= or t=")
     period = arguments.sample_period(samples, delta=delta, sample_rate=sample_rate, t=t)
     given = {
-        "window_length": window_length,
-        "max_order": max_order,
-        "criterion": criterion,
-        "selection": selection,
-        "form": form,
-        "exponent": exponent,
-        "equations": equations,
-        "variation": variation,
         "inertia": inertia,
         "damping": damping,
         "stiffness": stiffness,
         "terms": terms,
-        "filter_torque": filter_torque,
         "lag": lag,
         "quantisation": quantisation,
     }
-    used = resolve(preset, given, settings)
-    rounded = used["quantisation"]
-    used["quantisation"] = quantisation_step(angles, rounded)
+    request = resolve(method, given, settings, 1 / period)
     for name, array in (("angle", angles), ("torque", torques)):
         arguments.check_nan(name, array, nan_policy, arguments.RowPolicy)
-    lags = used["lag"] if isinstance(used["lag"], tuple) else (used["lag"],)
-    for late in lags:
-        if late != "auto" and abs(late) >= samples * period:
-            raise ValueError(
-                f"lag must be shorter than the record of {samples * period:.6g} s; got {late:.6g} s; "
-                "give it in seconds, or align the channels"
-            )
     start = 0.0 if t is None else float(np.asarray(t)[0])
-    task = Task(
+    data = Data(
         angles=angles,
         torques=torques,
         time=start + np.arange(samples, dtype=np.float64) * period,
         period=period,
-        settings=used,
-        rounded=rounded,
-        holes=missing(angles, torques),
-        propagate=nan_policy == "propagate",
         mask=arguments.mask("mask", mask, angles.shape),
+        propagate=nan_policy == "propagate",
         step=arguments.whole_number("step", step, least=1),
         workers=arguments.worker_count(workers),
-        parameters={name: parameter(name, used[name], angles.shape) for name in COEFFICIENTS},
     )
-    return task.weak(progress) if used["form"] == "weak" else task.strong(progress)
+    return Task(data, request).run(progress)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -48,30 +49,25 @@ def windows_that_hold(holes: npt.NDArray[np.bool_], before: int, after: int, ste
     return np.asarray(counted[np.minimum(samples + after + 1, n)] > counted[np.maximum(samples - before, 0)])
 
 
-def propagate(found: Any, holes: npt.NDArray[np.bool_], lengths: list[tuple[int, int]], step: int) -> None:
+def propagate_missing(found: Sequence[Any], holes: npt.NDArray[np.bool_], step: int) -> None:
     r"""Take the numbers away whose windows hold a hole, but for constants, whose window is the record.
 
     Parameters
     ----------
-    found : Collected
-        What was found; changed.
+    found : sequence of Identified
+        One a record; changed.
     holes : ndarray of bool, shape (\*, n)
-    lengths : list of (int, int)
-        By record, samples of the window that makes an equation, and of the one whose equations are solved together.
     step : int
         Every how many samples there is a number.
     """
-    records = holes.reshape(-1, holes.shape[-1])
-    each = []
-    for record, (length, rows) in zip(records, lengths, strict=True):
-        half = length // 2
-        each.append(windows_that_hold(record, half + rows // 2, half + rows - rows // 2 - 1, step))
-    hit = np.stack(each).reshape(found.status.shape)
-    changing = [name for name in found.values if name not in found.constants]
-    if not changing:
-        return
-    for table in (found.values, found.errors):
-        for name in changing:
-            table[name] = np.where(hit, np.nan, table[name])
-    found.residual_std, found.condition = (np.where(hit, np.nan, one) for one in (found.residual_std, found.condition))
-    found.status = np.where(hit, found.status | np.uint16(Status.INVALID | Status.GAP), found.status)
+    for record, one in zip(holes.reshape(-1, holes.shape[-1]), found, strict=True):
+        changing = [unknown for unknown in one.unknowns if unknown.kind != "constant"]
+        if not changing:
+            continue
+        half, rows = one.window_length // 2, one.regression_window
+        hit = windows_that_hold(record, half + rows // 2, half + rows - rows // 2 - 1, step)
+        for unknown in changing:
+            unknown.values = np.where(hit, np.nan, unknown.values)
+            unknown.stderr = np.where(hit, np.nan, unknown.stderr)
+        one.residual_std, one.condition = (np.where(hit, np.nan, each) for each in (one.residual_std, one.condition))
+        one.status = np.where(hit, one.status | np.uint16(Status.INVALID | Status.GAP), one.status)

@@ -1,170 +1,192 @@
-"""What is used where nothing is given, and how an earlier choice is used again."""
+"""What is asked for: what is given wins over an earlier result's settings, those over the method's."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Literal, TypeAlias, get_args
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
 
 from tvident import _arguments as arguments
-from tvident._derivatives import Criterion
+from tvident._equation import COEFFICIENTS, Term
+from tvident._identify.methods import Form, Method, StrongForm, WeakForm
 
-Preset: TypeAlias = Literal["auto", "paper"]
-
-Form: TypeAlias = Literal["auto", "weak", "strong"]
-
-Variation: TypeAlias = Literal["constant", "linear"]
-
-Selection: TypeAlias = Literal["auto", "window", "pooled", "average"]
-
-PRESETS: dict[str, dict[str, Any]] = {
+_OF_METHOD: dict[str, dict[str, Any]] = {
     "paper": {
-        "form": "strong",
-        "window_length": 201,
-        "exponent": 8,
-        "max_order": 15,
-        "criterion": "aicc",
-        "selection": "window",
-        "equations": 200,
-        "variation": "constant",
-        "filter_torque": False,
-        "lag": 0.0,
-        "quantisation": 0.0,
         "inertia": "windowed",
         "damping": "windowed",
         "stiffness": "windowed",
         "terms": (),
+        "lag": 0.0,
+        "quantisation": 0.0,
     },
     "auto": {
-        "form": "auto",
-        "window_length": "auto",
-        "exponent": "auto",
-        "max_order": 15,
-        "criterion": "aicc",
-        "selection": "auto",
-        "equations": "auto",
-        "variation": "linear",
-        "filter_torque": False,
-        "lag": 0.0,
-        "quantisation": None,
         "inertia": "auto",
         "damping": "auto",
         "stiffness": "windowed",
         "terms": (("offset", "constant"),),
+        "lag": 0.0,
+        "quantisation": None,
     },
 }
-"""Every setting by preset."""
-
-_COEFFICIENTS = ("inertia", "damping", "stiffness")
-
-_OF_ONE_FORM = {"exponent": "weak", "max_order": "strong", "criterion": "strong", "filter_torque": "strong"}
-"""Settings that only one of the forms has."""
-
-_OF_BOTH = {"filter_torque": False}
-"""Values of these that are true of both forms: the weak form never filters the torque."""
+"""What is used beside the form where nothing is given; forms of the user's own take the same as "auto"."""
 
 
-def resolve(preset: str, given: Mapping[str, Any], earlier: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Return all settings: what is given wins over an earlier result's settings, those over the preset's.
+@dataclass(frozen=True)
+class Request:
+    """What is asked for, settled: every word is known, every number checked.
+
+    Parameters
+    ----------
+    name : str
+        "auto", "paper", "weak" or "strong".
+    form : WeakForm or StrongForm
+    by_record : mapping of str to sequence
+        What an earlier result chose for every record of a batch on its own; wins over the form's value.
+    parameters : mapping of str to object
+        How inertia, damping and stiffness come about, as given.
+    terms : sequence
+        Terms, or pairs of a term and its kind.
+    lag : float, "auto" or a sequence of float
+        Seconds.
+    lag_samples : sequence of float, optional
+        The same in samples, where an earlier result found it: seconds may round to other samples.
+    quantisation : float, optional
+    chosen : bool
+        Nobody asked for this form.
+    """
+
+    name: str
+    form: Form
+    by_record: Mapping[str, Sequence[Any]]
+    parameters: Mapping[str, Any]
+    terms: Sequence[Any]
+    lag: Any
+    lag_samples: Sequence[float] | None
+    quantisation: float | None
+    chosen: bool
+
+    def each(self, name: str, records: int) -> Sequence[Any]:
+        """Return a setting of every record: the same for all, or what an earlier result chose for each."""
+        value = self.by_record.get(name)
+        if value is None:
+            return [self.lag if name == "lag" else getattr(self.form, name)] * records
+        if len(value) != records:
+            raise ValueError(
+                f"{name} must be one number, or one for each of the {records} records; got {len(value)}; "
+                "give settings of a result with as many records"
+            )
+        return value
+
+
+def resolve(method: Method, given: Mapping[str, Any], earlier: Mapping[str, Any] | None, sample_rate: float) -> Request:
+    """Return what is asked for.
 
     Raises
     ------
     ValueError
-        If a word is unknown, a setting belongs to the other form, or "auto" stands where nothing chooses.
+        If a word is unknown, or "auto" stands where nothing chooses.
     TypeError
-        If a setting is of the wrong type, or `earlier` is not of a result.
+        If something is of the wrong type, or `earlier` is not of a result.
     """
-    given = {name: value for name, value in given.items() if value is not None}
-    earlier = {} if earlier is None else _of_result(earlier, given)
-    preset = earlier.pop("preset", preset)
-    arguments.one_of("preset", preset, get_args(Preset))
-    settings = PRESETS[preset] | earlier | given
-    settings["preset"] = preset
-    if given.get("equations", "auto") != "auto" and "selection" not in given:
-        # Whoever gives a length means windows of that length.
-        settings["selection"] = "window" if settings["form"] != "strong" else settings["selection"]
-    choices = {"form": Form, "selection": Selection, "variation": Variation, "criterion": Criterion}
-    for name, literal in choices.items():
-        arguments.one_of(name, settings[name], get_args(literal))
-    settings["lag"] = _lag(settings)
-    if not isinstance(settings["filter_torque"], bool):
-        raise TypeError(f"filter_torque must be True or False; got {settings['filter_torque']!r}; pass one of them")
-    settings["form_chosen"] = settings["form"] == "auto"
-    settings["form"] = "strong" if settings["form"] == "strong" else "weak"
-    if settings["form"] == "weak" and not {"quantisation"} & (given.keys() | earlier.keys()):
-        settings["quantisation"] = None
-    _check_form(settings, given)
-    if settings["form"] == "strong":
-        _settle_strong(settings, given)
-    elif settings["selection"] == "auto":
-        settings["selection"] = "average"
-    elif settings["selection"] == "pooled":
+    name, form = _method(method)
+    given = {key: value for key, value in given.items() if value is not None}
+    by_record: dict[str, Sequence[Any]] = {}
+    before: dict[str, Any] = {}
+    if earlier is not None:
+        before = _of_result(earlier, given)
+        if "terms" in given:
+            given["terms"] = _with_earlier_kinds(given["terms"], earlier)
+        if method == "auto":
+            name, form, by_record = _form_of_result(earlier)
+    asked = _OF_METHOD["paper" if name == "paper" else "auto"] | before | given
+    lag = asked["lag"]
+    if isinstance(lag, tuple | list) and isinstance(form, WeakForm):
+        by_record["lag"] = [arguments.finite_number("lag", one) for one in lag]
+    elif lag == "auto" and isinstance(form, StrongForm):
         raise ValueError(
-            "selection must be 'window' or 'average' in weak form, which fits no polynomials whose order could be pooled; "
-            "got 'pooled'; use one of these, or form='strong'"
+            "lag='auto' needs the weak form; got the strong form; use WeakForm, or give the lag that it finds, settings['lag']"
         )
-    return settings
+    elif lag != "auto":
+        lag = arguments.finite_number("lag", lag)
+    same_lag = earlier is not None and "lag" not in given and earlier.get("sample_rate") == sample_rate
+    return Request(
+        name=name,
+        form=form,
+        by_record=by_record,
+        parameters={one: asked[one] for one in COEFFICIENTS},
+        terms=asked["terms"],
+        lag=lag,
+        lag_samples=earlier.get("lag_samples") if same_lag and earlier is not None else None,
+        quantisation=asked["quantisation"],
+        chosen=earlier is None and name == "auto",
+    )
 
 
-def _lag(settings: Mapping[str, Any]) -> float | str | tuple[float, ...]:
-    """Check the lag of the torque: a number, one for every record, or "auto"."""
-    lag = settings["lag"]
-    if lag == "auto":
-        if settings["form"] == "strong":
-            raise ValueError(
-                "lag='auto' needs the weak form; got form='strong'; use form='weak', or give the lag that it finds, settings['lag']"
-            )
-        return "auto"
-    if isinstance(lag, tuple | list) and settings["form"] != "strong":
-        return tuple(arguments.finite_number("lag", one) for one in lag)
-    return arguments.finite_number("lag", lag)
+def _method(method: Method) -> tuple[str, Form]:
+    """Return the name of a method and its form."""
+    if isinstance(method, WeakForm):
+        return "weak", method
+    if isinstance(method, StrongForm):
+        return "strong", method
+    if isinstance(method, type) and method in {WeakForm, StrongForm}:
+        raise TypeError(f"method must be an object; got the class {method.__name__}; write {method.__name__}()")
+    if method == "auto":
+        return "auto", WeakForm()
+    if method == "paper":
+        return "paper", StrongForm()
+    raise ValueError(f"method must be 'auto', 'paper', a WeakForm or a StrongForm; got {method!r}; use one of these")
 
 
-def _check_form(settings: Mapping[str, Any], given: Mapping[str, Any]) -> None:
-    """Refuse what would change nothing: a setting of the other form.
-
-    Where the form itself was not given, whatever the preset says anyway may be said again.
-    """
-    said_again = PRESETS[settings["preset"]] if given.get("form", "auto") == "auto" else {}
-    for name, form in _OF_ONE_FORM.items():
-        harmless = [values[name] for values in (_OF_BOTH, said_again) if name in values]
-        if name in given and settings["form"] != form and given[name] not in harmless:
-            raise ValueError(
-                f"{name} belongs to the {form} form; got {given[name]!r} with form={settings['form']!r}; "
-                f"leave it out, or give form={form!r}"
-            )
-
-
-def _settle_strong(settings: dict[str, Any], given: Mapping[str, Any]) -> None:
-    """Put the paper's numbers where nothing chooses."""
-    for name in ("window_length", "equations"):
-        if given.get(name) == "auto":
-            paper = PRESETS["paper"][name]
-            raise ValueError(
-                f"{name} must be a number of samples or a duration in strong form, where nothing chooses it; got 'auto'; "
-                f"give a length ({paper} in the paper), or form='weak'"
-            )
-        if settings[name] == "auto":
-            settings[name] = PRESETS["paper"][name]
-    if settings["selection"] == "auto":
-        settings["selection"] = "pooled"
+def _form_of_result(earlier: Mapping[str, Any]) -> tuple[str, Form, dict[str, Sequence[Any]]]:
+    """Return the method of an earlier result, and what it chose for every record of a batch."""
+    kind: Any = {"weak": WeakForm, "strong": StrongForm}[earlier["form"]]
+    values = {one.name: earlier[one.name] for one in fields(kind)}
+    if values.get("averaging") and "regression_window" in earlier["chosen"]:
+        # Where windows of all lengths are averaged, which of them predicts best is a matter of the record, as their weights are.
+        values["regression_window"] = "auto"
+    by_record: dict[str, Sequence[Any]] = {
+        key: value for key, value in values.items() if isinstance(value, list | tuple)
+    }
+    return str(earlier["method"]), kind(**(values | dict.fromkeys(by_record, "auto"))), by_record
 
 
 def _of_result(earlier: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the arguments that an earlier result's settings stand for."""
+    """Return the arguments beside the form that an earlier result's settings stand for."""
     try:
-        kinds = dict(earlier["kinds"])
-        settings = {name: earlier[name] for name in (*PRESETS["paper"], "preset") if earlier.get(name) is not None}
-        known = dict(earlier["known"])
-    except (KeyError, TypeError):
+        kinds, known = dict(earlier["kinds"]), dict(earlier["known"])
+        terms = [(str(name), str(kind)) for name, kind in earlier["terms"]]
+        asked = {name: earlier[name] for name in ("lag", "quantisation")}
+    except (KeyError, TypeError, ValueError):
         raise TypeError(f"settings must be those of an earlier result; got {earlier!r}; pass result.settings") from None
-    for name in _COEFFICIENTS:
-        settings[name] = known[name] if kinds[name] == "known" else kinds[name]
-        if settings[name] is None and name not in given:
+    for name in COEFFICIENTS:
+        asked[name] = known[name] if kinds[name] == "known" else kinds[name]
+        if asked[name] is None and name not in given:
             raise ValueError(
                 f"settings hold no {name}, since it was known at every sample; got None; pass {name}= again"
             )
-    settings["terms"] = tuple(tuple(term) for term in settings["terms"])
-    if settings["selection"] == "average" and "equations" in earlier.get("chosen", ()):
-        # Where windows of all lengths are averaged, which of them predicts best is a matter of the record, as their weights are.
-        settings["equations"] = "auto"
-    return settings
+    own = earlier.get("own_terms")
+    if own and "terms" not in given:
+        raise ValueError(
+            f"settings hold no functions, and term {own[0]!r} is one of the user's own; got no terms; pass terms= again, "
+            f"with all of {', '.join(name for name, _ in terms)}"
+        )
+    return asked | {"terms": terms}
+
+
+def _with_earlier_kinds(terms: Sequence[Any], earlier: Mapping[str, Any]) -> Sequence[Any]:
+    """Return terms that are given again, those without a kind with that of the earlier result."""
+    if isinstance(terms, str | Term):
+        return terms  # refused where terms are read
+    kinds = dict(earlier["terms"])
+
+    def with_kind(term: Any) -> Any:
+        name = term.name if isinstance(term, Term) else term
+        return (term, kinds[name]) if isinstance(name, str) and name in kinds else term
+
+    return [with_kind(term) for term in terms]
+
+
+def plain(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings as JSON has them: lists, numbers, words."""
+    return dict(json.loads(json.dumps(settings)))

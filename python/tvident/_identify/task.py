@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -11,318 +11,284 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
-from tvident._advice import Explained, ExplainedStrong, Words
-from tvident._derivatives import plan
-from tvident._equation import COEFFICIENTS, Kind, Unknown, all_terms
-from tvident._identify.collected import Collected
-from tvident._identify.missing import propagate
-from tvident._results import Identification
-
-_SHORTEST_WINDOW = 5
-
-_SHORTEST_TEST_FUNCTION = 9
+from tvident._advice import Explained, ExplainedStrong
+from tvident._derivatives import SHORTEST_WINDOW, plan, quantisation_step
+from tvident._equation import COEFFICIENTS, Kind, Unknown, all_terms, parameter
+from tvident._identify import one_face
+from tvident._identify.batch import estimates
+from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm
+from tvident._identify.missing import missing
+from tvident._identify.settings import Request, plain
+from tvident._results import Estimates, Identification, Words
 
 _WINDOW_OF_TERMS = 51
 """Samples of the polynomials that terms of one's own get angle and velocity from in weak form."""
 
 
-@dataclass
-class Task:
-    """One call: what is to be identified from what, and how."""
+@dataclass(frozen=True)
+class Data:
+    r"""Records, and what is to be done with them.
+
+    Parameters
+    ----------
+    angles, torques : ndarray, shape (\\*, n)
+    time : ndarray, shape (n,)
+    period : float
+        Seconds from one sample to the next.
+    mask : ndarray of bool, shape (\\*, n), optional
+    propagate : bool
+        Missing values make windows that hold one missing.
+    step : int
+        Every how many samples a result is wanted.
+    workers : int, optional
+    """
 
     angles: npt.NDArray[np.number]
     torques: npt.NDArray[np.number]
     time: npt.NDArray[np.float64]
     period: float
-    settings: dict[str, Any]
-    rounded: float | None
-    holes: npt.NDArray[np.bool_] | None
-    propagate: bool
     mask: npt.NDArray[np.bool_] | None
+    propagate: bool
     step: int
     workers: int | None
-    parameters: dict[str, Kind | float | npt.NDArray[np.number]]
 
-    def __post_init__(self) -> None:
-        kinds: dict[str, Kind] = {name: value for name, value in self.parameters.items() if isinstance(value, str)}
+    @property
+    def batch(self) -> tuple[int, ...]:
+        """Shape of the batch; empty for a single record."""
+        return self.angles.shape[:-1]
+
+    @property
+    def records(self) -> int:
+        """How many records there are."""
+        return int(np.prod(self.batch, dtype=int))
+
+
+class Task:
+    """One call.
+
+    Parameters
+    ----------
+    data : Data
+    request : Request
+    """
+
+    def __init__(self, data: Data, request: Request) -> None:
+        self._data = data
+        self._request = request
+        self._quantisation = quantisation_step(data.angles, request.quantisation)
+        shape = data.angles.shape
+        self._parameters = {name: parameter(name, value, shape) for name, value in request.parameters.items()}
+        kinds: dict[str, Kind] = {name: value for name, value in self._parameters.items() if isinstance(value, str)}
         default: Kind = "windowed" if all(kind == "windowed" for kind in kinds.values()) else "constant"
-        self.extra = all_terms(self.settings["terms"], default)
-        self.unknowns = [Unknown(name, kind) for name, kind in kinds.items()] + self.extra
-        if not self.unknowns:
+        self._terms = all_terms(request.terms, default)
+        self._unknowns = [Unknown(name, kind) for name, kind in kinds.items()] + self._terms
+        if not self._unknowns:
             raise ValueError(
                 "at least one parameter must be unknown; all are given; use 'windowed' or 'constant' for one"
             )
+        self._names = [one.name for one in self._unknowns]
+        self._known = {name: value for name, value in self._parameters.items() if not isinstance(value, str)}
 
-    def strong(self, progress: arguments.Progress) -> Identification:
-        """Identify in strong form."""
-        samples, used = self.time.size, self.settings
-        length = arguments.window_length("window_length", used["window_length"], self.period, odd=True)
-        arguments.check_window("window_length", length, samples, least=_SHORTEST_WINDOW)
-        rows = arguments.window_length("equations", used["equations"], self.period, odd=False)
-        core_plan = self._plan(length)
-        untested = [one.name for one in self.unknowns if one.kind == "auto" and _in_strong_form(one) == "constant"]
-        self.unknowns = [Unknown(one.name, _in_strong_form(one), one.own) for one in self.unknowns]
-        kinds = {unknown.kind for unknown in self.unknowns}
-        found = Collected(self.angles.shape[:-1], [unknown.name for unknown in self.unknowns])
-        options: dict[str, Any] = {"step": self.step, "workers": self.workers}
-        if "windowed" in kinds:
-            arguments.check_window("equations", rows, samples, least=len(self.unknowns) + 1)
-        motions = self._motions(core_plan)
-        plain = not used["filter_torque"] and used["lag"] == 0 and self.mask is None
-        whole = self.holes is None or self.propagate
-        with arguments.reporter(progress, "identification") as report:
-            options["progress"] = report
-            if plain and whole and kinds == {"windowed"} and used["variation"] == "constant":
-                found.windowed(core_plan, motions, rows, **options)
-            elif plain and kinds == {"constant"}:
-                found.constant(core_plan, motions, **options)
-            else:
-                options |= {"filter_torque": used["filter_torque"], "lag": used["lag"] / self.period}
-                options |= {"linear": used["variation"] == "linear", "equations": rows}
-                words = [unknown.kind for unknown in self.unknowns]
-                each = [
-                    _core.identify_strong(core_plan, motions, record, words, mask=self._mask(record), **options)
-                    for record in range(self._records)
-                ]
-                found.records(each, self._numbers)
-                if self.propagate and self.holes is not None:
-                    propagate(found, self.holes, [(length, rows)] * self._records, self.step)
-        chosen = {"chosen": (), "window_length": length, "exponent": None, "equations": rows}
-        explained = ExplainedStrong(
-            values=found.values,
-            errors=found.errors,
-            covariances=found.covariances,
-            factors=found.factors,
-            kinds={unknown.name: unknown.kind for unknown in self.unknowns},
-            untested=untested,
-            condition=found.condition,
-            order=found.order,
-            status=found.status,
-            settings=used | {"window_length": length},
-            mask=None if self.mask is None else self.mask[..., :: self.step],
+    def run(self, progress: arguments.Progress) -> Identification:
+        """Identify every record."""
+        data, request = self._data, self._request
+        form, core_plan = self._form()
+        lags = self._lags()
+        call = one_face.Call(
+            motions=self._motions(core_plan),
+            names=self._names,
+            kinds=[one.kind for one in self._unknowns],
+            lag=lags,
+            quantisation=request.quantisation,
+            mask=data.mask,
+            holes=missing(data.angles, data.torques),
+            propagate=data.propagate,
+            step=data.step,
+            delta=data.period,
+            not_missing=self._present(lags),
+            workers=data.workers,
+            records=data.records,
         )
-        return self._result(found, chosen, explained.words())
-
-    def weak(self, progress: arguments.Progress) -> Identification:
-        """Identify in weak form."""
-        samples, used = self.time.size, self.settings
-        lengths = [self._length(value) for value in self._each("window_length")]
-        equations = [self._equations(value) for value in self._each("equations")]
-        exponents = [
-            None if value == "auto" else arguments.whole_number("exponent", value) for value in self._each("exponent")
-        ]
-        average = used["selection"] != "window"
-        kinds = self._weak_kinds(average=average)
-        own = any(unknown.own is not None for unknown in self.extra)
-        core_plan = self._plan(min(_WINDOW_OF_TERMS, (samples - 1) // 2 * 2 + 1)) if own else None
-        motions = self._motions(core_plan)
-        lags = [None if lag == "auto" else lag / self.period for lag in self._each("lag")]
-        present = [unknown.name for unknown in self.extra] + ([] if used["lag"] == 0 else ["lag"])
-        if not isinstance(self.parameters["stiffness"], str):
-            # A cubic spring beside a known one is not a question that anybody asked.
-            present.append("cubic")
-        found = Collected(self.angles.shape[:-1], [unknown.name for unknown in self.unknowns])
         with arguments.reporter(progress, "identification") as report:
-            each = [
-                _core.identify_weak(
-                    motions,
-                    record,
-                    kinds,
-                    delta=self.period,
-                    half_width=None if length is None else length // 2,
-                    exponent=exponent,
-                    equations=rows,
-                    average=average,
-                    linear=used["variation"] == "linear",
-                    lag=lag,
-                    quantisation=self.rounded,
-                    mask=self._mask(record),
-                    step=self.step,
-                    not_missing=present,
-                    workers=self.workers,
-                    progress=report,
-                )
-                for record, (length, exponent, rows, lag) in enumerate(
-                    zip(lengths, exponents, equations, lags, strict=True)
-                )
-            ]
-        found.records(each, self._numbers)
-        if self.propagate and self.holes is not None:
-            reached = [(2 * one["half_width"] + 1, one["equations"]) for one in each]
-            propagate(found, self.holes, reached, self.step)
-        names = dict(zip(self._numbers, (unknown.name for unknown in self.unknowns), strict=True))
-        tested = [one.name for one in self.unknowns if one.kind == "auto"]
-        asked = {"window_length": lengths, "exponent": exponents, "equations": equations}
-        automatic = tuple(name for name, values in asked.items() if None in values)
-        automatic += ("lag",) if used["lag"] == "auto" else ()
-        explained = [Explained(one, names, automatic, tested, self.period) for one in each]
-        words = [one.words(form_chosen=used["form_chosen"]) for one in explained]
-        chosen: dict[str, Any] = {
-            "chosen": automatic,
-            "window_length": tuple(2 * one["half_width"] + 1 for one in each),
-            "exponent": tuple(one["exponent"] for one in each),
-            "equations": tuple(one["equations"] for one in each),
+            found = one_face.identify(call, form, report)
+        known = {
+            name: value if isinstance(value, float) else value[..., :: data.step] for name, value in self._known.items()
         }
-        if used["lag"] == "auto":
-            known = [one["lag"] or (0.0, np.nan) for one in each]
-            late, error = (tuple(lag[place] * self.period for lag in known) for place in (0, 1))
-            chosen |= {"lag": late, "lag_stderr": error}
-        if len(each) == 1:
-            chosen |= {name: value[0] for name, value in chosen.items() if name != "chosen"}
-            slow = {names[number] for number in each[0]["changing"]} & set(COEFFICIENTS)
-            self.unknowns = [Unknown(one.name, _in_the_end(one, slow), one.own) for one in self.unknowns]
-        else:
-            # What is constant in some records and changes in others stays to be tested in each.
-            self.unknowns = [
-                Unknown(one.name, "constant" if one.name in found.constants else one.kind, one.own)
-                for one in self.unknowns
-            ]
-        return self._result(found, chosen, words[0] if len(words) == 1 else _of_batch(words))
+        batch = estimates(data.batch, self._names, found, known)
+        settings = self._settings(found, form)
+        explain = self._words_of_strong_form if isinstance(request.form, StrongForm) else self._words_of_weak_form
+        jumps = tuple(tuple(data.time[one.jumps].tolist()) for one in found)
+        return Identification(
+            batch,
+            time=data.time[:: data.step],
+            terms=[term.name for term in self._terms],
+            jumps=jumps if data.batch else jumps[0],
+            words=explain(found, batch, settings),
+            settings=plain(settings),
+        )
+
+    def _form(self) -> tuple[one_face.WeakForm | one_face.StrongForm, _core.LocalPolynomials | None]:
+        """Return the form as the core has it, and the polynomials that terms of the user's own need."""
+        form, own = self._request.form, any(term.own is not None for term in self._terms)
+        samples = self._data.time.size
+        if isinstance(form, StrongForm):
+            length = self._length("window_length", form.window_length, least=SHORTEST_WINDOW)
+            core_plan = self._plan(length, form)
+            rows = arguments.window_length("regression_window", form.regression_window, self._data.period, odd=False)
+            if any(
+                one.kind in {"windowed", "varying"} or (one.name, one.kind) == ("stiffness", "auto")
+                for one in self._unknowns
+            ):
+                self._check_rows(rows)
+            linear = form.variation == "linear"
+            return one_face.StrongForm(core_plan, length, rows, form.filter_torque, linear), core_plan
+        lengths = [
+            None if value == "auto" else self._length("window_length", value, least=SHORTEST_TEST_FUNCTION)
+            for value in self._each("window_length")
+        ]
+        rows_of = [None if value == "auto" else self._rows(value) for value in self._each("regression_window")]
+        exponents = [None if value == "auto" else int(value) for value in self._each("exponent")]
+        linear = form.variation != "constant"
+        weak = one_face.WeakForm(lengths, exponents, rows_of, bool(form.averaging), linear)
+        return weak, self._plan(min(_WINDOW_OF_TERMS, (samples - 1) // 2 * 2 + 1), StrongForm()) if own else None
 
     def _each(self, name: str) -> Sequence[Any]:
-        """Return a setting of every record: the same for all, or what an earlier call chose for each."""
-        value = self.settings[name]
-        if not isinstance(value, tuple | list):
-            return [value] * self._records
-        if len(value) != self._records:
-            raise ValueError(
-                f"{name} must be one number, or one for each of the {self._records} records; got {len(value)}; "
-                "give settings of a result with as many records"
-            )
-        return value
+        return self._request.each(name, self._data.records)
 
-    def _length(self, value: int | str) -> int | None:
-        """Return the samples of a test function, None for those that are to be chosen."""
-        if value == "auto":
-            return None
-        length = arguments.window_length("window_length", value, self.period, odd=True)
-        arguments.check_window("window_length", length, self.time.size, least=_SHORTEST_TEST_FUNCTION)
+    def _length(self, name: str, value: int | str, *, least: int) -> int:
+        """Return the samples of an odd window."""
+        length = arguments.window_length(name, value, self._data.period, odd=True)
+        arguments.check_window(name, length, self._data.time.size, least=least)
         return length
 
-    def _equations(self, value: int | str) -> int | None:
-        """Return the samples of a window of equations, None for those that are to be chosen."""
-        if value == "auto":
-            return None
-        rows = arguments.window_length("equations", value, self.period, odd=False)
-        arguments.check_window("equations", rows, self.time.size, least=len(self.unknowns) + 1)
+    def _rows(self, value: int | str) -> int:
+        """Return the samples of a regression window."""
+        rows = arguments.window_length("regression_window", value, self._data.period, odd=False)
+        self._check_rows(rows)
         return rows
 
-    @property
-    def _records(self) -> int:
-        return int(np.prod(self.angles.shape[:-1], dtype=int))
+    def _check_rows(self, rows: int) -> None:
+        arguments.check_window("regression_window", rows, self._data.time.size, least=len(self._unknowns) + 1)
 
-    @property
-    def _numbers(self) -> list[int]:
-        """What the core calls the unknowns: coefficients by their place, then the terms."""
-        unknown = [place for place, name in enumerate(COEFFICIENTS) if isinstance(self.parameters[name], str)]
-        return unknown + [len(COEFFICIENTS) + place for place in range(len(self.extra))]
-
-    def _weak_kinds(self, *, average: bool) -> list[str]:
-        """Return the kinds by the words of the core."""
-        words: list[str] = []
-        several = any(one.kind == "windowed" for one in self.unknowns if one.name not in {"inertia", "damping"})
-        for one in self.unknowns:
-            kind: str = one.kind
-            if kind == "auto":
-                kind = "windowed" if one.name == "stiffness" else "auto"
-            if average and several and kind == "windowed" and one.name in {"inertia", "damping"}:
-                # In windows short enough for the stiffness they cannot be told from it.
-                kind = "varying"
-            if kind == "varying" and (not average or not several):
-                kind = "windowed"
-            words.append(kind)
-        return words
-
-    def _plan(self, length: int) -> _core.LocalPolynomials:
+    def _plan(self, length: int, form: StrongForm) -> _core.LocalPolynomials:
         return plan(
             length,
             order=None,
-            max_order=arguments.whole_number("max_order", self.settings["max_order"], least=0),
-            criterion=self.settings["criterion"],
-            selection=self.settings["selection"] if self.settings["form"] == "strong" else "window",
+            max_order=form.max_order,
+            criterion=form.criterion,
+            selection=form.selection,
             derivatives=(0, 1, 2),
-            delta=self.period,
+            delta=self._data.period,
             noise=True,
-            quantisation=self.settings["quantisation"],
+            quantisation=self._quantisation,
         )
+
+    def _lags(self) -> list[float | None]:
+        """Return by how many samples the torque of every record is late; None where that is to be found."""
+        data, samples = self._data, self._data.time.size
+        lags = list(self._each("lag"))
+        for late in lags:
+            if late != "auto" and abs(late) >= samples * data.period:
+                raise ValueError(
+                    f"lag must be shorter than the record of {samples * data.period:.6g} s; got {late:.6g} s; "
+                    "give it in seconds, or align the channels"
+                )
+        found_earlier = self._request.lag_samples
+        if found_earlier is not None and len(found_earlier) == data.records:
+            return list(found_earlier)
+        return [None if late == "auto" else late / data.period for late in lags]
+
+    def _present(self, lags: Sequence[float | None]) -> list[str]:
+        """Return what cannot be missing from the equation."""
+        present = [term.name for term in self._terms]
+        if self._request.lag_samples is not None or any(lag != 0 for lag in lags):
+            present.append("lag")
+        if "stiffness" in self._known:
+            # A cubic spring beside a known one is not a question that anybody asked.
+            present.append("cubic")
+        return present
 
     def _motions(self, core_plan: _core.LocalPolynomials | None) -> _core.Motions:
-        columns: list[npt.NDArray[np.number] | str] = [unknown.name for unknown in self.extra]
-        if core_plan is not None and any(unknown.own is not None for unknown in self.extra):
-            (angle, velocity, _), *_ = core_plan.estimate(self.angles, workers=self.workers)
-            columns = [
-                unknown.own.values(self.time, angle, velocity) if unknown.own else unknown.name
-                for unknown in self.extra
-            ]
-        known = [None if isinstance(value, str) else value for value in self.parameters.values()]
-        return _core.Motions(self.angles, self.torques, known, columns)
+        data = self._data
+        columns: list[npt.NDArray[np.number] | str] = [term.name for term in self._terms]
+        if core_plan is not None and any(term.own is not None for term in self._terms):
+            (angle, velocity, _), *_ = core_plan.estimate(data.angles, workers=data.workers)
+            columns = [term.own.values(data.time, angle, velocity) if term.own else term.name for term in self._terms]
+        known = [self._known.get(name) for name in COEFFICIENTS]
+        return _core.Motions(data.angles, data.torques, known, columns)
 
-    def _mask(self, record: int) -> npt.NDArray[np.bool_] | None:
-        if self.mask is None:
-            return None
-        return np.ascontiguousarray(self.mask.reshape(-1, self.time.size)[record])
+    def _settings(
+        self, found: Sequence[one_face.Identified], form: one_face.WeakForm | one_face.StrongForm
+    ) -> dict[str, Any]:
+        """Return inputs and choices."""
+        request, data = self._request, self._data
 
-    def _result(self, found: Collected, chosen: Mapping[str, Any], words: Words) -> Identification:
-        known = {name: value for name, value in self.parameters.items() if not isinstance(value, str)}
-        found.add_known(known, self.step)
-        kinds: dict[str, str] = dict.fromkeys(COEFFICIENTS, "known")
-        kinds |= {unknown.name: unknown.kind for unknown in self.unknowns}
-        used = self.settings
-        same = (
-            "preset",
-            "form",
-            "max_order",
-            "criterion",
-            "selection",
-            "variation",
-            "filter_torque",
-            "lag",
-            "quantisation",
-        )
-        terms = tuple((one.own or one.name, one.kind) for one in self.unknowns if one.name not in COEFFICIENTS)
-        jumps: tuple[Any, ...] = tuple(tuple(self.time[samples].tolist()) for samples in found.jumps)
-        return Identification(
-            time=self.time[:: self.step],
-            values=found.values,
-            errors=found.errors,
-            covariances=found.covariances,
-            factors=found.factors,
-            constants=found.constants,
-            terms=[unknown.name for unknown in self.extra],
-            condition=found.condition,
-            residual_std=found.residual_std,
-            order=found.order,
-            status=found.status,
-            jumps=jumps if found.status.ndim > 1 else jumps[0],
-            settings={
-                **{name: used[name] for name in same},
-                "sample_rate": 1 / self.period,
-                "order": None,
-                **chosen,
-                "kinds": kinds,
-                "terms": terms,
-                "known": {name: value if isinstance(value, float) else None for name, value in known.items()},
-                "step": self.step,
-                "reasons": words.reasons,
-                "advice": words.advice,
-            },
-        )
+        def by_record(values: Sequence[Any]) -> Any:
+            return list(values) if data.batch else values[0]
 
+        used = {one.name: getattr(request.form, one.name) for one in fields(request.form)}
+        names = ("window_length", "exponent", "regression_window")
+        used |= {name: by_record([getattr(one, name) for one in found]) for name in names if name in used}
+        chosen: list[str] = []
+        lag: dict[str, Any] = {"lag": by_record(self._each("lag"))}
+        if isinstance(form, one_face.StrongForm):
+            used |= {"window_length": form.window_length, "regression_window": form.regression_window}
+            lag = {"lag": request.lag}
+        else:
+            chosen = [name for name in names if None in getattr(form, name)]
+            used["variation"] = "linear" if form.linear else "constant"
+            if request.lag == "auto":
+                chosen.append("lag")
+                lags = [one.lag or (0.0, None) for one in found]
+                lag = {
+                    "lag": by_record([late * data.period for late, _ in lags]),
+                    "lag_stderr": by_record([None if error is None else error * data.period for _, error in lags]),
+                    "lag_samples": [late for late, _ in lags],
+                }
+        kinds = dict.fromkeys(COEFFICIENTS, "known")
+        for place, unknown in enumerate(self._unknowns):
+            turned_out = {one.unknowns[place].kind for one in found}
+            # What is constant in some records and changes in others stays to be tested in each.
+            kinds[unknown.name] = turned_out.pop() if len(turned_out) == 1 else unknown.kind
+        return {
+            "method": request.name,
+            "form": "strong" if isinstance(request.form, StrongForm) else "weak",
+            **used,
+            **lag,
+            "quantisation": self._quantisation,
+            "kinds": kinds,
+            "terms": [[term.name, kinds[term.name]] for term in self._terms],
+            "own_terms": [term.name for term in self._terms if term.own is not None],
+            "known": {name: value if isinstance(value, float) else None for name, value in self._known.items()},
+            "sample_rate": 1 / data.period,
+            "step": data.step,
+            "chosen": chosen,
+        }
 
-def _of_batch(each: Sequence[Words]) -> Words:
-    """Return the advice of every record; reasons differ too much from one to the next."""
-    return Words((), tuple(f"record {record}: {line}" for record, words in enumerate(each) for line in words.advice))
+    def _words_of_weak_form(
+        self, found: Sequence[one_face.Identified], batch: Estimates, settings: dict[str, Any]
+    ) -> Words:
+        del batch
+        tested = [one.name for one in self._unknowns if one.kind == "auto"]
+        each = [
+            Explained(one, self._names, settings["chosen"], tested, self._data.period).words(
+                method_chosen=self._request.chosen
+            )
+            for one in found
+        ]
+        if not self._data.batch:
+            return each[0]
+        # Reasons differ too much from one record to the next.
+        return Words((), tuple(f"record {place}: {line}" for place, words in enumerate(each) for line in words.advice))
 
-
-def _in_strong_form(unknown: Unknown) -> Kind:
-    """Return the kind of an unknown where nothing tests it."""
-    if unknown.kind in {"windowed", "constant"}:
-        return unknown.kind
-    return "windowed" if unknown.name == "stiffness" or unknown.kind == "varying" else "constant"
-
-
-def _in_the_end(unknown: Unknown, changing: set[str]) -> Kind:
-    """Return the kind that an unknown turned out to be of."""
-    if unknown.kind == "auto" and unknown.name != "stiffness":
-        return "varying" if unknown.name in changing else "constant"
-    return "windowed" if unknown.kind == "auto" else unknown.kind
+    def _words_of_strong_form(
+        self, found: Sequence[one_face.Identified], batch: Estimates, settings: dict[str, Any]
+    ) -> Words:
+        mask, step = self._data.mask, self._data.step
+        return ExplainedStrong(
+            found=batch,
+            kinds={name: settings["kinds"][name] for name in self._names},
+            untested=[name for place, name in enumerate(self._names) if found[0].unknowns[place].untested],
+            settings=settings,
+            mask=None if mask is None else mask[..., ::step],
+        ).words()

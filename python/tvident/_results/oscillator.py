@@ -8,6 +8,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from tvident._equation import COEFFICIENTS
+from tvident._results.estimates import Estimates
+
 Array = npt.NDArray[np.float64]
 
 
@@ -20,19 +23,13 @@ class Oscillator:
 
     def __init__(
         self,
-        inertia: Array,
-        damping: Array,
-        stiffness: Array,
+        found: Estimates,
         errors: Mapping[str, Array],
-        covariances: dict[frozenset[str], Array],
-        factors: dict[str, Array],
     ) -> None:
-        self._inertia = inertia
-        self._damping = damping
-        self._stiffness = stiffness
+        self._inertia, self._damping, self._stiffness = (found.values[name] for name in COEFFICIENTS)
         self._errors = errors
-        self._covariances = covariances
-        self._factors = factors
+        self._covariances = found.covariances
+        self._factors = found.factors
 
     @cached_property
     def natural_frequency(self) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -12,9 +12,11 @@ import numpy.typing as npt
 
 from tvident._equation import UNITS
 from tvident._files import aligned, write_table
+from tvident._results.estimates import Estimates
 from tvident._results.oscillator import Oscillator
 from tvident._results.standard_errors import StandardErrors
-from tvident._status import Status, describe
+from tvident._results.words import Words
+from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status, describe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,7 +29,7 @@ _MOST_SENTENCES = 20
 
 def _range(value: Any) -> str:
     """Return one number, or those of several records."""
-    if not isinstance(value, tuple):
+    if not isinstance(value, list):
         return str(value)
     least, most = min(value, default=0), max(value, default=0)
     return str(least) if least == most else f"{least} to {most}"
@@ -64,12 +66,17 @@ class Identification:
     order : ndarray of uint8, shape (\*, n)
         Order of the polynomial around each sample; 0 in weak form, which has none.
     status : ndarray of uint16, shape (\*, n)
-        Flags of :class:`tvident.Status`.
+        Flags of :class:`tvident.Status` that hold at this sample: ``status == 0`` selects good samples.
+    record_status : Status, or ndarray of uint16 in the shape of the batch
+        Flags that hold for the whole record.
     jumps : tuple of float
         Times in seconds at which what is windowed jumps, where windows of all lengths are averaged; one such tuple a record in a batch.
+    reasons : tuple of str
+        What was chosen, and why.
+    advice : tuple of str
+        What to do about what looks wrong.
     settings : dict
-        What was used, what was chosen, in words why (``"reasons"``) and what to do (``"advice"``). ``identify(…, settings=…)`` uses it
-        again.
+        What was used and what was chosen, as plain JSON. ``identify(…, settings=result.settings)`` repeats it.
 
     Examples
     --------
@@ -84,44 +91,53 @@ class Identification:
 
     def __init__(
         self,
+        found: Estimates,
         *,
         time: Array,
-        values: dict[str, Array],
-        errors: dict[str, Array],
-        covariances: dict[frozenset[str], Array],
-        factors: dict[str, Array],
-        constants: dict[str, tuple[Any, Any]],
-        terms: list[str],
-        condition: Array,
-        residual_std: Array,
-        order: npt.NDArray[np.uint8],
-        status: npt.NDArray[np.uint16],
+        terms: Sequence[str],
         jumps: tuple[Any, ...],
+        words: Words,
         settings: dict[str, Any],
     ) -> None:
         self.time = time
-        self.inertia = values["inertia"]
-        self.damping = values["damping"]
-        self.stiffness = values["stiffness"]
-        self.terms = {name: values[name] for name in terms}
-        self.constants = constants
-        self.condition = condition
-        self.residual_std = residual_std
-        self.order = order
-        self.status = status
+        self.inertia = found.values["inertia"]
+        self.damping = found.values["damping"]
+        self.stiffness = found.values["stiffness"]
+        self.terms = {name: found.values[name] for name in terms}
+        self.constants = dict(found.constants)
+        self.condition = found.condition
+        self.residual_std = found.residual_std
+        self.order = found.order
+        self.status = found.status
+        self.record_status = found.record_status
         self.jumps = jumps
+        self.reasons = words.reasons
+        self.advice = words.advice
         self.settings = settings
-        known = {name: error for name, error in errors.items() if name not in factors}
+        known = {name: error for name, error in found.errors.items() if name not in found.factors}
         computed: dict[str, Callable[[], Array]] = {
-            name: partial(_product, factor, errors[name]) for name, factor in factors.items()
+            name: partial(_product, factor, found.errors[name]) for name, factor in found.factors.items()
         }
         enlarged = StandardErrors(known, computed)
-        self._oscillator = Oscillator(self.inertia, self.damping, self.stiffness, enlarged, covariances, factors)
+        self._oscillator = Oscillator(found, enlarged)
         derived = {
             "natural_frequency": self._oscillator.natural_frequency_error,
             "damping_ratio": self._oscillator.damping_ratio_error,
         }
         self.stderr = StandardErrors(known, computed | derived)
+
+    @property
+    def trusted(self) -> npt.NDArray[np.bool_]:
+        r"""Where numbers may be believed, shape (\*, n): the mask for plotting and averaging.
+
+        True where every parameter is a finite number, where the sample's status has none of INVALID, RANK_DEFICIENT, ILL_CONDITIONED and
+        NOISE_MODEL, and where that of the record has neither RANK_DEFICIENT nor ILL_CONDITIONED.
+        """
+        records = np.asarray(self.record_status)[..., np.newaxis]
+        trusted = (self.status & DOUBTFUL == 0) & (records & DOUBTFUL_RECORD == 0)
+        for values in (self.inertia, self.damping, self.stiffness, *self.terms.values()):
+            trusted &= np.isfinite(values)
+        return np.asarray(trusted)
 
     @property
     def natural_frequency(self) -> Array:
@@ -139,8 +155,8 @@ class Identification:
         Returns
         -------
         dict of str to ndarray, shape (n,)
-            Time, parameters and terms with their standard errors, and what is known of the equations. Units stand in
-            ``tvident.result.UNITS``.
+            Time, parameters and terms with their standard errors, what is known of the equations, the status of the sample and of the
+            record, and 1 where numbers may be believed.
 
         Raises
         ------
@@ -158,7 +174,9 @@ class Identification:
             columns[name] = value
             columns[f"{name}_stderr"] = self.stderr[name]
         columns |= {"condition": self.condition, "residual_std": self.residual_std}
-        return columns | {"order": self.order, "status": self.status}
+        columns |= {"order": self.order, "status": self.status}
+        columns["record_status"] = np.full(self.time.size, int(self.record_status), np.uint16)
+        return columns | {"trusted": self.trusted.astype(np.uint8)}
 
     def save(self, path: str | Path) -> None:
         """Write every column to a CSV or NPZ file, with units in the header.
@@ -188,20 +206,20 @@ class Identification:
         """
         s = self.settings
         n, seconds = self.time.size, float(self.time[-1] - self.time[0]) if self.time.size else 0.0
-        lines = [f"{n} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz, preset {s['preset']}"]
+        lines = [f"{n} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz, method {s['method']}"]
+        length, rows = (_range(s[name]) for name in ("window_length", "regression_window"))
         if s["form"] == "strong":
-            order = s["max_order"] if s["order"] is None else s["order"]
-            equations = f"{s['equations']} equations"
             lines.append(
-                f"windows of {s['window_length']} samples, orders up to {order} by {s['criterion']}, {equations}"
+                f"strong form: windows of {length} samples, orders up to {s['max_order']} by {s['criterion']}; "
+                f"regression windows of {rows} samples"
             )
         else:
-            length, exponent, equations = (_range(s[name]) for name in ("window_length", "exponent", "equations"))
             lines.append(
-                f"weak form: test functions of {length} samples, exponent {exponent}; windows of {equations} samples"
+                f"weak form: test functions of {length} samples, exponent {_range(s['exponent'])}; "
+                f"regression windows of {rows} samples"
             )
         lines.append("")
-        rows = [("parameter", "kind", "median", "5 %", "95 %", "std. error", "unit")]
+        cells = [("parameter", "kind", "median", "5 %", "95 %", "std. error", "unit")]
         values = {"inertia": self.inertia, "damping": self.damping, "stiffness": self.stiffness, **self.terms}
         for name, value in values.items():
             kind = s["kinds"][name]
@@ -211,14 +229,15 @@ class Identification:
             shown = [f"{number:.5g}" for number in numbers] + [f"{np.median(error):.2g}" if error.size else "nan"]
             if kind not in {"windowed", "varying"}:
                 shown[1] = shown[2] = ""
-            rows.append((name, kind, *shown, UNITS.get(name, "")))
-        lines += aligned(rows)
+            cells.append((name, kind, *shown, UNITS.get(name, "")))
+        lines += aligned(cells)
         for name, title in (("reasons", "what was chosen, and why"), ("advice", "what to do")):
-            if s[name]:
-                lines += ["", title, *(f"  {sentence}" for sentence in s[name][:_MOST_SENTENCES])]
-            if len(s[name]) > _MOST_SENTENCES:
-                lines.append(f"  and {len(s[name]) - _MOST_SENTENCES} more in settings[{name!r}]")
-        lines += ["", *describe(self.status)]
+            sentences = getattr(self, name)
+            if sentences:
+                lines += ["", title, *(f"  {sentence}" for sentence in sentences[:_MOST_SENTENCES])]
+            if len(sentences) > _MOST_SENTENCES:
+                lines.append(f"  and {len(sentences) - _MOST_SENTENCES} more in .{name}")
+        lines += ["", *describe(self.status, self.record_status)]
         return "\n".join(lines)
 
     def plot(self) -> Figure:

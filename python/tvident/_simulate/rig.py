@@ -21,6 +21,7 @@ Excitation: TypeAlias = Literal["multisine", "chirp", "random"]
 Function: TypeAlias = Callable[[Array], npt.ArrayLike]
 
 
+# All have a default, as users call it.
 def simulate_torsional_rig(
     duration: float = 20.0,
     sample_rate: float = 1000.0,

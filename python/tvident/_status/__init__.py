@@ -1,9 +1,6 @@
 """Says what is known of a number beside its value: flags, what they mean, how often they occur."""
 
 from tvident._status.counts import describe
-from tvident._status.flags import Status
+from tvident._status.flags import DOUBTFUL, DOUBTFUL_RECORD, RECORD_FLAGS, Status
 
-__all__ = [
-    "Status",
-    "describe",
-]
+__all__ = ["DOUBTFUL", "DOUBTFUL_RECORD", "RECORD_FLAGS", "Status", "describe"]

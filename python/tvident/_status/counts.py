@@ -7,25 +7,20 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tvident._status.flags import _OF_THE_RECORD, Status
+from tvident._status.flags import Status
 
 
-def describe(status: npt.NDArray[Any]) -> list[str]:
-    """Return a line for every flag that occurs: how often, and what it means."""
+def describe(status: npt.NDArray[Any], record_status: npt.ArrayLike = 0) -> list[str]:
+    """Return a line for every flag that occurs: how often, and what it means; then those of the records."""
     if not status.size:
         return ["no samples"]
+    lines = [f"{float(np.mean(status == 0)):6.1%}  good"]
     shares = {flag: float(np.mean(status & flag != 0)) for flag in Status}
-    everywhere = [flag for flag in _OF_THE_RECORD if shares[flag] == 1]
-    own = np.uint16(0xFFFF & ~sum(everywhere))
-    lines = [
-        f"{float(np.mean(status & own == 0)):6.1%}  good"
-        + (" but for what holds for the whole record" if everywhere else "")
-    ]
-    lines += [
-        f"{shares[flag]:6.1%}  {flag.name}: {flag.advice}"
-        for flag in Status
-        if shares[flag] > 0 and flag not in everywhere
-    ]
-    if everywhere:
-        lines.append(f"record  {', '.join(flag.name or '' for flag in everywhere)}: see what to do, or tvident.Status")
+    lines += [f"{share:6.1%}  {flag.name}: {flag.advice}" for flag, share in shares.items() if share > 0]
+    records = np.atleast_1d(np.asarray(record_status))
+    counts = {flag: int(np.count_nonzero(records & flag)) for flag in Status}
+    for flag, count in counts.items():
+        if count:
+            which = "record" if records.size == 1 else f"{count} of {records.size} records"
+            lines.append(f"{which:>6}  {flag.name}: {flag.advice}")
     return lines

@@ -1,4 +1,4 @@
-"""What a flag says of a sample, and what to do about it."""
+"""What a flag says of a sample or of a record, and what to do about it."""
 
 from __future__ import annotations
 
@@ -6,10 +6,17 @@ import enum
 
 
 class Status(enum.IntFlag):
-    """Flags of one window; 0 is good.
+    """Flags of one sample, or of a whole record; 0 is good.
 
     Data never raises: a window that something is wrong with gets a status, and the rest of the record goes on. Arrays hold the flags
     as ``uint16``, so ``fit.status & Status.EDGE`` works on whole arrays.
+
+    There are two groups. Flags of a sample stand in ``result.status`` and say what holds at that sample only: INVALID, EDGE, GAP,
+    LOWEST_ORDER, HIGHEST_ORDER, EXACT, RANK_DEFICIENT, ILL_CONDITIONED, NOISE_MODEL. Flags of a record stand in ``result.record_status``
+    and say what holds for the whole record: NOISE_MODEL, COLOURED, KIND_CONTRADICTED, WINDOW_LIMIT, LAG_SUSPECTED, TERM_SUSPECTED,
+    RANK_DEFICIENT, ILL_CONDITIONED. Three are in both groups: RANK_DEFICIENT and ILL_CONDITIONED are flags of the record where they
+    concern its constants, and of a sample where they concern the window around it; NOISE_MODEL is a flag of a sample where it holds
+    outside a mask only.
 
     Examples
     --------
@@ -39,10 +46,12 @@ class Status(enum.IntFlag):
     """The residual is at the floor set by rounding or quantisation, so there was no noise to weigh orders against."""
 
     RANK_DEFICIENT = 64
-    """The equations do not determine the parameters (goes with INVALID). Excite the system, or leave a parameter out."""
+    """The equations do not determine the parameters: those of the window around a sample, or the constants of the record. Their values
+    are NaN, and INVALID says so. Excite the system, or leave a parameter out."""
 
     ILL_CONDITIONED = 128
-    """The equations hardly tell the parameters apart. Look at the condition number, and at the standard errors before any value."""
+    """The equations hardly tell the parameters apart: those of the window around a sample, or the constants of the record. Look at the
+    condition number, and at the standard errors before any value."""
 
     NOISE_MODEL = 256
     """Equations are predicted much worse than the noise of the channels explains: it is coloured, the torque is late, or a term is
@@ -99,12 +108,20 @@ _ADVICE = {
     Status.ILL_CONDITIONED: "the equations hardly tell the parameters apart: look at the standard errors first",
 }
 
-_OF_THE_RECORD = (
-    Status.NOISE_MODEL,
-    Status.COLOURED,
-    Status.KIND_CONTRADICTED,
-    Status.WINDOW_LIMIT,
-    Status.LAG_SUSPECTED,
-    Status.TERM_SUSPECTED,
+RECORD_FLAGS = (
+    Status.RANK_DEFICIENT
+    | Status.ILL_CONDITIONED
+    | Status.NOISE_MODEL
+    | Status.COLOURED
+    | Status.KIND_CONTRADICTED
+    | Status.WINDOW_LIMIT
+    | Status.LAG_SUSPECTED
+    | Status.TERM_SUSPECTED
 )
-"""Flags that every sample of a record has, or none."""
+"""Flags that concern a whole record."""
+
+DOUBTFUL = Status.INVALID | Status.RANK_DEFICIENT | Status.ILL_CONDITIONED | Status.NOISE_MODEL
+"""Flags of a sample whose number is not to be believed."""
+
+DOUBTFUL_RECORD = Status.RANK_DEFICIENT | Status.ILL_CONDITIONED
+"""Flags of a record none of whose numbers is to be believed."""

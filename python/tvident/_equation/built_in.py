@@ -1,0 +1,46 @@
+"""Terms that are called by name: the one place in Python that knows them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class BuiltIn:
+    """A term that the core has by the same name.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    unit : str
+        Unit of its factor.
+    meaning : str
+        What its factor multiplies.
+    suspicion : str
+        What is said where it seems to be missing, with a place for the amount.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    suspicion: str
+
+
+BUILT_IN = {
+    term.name: term
+    for term in (
+        BuiltIn("offset", "N m", "1: a constant torque", "a constant torque of {amount} seems to act"),
+        BuiltIn("coulomb", "N m", "the sign of the velocity: dry friction", "dry friction of {amount} seems to act"),
+        BuiltIn(
+            "cubic",
+            "N m/rad^3",
+            "the cube of the angle: a hardening spring",
+            "the spring seems to harden or soften, by {amount}",
+        ),
+        BuiltIn("gravity", "N m", "the sine of the angle: a pendulum", "gravity of {amount} seems to act"),
+    )
+}
+"""Built-in terms by name."""
+
+TERM_NAMES = tuple(BUILT_IN)

@@ -1,0 +1,80 @@
+"""Results of records, put back into the shape of the batch and called by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._equation import COEFFICIENTS
+from tvident._identify.one_face import Identified
+from tvident._results import Estimates
+from tvident._status import Status
+
+
+def estimates(
+    shape: tuple[int, ...],
+    names: Sequence[str],
+    found: Sequence[Identified],
+    known: Mapping[str, npt.NDArray[np.number] | float],
+) -> Estimates:
+    """Return what was found in every record, by name, and beside it what was known beforehand.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Shape of the batch; empty for a single record.
+    names : sequence of str
+        Unknowns in the order of the core.
+    found : sequence of Identified
+        One a record.
+    known : mapping of str to float or ndarray
+        One value, or one for every sample there is a result at.
+    """
+    count = found[0].status.size
+
+    def joined(arrays: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+        """Join one array a record, without a copy of a single one or of one number for all samples."""
+        if len({one.size for one in arrays}) > 1:
+            arrays = [np.broadcast_to(one, count) for one in arrays]
+        together = np.stack(arrays) if len(arrays) > 1 else arrays[0]
+        shaped = together.reshape(*shape, together.shape[-1])
+        return shaped if shaped.shape[-1] == count else np.broadcast_to(shaped, (*shape, count))
+
+    def alone(values: Sequence[float]) -> Any:
+        """Return one number a record, in the shape of the batch."""
+        return np.array(values).reshape(shape) if shape else float(values[0])
+
+    values, errors, factors, constants = {}, {}, {}, {}
+    for place, name in enumerate(names):
+        each = [one.unknowns[place] for one in found]
+        values[name], errors[name] = joined([one.values for one in each]), joined([one.stderr for one in each])
+        if any(one.factor != 1 for one in each):
+            factors[name] = np.array([one.factor for one in each]).reshape(*shape, 1)
+        if all(one.kind == "constant" for one in each):
+            # Where only some records say that it changes there is no one number for all.
+            constants[name] = (alone([one.values[0] for one in each]), alone([one.stderr[0] for one in each]))
+    for name, value in known.items():
+        values[name] = np.broadcast_to(np.asarray(value, dtype=np.float64), (*shape, count))
+        errors[name] = np.broadcast_to(np.float64(0), (*shape, count))
+    pairs = combinations(range(sum(name in COEFFICIENTS for name in names)), 2)
+    flags = np.array([one.record_status for one in found], dtype=np.uint16)
+    has_orders = found[0].order.size == count
+    return Estimates(
+        values=values,
+        errors=errors,
+        factors=factors,
+        covariances={
+            frozenset((names[one], names[other])): joined([record.covariances[one, other] for record in found])
+            for one, other in pairs
+        },
+        constants=constants,
+        condition=joined([one.condition for one in found]),
+        residual_std=joined([one.residual_std for one in found]),
+        order=joined([one.order for one in found]) if has_orders else np.zeros((*shape, count), np.uint8),
+        status=joined([one.status for one in found]),
+        record_status=flags.reshape(shape) if shape else Status(int(flags[0])),
+    )

@@ -1,0 +1,46 @@
+"""What was estimated for a batch of records, by name and in the shape of the batch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._status import Status
+
+Array: TypeAlias = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Estimates:
+    r"""Numbers of a batch of records.
+
+    Attributes
+    ----------
+    values, errors : mapping of str to ndarray, shape (\*, n)
+        Inertia, damping, stiffness and terms, unknown or known; errors before `factors`.
+    factors : mapping of str to ndarray, shape (\*, 1)
+        What standard errors are still to be multiplied by, where that is left to those who ask for them.
+    covariances : mapping of frozenset to ndarray, shape (\*, n)
+        Of pairs of coefficients, before `factors`.
+    constants : mapping of str to (value, stderr)
+        What is constant in every record: numbers for a single record, arrays in the batch's shape otherwise.
+    condition, residual_std : ndarray, shape (\*, n)
+    order : ndarray of uint8, shape (\*, n)
+    status : ndarray of uint16, shape (\*, n)
+    record_status : Status or ndarray of uint16, shape (\*)
+    """
+
+    values: Mapping[str, Array]
+    errors: Mapping[str, Array]
+    factors: Mapping[str, Array]
+    covariances: Mapping[frozenset[str], Array]
+    constants: Mapping[str, tuple[Any, Any]]
+    condition: Array
+    residual_std: Array
+    order: npt.NDArray[np.uint8]
+    status: npt.NDArray[np.uint16]
+    record_status: Status | npt.NDArray[np.uint16]

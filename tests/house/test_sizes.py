@@ -1,0 +1,65 @@
+"""Files and functions are small enough to be read at once, or say beside them why not."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+from statistics import median
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+LONGEST_FILE, MEDIAN_FILE = 450, 200
+LONGEST_FUNCTION = 80
+"""Lines of a function, without its docstring."""
+MOST_PARAMETERS = 7
+"""Parameters of a function, without self. A comment in the line above says why there are more: users' own options, say."""
+
+SOURCES = {
+    "package": sorted((ROOT / "python").rglob("*.py")),
+}
+FILES = [path for paths in SOURCES.values() for path in paths]
+
+
+def lines(path: Path) -> list[str]:
+    return path.read_text(encoding="utf-8").splitlines()
+
+
+def functions(path: Path) -> Iterator[ast.FunctionDef]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef):
+            yield node
+
+
+def length(function: ast.FunctionDef) -> int:
+    """Give the lines of a function without its docstring."""
+    first = function.body[0]
+    documented = ast.get_docstring(function) is not None
+    docstring = (first.end_lineno or 0) - first.lineno + 1 if documented else 0
+    return (function.end_lineno or 0) - function.lineno + 1 - docstring
+
+
+def parameters(function: ast.FunctionDef) -> int:
+    names = [one.arg for one in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs)]
+    return sum(name not in {"self", "cls"} for name in names)
+
+
+def has_reason(path: Path, function: ast.FunctionDef) -> bool:
+    """Return whether a comment stands above the function."""
+    first = min([function.lineno, *(decorator.lineno for decorator in function.decorator_list)])
+    return lines(path)[first - 2].strip().startswith("#")
+
+
+@pytest.mark.parametrize("sources", SOURCES)
+def test_files_are_short(sources: str) -> None:
+    counts = {path: len(lines(path)) for path in SOURCES[sources]}
+    assert not {str(path): count for path, count in counts.items() if count > LONGEST_FILE}
+    assert median(counts.values()) <= MEDIAN_FILE
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_functions_are_short_or_say_why_not(path: Path) -> None:
+    long = [one for one in functions(path) if length(one) > LONGEST_FUNCTION or parameters(one) > MOST_PARAMETERS]
+    assert not [one.name for one in long if not has_reason(path, one)]

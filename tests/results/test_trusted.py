@@ -1,0 +1,112 @@
+"""What the flags of samples and of the record say together."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import tvident
+from tvident import Status
+
+OF_A_SAMPLE = (
+    Status.INVALID
+    | Status.EDGE
+    | Status.GAP
+    | Status.LOWEST_ORDER
+    | Status.HIGHEST_ORDER
+    | Status.EXACT
+    | Status.RANK_DEFICIENT
+    | Status.ILL_CONDITIONED
+    | Status.NOISE_MODEL
+)
+OF_A_RECORD = (
+    Status.RANK_DEFICIENT
+    | Status.ILL_CONDITIONED
+    | Status.NOISE_MODEL
+    | Status.COLOURED
+    | Status.KIND_CONTRADICTED
+    | Status.WINDOW_LIMIT
+    | Status.LAG_SUSPECTED
+    | Status.TERM_SUSPECTED
+)
+CONSTANT: dict[str, Any] = {"inertia": "constant", "damping": "constant", "stiffness": "constant"}
+
+
+@pytest.fixture(scope="module")
+def rig() -> tvident.Recording:
+    return tvident.simulate_torsional_rig(duration=6.0, angle_noise=1e-3)
+
+
+def sine() -> tuple[Any, Any]:
+    t = np.arange(6000) / 1000
+    generator = np.random.default_rng(0)
+    angle = np.sin(2 * np.pi * 3 * t)
+    return angle + 1e-4 * generator.standard_normal(t.size), 10 * angle + 0.01 * generator.standard_normal(t.size)
+
+
+def test_every_flag_is_in_a_group_and_the_documentation_says_in_which() -> None:
+    assert sum(Status) == OF_A_SAMPLE | OF_A_RECORD
+    text = " ".join((Status.__doc__ or "").split())
+    samples, records = text.split("Flags of a sample stand in")[1].split("Flags of a record stand in")
+    records = records.split("Three are in both groups")[0]
+    assert [str(flag.name) in samples for flag in Status] == [flag in OF_A_SAMPLE for flag in Status]
+    assert [str(flag.name) in records for flag in Status] == [flag in OF_A_RECORD for flag in Status]
+
+
+@pytest.mark.parametrize(
+    "call",
+    [{}, {"method": "paper"}, CONSTANT, {"method": tvident.StrongForm(), **CONSTANT}, {"inertia": "windowed"}],
+    ids=str,
+)
+def test_flags_of_samples_and_of_records_stand_apart(rig: tvident.Recording, call: dict[str, Any]) -> None:
+    for angle, torque in ((rig.angle, rig.torque), sine(), (rig.angle[5:], rig.torque[:-5])):
+        result = tvident.identify(angle, torque, sample_rate=1000, **call)
+        assert np.bitwise_or.reduce(result.status) & ~np.uint16(OF_A_SAMPLE) == 0
+        assert result.record_status & ~OF_A_RECORD == 0
+        assert isinstance(result.record_status, int)
+        good = result.trusted
+        for name in ("inertia", "damping", "stiffness"):
+            assert np.isfinite(getattr(result, name)[good]).all()
+        doubtful = Status.INVALID | Status.RANK_DEFICIENT | Status.ILL_CONDITIONED | Status.NOISE_MODEL
+        expected = result.status & doubtful == 0
+        if result.record_status & (Status.RANK_DEFICIENT | Status.ILL_CONDITIONED):
+            expected[:] = False
+        np.testing.assert_array_equal(good, expected)
+
+
+def test_a_late_torque_concerns_the_record_and_leaves_its_samples_good(rig: tvident.Recording) -> None:
+    result = tvident.identify(rig.angle[5:], rig.torque[:-5], sample_rate=1000)
+    assert Status.LAG_SUSPECTED in result.record_status
+    assert (result.status == 0).mean() > 0.9
+    assert (result.status & Status.LAG_SUSPECTED == 0).all()
+    assert any(line.startswith("record  LAG_SUSPECTED") for line in result.summary().splitlines())
+    assert "whole record: " in result.plot().axes[-1].get_xlabel()
+
+
+def test_what_a_record_does_not_determine_is_not_trusted() -> None:
+    result = tvident.identify(*sine(), sample_rate=1000, **CONSTANT)
+    assert result.record_status & (Status.ILL_CONDITIONED | Status.RANK_DEFICIENT)
+    assert not result.trusted.any()
+
+
+def test_records_of_a_batch_have_flags_of_their_own(rig: tvident.Recording) -> None:
+    n = rig.angle.size - 5
+    angle = np.stack([rig.angle[:n], rig.angle[5:]])[np.newaxis]
+    torque = np.stack([rig.torque[:n], rig.torque[:n]])[np.newaxis]
+    result = tvident.identify(angle, torque, sample_rate=1000)
+    flags = np.asarray(result.record_status)
+    assert flags.shape == (1, 2)
+    assert flags.dtype == np.uint16
+    assert (flags & Status.LAG_SUSPECTED != 0).tolist() == [[False, True]]
+    assert result.trusted.shape == angle.shape
+    assert "1 of 2 records  LAG_SUSPECTED" in result.summary()
+
+
+def test_reasons_and_advice_are_attributes_and_no_settings(rig: tvident.Recording) -> None:
+    result = tvident.identify(rig.angle[5:], rig.torque[:-5], sample_rate=1000)
+    assert result.reasons
+    assert all(isinstance(line, str) and line in result.summary() for line in (*result.reasons, *result.advice))
+    assert any("give lag=" in line for line in result.advice)
+    assert not {"reasons", "advice"} & result.settings.keys()
