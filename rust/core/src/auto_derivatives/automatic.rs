@@ -7,17 +7,18 @@
 use std::num::NonZeroUsize;
 
 use crate::auto_derivatives::boundary;
+use crate::auto_derivatives::candidate_weights::Refinement;
 use crate::auto_derivatives::candidates::Target;
 use crate::auto_derivatives::global_choice::{Pair, SHORTEST, Survey, rounded};
-use crate::auto_derivatives::local_average::{DerivativeOutputs, Refinement};
+use crate::auto_derivatives::local_average::DerivativeOutputs;
 use crate::error::Error;
 use crate::exec::pool::Watch;
 use crate::local_polynomials::boundary::End;
 use crate::local_polynomials::options::HIGHEST_ORDER;
-use crate::noise::channel::quantisation_step;
+use crate::noise::quantisation::quantisation_step;
 use crate::record::samples::{Samples, is_usable};
 use crate::record::subsample::stretches;
-use crate::simd::vectors::Instructions;
+use crate::simd::instructions::Instructions;
 use crate::status::Status;
 
 /// The fewest samples of a record for which a window can be chosen.

@@ -19,10 +19,10 @@
 
 use std::ops::Range;
 
+use crate::auto_derivatives::candidate_weights::Reference;
 use crate::auto_derivatives::candidates::{Target, product};
 use crate::auto_derivatives::eigen;
 use crate::auto_derivatives::global_choice::{CheckCancelled, Pair, rounded};
-use crate::auto_derivatives::local_average::Reference;
 use crate::error::Error;
 use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::boundary::End;

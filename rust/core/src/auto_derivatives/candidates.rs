@@ -12,7 +12,7 @@ use std::ops::Range;
 use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::coefficients::{self, Coefficients, Projected};
 use crate::record::samples::Samples;
-use crate::simd::vectors::Instructions;
+use crate::simd::instructions::Instructions;
 
 /// What is to be estimated, and by which orders.
 #[derive(Clone, Copy, Debug)]

@@ -252,7 +252,7 @@ pub(crate) fn rounded(number: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::vectors::Instructions;
+    use crate::simd::instructions::Instructions;
 
     #[test]
     fn a_window_is_judged_where_it_and_what_it_is_compared_with_fit() {

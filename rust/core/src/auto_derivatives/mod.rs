@@ -2,6 +2,7 @@
 
 pub(crate) mod automatic;
 pub(crate) mod boundary;
+pub(crate) mod candidate_weights;
 pub(crate) mod candidates;
 pub(crate) mod eigen;
 pub(crate) mod global_choice;

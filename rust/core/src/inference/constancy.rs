@@ -12,7 +12,7 @@ use crate::regression::constants::{Expected, pool};
 use crate::regression::fit::Fit;
 use crate::regression::problem::Problem;
 use crate::regression::row_covariance::RowCovariance;
-use crate::simd::vectors::Instructions;
+use crate::simd::instructions::Instructions;
 
 /// Blocks that a record is cut into.
 const BLOCKS: usize = 8;
@@ -118,7 +118,7 @@ pub(crate) fn chi_squared_beyond(value: f64, freedom: usize) -> f64 {
 }
 
 /// `erfc(x)` for `x ≥ 0`, by its power series near zero and its continued fraction beyond.
-pub(crate) fn complementary_error(x: f64) -> f64 {
+fn complementary_error(x: f64) -> f64 {
     if x < 2.0 {
         let (mut sum, mut term) = (x, x);
         for n in 1..60 {

@@ -7,7 +7,7 @@ use crate::regression::fit::Fit;
 use crate::regression::predictor::{Predictor, without_constants};
 use crate::regression::problem::Problem;
 use crate::regression::window_length::Scale;
-use crate::simd::vectors::Instructions;
+use crate::simd::instructions::Instructions;
 
 /// The largest squared error, over the noise's, that a single row counts with.
 const MOST: f64 = 9.0;

@@ -13,7 +13,7 @@ use crate::regression::layout::Layout;
 use crate::regression::model::Model;
 use crate::regression::problem::Correlated;
 use crate::regression::row_covariance::RowCovariance;
-use crate::simd::vectors::Instructions;
+use crate::simd::instructions::Instructions;
 
 /// A term is suspected where its factor exceeds its standard error so many times.
 const CONSPICUOUS: f64 = 5.0;

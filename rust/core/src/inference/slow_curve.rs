@@ -34,7 +34,7 @@ impl Varying {
 
 /// Interpolates between points a distance of `spacing` apart by the cubic through the nearest four; constant beyond the ends. Returns
 /// the value and its slope.
-pub(crate) fn interpolate(values: &[f64], place: f64, spacing: f64) -> (f64, f64) {
+fn interpolate(values: &[f64], place: f64, spacing: f64) -> (f64, f64) {
     let last = values.len() - 1;
     let clamped = place.clamp(0.0, last as f64);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the points")]

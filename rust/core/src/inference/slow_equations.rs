@@ -11,13 +11,14 @@ use crate::regression::solved::{Solved, is_determined};
 use crate::regression::summary::absorb;
 use crate::regression::window_length::Scale;
 use crate::simd::f64x8::{Packet, WIDTH};
-use crate::simd::vectors::{Instructions, Kernel, Lanes, dispatch};
+use crate::simd::instructions::Instructions;
+use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
 /// Coefficients of the polynomials in time.
-pub(crate) const TERMS: usize = 3;
+const TERMS: usize = 3;
 
 /// Points within one reach.
-pub(crate) const DENSITY: usize = 8;
+const DENSITY: usize = 8;
 
 /// The equations that windows left for slow coefficients, which come first among their constants.
 pub(crate) struct Slow<'a> {
@@ -66,7 +67,7 @@ impl Slow<'_> {
 }
 
 /// Fills gaps from the nearest number; nothing where there is none.
-pub(crate) fn fill(values: &[Option<f64>]) -> Option<Vec<f64>> {
+fn fill(values: &[Option<f64>]) -> Option<Vec<f64>> {
     let known: Vec<(usize, f64)> =
         values.iter().enumerate().filter_map(|(place, value)| value.map(|value| (place, value))).collect();
     let nearest = |place: usize| known.iter().min_by_key(|(other, _)| other.abs_diff(place)).map(|(_, value)| *value);
@@ -149,7 +150,7 @@ impl Kernel for Points<'_, '_> {
 }
 
 /// The largest squared error, over the noise's, that a single row counts with.
-pub(crate) const MOST: f64 = 25.0;
+const MOST: f64 = 25.0;
 
 impl Slow<'_> {
     /// Mean squared error of predicting rows, over the noise's variance: slow coefficients from equations that the row had no part in,

@@ -14,7 +14,7 @@ use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
 use crate::regression::window_length::Scale;
-use crate::simd::vectors::Instructions;
+use crate::simd::instructions::Instructions;
 
 /// Multiples of what a prediction leaves out that are tried as reach.
 const REACHES: [f64; 10] = [1.6, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 23.0, 32.0];

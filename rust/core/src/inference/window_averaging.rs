@@ -14,7 +14,7 @@ use crate::regression::constants::Expected;
 use crate::regression::problem::Problem;
 use crate::regression::subsample::holds;
 use crate::regression::window_length::{Cells, Scale};
-use crate::simd::vectors::Instructions;
+use crate::simd::instructions::Instructions;
 
 /// The largest squared error, over the noise's, that a single row counts with.
 const MOST: f64 = 16.0;

@@ -18,7 +18,7 @@ use crate::simd::vectors::{Kernel, Lanes, MOST_LANES};
 use crate::status::Status;
 
 /// Rows of every lane between two questions whether to go on: with 16 regressors some 10 ms.
-pub(crate) const ASK: usize = 256;
+const ASK: usize = 256;
 
 /// The kernel of a run.
 pub(crate) struct RollingKernel<'a, 'b, 'c, H: Dimensions> {
@@ -203,6 +203,6 @@ impl<H: Dimensions> RollingKernel<'_, '_, '_, H> {
 
 /// Flags as the tile holds them.
 #[inline(always)]
-pub(crate) fn code<S: Lanes>(simd: S, status: Status) -> S::f64s {
+fn code<S: Lanes>(simd: S, status: Status) -> S::f64s {
     simd.splat_f64s(256.0 * f64::from(status.bits()))
 }

@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::lanes::output::{Elements, Outputs, split_off};
 use crate::least_squares::givens_factor::MOST_REGRESSORS;
 use crate::record::samples::Samples;
-use crate::simd::vectors::Instructions;
+use crate::simd::instructions::Instructions;
 
 /// A condition number from which on parameters have lost half of their digits.
 pub const HALF_OF_THE_DIGITS: f64 = 1e8;

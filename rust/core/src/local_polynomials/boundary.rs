@@ -17,7 +17,7 @@ use std::ops::Range;
 use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
 use crate::local_polynomials::estimates::Estimates;
 use crate::local_polynomials::options::{Options, Order};
-use crate::local_polynomials::order_selection::Wanted;
+use crate::local_polynomials::order_shares::Wanted;
 use crate::local_polynomials::single_window::Window;
 use crate::record::samples::Samples;
 use crate::status::Status;

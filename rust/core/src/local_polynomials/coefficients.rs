@@ -7,10 +7,9 @@ use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::engine::{self, Walk, engine};
 use crate::local_polynomials::estimates::Estimates;
 use crate::local_polynomials::evaluate::Finish;
-use crate::local_polynomials::options::Selection;
-use crate::local_polynomials::options::{Options, Order};
+use crate::local_polynomials::options::{Options, Order, Selection};
 use crate::record::samples::Samples;
-use crate::simd::vectors::Instructions;
+use crate::simd::instructions::Instructions;
 
 /// Plan of a walk that gives coefficients.
 #[derive(Debug)]

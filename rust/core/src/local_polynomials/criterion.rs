@@ -10,7 +10,8 @@
 //! logarithm is taken of any window.
 
 use crate::local_polynomials::sliding_projection::{ROUNDING, State};
-use crate::simd::vectors::{Lanes, TABLE, unroll};
+use crate::simd::unroll::unroll;
+use crate::simd::vectors::{Lanes, TABLE};
 
 /// What is minimised to choose the order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

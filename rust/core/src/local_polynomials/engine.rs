@@ -20,7 +20,8 @@ use crate::local_polynomials::sliding_projection::Projection;
 use crate::record::buffer::Stretch;
 use crate::record::samples::Samples;
 use crate::simd::aligned::Aligned;
-use crate::simd::vectors::{Instructions, MOST_LANES, dispatch};
+use crate::simd::instructions::Instructions;
+use crate::simd::vectors::{MOST_LANES, dispatch};
 use crate::status::Status;
 
 /// Samples copied out of a record at a time, about: several runs of short windows.

@@ -5,7 +5,8 @@ use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
 use crate::local_polynomials::criterion::{Tables, choose};
 use crate::local_polynomials::options::{Options, Order};
 use crate::local_polynomials::sliding_projection::State;
-use crate::simd::vectors::{Lanes, TABLE, unroll};
+use crate::simd::unroll::unroll;
+use crate::simd::vectors::{Lanes, TABLE};
 use crate::status::Status;
 
 /// A linear function of a window's coefficients that is even or odd in time.

@@ -12,9 +12,11 @@ pub(crate) mod kernels;
 pub(crate) mod neighbour_sums;
 pub(crate) mod options;
 pub(crate) mod order_selection;
+pub(crate) mod order_shares;
 pub(crate) mod plan;
 pub(crate) mod single_window;
 pub(crate) mod sliding_projection;
+pub(crate) mod span;
 
 pub use basis::Basis;
 pub use boundary::End;

@@ -1,7 +1,7 @@
 //! What to estimate in every window, and how its order comes about.
 
 use crate::local_polynomials::criterion::Criterion;
-use crate::simd::vectors::Instructions;
+use crate::simd::instructions::Instructions;
 
 /// The highest polynomial order that is offered.
 pub const HIGHEST_ORDER: usize = 15;

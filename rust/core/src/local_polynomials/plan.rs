@@ -17,7 +17,7 @@ use crate::local_polynomials::engine::{Walk, engine};
 use crate::local_polynomials::estimates::Estimates;
 use crate::local_polynomials::evaluate::Finish;
 use crate::local_polynomials::options::{HIGHEST_ORDER, Options, Order, Selection};
-use crate::local_polynomials::order_selection::{self, Selector, Wanted};
+use crate::local_polynomials::order_shares::{SelectionScratch, Selector, Wanted};
 use crate::local_polynomials::single_window::Window;
 use crate::record::samples::Samples;
 
@@ -39,7 +39,7 @@ pub struct LocalPolynomials {
 #[derive(Debug)]
 pub struct PolynomialScratch {
     walk: crate::local_polynomials::engine::EngineScratch,
-    selection: Option<order_selection::SelectionScratch>,
+    selection: Option<SelectionScratch>,
 }
 
 /// A piece of work: some samples of a record, and where what is known of them goes.

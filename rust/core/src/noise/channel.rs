@@ -14,10 +14,11 @@
 use crate::error::Error;
 use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
 use crate::local_polynomials::coefficients::{Coefficients, Projected};
+use crate::noise::quantisation::{STRETCHES, quantisation_step};
 use crate::noise::spectrum::power_of_whole_segments;
 use crate::record::samples::{Samples, is_usable};
 use crate::record::subsample::stretches;
-use crate::simd::vectors::Instructions;
+use crate::simd::instructions::Instructions;
 
 /// Half-widths of the windows that the noise is read from.
 const HALVES: [usize; 3] = [12, 20, 35];
@@ -30,20 +31,6 @@ pub const FEWEST_SAMPLES: usize = 2 * HALVES[0] + 1;
 
 /// Windows that are looked at, at most: so many know the variance to 0.7 %.
 const MOST_WINDOWS: usize = 1 << 17;
-
-/// Differences that a step is sought in, at most, and those that must be whole steps before it is believed.
-const MOST_DIFFERENCES: usize = 1 << 12;
-const FEWEST_DIFFERENCES: usize = 16;
-
-/// Stretches that a longer record is looked at in.
-const STRETCHES: usize = 64;
-
-/// Rounding of differences of numbers of single and of double precision, in units of the largest number. Single precision comes first,
-/// since its own last place is a step too.
-const PRECISIONS: [f64; 2] = [8.0 * f32::EPSILON as f64, 8.0 * f64::EPSILON];
-
-/// A step must be so many times as large as rounding.
-const ABOVE_ROUNDING: f64 = 64.0;
 
 /// Bands of frequencies that are searched for one without signal, samples of a segment whose spectrum is taken, and how many segments a
 /// record must hold.
@@ -131,55 +118,8 @@ fn variance(record: &dyn Samples, half: usize, instructions: Instructions) -> f6
     if count == 0 { f64::NAN } else { sum / f64::from(count) }
 }
 
-/// The step that all differences of neighbouring samples are multiples of, or zero where there is none.
-///
-/// Costs nothing to speak of: at most 4096 differences are looked at.
-#[must_use]
-pub fn quantisation_step(record: &dyn Samples) -> f64 {
-    let mut differences = Vec::new();
-    let mut largest = 0.0_f64;
-    let mut samples = Vec::new();
-    for places in stretches(record.len(), MOST_DIFFERENCES, STRETCHES) {
-        samples.resize(places.len(), 0.0);
-        record.read(places.start, &mut samples);
-        let usable = samples.iter().filter(|value| is_usable(**value));
-        largest = usable.fold(largest, |largest, value| largest.max(value.abs()));
-        differences.extend(samples.windows(2).map(|pair| (pair[1] - pair[0]).abs()));
-    }
-    differences.retain(|&difference| is_usable(difference) && difference > 0.0);
-    differences.sort_unstable_by(f64::total_cmp);
-    if differences.len() < FEWEST_DIFFERENCES {
-        return 0.0;
-    }
-    let step = |precision: &f64| common_step(&differences, precision * largest);
-    PRECISIONS.iter().find_map(step).unwrap_or(0.0)
-}
-
-/// The largest step of which all differences, in rising order, are multiples within rounding: Euclid's algorithm for numbers that
-/// are rounded.
-fn common_step(differences: &[f64], rounding: f64) -> Option<f64> {
-    let mut step = *differences.first()?;
-    'smaller: loop {
-        if step < ABOVE_ROUNDING * rounding {
-            return None;
-        }
-        // The larger the multiple, the better it knows the step.
-        let mut known = step;
-        for &difference in differences {
-            let multiple = (difference / known).round();
-            let rest = (difference - multiple * known).abs();
-            if rest > rounding {
-                step = rest;
-                continue 'smaller;
-            }
-            known = difference / multiple;
-        }
-        return Some(known);
-    }
-}
-
 /// The largest number of a record in magnitude, as far as it can be used.
-fn largest(record: &dyn Samples) -> f64 {
+pub(crate) fn largest(record: &dyn Samples) -> f64 {
     let mut samples = Vec::new();
     let mut largest = 0.0_f64;
     for places in stretches(record.len(), MOST_WINDOWS, STRETCHES) {
@@ -193,30 +133,7 @@ fn largest(record: &dyn Samples) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Numbers between -0.5 and 0.5 of variance 1/12.
-    fn uniform(count: usize) -> Vec<f64> {
-        let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-        let mut next = || {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        };
-        (0..count).map(|_| next()).collect()
-    }
-
-    #[test]
-    #[allow(clippy::cast_possible_truncation, reason = "that is what is tested")]
-    fn a_step_is_found_in_double_and_single_precision_and_with_an_offset() {
-        for step in [1.0, 0.1, std::f64::consts::TAU / 4096.0] {
-            let whole: Vec<f64> =
-                (0..3000).map(|i| (100.0 * (f64::from(i) * 0.01).sin()).round() * step + 7.3).collect();
-            let single: Vec<f64> = whole.iter().map(|&value| f64::from(value as f32)).collect();
-            assert!((quantisation_step(&whole.as_slice()) / step - 1.0).abs() < 1e-9);
-            assert!((quantisation_step(&single.as_slice()) / step - 1.0).abs() < 1e-3);
-        }
-    }
+    use crate::noise::quantisation::tests::uniform;
 
     /// 6000 samples tell the variance to 5 to 8 %, by the length of the windows, and the smallest of three such is some 3 % too small; 20 of them
     /// tell that to 2 %. The quietest of sixteen bands would be 13 % too small.
@@ -227,33 +144,5 @@ mod tests {
             samples.chunks_exact(6000).map(|one| 12.0 * channel_variance(&one, None, Instructions::current()));
         let mean = variances.sum::<f64>() / 20.0;
         assert!((mean - 1.0).abs() < 0.05, "{mean}");
-    }
-
-    #[test]
-    fn steps_that_are_never_single_are_found_too() {
-        // Differences of 6, 10 and 15 steps have nothing in common but one.
-        let mut level = 0.0;
-        let samples: Vec<f64> = (0..90)
-            .map(|i| {
-                level += [6.0, -10.0, 15.0][i % 3] * 0.01;
-                level
-            })
-            .collect();
-        assert!((quantisation_step(&samples.as_slice()) - 0.01).abs() < 1e-12);
-    }
-
-    #[test]
-    fn jumps_of_a_quiet_record_are_no_steps() {
-        let quiet: Vec<f64> =
-            uniform(500).iter().enumerate().map(|(i, e)| 1e-7 * e + f64::from(u8::from(i % 20 == 0))).collect();
-        assert_eq!(quantisation_step(&quiet.as_slice()), 0.0);
-    }
-
-    #[test]
-    fn nothing_is_found_where_there_is_no_step() {
-        assert_eq!(quantisation_step(&uniform(5000).as_slice()), 0.0);
-        assert_eq!(quantisation_step(&[3.0; 100].as_slice()), 0.0);
-        assert_eq!(quantisation_step(&[f64::NAN; 100].as_slice()), 0.0);
-        assert_eq!(quantisation_step(&[].as_slice()), 0.0);
     }
 }

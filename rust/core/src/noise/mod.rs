@@ -1,6 +1,8 @@
 //! The noise of a channel: its variance, its quantisation and its spectrum.
 
 pub(crate) mod channel;
+pub(crate) mod quantisation;
 pub(crate) mod spectrum;
 
-pub use channel::{FEWEST_SAMPLES, noise, quantisation_step};
+pub use channel::{FEWEST_SAMPLES, noise};
+pub use quantisation::quantisation_step;

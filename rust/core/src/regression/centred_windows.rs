@@ -13,7 +13,7 @@ use crate::regression::layout::Fields;
 use crate::regression::predictor::Predictor;
 use crate::regression::problem::Problem;
 use crate::regression::solved::Solved;
-use crate::simd::vectors::Instructions;
+use crate::simd::instructions::Instructions;
 use crate::status::Status;
 
 /// The condition number of a window is at least the number of its unknowns, but for rounding; a column of zeros takes its share away.

@@ -11,7 +11,8 @@ use crate::regression::row_covariance::RowCovariance;
 use crate::regression::solved::{Solved, is_determined};
 use crate::regression::summary::absorb;
 use crate::simd::f64x8::{Packet, WIDTH};
-use crate::simd::vectors::{Instructions, Kernel, Lanes, dispatch};
+use crate::simd::instructions::Instructions;
+use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
 /// Windows whose misfit exceeds the median by more than so many standard deviations count less.
 const TOLERATED: f64 = 4.0;

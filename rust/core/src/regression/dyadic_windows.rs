@@ -13,7 +13,8 @@ use crate::regression::solve::{SolveScratch, solve};
 use crate::regression::solved::Solved;
 use crate::regression::summary::{absorb, count, merge, recentre};
 use crate::simd::f64x8::{Packet, WIDTH};
-use crate::simd::vectors::{Instructions, Kernel, Lanes, dispatch};
+use crate::simd::instructions::Instructions;
+use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
 /// Numbers of one length of windows whose memory a thread keeps for its next piece of work.
 const MOST_KEPT: usize = 1 << 17;

@@ -12,13 +12,13 @@ use crate::regression::row_covariance::RowCovariance;
 use crate::regression::sandwich::{between, influence, products, sandwich};
 use crate::regression::solved::{Solved, is_determined, local};
 use crate::regression::window_length::Scale;
-use crate::simd::vectors::Instructions;
+use crate::simd::instructions::Instructions;
 
 /// Blocks that a record without windowed unknowns is cut into.
-pub(crate) const BLOCKS: usize = 64;
+const BLOCKS: usize = 64;
 
 /// Windows that begin within the length of one.
-pub(crate) const DENSITY: usize = 8;
+const DENSITY: usize = 8;
 
 /// What windows of one length, or the whole record, say of a model.
 #[derive(Clone, Debug)]

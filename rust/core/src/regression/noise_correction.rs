@@ -8,7 +8,7 @@ use crate::regression::layout::Layout;
 use crate::simd::f64x8::Packet;
 
 /// The largest part of a window's information that is ever believed to be noise.
-pub(crate) const GUARD: f64 = 0.9;
+const GUARD: f64 = 0.9;
 
 /// Covariance of the noise that the angle's noise makes in one row: of all regressors' values, of the companions of the windowed ones
 /// and of the right-hand side, in the order of [`Layout`].
@@ -148,7 +148,7 @@ pub(crate) fn correct(
 
 /// A number, but zero where another one is.
 #[inline(always)]
-pub(crate) fn zero_where_zero(zero: Packet, value: Packet) -> Packet {
+fn zero_where_zero(zero: Packet, value: Packet) -> Packet {
     let mut result = value;
     for (value, zero) in result.0.iter_mut().zip(zero.0) {
         *value = if zero == 0.0 { 0.0 } else { *value };

@@ -92,7 +92,7 @@ pub(crate) fn solve(
 /// Covariance of the local unknowns, what they take of the residual, and how hard they are to tell apart.
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "the parts of one scratch")]
-pub(crate) fn errors(
+fn errors(
     layout: Layout,
     summary: &[Packet],
     factor: &[Packet],
@@ -179,7 +179,7 @@ pub(crate) fn errors(
 
 /// Entry of `(RᵀR)⁻¹`.
 #[inline(always)]
-pub(crate) fn inverse_normal(inverse: &[Packet], local: usize, i: usize, j: usize) -> Packet {
+fn inverse_normal(inverse: &[Packet], local: usize, i: usize, j: usize) -> Packet {
     let mut sum = Packet::ZERO;
     for k in i.max(j)..local {
         sum += inverse[i * local + k] * inverse[j * local + k];

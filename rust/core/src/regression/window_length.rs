@@ -12,7 +12,7 @@ use crate::exec::stages::Stages;
 use crate::regression::dyadic_windows::{WindowShape, solve_windows};
 use crate::regression::problem::Problem;
 use crate::regression::solved::Solved;
-use crate::simd::vectors::Instructions;
+use crate::simd::instructions::Instructions;
 
 /// Cells in a piece of work.
 const PIECE: usize = 512;

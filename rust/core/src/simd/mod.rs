@@ -2,6 +2,8 @@
 
 pub(crate) mod aligned;
 pub(crate) mod f64x8;
+pub(crate) mod instructions;
+pub(crate) mod unroll;
 pub(crate) mod vectors;
 
-pub use vectors::Instructions;
+pub use instructions::Instructions;

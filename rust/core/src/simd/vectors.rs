@@ -4,92 +4,12 @@
 //! depend on which lane worked on it or on what its neighbours held. Multiplications and additions are fused where they are written
 //! fused, on every path.
 
-use std::sync::atomic::{AtomicU8, Ordering};
-
 use pulp::{NullaryFnOnce, Scalar, Simd};
+
+use crate::simd::instructions::Instructions;
 
 /// The longest vector of any path, in numbers of 64 bits.
 pub(crate) const MOST_LANES: usize = 8;
-
-/// A family of vector instructions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Instructions {
-    /// One number at a time: runs anywhere.
-    Scalar = 1,
-    /// 128 bits, 64-bit Arm.
-    Neon = 2,
-    /// 256 bits with fused multiply-add, x86-64.
-    Avx2 = 3,
-    /// 512 bits, x86-64.
-    Avx512 = 4,
-}
-
-impl Instructions {
-    const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Neon, Self::Scalar];
-
-    /// What this processor can run, the fastest first.
-    #[must_use]
-    pub fn available() -> Vec<Self> {
-        Self::ALL.into_iter().filter(|instructions| instructions.runs_here()).collect()
-    }
-
-    /// What the next call will use: the fastest this processor has, unless [`Instructions::force`] said otherwise.
-    #[must_use]
-    pub fn current() -> Self {
-        let forced = FORCED.load(Ordering::Relaxed);
-        Self::ALL.into_iter().find(|&one| one as u8 == forced || forced == 0 && one.runs_here()).unwrap_or(Self::Scalar)
-    }
-
-    /// Uses these instructions in every later call of this process, or the fastest again after `None`. Meant for tests.
-    ///
-    /// Returns whether this processor can run them; where it cannot, nothing changes.
-    pub fn force(choice: Option<Self>) -> bool {
-        let possible = choice.is_none_or(Self::runs_here);
-        if possible {
-            FORCED.store(choice.map_or(0, |instructions| instructions as u8), Ordering::Relaxed);
-        }
-        possible
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    fn runs_here(self) -> bool {
-        match self {
-            Self::Scalar => true,
-            Self::Neon => false,
-            Self::Avx2 => pulp::x86::V3::is_available(),
-            Self::Avx512 => pulp::x86::V4::is_available(),
-        }
-    }
-
-    #[cfg(target_arch = "aarch64")]
-    fn runs_here(self) -> bool {
-        match self {
-            Self::Scalar => true,
-            Self::Neon => pulp::aarch64::Neon::is_available(),
-            Self::Avx2 | Self::Avx512 => false,
-        }
-    }
-
-    #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-    fn runs_here(self) -> bool {
-        self == Self::Scalar
-    }
-
-    /// Numbers worked on side by side.
-    #[must_use]
-    pub fn lanes(self) -> usize {
-        match self {
-            Self::Scalar => 1,
-            Self::Neon => 2,
-            Self::Avx2 => 4,
-            Self::Avx512 => 8,
-        }
-    }
-}
-
-/// Zero, or the path that every call must take.
-static FORCED: AtomicU8 = AtomicU8::new(0);
 
 /// A path's vectors of 64-bit numbers.
 pub(crate) trait Lanes: Simd {
@@ -298,25 +218,6 @@ impl Lanes for pulp::x86::V4 {
         cast_slice_mut::<u16, u8>(&mut high[..8]).copy_from_slice(&flags.to_le_bytes());
     }
 }
-
-/// Writes a block of code once for every `J` below a bound known when compiling, upwards or downwards.
-///
-/// Loops over the degrees must be unrolled whole, so that the coefficients stay in registers.
-macro_rules! unroll {
-    ($index:ident < $bound:expr, $body:block) => {
-        $crate::simd::vectors::unroll!(@ $index, $bound, $body, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19)
-    };
-    (rev $index:ident < $bound:expr, $body:block) => {
-        $crate::simd::vectors::unroll!(@ $index, $bound, $body, 19 18 17 16 15 14 13 12 11 10 9 8 7 6 5 4 3 2 1 0)
-    };
-    (@ $index:ident, $bound:expr, $body:block, $($value:literal)*) => {
-        $({
-            const $index: usize = $value;
-            if $index < $bound $body
-        })*
-    };
-}
-pub(crate) use unroll;
 
 #[cfg(test)]
 mod tests {

@@ -14,9 +14,9 @@
 use crate::error::Error;
 
 /// The lowest exponent for which `φ″` vanishes at the ends.
-pub(crate) const LEAST_EXPONENT: usize = 3;
+const LEAST_EXPONENT: usize = 3;
 /// The highest exponent: beyond it most of the window is as good as zero.
-pub(crate) const MOST_EXPONENT: usize = 20;
+const MOST_EXPONENT: usize = 20;
 /// The fewest samples on either side of the centre.
 pub(crate) const LEAST_HALF_WIDTH: usize = 4;
 

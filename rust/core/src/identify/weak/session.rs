@@ -26,7 +26,7 @@ use crate::regression::model::Model;
 use crate::regression::row_covariance::RowCovariance;
 use crate::regression::subsample::stretches_of_blocks;
 use crate::regression::window_length::Scale;
-use crate::simd::vectors::Instructions;
+use crate::simd::instructions::Instructions;
 use crate::weak_form::coverage::Usable;
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 use crate::weak_form::test_function_choice::{Candidates, Evidence, half_widths, spectrum_length};

@@ -4,7 +4,7 @@ use crate::record::samples::Samples;
 use crate::regression::constants::Expected;
 use crate::regression::problem::Problem;
 use crate::regression::window_length::Scale;
-use crate::simd::vectors::Instructions;
+use crate::simd::instructions::Instructions;
 
 /// A place of a jump that is less probable does not count.
 pub(crate) const UNLIKELY: f64 = 1e-3;
