@@ -47,3 +47,14 @@ def profile(windowed: Array, constant: Array, b: Array, window: int, step: int) 
         left = constant[rows_of] - Q @ (Q.T @ constant[rows_of])
         normal, side = normal + left.T @ left, side + left.T @ b[rows_of]
     return np.asarray(np.linalg.solve(normal, side))
+
+
+def companion_kernels(half: int, exponent: int, delta: float) -> Array:
+    """Give the kernels of coefficients that grow in proportion to the time τ from the centre: (τφ)″, -(τφ)′ and τφ, exact for constants."""
+    phi = Polynomial([1, 0, -1]) ** exponent
+    grows = Polynomial([0, 1]) * phi
+    x = np.arange(-half, half + 1) / half
+    second = half * delta
+    total = phi(x).sum()
+    rows = np.array([grows.deriv(2)(x) / second, -grows.deriv(1)(x), second * grows(x)]) / total
+    return np.asarray(rows - np.outer(rows.sum(axis=1), phi(x)) / total)
