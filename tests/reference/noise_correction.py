@@ -91,12 +91,13 @@ class Window:
     @property
     def own(self) -> Array:
         """The window's own unknowns where all constants are zero."""
-        return np.linalg.solve(self.normal[: self.local, : self.local], self.side[: self.local])
+        return np.asarray(np.linalg.solve(self.normal[: self.local, : self.local], self.side[: self.local]))
 
     @property
     def dependence(self) -> Array:
         """By what they fall with each constant."""
-        return np.linalg.solve(self.normal[: self.local, : self.local], self.normal[: self.local, self.local :])
+        own = self.normal[: self.local]
+        return np.asarray(np.linalg.solve(own[:, : self.local], own[:, self.local :]))
 
     @property
     def left(self) -> tuple[Array, Array]:
@@ -163,7 +164,7 @@ def row_covariance(kernels: Array, parameters: Array, noise: tuple[float, float]
 
     def by_lag(kernel: Array) -> Array:
         every = np.correlate(kernel, kernel, "full")[kernel.size - 1 :: stride]
-        return np.r_[every, np.zeros(count)][:count]
+        return np.asarray(np.r_[every, np.zeros(count)][:count])
 
     lags = noise[0] * by_lag(mixed) + noise[1] * by_lag(kernels[2])
     return np.asarray(lags[np.abs(np.subtract.outer(np.arange(count), np.arange(count)))])

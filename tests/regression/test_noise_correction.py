@@ -57,7 +57,7 @@ class Case:
 
 def identified(case: Case) -> dict[str, Any]:
     """Identify with everything fixed, the noise's variances too."""
-    known = [case.known.get(name) for name in NAMES[:3]]
+    known: list[Any] = [case.known.get(name) for name in NAMES[:3]]
     motions = _core.Motions(case.angle[None], case.torque[None], known, ["offset"])
     kinds = ["windowed" if name in case.windowed else "constant" for name in NAMES if name not in case.known]
     return _core.identify_weak(
@@ -241,7 +241,7 @@ def test_windows_that_fit_badly_count_less(seed: int, linear: bool) -> None:
     case = Case(angle, torque, 20, 8, ("stiffness",), {}, linear, (0.0, 0.01), 200)
     rows, _, found = fitted(case, np.zeros(3))
     assert 0 < (found.weights < 1).mean() < 0.5
-    condition, norms = found.condition, [np.mean(one.values**2) for one in rows.constant]
+    condition, norms = found.condition, np.array([np.mean(one.values**2) for one in rows.constant])
     scale = np.sqrt(np.mean(rows.side.values**2) / norms)
     for place, (_, value, error, _) in enumerate(identified(case)["constants"]):
         assert abs(value - found.values[place]) <= ROUNDING * condition * (scale[place] + abs(found.values[place]))
