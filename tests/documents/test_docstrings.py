@@ -37,7 +37,7 @@ def examples() -> Iterator[doctest.DocTest]:
 def section(documented: Any, name: str) -> str:
     """Give a section of a docstring, or nothing."""
     text = inspect.getdoc(documented) or ""
-    found = re.search(rf"^{name}\n-+\n(.*?)(?=^\w+\n-+\n|\Z)", text, re.MULTILINE | re.DOTALL)
+    found = re.search(rf"^{name}\n-+\n(.*?)(?=^[\w ]+\n-+\n|\Z)", text, re.MULTILINE | re.DOTALL)
     return found[1] if found else ""
 
 
@@ -62,6 +62,11 @@ def test_everything_public_has_an_example(documented: Any) -> None:
     assert ">>> " in section(documented, "Examples")
 
 
+@named(PUBLIC)
+def test_everything_public_says_what_else_to_see(documented: Any) -> None:
+    assert section(documented, "See Also")
+
+
 @named(FUNCTIONS)
 def test_functions_say_what_goes_in_and_comes_out(documented: Callable[..., Any]) -> None:
     parameters = section(documented, "Parameters")
@@ -76,6 +81,7 @@ def test_functions_say_what_goes_in_and_comes_out(documented: Callable[..., Any]
 def test_functions_that_compute_say_their_equation_and_cost(documented: Callable[..., Any]) -> None:
     text = inspect.getdoc(documented) or ""
     assert re.search(r"[Ee]quations? \(", text)
+    assert section(documented, "References")
     assert re.search(r"\bcosts?\b.* (ns|µs) a (sample|row)", section(documented, "Notes"), re.DOTALL)
 
 

@@ -35,6 +35,11 @@ class LocalPolynomialFit:
         What was used and what was chosen: ``window_length``, ``order``, ``max_order``, ``quantisation``, and either ``criterion`` and
         ``selection`` or ``noise``, the standard deviation of each record's noise.
 
+    See Also
+    --------
+    fit_local_polynomials : returns it.
+    Status : what the flags mean.
+
     Examples
     --------
     >>> import numpy as np

@@ -120,6 +120,11 @@ def fit_local_polynomials(
     averaged some 300 ns, since every window's orders need their logarithms; ``"auto"`` some 0.2 s a derivative for the first 65 000
     samples and 500 ns a sample and derivative beyond.
 
+    See Also
+    --------
+    savgol_filter : a filter of fixed order, with SciPy's call.
+    identify : parameters of the equation of motion, from these derivatives or without any.
+
     References
     ----------
     M. Ruzek, S. Chesné, D. Rémond: identification of a time-varying mechanical system using the Akaike information criterion.

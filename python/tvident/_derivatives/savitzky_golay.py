@@ -75,6 +75,11 @@ def savgol_filter(
     Equation (2) of the paper with a fixed order. The cost is a few ns a sample at any window length, and more where the order is
     chosen: see :func:`fit_local_polynomials`.
 
+    See Also
+    --------
+    fit_local_polynomials : all derivatives at once, with standard errors and a status.
+    scipy.signal.savgol_filter : whose call and results these are.
+
     References
     ----------
     A. Savitzky, M. J. E. Golay: Smoothing and differentiation of data by simplified least squares procedures, Analytical Chemistry 36

@@ -26,6 +26,10 @@ class Term:
         Function of ``(t, angle, velocity)``: times in s of shape (n,), smoothed angle in rad and velocity in rad/s of the angle's shape.
         Returns an array of that shape. The unit of the factor is N m over that of the function.
 
+    See Also
+    --------
+    identify : takes it in ``terms=``, beside the built-in ones.
+
     Examples
     --------
     >>> import numpy as np

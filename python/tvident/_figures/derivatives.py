@@ -33,6 +33,10 @@ def plot_derivatives(time: npt.NDArray[np.float64], fit: LocalPolynomialFit, nam
     ValueError
         If there are several records.
 
+    See Also
+    --------
+    fit_local_polynomials : differentiates a channel.
+
     Examples
     --------
     >>> import tvident

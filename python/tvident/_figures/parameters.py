@@ -58,6 +58,10 @@ def plot_identification(result: Identified, truth: Recording | None = None) -> F
     ValueError
         If the result holds several records.
 
+    See Also
+    --------
+    Identification.plot : the same as a method.
+
     Examples
     --------
     >>> import tvident

@@ -22,6 +22,10 @@ def plot_recording(recording: Recording) -> Figure:
     -------
     matplotlib.figure.Figure
 
+    See Also
+    --------
+    simulate_torsional_rig : simulates a recording.
+
     Examples
     --------
     >>> import tvident

@@ -42,6 +42,10 @@ def plot_window(
     ValueError
         If the window is even, too short or longer than the record, or the order is too high.
 
+    See Also
+    --------
+    fit_local_polynomials : chooses an order in every window.
+
     Examples
     --------
     >>> import tvident

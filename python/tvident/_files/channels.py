@@ -37,6 +37,10 @@ def channel(channels: Mapping[str, npt.NDArray[Any]], name: str, source: str) ->
     KeyError
         If there is no such channel: the message lists what there is.
 
+    See Also
+    --------
+    read : reads channels from a file.
+
     Examples
     --------
     >>> import numpy as np

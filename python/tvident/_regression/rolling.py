@@ -31,6 +31,11 @@ class RollingRegression:
     status : ndarray of uint16, shape (n,)
         Flags of :class:`tvident.Status`.
 
+    See Also
+    --------
+    rolling_least_squares : returns it.
+    Status : what the flags mean.
+
     Examples
     --------
     >>> import numpy as np
@@ -96,6 +101,10 @@ def rolling_least_squares(
     -----
     Equations (3) and (4) of the paper are of this kind. Factors are updated by rotations without square roots. The cost for three
     regressors is some 30 ns a row and thread, whatever the window; it grows with the square of their number.
+
+    See Also
+    --------
+    identify : the same with the rows made from an angle and a torque.
 
     References
     ----------

@@ -78,6 +78,11 @@ class Identification:
     settings : dict
         What was used and what was chosen, as plain JSON. ``identify(…, settings=result.settings)`` repeats it.
 
+    See Also
+    --------
+    identify : returns it.
+    Status : what the flags mean.
+
     Examples
     --------
     >>> import tvident

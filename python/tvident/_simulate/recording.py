@@ -33,6 +33,10 @@ class Recording:
     sample_rate : float
         Samples per second.
 
+    See Also
+    --------
+    simulate_torsional_rig : returns it.
+
     Examples
     --------
     >>> import tvident

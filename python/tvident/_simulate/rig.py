@@ -81,6 +81,16 @@ def simulate_torsional_rig(
     Equation (1) of the paper is integrated by the Magnus expansion of fourth order, in steps so short that the angle is good to 1e-10.
     It costs some 5 µs a sample.
 
+    See Also
+    --------
+    identify : finds the parameters again.
+    tvident.figures.plot_recording : draws it.
+
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: identification of a time-varying mechanical system using the Akaike information criterion.
+    S. Blanes, F. Casas, J. A. Oteo, J. Ros: The Magnus expansion and some of its applications, Physics Reports 470 (2009).
+
     Examples
     --------
     >>> import tvident

@@ -18,6 +18,11 @@ class Status(enum.IntFlag):
     concern its constants, and of a sample where they concern the window around it; NOISE_MODEL is a flag of a sample where it holds
     outside a mask only.
 
+    See Also
+    --------
+    Identification : has flags of samples and of records.
+    LocalPolynomialFit, RollingRegression : have flags of samples.
+
     Examples
     --------
     >>> from tvident import Status
