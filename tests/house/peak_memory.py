@@ -9,17 +9,24 @@ import ctypes
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 import tvident
-from calls import paper
 
 Array = npt.NDArray[np.float64]
 
 STEP = 1000
 """Results of every so manieth sample are next to nothing: what is left is scratch."""
+
+WINDOWED: dict[str, Any] = {
+    **dict.fromkeys(("inertia", "damping", "stiffness"), "windowed"),
+    "terms": (),
+    "sample_rate": 1000,
+    "step": STEP,
+}
 
 CALLS: dict[str, Callable[[Array, Array, int, int], object]] = {
     "the paper's method": lambda angle, torque, _window, workers: tvident.identify(
@@ -32,10 +39,10 @@ CALLS: dict[str, Callable[[Array, Array, int, int], object]] = {
         np.lib.stride_tricks.sliding_window_view(angle, 3), torque[:-2], window, step=STEP, workers=workers
     ),
     "identify, window": lambda angle, torque, window, workers: tvident.identify(
-        angle, torque, sample_rate=1000, **paper(window_length=window | 1, step=STEP, workers=workers)
+        angle, torque, **WINDOWED, method=tvident.StrongForm(window_length=window | 1), workers=workers
     ),
     "identify, regression window": lambda angle, torque, window, workers: tvident.identify(
-        angle, torque, sample_rate=1000, **paper(regression_window=window, step=STEP, workers=workers)
+        angle, torque, **WINDOWED, method=tvident.StrongForm(regression_window=window), workers=workers
     ),
 }
 
