@@ -1,5 +1,5 @@
 from collections.abc import Callable, Sequence
-from typing import Any, final
+from typing import Literal, final
 
 import numpy as np
 import numpy.typing as npt
@@ -9,15 +9,19 @@ __all__ = [
     "HARDLY_TOLD_APART",
     "NOISE_MODEL_FAILS",
     "NO_CHANCE",
+    "Identification",
     "LocalPolynomials",
     "Motions",
+    "OutsideMask",
+    "StrongForm",
+    "Suspect",
+    "Unknown",
+    "WeakForm",
     "available_instructions",
+    "built_in_terms",
     "estimate_automatically",
     "force_instructions",
-    "identify_constant",
-    "identify_strong",
-    "identify_weak",
-    "identify_windowed",
+    "identify",
     "instructions",
     "noise",
     "quantisation_step",
@@ -70,6 +74,105 @@ class Motions:
         terms: list[npt.NDArray[np.number] | str],
     ) -> Motions: ...
 
+@final
+class WeakForm:
+    def __new__(
+        cls,
+        window_length: Sequence[int | None],
+        exponent: Sequence[int | None],
+        regression_window: Sequence[int | None],
+        *,
+        averaging: bool = True,
+        linear: bool = True,
+        noise: tuple[float | None, float | None] = ...,
+    ) -> WeakForm: ...
+
+@final
+class StrongForm:
+    def __new__(
+        cls, plan: LocalPolynomials, regression_window: int, *, filter_torque: bool = False, linear: bool = False
+    ) -> StrongForm: ...
+
+@final
+class Unknown:
+    @property
+    def kind(self) -> Literal["windowed", "constant", "varying"]: ...
+    @property
+    def values(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def stderr(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def factor(self) -> float: ...
+    @property
+    def test(self) -> tuple[float, float] | None: ...
+    @property
+    def untested(self) -> bool: ...
+
+@final
+class Suspect:
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> float: ...
+    @property
+    def stderr(self) -> float: ...
+    @property
+    def conspicuous(self) -> bool: ...
+
+@final
+class OutsideMask:
+    @property
+    def differing(self) -> list[tuple[int, float, float]]: ...
+    @property
+    def residual_ratio(self) -> float | None: ...
+
+@final
+class Identification:
+    @property
+    def window_length(self) -> int: ...
+    @property
+    def exponent(self) -> int | None: ...
+    @property
+    def regression_window(self) -> int: ...
+    @property
+    def unknowns(self) -> list[Unknown]: ...
+    @property
+    def covariances(self) -> dict[tuple[int, int], npt.NDArray[np.float64]]: ...
+    @property
+    def condition(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def residual_std(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def status(self) -> npt.NDArray[np.uint16]: ...
+    @property
+    def record_status(self) -> int: ...
+    @property
+    def order(self) -> npt.NDArray[np.uint8]: ...
+    @property
+    def jumps(self) -> list[int]: ...
+    @property
+    def noise(self) -> tuple[float, float] | None: ...
+    @property
+    def lengths(self) -> list[tuple[int, float]]: ...
+    @property
+    def prediction_error(self) -> float: ...
+    @property
+    def weighted(self) -> bool: ...
+    @property
+    def pooling(self) -> float | None: ...
+    @property
+    def constants_condition(self) -> float: ...
+    @property
+    def weakest(self) -> list[float]: ...
+    @property
+    def mostly_noise(self) -> bool: ...
+    @property
+    def lag(self) -> tuple[float, float] | None: ...
+    @property
+    def suspects(self) -> list[Suspect]: ...
+    @property
+    def outside_mask(self) -> OutsideMask | None: ...
+
 def estimate_automatically(
     samples: npt.NDArray[np.number],
     derivatives: list[int],
@@ -88,77 +191,24 @@ def estimate_automatically(
     list[list[tuple[int, int]]],
     list[tuple[float, float]],
 ]: ...
-def identify_windowed(
-    plan: LocalPolynomials,
-    motions: Motions,
-    equations: int,
-    pairs: list[tuple[int, int]],
-    *,
-    step: int = 1,
-    workers: int | None = None,
-    progress: Callable[[int, int], object] | None = None,
-) -> tuple[
-    npt.NDArray[np.float64],
-    npt.NDArray[np.float64],
-    npt.NDArray[np.float64],
-    npt.NDArray[np.float64],
-    npt.NDArray[np.float64],
-    npt.NDArray[np.uint16],
-    npt.NDArray[np.uint8],
-    npt.NDArray[np.float64],
-]: ...
-def identify_constant(
-    plan: LocalPolynomials,
-    motions: Motions,
-    *,
-    step: int = 1,
-    workers: int | None = None,
-    progress: Callable[[int, int], object] | None = None,
-) -> tuple[
-    npt.NDArray[np.float64],
-    npt.NDArray[np.float64],
-    npt.NDArray[np.float64],
-    npt.NDArray[np.float64],
-    npt.NDArray[np.uint16],
-    npt.NDArray[np.uint8],
-]: ...
 def noise(samples: npt.NDArray[np.number], quantisation: float | None = None) -> tuple[list[float], list[float]]: ...
 def quantisation_step(samples: npt.NDArray[np.number]) -> float: ...
-def identify_strong(
-    plan: LocalPolynomials,
+def identify(
     motions: Motions,
-    record: int,
     kinds: Sequence[str],
-    *,
-    equations: int,
-    linear: bool = False,
-    filter_torque: bool = False,
-    lag: float = 0.0,
-    mask: npt.NDArray[np.bool_] | None = None,
-    step: int = 1,
-    workers: int | None = None,
-    progress: Callable[[int, int], object] | None = None,
-) -> dict[str, Any]: ...
-def identify_weak(
-    motions: Motions,
-    record: int,
-    kinds: Sequence[str],
+    method: WeakForm | StrongForm,
     *,
     delta: float,
-    half_width: int | None = None,
-    exponent: int | None = None,
-    equations: int | None = None,
-    average: bool = True,
-    linear: bool = True,
-    noise: tuple[float | None, float | None] = ...,
-    lag: float | None = None,
+    lag: Sequence[float | None],
     quantisation: float | None = None,
-    mask: npt.NDArray[np.bool_] | None = None,
+    masks: Sequence[npt.NDArray[np.bool_]] | None = None,
+    propagate: bool = False,
     step: int = 1,
-    not_missing: Sequence[str] | None = None,
+    diagnose: bool = True,
     workers: int | None = None,
     progress: Callable[[int, int], object] | None = None,
-) -> dict[str, Any]: ...
+) -> list[Identification]: ...
+def built_in_terms() -> list[str]: ...
 def rolling_least_squares(
     regressors: npt.NDArray[np.number],
     sides: npt.NDArray[np.number],

@@ -4,13 +4,12 @@ use std::num::NonZeroUsize;
 
 use tvident::Error;
 use tvident::equation::{Coefficient, Motion};
-use tvident::identify::{Identified, identify_windowed};
+use tvident::identify::{Kind, Method, Options as IdentifyOptions, StrongForm, Task, identify_all};
 use tvident::lanes::Elements;
 use tvident::least_squares::HALF_OF_THE_DIGITS;
 use tvident::least_squares::{Equations, Regressions, RollingLeastSquares};
 use tvident::local_polynomials::{Criterion, Estimates, LocalPolynomials, Options, Order, Selection};
 use tvident::record::Samples;
-use tvident::regression::HARDLY_TOLD_APART;
 use tvident::simd::Instructions;
 
 /// Runs on a record of one or two lengths and returns the number of windows.
@@ -160,9 +159,7 @@ fn identify(lengths: usize) -> Result<usize, Error> {
         quantisation: 0.0,
         instructions,
     })?;
-    let pairs = vec![(0, 1), (0, 2), (1, 2)];
-    let least_squares = RollingLeastSquares::new(200, 3, 1, pairs, HARDLY_TOLD_APART, instructions)?;
-    let windows = lengths * WINDOWS.next_multiple_of(least_squares.stride());
+    let windows = lengths * WINDOWS.next_multiple_of(derivatives.stride());
     let (angle, torque) = (Repeated::new(0, windows), Repeated::new(1, windows));
     let motion = Motion {
         angle: &angle,
@@ -170,11 +167,22 @@ fn identify(lengths: usize) -> Result<usize, Error> {
         coefficients: [Coefficient::Unknown, Coefficient::Unknown, Coefficient::Unknown],
         terms: Vec::new(),
     };
-    let mut solutions = Solutions::new(windows, 3, 3);
-    let mut order = vec![0; windows];
-    let mut regressions = solutions.regressions();
-    regressions.deviations = std::mem::take(&mut regressions.residuals);
-    let identified = Identified { regressions, order: &mut order };
-    identify_windowed(&derivatives, &least_squares, vec![(motion, identified)], NonZeroUsize::MIN, &mut |_, _| true)?;
+    let method = Method::Strong(StrongForm {
+        derivatives: &derivatives,
+        regression_window: 200,
+        filter_torque: false,
+        linear: false,
+    });
+    let task = Task { motion, mask: None, method, lag: Some(0.0) };
+    let options = IdentifyOptions {
+        delta: 1e-3,
+        kinds: vec![Kind::Windowed; 3],
+        quantisation: None,
+        propagate: false,
+        step: 1,
+        diagnose: false,
+        instructions,
+    };
+    identify_all(&[task], &options, NonZeroUsize::MIN, &mut |_, _| true)?;
     Ok(windows)
 }

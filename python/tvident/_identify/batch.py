@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _core
 from tvident._equation import COEFFICIENTS
-from tvident._identify.one_face import Identified
 from tvident._results import Estimates
 from tvident._status import Status
 
@@ -18,7 +18,7 @@ from tvident._status import Status
 def estimates(
     shape: tuple[int, ...],
     names: Sequence[str],
-    found: Sequence[Identified],
+    found: Sequence[_core.Identification],
     known: Mapping[str, npt.NDArray[np.number] | float],
 ) -> Estimates:
     """Return what was found in every record, by name, and beside it what was known beforehand.
@@ -29,7 +29,7 @@ def estimates(
         Shape of the batch; empty for a single record.
     names : sequence of str
         Unknowns in the order of the core.
-    found : sequence of Identified
+    found : sequence of Identification
         One a record.
     known : mapping of str to float or ndarray
         One value, or one for every sample there is a result at.

@@ -14,10 +14,8 @@ from tvident import _core
 from tvident._advice import Explained, ExplainedStrong
 from tvident._derivatives import SHORTEST_WINDOW, plan, quantisation_step
 from tvident._equation import COEFFICIENTS, Kind, Unknown, all_terms, parameter
-from tvident._identify import one_face
 from tvident._identify.batch import estimates
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm
-from tvident._identify.missing import missing
 from tvident._identify.settings import Request, plain
 from tvident._results import Estimates, Identification, Words
 
@@ -58,6 +56,13 @@ class Data:
         return self.angles.shape[:-1]
 
     @property
+    def masks(self) -> list[npt.NDArray[np.bool_]] | None:
+        """The mask of every record, or None without one."""
+        if self.mask is None:
+            return None
+        return [np.ascontiguousarray(one) for one in self.mask.reshape(-1, self.time.size)]
+
+    @property
     def records(self) -> int:
         """How many records there are."""
         return int(np.prod(self.batch, dtype=int))
@@ -93,29 +98,25 @@ class Task:
         """Identify every record."""
         data, request = self._data, self._request
         form, core_plan = self._form()
-        lags = self._lags()
-        call = one_face.Call(
-            motions=self._motions(core_plan),
-            names=self._names,
-            kinds=[one.kind for one in self._unknowns],
-            lag=lags,
-            quantisation=request.quantisation,
-            mask=data.mask,
-            holes=missing(data.angles, data.torques),
-            propagate=data.propagate,
-            step=data.step,
-            delta=data.period,
-            not_missing=self._present(lags),
-            workers=data.workers,
-            records=data.records,
-        )
         with arguments.reporter(progress, "identification") as report:
-            found = one_face.identify(call, form, report)
+            found = _core.identify(
+                self._motions(core_plan),
+                [one.kind for one in self._unknowns],
+                form,
+                delta=data.period,
+                lag=self._lags(),
+                quantisation=request.quantisation,
+                masks=data.masks,
+                propagate=data.propagate,
+                step=data.step,
+                workers=data.workers,
+                progress=report,
+            )
         known = {
             name: value if isinstance(value, float) else value[..., :: data.step] for name, value in self._known.items()
         }
         batch = estimates(data.batch, self._names, found, known)
-        settings = self._settings(found, form)
+        settings = self._settings(found)
         explain = self._words_of_strong_form if isinstance(request.form, StrongForm) else self._words_of_weak_form
         jumps = tuple(tuple(data.time[one.jumps].tolist()) for one in found)
         return Identification(
@@ -127,7 +128,7 @@ class Task:
             settings=plain(settings),
         )
 
-    def _form(self) -> tuple[one_face.WeakForm | one_face.StrongForm, _core.LocalPolynomials | None]:
+    def _form(self) -> tuple[_core.WeakForm | _core.StrongForm, _core.LocalPolynomials | None]:
         """Return the form as the core has it, and the polynomials that terms of the user's own need."""
         form, own = self._request.form, any(term.own is not None for term in self._terms)
         samples = self._data.time.size
@@ -141,7 +142,7 @@ class Task:
             ):
                 self._check_rows(rows)
             linear = form.variation == "linear"
-            return one_face.StrongForm(core_plan, length, rows, form.filter_torque, linear), core_plan
+            return _core.StrongForm(core_plan, rows, filter_torque=form.filter_torque, linear=linear), core_plan
         lengths = [
             None if value == "auto" else self._length("window_length", value, least=SHORTEST_TEST_FUNCTION)
             for value in self._each("window_length")
@@ -149,7 +150,7 @@ class Task:
         rows_of = [None if value == "auto" else self._rows(value) for value in self._each("regression_window")]
         exponents = [None if value == "auto" else int(value) for value in self._each("exponent")]
         linear = form.variation != "constant"
-        weak = one_face.WeakForm(lengths, exponents, rows_of, bool(form.averaging), linear)
+        weak = _core.WeakForm(lengths, exponents, rows_of, averaging=bool(form.averaging), linear=linear)
         return weak, self._plan(min(_WINDOW_OF_TERMS, (samples - 1) // 2 * 2 + 1), StrongForm()) if own else None
 
     def _each(self, name: str) -> Sequence[Any]:
@@ -198,16 +199,6 @@ class Task:
             return list(found_earlier)
         return [None if late == "auto" else late / data.period for late in lags]
 
-    def _present(self, lags: Sequence[float | None]) -> list[str]:
-        """Return what cannot be missing from the equation."""
-        present = [term.name for term in self._terms]
-        if self._request.lag_samples is not None or any(lag != 0 for lag in lags):
-            present.append("lag")
-        if "stiffness" in self._known:
-            # A cubic spring beside a known one is not a question that anybody asked.
-            present.append("cubic")
-        return present
-
     def _motions(self, core_plan: _core.LocalPolynomials | None) -> _core.Motions:
         data = self._data
         columns: list[npt.NDArray[np.number] | str] = [term.name for term in self._terms]
@@ -217,9 +208,7 @@ class Task:
         known = [self._known.get(name) for name in COEFFICIENTS]
         return _core.Motions(data.angles, data.torques, known, columns)
 
-    def _settings(
-        self, found: Sequence[one_face.Identified], form: one_face.WeakForm | one_face.StrongForm
-    ) -> dict[str, Any]:
+    def _settings(self, found: Sequence[_core.Identification]) -> dict[str, Any]:
         """Return inputs and choices."""
         request, data = self._request, self._data
 
@@ -231,12 +220,12 @@ class Task:
         used |= {name: by_record([getattr(one, name) for one in found]) for name in names if name in used}
         chosen: list[str] = []
         lag: dict[str, Any] = {"lag": by_record(self._each("lag"))}
-        if isinstance(form, one_face.StrongForm):
-            used |= {"window_length": form.window_length, "regression_window": form.regression_window}
+        if isinstance(request.form, StrongForm):
+            used |= {name: getattr(found[0], name) for name in ("window_length", "regression_window")}
             lag = {"lag": request.lag}
         else:
-            chosen = [name for name in names if None in getattr(form, name)]
-            used["variation"] = "linear" if form.linear else "constant"
+            chosen = [name for name in names if "auto" in self._each(name)]
+            used["variation"] = "constant" if request.form.variation == "constant" else "linear"
             if request.lag == "auto":
                 chosen.append("lag")
                 lags = [one.lag or (0.0, None) for one in found]
@@ -266,7 +255,7 @@ class Task:
         }
 
     def _words_of_weak_form(
-        self, found: Sequence[one_face.Identified], batch: Estimates, settings: dict[str, Any]
+        self, found: Sequence[_core.Identification], batch: Estimates, settings: dict[str, Any]
     ) -> Words:
         del batch
         tested = [one.name for one in self._unknowns if one.kind == "auto"]
@@ -282,7 +271,7 @@ class Task:
         return Words((), tuple(f"record {place}: {line}" for place, words in enumerate(each) for line in words.advice))
 
     def _words_of_strong_form(
-        self, found: Sequence[one_face.Identified], batch: Estimates, settings: dict[str, Any]
+        self, found: Sequence[_core.Identification], batch: Estimates, settings: dict[str, Any]
     ) -> Words:
         mask, step = self._data.mask, self._data.step
         return ExplainedStrong(

@@ -7,14 +7,14 @@
 )]
 
 mod automatic;
-mod identification;
+mod identified;
+mod identify;
 mod local_polynomials;
+mod motions;
 mod noise;
 mod records;
 mod rolling;
-mod strong_identification;
 mod watch;
-mod weak_identification;
 
 use pyo3::prelude::*;
 
@@ -24,22 +24,23 @@ mod _core {
     use pyo3::exceptions::PyValueError;
     use pyo3::prelude::*;
     use tvident::Status;
+    use tvident::equation::BUILT_IN_TERMS;
     use tvident::simd::Instructions;
 
     #[pymodule_export]
     use crate::automatic::estimate_automatically;
     #[pymodule_export]
-    use crate::identification::{Motions, identify_constant, identify_windowed};
+    use crate::identified::{Identification, OutsideMask, Suspect, Unknown};
+    #[pymodule_export]
+    use crate::identify::{StrongForm, WeakForm, identify};
     #[pymodule_export]
     use crate::local_polynomials::LocalPolynomials;
+    #[pymodule_export]
+    use crate::motions::Motions;
     #[pymodule_export]
     use crate::noise::{noise, quantisation_step};
     #[pymodule_export]
     use crate::rolling::rolling_least_squares;
-    #[pymodule_export]
-    use crate::strong_identification::identify_strong;
-    #[pymodule_export]
-    use crate::weak_identification::identify_weak;
 
     /// Probability below which parts of a record differ by more than chance.
     #[pymodule_export]
@@ -58,6 +59,12 @@ mod _core {
     #[pyfunction]
     fn status_flags() -> Vec<(&'static str, u16)> {
         Status::NAMED.iter().map(|(name, flag)| (*name, flag.bits())).collect()
+    }
+
+    /// Names of the built-in terms of the equation of motion.
+    #[pyfunction]
+    fn built_in_terms() -> Vec<&'static str> {
+        BUILT_IN_TERMS.iter().map(|term| term.name).collect()
     }
 
     /// Vector instructions that this processor has, the fastest first.

@@ -2,5 +2,7 @@
 
 pub(crate) mod motion;
 pub(crate) mod rows;
+pub(crate) mod terms;
 
 pub use motion::{Coefficient, Motion, Term};
+pub use terms::{BUILT_IN_TERMS, BuiltInTerm};

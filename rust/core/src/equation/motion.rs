@@ -1,8 +1,8 @@
 //! Rows of the equation of motion `I θ̈ + C θ̇ + K θ + terms = T`, from derivatives of the angle.
 //!
-//! What is unknown becomes a column of regressors; what is known moves to the right-hand side.
+//! What is unknown becomes a column of regressors; what is known moves to the right-hand rhs.
 
-use crate::record::derived::sign;
+use crate::equation::terms::{BuiltInTerm, TermFunction};
 use crate::record::samples::Samples;
 
 /// What is known of inertia, damping or stiffness beforehand.
@@ -16,15 +16,11 @@ pub enum Coefficient<'a> {
     Record(&'a dyn Samples),
 }
 
-/// A term on the left-hand side beside inertia, damping and stiffness, with an unknown factor.
+/// A term on the left-hand rhs beside inertia, damping and stiffness, with an unknown factor.
 #[derive(Clone, Copy)]
 pub enum Term<'a> {
-    /// A constant: 1.
-    Offset,
-    /// Dry friction: the sign of the velocity.
-    Coulomb,
-    /// A hardening or softening spring: the cube of the angle.
-    Cubic,
+    /// One that has a name.
+    BuiltIn(&'static BuiltInTerm),
     /// Anything else, given at every sample.
     Record(&'a dyn Samples),
 }
@@ -50,7 +46,7 @@ impl Motion<'_> {
     }
 
     /// Builds the rows of the samples from `first` on: one column an unknown, in the order of inertia, damping, stiffness and terms,
-    /// then the right-hand side. `derivatives` are the angle and its first and second derivative at these samples; those that are
+    /// then the right-hand rhs. `derivatives` are the angle and its first and second derivative at these samples; those that are
     /// columns as they are change places with them and are not copied.
     pub(crate) fn rows(
         &self,
@@ -85,16 +81,14 @@ impl Motion<'_> {
         for (term, column) in self.terms.iter().zip(terms) {
             column.resize(count, 0.0);
             match *term {
-                Term::Offset => column.fill(1.0),
-                Term::Coulomb => {
-                    for (value, &velocity) in column.iter_mut().zip(&*velocity) {
-                        *value = sign(velocity);
-                    }
+                Term::BuiltIn(BuiltInTerm { function: TermFunction::One, .. }) => column.fill(1.0),
+                Term::BuiltIn(BuiltInTerm { function: TermFunction::OfAngle(function), .. }) => {
+                    column.copy_from_slice(angle);
+                    function(column);
                 }
-                Term::Cubic => {
-                    for (value, &angle) in column.iter_mut().zip(&*angle) {
-                        *value = angle * angle * angle;
-                    }
+                Term::BuiltIn(BuiltInTerm { function: TermFunction::OfVelocity(function), .. }) => {
+                    column.copy_from_slice(velocity);
+                    function(column);
                 }
                 Term::Record(record) => record.read(first, column),
             }

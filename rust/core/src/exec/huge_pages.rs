@@ -8,15 +8,15 @@ const PAGE: usize = 1 << 12;
 
 /// So many zeros. Where there are many, the system is asked for huge pages, as NumPy asks for its arrays: a page that is touched first costs
 /// about as much as writing it, and an hour of results has 7000 small ones a column.
-pub(crate) fn zeros(count: usize) -> Vec<f64> {
-    let column = vec![0.0; count];
+pub(crate) fn zeros<T: Copy + Default>(count: usize) -> Vec<T> {
+    let column = vec![T::default(); count];
     #[cfg(target_os = "linux")]
-    if count * size_of::<f64>() >= 2 * HUGE {
+    if count * size_of::<T>() >= 2 * HUGE {
         let before = column.as_ptr().align_offset(PAGE);
         let first = column[before.min(count)..].as_ptr();
         // SAFETY: the range begins with a page of the column and ends within it, or with the page of its last number; advice changes no
         // contents. Refused advice is no error.
-        unsafe { libc::madvise(first.cast_mut().cast(), (count - before) * size_of::<f64>(), libc::MADV_HUGEPAGE) };
+        unsafe { libc::madvise(first.cast_mut().cast(), (count - before) * size_of::<T>(), libc::MADV_HUGEPAGE) };
     }
     column
 }
@@ -28,7 +28,7 @@ mod tests {
     #[test]
     fn zeros_are_zeros_however_many() {
         for count in [0, 1, 1000, 1 << 19, (1 << 20) + 3] {
-            assert!(zeros(count).iter().all(|&value| value == 0.0) && zeros(count).len() == count);
+            assert!(zeros::<f64>(count).iter().all(|&value| value == 0.0) && zeros::<u8>(count).len() == count);
         }
     }
 }

@@ -1,13 +1,18 @@
 //! One record, from samples to numbers with errors and a status.
 
+pub(crate) mod form;
+pub(crate) mod identification;
+pub(crate) mod kinds;
+pub(crate) mod missing;
+pub(crate) mod options;
 pub(crate) mod results;
+pub(crate) mod route;
 pub(crate) mod strong;
 pub(crate) mod weak;
 
-pub use results::SampleResults;
-pub use strong::general::{StrongIdentified, StrongOptions, identify_strong};
-pub use strong::scatter::{Track, identify_with_scatter, scatter};
-pub use strong::streaming::{Identified, identify_constant, identify_windowed};
+pub use identification::{Covariance, Identification, Unknown, WeakDetails};
+pub use kinds::Kind;
+pub use options::{Method, Options, StrongForm, Task, WeakForm};
+pub use route::identify_all;
 pub use weak::lag::Lag;
 pub use weak::outside_mask::Outside;
-pub use weak::session::{Constant, Kind, WeakIdentified, WeakOptions, identify_weak};

@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::exec::huge_pages::zeros;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
+use crate::inference::constancy::Test;
 use crate::inference::jumps::jump::{Jump, UNLIKELY};
 use crate::status::Status;
 
@@ -36,21 +37,34 @@ pub(crate) struct RowResults {
     pub(crate) jumps: Vec<Jump>,
 }
 
+/// A parameter that is constant over the record.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Constant {
+    /// Which unknown: 0 inertia, 1 damping, 2 stiffness, then terms.
+    pub(crate) unknown: usize,
+    /// Its value.
+    pub(crate) value: f64,
+    /// Its standard error.
+    pub(crate) error: f64,
+    /// Whether it is the same in all parts of the record.
+    pub(crate) test: Option<Test>,
+}
+
 /// Numbers at every so-manieth sample.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct SampleResults {
+pub(crate) struct SampleResults {
     /// Unknowns that change, in the order in which they are listed.
-    pub values: Vec<Vec<f64>>,
+    pub(crate) values: Vec<Vec<f64>>,
     /// Their standard errors.
-    pub errors: Vec<Vec<f64>>,
+    pub(crate) errors: Vec<Vec<f64>>,
     /// Covariances of pairs of unknowns.
-    pub covariances: Vec<Vec<f64>>,
+    pub(crate) covariances: Vec<Vec<f64>>,
     /// Standard deviation of what is left of the torque after multiplication with the test function.
-    pub deviation: Vec<f64>,
+    pub(crate) deviation: Vec<f64>,
     /// Condition number of the equations.
-    pub condition: Vec<f64>,
+    pub(crate) condition: Vec<f64>,
     /// Bits of [`Status`].
-    pub status: Vec<u16>,
+    pub(crate) status: Vec<u16>,
 }
 
 impl SampleResults {
@@ -228,7 +242,7 @@ impl RowResults {
             let only = if self.is_usable(row) { row } else { next };
             place = Place { row: only, next: only, part: 0.0, beyond: exact - only as f64, nearest: only };
         }
-        // A jump between two rows: the one on the sample's side of it is carried on.
+        // A jump between two rows: the one on the sample's rhs of it is carried on.
         let jump = self.jumps.partition_point(|jump| jump.sample <= sample);
         let before = jump.checked_sub(1).is_some_and(|index| self.jumps[index].sample as f64 > self.at(row));
         let after = self.jumps.get(jump).is_some_and(|jump| jump.sample as f64 <= self.at(next));

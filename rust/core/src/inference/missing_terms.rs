@@ -5,8 +5,11 @@
 use std::sync::Arc;
 
 use crate::equation::rows::Rows;
+use crate::equation::terms::BuiltInTerm;
 use crate::error::Error;
 use crate::exec::stages::Stages;
+use crate::record::derived::Mapped;
+use crate::record::samples::Samples;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::layout::Layout;
@@ -21,12 +24,8 @@ const CONSPICUOUS: f64 = 5.0;
 /// Something that may have been left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Missing {
-    /// A constant torque.
-    Offset,
-    /// Dry friction.
-    Coulomb,
-    /// A hardening or softening spring.
-    Cubic,
+    /// A built-in term.
+    Term(&'static BuiltInTerm),
     /// The torque comes late.
     Lag,
 }
@@ -36,10 +35,29 @@ pub enum Missing {
 pub struct Suspect {
     /// What it is.
     pub missing: Missing,
-    /// Its factor: N·m, N·m, N·m/rad³, or samples.
+    /// Its factor, in the unit of the term, or samples.
     pub value: f64,
     /// Its standard error.
     pub error: f64,
+}
+
+impl Missing {
+    /// What it is called.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Term(term) => term.name,
+            Self::Lag => "lag",
+        }
+    }
+
+    /// The samples of a term, `None` if they are one everywhere or it is none.
+    pub(crate) fn samples<'a>(&self, angle: &'a dyn Samples, velocity: &'a dyn Samples) -> Option<Mapped<'a>> {
+        match self {
+            Self::Term(term) => term.function.samples(angle, velocity),
+            Self::Lag => None,
+        }
+    }
 }
 
 impl Suspect {

@@ -79,44 +79,45 @@ impl Samples for Scaled<'_> {
     }
 }
 
-/// The cube of a channel.
-pub(crate) struct Cubed<'a>(pub(crate) &'a dyn Samples);
+/// A function of a channel, applied in place.
+pub(crate) struct Mapped<'a> {
+    pub(crate) channel: &'a dyn Samples,
+    pub(crate) function: fn(&mut [f64]),
+}
 
-impl Samples for Cubed<'_> {
+impl Samples for Mapped<'_> {
     fn len(&self) -> usize {
-        self.0.len()
+        self.channel.len()
     }
 
     fn read(&self, first: usize, into: &mut [f64]) {
-        self.0.read(first, into);
-        for value in into {
-            *value = value.powi(3);
-        }
+        self.channel.read(first, into);
+        (self.function)(into);
     }
 }
 
-/// The sign of a velocity that is known every `stride` samples from sample `first` on.
-pub(crate) struct VelocitySign<'a> {
-    pub(crate) velocity: &'a [f64],
+/// A channel that is known every `stride` samples from sample `first` on, interpolated between them.
+pub(crate) struct Interpolated<'a> {
+    pub(crate) values: &'a [f64],
     pub(crate) first: usize,
     pub(crate) stride: usize,
     pub(crate) samples: usize,
 }
 
-impl Samples for VelocitySign<'_> {
+impl Samples for Interpolated<'_> {
     fn len(&self) -> usize {
         self.samples
     }
 
     fn read(&self, first: usize, into: &mut [f64]) {
-        let last = self.velocity.len() - 1;
+        let last = self.values.len() - 1;
         for (sample, value) in (first..).zip(into) {
             let place = (sample as f64 - self.first as f64) / self.stride as f64;
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the rows")]
             let row = place.floor().clamp(0.0, last as f64) as usize;
             let part = (place - row as f64).clamp(0.0, 1.0);
-            let (here, next) = (self.velocity[row], self.velocity[(row + 1).min(last)]);
-            *value = sign(here + part * (next - here));
+            let (here, next) = (self.values[row], self.values[(row + 1).min(last)]);
+            *value = here + part * (next - here);
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Limits from which on a fit is not to be believed as it is.
 
+use crate::status::Status;
+
 /// A condition number of the equations of motion from which on they hardly tell the parameters apart.
 ///
 /// Under a multisine windows have 10 … 100; under a single sine only noise tells inertia from stiffness, and they have 1000 and more.
@@ -7,3 +9,14 @@ pub const HARDLY_TOLD_APART: f64 = 500.0;
 
 /// A cross-validation error beyond which the rows hold more than the noise of the channels explains.
 pub const NOISE_MODEL_FAILS: f64 = 4.0;
+
+/// The flag of a condition number.
+pub(crate) fn status_of(condition: f64) -> Status {
+    if condition.is_infinite() {
+        Status::RANK_DEFICIENT
+    } else if condition > HARDLY_TOLD_APART {
+        Status::ILL_CONDITIONED
+    } else {
+        Status::GOOD
+    }
+}

@@ -32,22 +32,22 @@ const MEDIAN: f64 = 0.454_936;
 
 /// What windows around samples say: unknowns and their standard errors, one slice an unknown.
 #[derive(Clone, Copy, Debug)]
-pub struct Track<'a> {
+pub(crate) struct Track<'a> {
     /// Values by unknown.
-    pub values: &'a [&'a [f64]],
+    pub(crate) values: &'a [&'a [f64]],
     /// Standard errors by unknown.
-    pub errors: &'a [&'a [f64]],
+    pub(crate) errors: &'a [&'a [f64]],
 }
 
 /// By how much standard errors of windowed unknowns exceed those of ordinary least squares: one factor an unknown, in every record.
 ///
-/// The tracks hold what [`identify_windowed`](crate::identify_windowed) found at every sample. The factors are never less than one. Where
+/// The tracks hold what [`identify_windowed`] found at every sample. The factors are never less than one. Where
 /// a record is too short for windows that share no equation they come from the correlation of the residuals. They cost well below a
 /// millisecond.
 ///
 /// # Errors
 /// If a record is shorter than the window of the polynomials.
-pub fn scatter(
+pub(crate) fn scatter(
     derivatives: &LocalPolynomials,
     least_squares: &RollingLeastSquares,
     records: &[(Motion<'_>, Track<'_>)],
@@ -60,12 +60,12 @@ pub fn scatter(
     Ok(all)
 }
 
-/// Identifies as [`identify_windowed`](crate::identify_windowed) does, for outputs of which not every sample has an element, and returns
+/// Identifies as [`identify_windowed`] does, for outputs of which not every sample has an element, and returns
 /// the factors of [`scatter`] as well: the windows that they need, 32 768 or so, are solved in the same go.
 ///
 /// # Errors
 /// If a record is shorter than the window of the polynomials, or the watch cancels.
-pub fn identify_with_scatter(
+pub(crate) fn identify_with_scatter(
     derivatives: &LocalPolynomials,
     least_squares: &RollingLeastSquares,
     records: Vec<(Motion<'_>, Identified<'_>)>,

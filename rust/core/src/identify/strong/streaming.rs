@@ -6,19 +6,19 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::equation::motion::Motion;
 use crate::error::Error;
-use crate::exec::pool::{self, GoOn, Piece, Watch};
+use crate::exec::pool;
+use crate::exec::pool::{GoOn, Piece, Watch};
 use crate::lanes::output::{Elements, split_off};
 use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares};
-use crate::least_squares::stacked_qr::{SharedParameters, Summary};
 use crate::local_polynomials::estimates::Estimates;
 use crate::local_polynomials::plan::LocalPolynomials;
 use crate::record::samples::{Samples, is_usable};
 use crate::record::subsample::stretches;
-use crate::regression::newey_west::{Stretched, enlarge};
+use crate::regression::newey_west::Stretched;
 use crate::status::Status;
 
 /// Rows in a piece of work, about.
-const PIECE: usize = 1 << 14;
+pub(crate) const PIECE: usize = 1 << 14;
 
 /// Rows that the correlation of residuals is read off in a long record, and in how many stretches.
 const MOST_ROWS: usize = 1 << 14;
@@ -26,15 +26,15 @@ const STRETCHES: usize = 8;
 
 /// Where results of one record are written. An empty slice stands for what is not wanted.
 #[derive(Debug, Default)]
-pub struct Identified<'a> {
+pub(crate) struct Identified<'a> {
     /// Parameters of every window; their elements say which samples all outputs belong to.
-    pub regressions: Regressions<'a>,
+    pub(crate) regressions: Regressions<'a>,
     /// Order of the polynomial around each sample.
-    pub order: &'a mut [u8],
+    pub(crate) order: &'a mut [u8],
 }
 
 impl Identified<'_> {
-    fn split_off_before(&mut self, sample: usize) -> Self {
+    pub(crate) fn split_off_before(&mut self, sample: usize) -> Self {
         let count = self.regressions.elements.of(0..sample).len();
         Identified { order: split_off(&mut self.order, count), regressions: self.regressions.split_off_before(sample) }
     }
@@ -48,7 +48,7 @@ pub(crate) struct Chunk {
     order: Vec<u8>,
     status: Vec<u16>,
     known: Vec<f64>,
-    /// Unknowns, then the right-hand side.
+    /// Unknowns, then the right-hand rhs.
     pub(crate) columns: Vec<Vec<f64>>,
     polynomials: crate::local_polynomials::plan::PolynomialScratch,
 }
@@ -124,6 +124,12 @@ impl Chunk {
     }
 }
 
+/// Pairs of unknown coefficients, by the places of the unknowns.
+pub(crate) fn pairs(motion: &Motion<'_>) -> Vec<(usize, usize)> {
+    let coefficients = motion.unknowns() - motion.terms.len();
+    (0..coefficients).flat_map(|one| (one + 1..coefficients).map(move |other| (one, other))).collect()
+}
+
 /// The samples that are equations: those around which a full window of the angle lies.
 pub(crate) fn equations(plan: &LocalPolynomials, samples: usize) -> Range<usize> {
     let before = plan.before_centre();
@@ -137,7 +143,7 @@ pub(crate) fn equations(plan: &LocalPolynomials, samples: usize) -> Range<usize>
 ///
 /// # Errors
 /// If a record is shorter than the window of the polynomials, or the watch cancels.
-pub fn identify_windowed(
+pub(crate) fn identify_windowed(
     derivatives: &LocalPolynomials,
     least_squares: &RollingLeastSquares,
     records: Vec<(Motion<'_>, Identified<'_>)>,
@@ -194,7 +200,7 @@ pub(crate) fn identify_parts(
 }
 
 /// Adds what is known of the polynomials to a piece of the results.
-fn finish(chunk: &Chunk, samples: Range<usize>, part: &mut Identified<'_>) {
+pub(crate) fn finish(chunk: &Chunk, samples: Range<usize>, part: &mut Identified<'_>) {
     let elements = part.regressions.elements;
     for element in elements.of(samples) {
         let place = elements.sample(element) - chunk.first;
@@ -205,71 +211,6 @@ fn finish(chunk: &Chunk, samples: Range<usize>, part: &mut Identified<'_>) {
             *status |= chunk.status[place] & !Status::INVALID.bits();
         }
     }
-}
-
-/// Identifies parameters that are the same over the whole record, one result a record; nothing where they are not determined.
-///
-/// `derivatives` must be a plan for the value and the first two derivatives. Equations that hold a value that is no number are left
-/// out. Of the outputs only orders and statuses are written. Standard errors hold the correlation of neighbouring rows, as residuals of
-/// at most 16 384 rows show it.
-///
-/// # Errors
-/// If a record is shorter than the window of the polynomials, or the watch cancels.
-pub fn identify_constant(
-    derivatives: &LocalPolynomials,
-    records: Vec<(Motion<'_>, Identified<'_>)>,
-    workers: NonZeroUsize,
-    watch: &mut Watch<'_>,
-) -> Result<Vec<Option<SharedParameters>>, Error> {
-    let motions: Vec<Motion<'_>> = records.iter().map(|(motion, _)| motion.clone()).collect();
-    let unknowns = motions.first().map_or(0, Motion::unknowns);
-    let mut pieces = Vec::new();
-    let mut owners = Vec::new();
-    for (index, (motion, (_, mut identified))) in motions.iter().zip(records).enumerate() {
-        derivatives.windows(motion.angle.len())?;
-        for first in (0..motion.angle.len()).step_by(PIECE) {
-            let samples = first..motion.angle.len().min(first + PIECE);
-            let part = identified.split_off_before(samples.end);
-            pieces.push(Piece { size: samples.len(), content: (pieces.len(), motion, samples, part) });
-            owners.push(index);
-        }
-    }
-    let summaries = Mutex::new(vec![None; pieces.len()]);
-    let failed = Mutex::new(None);
-    let work = |(place, motion, samples, mut part): (usize, &Motion<'_>, Range<usize>, Identified<'_>),
-                chunk: &mut Chunk| {
-        if let Err(error) = chunk.fill(derivatives, motion, samples.clone()) {
-            *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
-            return;
-        }
-        let rows = equations(derivatives, motion.angle.len());
-        let summary = Summary::of(&chunk.columns, |row| chunk.is_equation(row, &rows));
-        finish(chunk, samples, &mut part);
-        summaries.lock().unwrap_or_else(PoisonError::into_inner)[place] = Some(summary);
-    };
-    pool::run(pieces, workers, || Chunk::new(derivatives, unknowns + 1), work, watch)?;
-    if let Some(error) = failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
-        return Err(error);
-    }
-    let mut totals = vec![Summary::empty(unknowns + 1); motions.len()];
-    for (summary, owner) in summaries.into_inner().unwrap_or_else(PoisonError::into_inner).iter().zip(owners) {
-        if let Some(summary) = summary {
-            totals[owner].add(summary);
-        }
-    }
-    let mut solved: Vec<_> = totals.iter().map(Summary::solve).collect();
-    let pieces = solved.iter_mut().zip(&motions).map(|content| Piece { size: 1, content }).collect();
-    let work = |(solved, motion): (&mut Option<SharedParameters>, &Motion<'_>), chunk: &mut Chunk| {
-        if let Some(solved) = solved {
-            enlarge(&mut solved.covariance, &redundancies(derivatives, motion, chunk)?);
-        }
-        Ok(())
-    };
-    let samples = motions.iter().map(|motion| motion.angle.len()).sum();
-    let chunk = || Chunk::new(derivatives, unknowns + 1);
-    let done: Result<(), Error> =
-        pool::map(pieces, workers, chunk, work, &mut |_, _| watch(samples, samples))?.into_iter().collect();
-    done.map(|()| solved)
 }
 
 /// By how much the standard errors of constants exceed those of ordinary least squares, from stretches of a long record.

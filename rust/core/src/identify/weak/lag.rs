@@ -10,8 +10,9 @@ use std::sync::Arc;
 
 use crate::equation::rows::Rows;
 use crate::error::Error;
-use crate::identify::weak::decide::Decided;
-use crate::identify::weak::session::{Chosen, Session};
+use crate::identify::weak::choice::Chosen;
+use crate::identify::weak::decided::Decided;
+use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::JudgedTerm;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
@@ -112,7 +113,7 @@ impl Session<'_, '_, '_> {
         decided: &Decided,
         fit: &Fit,
     ) -> Result<Option<(f64, f64)>, Error> {
-        // What changes slowly depends on the angle only, so what it took off the right-hand side is the same for every lag.
+        // What changes slowly depends on the angle only, so what it took off the right-hand rhs is the same for every lag.
         let (before, without) = (&chosen.weak.rows.rhs, decided.rhs(&chosen.weak.rows));
         let slow = before.iter().zip(without).map(|(rhs, without)| rhs - without);
         let rhs = weak.rows.rhs.iter().zip(slow).map(|(rhs, slow)| rhs - slow).collect();

@@ -1,7 +1,15 @@
 //! Identification in weak form: test function, decisions, report.
 
+pub(crate) mod choice;
 pub(crate) mod decide;
+pub(crate) mod decided;
+pub(crate) mod form;
+pub(crate) mod found;
+pub(crate) mod jumps;
 pub(crate) mod lag;
+pub(crate) mod options;
 pub(crate) mod outside_mask;
 pub(crate) mod report;
 pub(crate) mod session;
+pub(crate) mod weighting;
+pub(crate) mod windows;

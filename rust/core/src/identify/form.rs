@@ -1,0 +1,196 @@
+//! What each form finds, told in the same words.
+
+use std::num::NonZeroUsize;
+
+use crate::equation::motion::{Coefficient, Motion, Term, unknowns};
+use crate::equation::terms::BuiltInTerm;
+use crate::error::Error;
+use crate::exec::pool::Watch;
+use crate::identify::identification::{Covariance, Identification, Unknown, WeakDetails};
+use crate::identify::kinds::{Kind, in_strong_form, in_weak_form};
+use crate::identify::options::{Options, StrongForm, Task, WeakForm};
+use crate::identify::results::{Constant, SampleResults};
+use crate::identify::strong::general::{StrongOptions, identify_strong};
+use crate::identify::weak::form::identify_weak;
+use crate::identify::weak::options::WeakOptions;
+use crate::identify::weak::outside_mask::Outside;
+use crate::inference::missing_terms::Missing;
+
+/// What was found of the unknowns of one record, by the numbers of their regressors.
+struct Found {
+    constants: Vec<Constant>,
+    changing: Vec<usize>,
+    /// Pairs of constants and their covariance.
+    constant_pairs: Vec<(usize, usize, f64)>,
+    /// Pairs of unknowns whose covariances are at the samples.
+    pairs: Vec<(usize, usize)>,
+    results: SampleResults,
+}
+
+impl Found {
+    /// The unknowns in their order. What was asked of a kind keeps its name; the record names the others.
+    fn unknowns(&mut self, asked: &[Kind], regressors: &[usize]) -> Vec<Unknown> {
+        let unknown = |(&asked, &number): (&Kind, &usize)| {
+            if let Some(found) = self.constants.iter().find(|constant| constant.unknown == number) {
+                let unknown = Unknown::constant(found.value, found.error);
+                return Unknown { test: found.test.clone(), ..unknown };
+            }
+            let place = self.changing.iter().position(|&one| one == number);
+            let take = |columns: &mut Vec<Vec<f64>>| {
+                place.and_then(|place| columns.get_mut(place)).map(std::mem::take).unwrap_or_default()
+            };
+            let kind = match asked {
+                Kind::Automatic if number < 2 => Kind::Varying,
+                Kind::Automatic => Kind::Windowed,
+                kind => kind,
+            };
+            let (values, stderr) = (take(&mut self.results.values), take(&mut self.results.errors));
+            Unknown { kind, ..Unknown::windowed(values, stderr, 1.0) }
+        };
+        asked.iter().zip(regressors).map(unknown).collect()
+    }
+
+    /// Covariances of all pairs of coefficients: zero where nothing tells them.
+    fn covariances(&mut self, regressors: &[usize]) -> Vec<Covariance> {
+        let coefficients: Vec<usize> = regressors.iter().copied().filter(|&number| number < 3).collect();
+        let mut found = Vec::new();
+        for one in 0..coefficients.len() {
+            for other in one + 1..coefficients.len() {
+                let is_it = |a: usize, b: usize| [(a, b), (b, a)].contains(&(coefficients[one], coefficients[other]));
+                let changing = self.pairs.iter().position(|&(a, b)| is_it(a, b));
+                let constant = self.constant_pairs.iter().find(|&&(a, b, _)| is_it(a, b));
+                let values = match changing {
+                    Some(place) => std::mem::take(&mut self.results.covariances[place]),
+                    None => vec![constant.map_or(0.0, |(_, _, covariance)| *covariance)],
+                };
+                found.push(Covariance { pair: (one, other), values });
+            }
+        }
+        found
+    }
+}
+
+/// Identifies one record in weak form.
+pub(crate) fn weak(
+    task: &Task<'_>,
+    form: &WeakForm,
+    options: &Options,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<Identification, Error> {
+    let regressors = regressors(&task.motion);
+    let weak_options = WeakOptions {
+        delta: options.delta,
+        half_width: form.window_length.map(|length| length / 2),
+        exponent: form.exponent,
+        regression_window: form.regression_window,
+        averaging: form.averaging,
+        linear: form.linear,
+        kinds: in_weak_form(&options.kinds, &regressors, form.averaging),
+        noise: form.noise,
+        lag: task.lag,
+        quantisation: options.quantisation,
+        step: options.step,
+        diagnose: options.diagnose,
+        not_missing: not_missing(task),
+        instructions: options.instructions,
+    };
+    let found = identify_weak(&task.motion, task.mask, &weak_options, workers, watch)?;
+    let place = |number: usize| regressors.iter().position(|&one| one == number).unwrap_or(number);
+    let outside_mask = found.outside_mask.map(|outside| {
+        let differing = outside.differing.iter().map(|&(number, value, error)| (place(number), value, error)).collect();
+        Outside { differing, ..outside }
+    });
+    let details = WeakDetails {
+        noise: found.noise,
+        lengths: found.lengths,
+        prediction_error: found.prediction_error,
+        weighted: found.weighted,
+        pooling: found.pooling,
+        condition: found.condition,
+        weakest: found.weakest,
+        mostly_noise: found.mostly_noise,
+        lag: found.lag,
+        suspects: found.suspects,
+        outside_mask,
+    };
+    let mut unknowns = Found {
+        constants: found.constants,
+        changing: found.changing,
+        constant_pairs: found.constant_pairs,
+        pairs: found.pairs,
+        results: found.results,
+    };
+    Ok(Identification {
+        window_length: found.function.window_length(),
+        exponent: Some(found.function.exponent()),
+        regression_window: found.regression_window,
+        unknowns: unknowns.unknowns(&options.kinds, &regressors),
+        covariances: unknowns.covariances(&regressors),
+        condition: unknowns.results.condition,
+        residual_std: unknowns.results.deviation,
+        status: unknowns.results.status,
+        record_status: found.record_status,
+        order: Vec::new(),
+        jumps: found.jumps,
+        weak: Some(details),
+    })
+}
+
+/// Identifies one record in strong form, whatever its kinds, mask and missing samples.
+pub(crate) fn strong(
+    task: &Task<'_>,
+    form: &StrongForm<'_>,
+    options: &Options,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<Identification, Error> {
+    let regressors = regressors(&task.motion);
+    let strong_options = StrongOptions {
+        regression_window: form.regression_window,
+        linear: form.linear,
+        kinds: in_strong_form(&options.kinds, &regressors),
+        filter_torque: form.filter_torque,
+        lag: task.lag.unwrap_or(0.0),
+        step: options.step,
+    };
+    let found = identify_strong(form.derivatives, &task.motion, task.mask, &strong_options, workers, watch)?;
+    let mut unknowns = Found {
+        constants: found.constants,
+        changing: found.changing,
+        constant_pairs: Vec::new(),
+        pairs: found.pairs,
+        results: found.results,
+    };
+    Ok(Identification {
+        window_length: form.derivatives.options().window_length,
+        exponent: None,
+        regression_window: form.regression_window,
+        unknowns: unknowns.unknowns(&strong_options.kinds, &regressors),
+        covariances: unknowns.covariances(&regressors),
+        condition: unknowns.results.condition,
+        residual_std: unknowns.results.deviation,
+        status: unknowns.results.status,
+        record_status: found.record_status,
+        order: found.order,
+        jumps: Vec::new(),
+        weak: None,
+    })
+}
+
+/// The numbers of the regressors whose factors are unknown.
+pub(crate) fn regressors(motion: &Motion<'_>) -> Vec<usize> {
+    unknowns(&motion.coefficients, motion.terms.len())
+}
+
+/// What cannot be missing because it is there, or is not a question that anybody asked: a cubic spring beside a known one.
+fn not_missing(task: &Task<'_>) -> Vec<Missing> {
+    let built_in = task.motion.terms.iter().filter_map(|term| match term {
+        Term::BuiltIn(term) => Some(Missing::Term(term)),
+        Term::Record(_) => None,
+    });
+    let cubic = BuiltInTerm::named("cubic").map(Missing::Term);
+    let cubic = cubic.filter(|_| !matches!(task.motion.coefficients[2], Coefficient::Unknown));
+    let lag = (task.lag != Some(0.0)).then_some(Missing::Lag);
+    built_in.chain(cubic).chain(lag).collect()
+}

@@ -1,0 +1,115 @@
+//! What is found in one record, whatever the route.
+
+use crate::identify::kinds::Kind;
+use crate::identify::weak::lag::Lag;
+use crate::identify::weak::outside_mask::Outside;
+use crate::inference::constancy::Test;
+use crate::inference::missing_terms::Suspect;
+use crate::status::Status;
+
+/// What was found of one unknown. Places of unknowns count coefficients that are not known, then terms.
+#[derive(Clone, Debug)]
+pub struct Unknown {
+    /// How it came about in the end.
+    pub kind: Kind,
+    /// One value for every wanted sample, or one for the record.
+    pub values: Vec<f64>,
+    /// Their standard errors, each still to be multiplied by `factor`.
+    pub stderr: Vec<f64>,
+    /// What standard errors are multiplied by: one, unless they are those of ordinary least squares.
+    pub factor: f64,
+    /// Whether it is the same in all parts of the record, where that was tested.
+    pub test: Option<Test>,
+    /// Whether the record was to decide, and the form cannot ask it.
+    pub untested: bool,
+}
+
+impl Unknown {
+    /// A value for the record.
+    pub(crate) fn constant(value: f64, stderr: f64) -> Self {
+        Self {
+            kind: Kind::Constant,
+            values: vec![value],
+            stderr: vec![stderr],
+            factor: 1.0,
+            test: None,
+            untested: false,
+        }
+    }
+
+    /// Values for every wanted sample, with standard errors that are still to be multiplied.
+    pub(crate) fn windowed(values: Vec<f64>, stderr: Vec<f64>, factor: f64) -> Self {
+        Self { kind: Kind::Windowed, values, stderr, factor, test: None, untested: false }
+    }
+
+    /// Whether it has one value for the record.
+    #[must_use]
+    pub fn is_constant(&self) -> bool {
+        self.kind == Kind::Constant
+    }
+}
+
+/// The covariance of two coefficients, before factors.
+#[derive(Clone, Debug)]
+pub struct Covariance {
+    /// Places of the unknowns.
+    pub pair: (usize, usize),
+    /// One value for every wanted sample, or one for the record.
+    pub values: Vec<f64>,
+}
+
+/// What only the weak form says.
+#[derive(Clone, Debug)]
+pub struct WeakDetails {
+    /// Variances of the noise of angle and torque.
+    pub noise: [f64; 2],
+    /// Lengths of windows that were tried, in samples, and the error of predicting a row with each, over the noise's.
+    pub lengths: Vec<(usize, f64)>,
+    /// Mean squared error of predicting a row from others, over the noise's.
+    pub prediction_error: f64,
+    /// Whether equations were weighted by the inverse of their noise's covariance.
+    pub weighted: bool,
+    /// Samples that coefficients which change slowly are taken from; `None` if there are none.
+    pub pooling: Option<f64>,
+    /// Condition number of the equations for the constants; infinite where they are not determined.
+    pub condition: f64,
+    /// How much each constant takes part in the combination that is determined worst, its column scaled to a norm of one.
+    pub weakest: Vec<f64>,
+    /// Whether that combination is mostly the angle's noise.
+    pub mostly_noise: bool,
+    /// The lag that was estimated; `None` if it was given or is not determined.
+    pub lag: Option<Lag>,
+    /// What may have been left out.
+    pub suspects: Vec<Suspect>,
+    /// What the rows say that the mask keeps out; `None` without a mask.
+    pub outside_mask: Option<Outside>,
+}
+
+/// What is found in one record. Numbers that concern a sample have one element for every wanted sample, or one where they are the same everywhere.
+#[derive(Clone, Debug)]
+pub struct Identification {
+    /// Samples of the test function, or of the windows of the polynomials.
+    pub window_length: usize,
+    /// Exponent of the test function; `None` in strong form.
+    pub exponent: Option<usize>,
+    /// Samples whose equations are solved together.
+    pub regression_window: usize,
+    /// What was found of each unknown.
+    pub unknowns: Vec<Unknown>,
+    /// Covariances of all pairs of unknown coefficients.
+    pub covariances: Vec<Covariance>,
+    /// Condition number of the equations.
+    pub condition: Vec<f64>,
+    /// Standard deviation of what is left of the torque.
+    pub residual_std: Vec<f64>,
+    /// Bits of [`Status`] for every wanted sample: what holds there.
+    pub status: Vec<u16>,
+    /// What holds for the whole record.
+    pub record_status: Status,
+    /// Order of the polynomial around every wanted sample; empty in weak form.
+    pub order: Vec<u8>,
+    /// Samples before which what is windowed jumps.
+    pub jumps: Vec<usize>,
+    /// What only the weak form says.
+    pub weak: Option<WeakDetails>,
+}

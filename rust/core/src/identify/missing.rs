@@ -1,0 +1,60 @@
+//! What becomes of the numbers around missing samples, where they are to have none.
+
+use crate::equation::motion::Motion;
+use crate::identify::identification::{Identification, Unknown};
+use crate::status::Status;
+
+/// Samples that are read at a time.
+const PIECE: usize = 1 << 14;
+
+/// Numbers of the samples at which angle or torque holds no finite number, in order.
+pub(crate) fn holes(motion: &Motion<'_>) -> Vec<usize> {
+    let samples = motion.angle.len();
+    let (mut angle, mut torque) = (vec![0.0; PIECE], vec![0.0; PIECE]);
+    let mut holes = Vec::new();
+    for first in (0..samples).step_by(PIECE) {
+        let count = PIECE.min(samples - first);
+        let (angle, torque) = (&mut angle[..count], &mut torque[..count]);
+        motion.angle.read(first, angle);
+        motion.torque.read(first, torque);
+        // No early return, so that the loop becomes vector instructions.
+        let finite = angle.iter().chain(&*torque).fold(true, |all, value| all & value.is_finite());
+        if !finite {
+            let lost = |&place: &usize| !angle[place].is_finite() || !torque[place].is_finite();
+            holes.extend((0..count).filter(lost).map(|place| first + place));
+        }
+    }
+    holes
+}
+
+/// Takes the numbers away whose windows hold a hole, but for constants, whose window is the record.
+pub(crate) fn propagate(found: &mut Identification, holes: &[usize], step: usize) {
+    if found.unknowns.iter().all(Unknown::is_constant) {
+        return;
+    }
+    let (half, rows) = (found.window_length / 2, found.regression_window);
+    let (before, after) = (half + rows / 2, half + rows - rows / 2 - 1);
+    let elements = found.status.len();
+    for column in [&mut found.residual_std, &mut found.condition] {
+        if column.len() == 1 {
+            column.resize(elements, column[0]);
+        }
+    }
+    let mut first = 0;
+    for element in 0..elements {
+        let sample = element * step;
+        while holes.get(first).is_some_and(|hole| hole + before < sample) {
+            first += 1;
+        }
+        if holes.get(first).is_none_or(|&hole| hole > sample + after) {
+            continue;
+        }
+        for unknown in found.unknowns.iter_mut().filter(|unknown| !unknown.is_constant()) {
+            unknown.values[element] = f64::NAN;
+            unknown.stderr[element] = f64::NAN;
+        }
+        found.residual_std[element] = f64::NAN;
+        found.condition[element] = f64::NAN;
+        found.status[element] |= (Status::INVALID | Status::GAP).bits();
+    }
+}

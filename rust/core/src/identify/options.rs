@@ -1,0 +1,92 @@
+//! How records are identified.
+
+use crate::equation::motion::Motion;
+use crate::identify::kinds::Kind;
+use crate::local_polynomials::plan::LocalPolynomials;
+use crate::simd::instructions::Instructions;
+
+/// Which equations are made of a record.
+#[derive(Clone, Debug)]
+pub enum Method<'a> {
+    /// The equation of motion multiplied by a test function and integrated by parts.
+    Weak(WeakForm),
+    /// The equation of motion at every sample, with derivatives of local polynomials.
+    Strong(StrongForm<'a>),
+}
+
+/// Settings of the weak form. What is `None` is chosen from the record.
+#[derive(Clone, Debug)]
+pub struct WeakForm {
+    /// Samples of the test function, odd.
+    pub window_length: Option<usize>,
+    /// Exponent of the test function.
+    pub exponent: Option<usize>,
+    /// Samples whose equations are solved together.
+    pub regression_window: Option<usize>,
+    /// Whether windows of many lengths, before, around and after a sample are averaged and, where nothing is windowed, equations are weighted by
+    /// their noise; otherwise ordinary least squares in windows of one length.
+    pub averaging: bool,
+    /// Whether what is windowed may grow linearly within a window.
+    pub linear: bool,
+    /// Variances of the noise of angle and torque.
+    pub noise: [Option<f64>; 2],
+}
+
+impl Default for WeakForm {
+    fn default() -> Self {
+        Self {
+            window_length: None,
+            exponent: None,
+            regression_window: None,
+            averaging: true,
+            linear: true,
+            noise: [None; 2],
+        }
+    }
+}
+
+/// Settings of the strong form.
+#[derive(Clone, Debug)]
+pub struct StrongForm<'a> {
+    /// The plan for the angle and its first two derivatives.
+    pub derivatives: &'a LocalPolynomials,
+    /// Rows that are solved together.
+    pub regression_window: usize,
+    /// Whether the torque is smoothed by polynomials of the orders chosen for the angle.
+    pub filter_torque: bool,
+    /// Whether what is windowed may grow linearly within a window.
+    pub linear: bool,
+}
+
+/// One record to identify.
+#[derive(Clone)]
+pub struct Task<'a> {
+    /// Its equation of motion.
+    pub motion: Motion<'a>,
+    /// Where a sample may be the centre of an equation; everywhere if `None`.
+    pub mask: Option<&'a [bool]>,
+    /// Which equations are made.
+    pub method: Method<'a>,
+    /// By how many samples the torque comes late; estimated if `None`, which the weak form can.
+    pub lag: Option<f64>,
+}
+
+/// What is the same for all records of a call.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Seconds from one sample to the next.
+    pub delta: f64,
+    /// How each unknown comes about: unknown coefficients in the order inertia, damping, stiffness, then terms.
+    pub kinds: Vec<Kind>,
+    /// The step that the angle was rounded to, zero for none; looked for if `None`. Only the weak form asks for it: the plan of the strong form
+    /// has its own.
+    pub quantisation: Option<f64>,
+    /// Whether windows that hold a missing sample have no number, rather than one from their other samples.
+    pub propagate: bool,
+    /// Every how many samples numbers are wanted.
+    pub step: usize,
+    /// Whether to look for terms that may have been left out.
+    pub diagnose: bool,
+    /// Vector instructions.
+    pub instructions: Instructions,
+}

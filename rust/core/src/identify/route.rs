@@ -1,0 +1,124 @@
+//! The one entry: every record takes the route that its form, kinds, mask and missing samples ask for.
+//!
+//! In strong form a record without holes or mask, whose unknowns are all windowed or all constant, is worked on piece by piece, and all such
+//! records of a call together; any other is held as a whole. Both make the same rows, so the numbers agree to rounding.
+
+use std::num::NonZeroUsize;
+
+use crate::equation::motion::Motion;
+use crate::error::Error;
+use crate::exec::pool::Watch;
+use crate::identify::form::{regressors, strong, weak};
+use crate::identify::identification::Identification;
+use crate::identify::kinds::{Kind, in_strong_form};
+use crate::identify::missing::{holes, propagate};
+use crate::identify::options::{Method, Options, StrongForm, Task};
+use crate::identify::strong::constant::constants;
+use crate::identify::strong::windowed::windows;
+
+/// How a record in strong form is worked on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Pieces {
+    /// Piece by piece, everything in windows.
+    Windowed,
+    /// Piece by piece, everything constant.
+    Constant,
+    /// As a whole.
+    Whole,
+}
+
+/// Identifies inertia, damping, stiffness and terms of every record.
+///
+/// # Errors
+/// If a record is shorter than its windows or has no room for the weak form's test functions, settings are impossible, or the watch cancels.
+pub fn identify_all(
+    tasks: &[Task<'_>],
+    options: &Options,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<Identification>, Error> {
+    let mut found: Vec<Option<Identification>> = tasks.iter().map(|_| None).collect();
+    for pieces in [Pieces::Windowed, Pieces::Constant] {
+        for (form, places) in together(tasks, options, pieces) {
+            let motions: Vec<Motion<'_>> = places.iter().map(|&place| tasks[place].motion.clone()).collect();
+            let each = if pieces == Pieces::Windowed {
+                windows(form, &motions, options.step, workers, watch)?
+            } else {
+                constants(form, &motions, options.step, workers, watch)?
+            };
+            for (place, mut one) in places.into_iter().zip(each) {
+                mark_untested(&mut one, options);
+                found[place] = Some(one);
+            }
+        }
+    }
+    let rest = tasks.iter().zip(found).map(|(task, found)| match found {
+        Some(found) => Ok(found),
+        None => alone(task, options, workers, watch),
+    });
+    rest.collect()
+}
+
+/// Identifies one record that is held as a whole.
+fn alone(
+    task: &Task<'_>,
+    options: &Options,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<Identification, Error> {
+    let mut found = match &task.method {
+        Method::Weak(form) => weak(task, form, options, workers, watch)?,
+        Method::Strong(form) => {
+            let mut found = strong(task, form, options, workers, watch)?;
+            mark_untested(&mut found, options);
+            found
+        }
+    };
+    if options.propagate {
+        let holes = holes(&task.motion);
+        if !holes.is_empty() {
+            propagate(&mut found, &holes, options.step);
+        }
+    }
+    Ok(found)
+}
+
+/// Records in strong form that are worked on together, by their settings.
+fn together<'a, 'b>(tasks: &'a [Task<'b>], options: &Options, pieces: Pieces) -> Vec<(&'a StrongForm<'b>, Vec<usize>)> {
+    let mut groups: Vec<(&StrongForm<'b>, Vec<usize>)> = Vec::new();
+    for (place, task) in tasks.iter().enumerate() {
+        let Method::Strong(form) = &task.method else { continue };
+        if route(task, form, options) != pieces {
+            continue;
+        }
+        let same = |other: &&StrongForm<'b>| {
+            std::ptr::eq(other.derivatives, form.derivatives) && other.regression_window == form.regression_window
+        };
+        match groups.iter_mut().find(|(other, _)| same(other)) {
+            Some((_, places)) => places.push(place),
+            None => groups.push((form, vec![place])),
+        }
+    }
+    groups
+}
+
+/// How a record in strong form is worked on.
+fn route(task: &Task<'_>, form: &StrongForm<'_>, options: &Options) -> Pieces {
+    let is_plain = !form.filter_torque && task.lag == Some(0.0) && task.mask.is_none();
+    let kinds = in_strong_form(&options.kinds, &regressors(&task.motion));
+    let all = |kind: Kind| is_plain && kinds.iter().all(|one| *one == kind);
+    if all(Kind::Constant) {
+        Pieces::Constant
+    } else if all(Kind::Windowed) && !form.linear && (options.propagate || holes(&task.motion).is_empty()) {
+        Pieces::Windowed
+    } else {
+        Pieces::Whole
+    }
+}
+
+/// Says of what the record was to decide, and strong form took as constant, that nothing tested it.
+fn mark_untested(found: &mut Identification, options: &Options) {
+    for (unknown, kind) in found.unknowns.iter_mut().zip(&options.kinds) {
+        unknown.untested = *kind == Kind::Automatic && unknown.is_constant();
+    }
+}

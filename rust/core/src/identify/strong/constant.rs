@@ -1,0 +1,160 @@
+//! Parameters that are the same over whole records in strong form, piece by piece.
+
+use std::num::NonZeroUsize;
+use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
+
+use crate::equation::motion::Motion;
+use crate::error::Error;
+use crate::exec::huge_pages::zeros;
+use crate::exec::pool;
+use crate::exec::pool::{Piece, Watch};
+use crate::identify::identification::{Covariance, Identification, Unknown};
+use crate::identify::options::StrongForm;
+use crate::identify::strong::streaming::{Chunk, Identified, PIECE, equations, finish, pairs, redundancies};
+use crate::lanes::output::Elements;
+use crate::least_squares::plan::Regressions;
+use crate::least_squares::stacked_qr::{SharedParameters, Summary};
+use crate::local_polynomials::plan::LocalPolynomials;
+use crate::regression::limits::status_of;
+use crate::regression::newey_west::enlarge;
+use crate::status::Status;
+
+/// Identifies parameters that are the same over the whole record, one result a record; nothing where they are not determined.
+///
+/// `derivatives` must be a plan for the value and the first two derivatives. Equations that hold a value that is no number are left
+/// out. Of the outputs only orders and statuses are written. Standard errors hold the correlation of neighbouring rows, as residuals of
+/// at most 16 384 rows show it.
+///
+/// # Errors
+/// If a record is shorter than the window of the polynomials, or the watch cancels.
+pub(crate) fn identify_constant(
+    derivatives: &LocalPolynomials,
+    records: Vec<(Motion<'_>, Identified<'_>)>,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<Option<SharedParameters>>, Error> {
+    let motions: Vec<Motion<'_>> = records.iter().map(|(motion, _)| motion.clone()).collect();
+    let unknowns = motions.first().map_or(0, Motion::unknowns);
+    let mut pieces = Vec::new();
+    let mut owners = Vec::new();
+    for (index, (motion, (_, mut identified))) in motions.iter().zip(records).enumerate() {
+        derivatives.windows(motion.angle.len())?;
+        for first in (0..motion.angle.len()).step_by(PIECE) {
+            let samples = first..motion.angle.len().min(first + PIECE);
+            let part = identified.split_off_before(samples.end);
+            pieces.push(Piece { size: samples.len(), content: (pieces.len(), motion, samples, part) });
+            owners.push(index);
+        }
+    }
+    let summaries = Mutex::new(vec![None; pieces.len()]);
+    let failed = Mutex::new(None);
+    let work = |(place, motion, samples, mut part): (usize, &Motion<'_>, Range<usize>, Identified<'_>),
+                chunk: &mut Chunk| {
+        if let Err(error) = chunk.fill(derivatives, motion, samples.clone()) {
+            *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+            return;
+        }
+        let rows = equations(derivatives, motion.angle.len());
+        let summary = Summary::of(&chunk.columns, |row| chunk.is_equation(row, &rows));
+        finish(chunk, samples, &mut part);
+        summaries.lock().unwrap_or_else(PoisonError::into_inner)[place] = Some(summary);
+    };
+    pool::run(pieces, workers, || Chunk::new(derivatives, unknowns + 1), work, watch)?;
+    if let Some(error) = failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        return Err(error);
+    }
+    let mut totals = vec![Summary::empty(unknowns + 1); motions.len()];
+    for (summary, owner) in summaries.into_inner().unwrap_or_else(PoisonError::into_inner).iter().zip(owners) {
+        if let Some(summary) = summary {
+            totals[owner].add(summary);
+        }
+    }
+    solved(derivatives, &motions, &totals, workers, watch)
+}
+
+/// The constants of every record, with the correlation of neighbouring rows in their standard errors.
+fn solved(
+    derivatives: &LocalPolynomials,
+    motions: &[Motion<'_>],
+    totals: &[Summary],
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<Option<SharedParameters>>, Error> {
+    let mut solved: Vec<_> = totals.iter().map(Summary::solve).collect();
+    let pieces = solved.iter_mut().zip(motions).map(|content| Piece { size: 1, content }).collect();
+    let work = |(solved, motion): (&mut Option<SharedParameters>, &Motion<'_>), chunk: &mut Chunk| {
+        if let Some(solved) = solved {
+            enlarge(&mut solved.covariance, &redundancies(derivatives, motion, chunk)?);
+        }
+        Ok(())
+    };
+    let samples = motions.iter().map(|motion| motion.angle.len()).sum();
+    let columns = motions.first().map_or(0, Motion::unknowns) + 1;
+    let chunk = || Chunk::new(derivatives, columns);
+    let done: Result<(), Error> =
+        pool::map(pieces, workers, chunk, work, &mut |_, _| watch(samples, samples))?.into_iter().collect();
+    done.map(|()| solved)
+}
+
+/// Identifies what is unknown as constant over each record.
+///
+/// # Errors
+/// If a record is shorter than the window of the polynomials, or the watch cancels.
+pub(crate) fn constants(
+    form: &StrongForm<'_>,
+    motions: &[Motion<'_>],
+    step: usize,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<Identification>, Error> {
+    let elements = Elements { first: 0, step };
+    let wanted = |motion: &Motion<'_>| motion.angle.len().div_ceil(step);
+    let mut outputs: Vec<(Vec<u8>, Vec<u16>)> =
+        motions.iter().map(|motion| (zeros(wanted(motion)), zeros(wanted(motion)))).collect();
+    let records = motions.iter().zip(&mut outputs).map(|(motion, (order, status))| {
+        let regressions = Regressions { elements, status, ..Regressions::default() };
+        (motion.clone(), Identified { regressions, order })
+    });
+    let solved = identify_constant(form.derivatives, records.collect(), workers, watch)?;
+    let found = motions.iter().zip(solved).zip(outputs);
+    Ok(found.map(|((motion, solved), (order, status))| identification(form, motion, solved, order, status)).collect())
+}
+
+/// What was found of one record.
+fn identification(
+    form: &StrongForm<'_>,
+    motion: &Motion<'_>,
+    solved: Option<SharedParameters>,
+    order: Vec<u8>,
+    mut status: Vec<u16>,
+) -> Identification {
+    let count = motion.unknowns();
+    let nan = vec![f64::NAN; count * count];
+    let solved = solved.unwrap_or_else(|| SharedParameters {
+        values: nan[..count].to_vec(),
+        covariance: nan,
+        residual: f64::NAN,
+        condition: f64::INFINITY,
+    });
+    let record_status = status_of(solved.condition);
+    if record_status.contains(Status::RANK_DEFICIENT) {
+        status.iter_mut().for_each(|status| *status |= (Status::INVALID | Status::RANK_DEFICIENT).bits());
+    }
+    let entry = |one: usize, other: usize| solved.covariance[one * count + other];
+    let pairs = pairs(motion).into_iter();
+    Identification {
+        window_length: form.derivatives.options().window_length,
+        exponent: None,
+        regression_window: form.regression_window,
+        unknowns: (0..count).map(|one| Unknown::constant(solved.values[one], entry(one, one).sqrt())).collect(),
+        covariances: pairs.map(|pair| Covariance { pair, values: vec![entry(pair.0, pair.1)] }).collect(),
+        condition: vec![solved.condition],
+        residual_std: vec![solved.residual],
+        status,
+        record_status,
+        order,
+        jumps: Vec::new(),
+        weak: None,
+    }
+}

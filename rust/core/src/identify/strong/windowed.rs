@@ -1,0 +1,110 @@
+//! Parameters in a window of equations around every sample in strong form, piece by piece: the paper's form.
+
+use std::num::NonZeroUsize;
+
+use crate::equation::motion::Motion;
+use crate::error::Error;
+use crate::exec::huge_pages::zeros;
+use crate::exec::pool::Watch;
+use crate::identify::identification::{Covariance, Identification, Unknown};
+use crate::identify::options::StrongForm;
+use crate::identify::strong::scatter::{Track, identify_with_scatter, scatter, slices};
+use crate::identify::strong::streaming::{Identified, identify_windowed, pairs};
+use crate::lanes::output::Elements;
+use crate::least_squares::plan::{Regressions, RollingLeastSquares};
+use crate::regression::limits::HARDLY_TOLD_APART;
+use crate::status::Status;
+
+/// Numbers of every wanted sample of one record, in columns.
+struct Columns {
+    values: Vec<Vec<f64>>,
+    stderr: Vec<Vec<f64>>,
+    covariances: Vec<Vec<f64>>,
+    residual_std: Vec<f64>,
+    condition: Vec<f64>,
+    status: Vec<u16>,
+    order: Vec<u8>,
+}
+
+impl Columns {
+    fn new(unknowns: usize, pairs: usize, elements: usize) -> Self {
+        let columns = |count: usize| (0..count).map(|_| zeros(elements)).collect();
+        Self {
+            values: columns(unknowns),
+            stderr: columns(unknowns),
+            covariances: columns(pairs),
+            residual_std: zeros(elements),
+            condition: zeros(elements),
+            status: zeros(elements),
+            order: zeros(elements),
+        }
+    }
+
+    fn outputs(&mut self, elements: Elements) -> Identified<'_> {
+        fn all(columns: &mut [Vec<f64>]) -> Vec<&mut [f64]> {
+            columns.iter_mut().map(Vec::as_mut_slice).collect()
+        }
+        let regressions = Regressions {
+            elements,
+            parameters: all(&mut self.values),
+            errors: all(&mut self.stderr),
+            covariances: all(&mut self.covariances),
+            residuals: Vec::new(),
+            deviations: vec![&mut self.residual_std],
+            condition: &mut self.condition,
+            status: &mut self.status,
+        };
+        Identified { regressions, order: &mut self.order }
+    }
+}
+
+/// Identifies what is unknown in a window of equations around every sample of every record.
+///
+/// # Errors
+/// If a record is shorter than the window of the polynomials, or the watch cancels.
+pub(crate) fn windows(
+    form: &StrongForm<'_>,
+    motions: &[Motion<'_>],
+    step: usize,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<Identification>, Error> {
+    let Some(first) = motions.first() else { return Ok(Vec::new()) };
+    let (derivatives, unknowns, pairs) = (form.derivatives, first.unknowns(), pairs(first));
+    let (rows, instructions) = (form.regression_window, derivatives.options().instructions);
+    let least_squares = RollingLeastSquares::new(rows, unknowns, 1, pairs.clone(), HARDLY_TOLD_APART, instructions)?;
+    let wanted = |motion: &Motion<'_>| Columns::new(unknowns, pairs.len(), motion.angle.len().div_ceil(step));
+    let mut columns: Vec<Columns> = motions.iter().map(wanted).collect();
+    let outputs = columns.iter_mut().map(|columns| columns.outputs(Elements { first: 0, step }));
+    let records = motions.iter().cloned().zip(outputs).collect();
+    let factors = if step == 1 {
+        identify_windowed(derivatives, &least_squares, records, workers, watch)?;
+        let found: Vec<_> = columns.iter().map(|columns| (slices(&columns.values), slices(&columns.stderr))).collect();
+        let tracks = found.iter().map(|(values, errors)| Track { values, errors });
+        scatter(derivatives, &least_squares, &motions.iter().cloned().zip(tracks).collect::<Vec<_>>())?
+    } else {
+        identify_with_scatter(derivatives, &least_squares, records, workers, watch)?
+    };
+    let found = columns.into_iter().zip(factors).map(|(columns, factors)| {
+        let unknowns = columns.values.into_iter().zip(columns.stderr).zip(factors);
+        Identification {
+            window_length: derivatives.options().window_length,
+            exponent: None,
+            regression_window: rows,
+            unknowns: unknowns.map(|((values, stderr), factor)| Unknown::windowed(values, stderr, factor)).collect(),
+            covariances: pairs
+                .iter()
+                .zip(columns.covariances)
+                .map(|(&pair, values)| Covariance { pair, values })
+                .collect(),
+            condition: columns.condition,
+            residual_std: columns.residual_std,
+            status: columns.status,
+            record_status: Status::GOOD,
+            order: columns.order,
+            jumps: Vec::new(),
+            weak: None,
+        }
+    });
+    Ok(found.collect())
+}

@@ -1,0 +1,119 @@
+//! The choice of the test function, from the spectra of the channels and what a first fit says of the parameters.
+
+use crate::equation::motion::Coefficient;
+use crate::error::Error;
+use crate::identify::weak::session::Session;
+use crate::noise::spectrum::power_in_pieces;
+use crate::regression::constants::Expected;
+use crate::regression::fit::Fit;
+use crate::regression::model::Model;
+use crate::regression::subsample::stretches_of_blocks;
+use crate::regression::window_length::Scale;
+use crate::weak_form::coverage::Usable;
+use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
+use crate::weak_form::test_function_choice::{Candidates, Evidence, half_widths, spectrum_length};
+use crate::weak_form::weak_rows::WeakRows;
+
+/// Half-widths of the test function that windows span while it is chosen.
+const PILOT_WINDOW: usize = 4;
+/// Samples of a long record that the test function is chosen with, in so many stretches, each at least so many half-widths of the widest
+/// long.
+const PILOT_SAMPLES: usize = 1 << 16;
+const PILOT_STRETCHES: usize = 8;
+const PILOT_WIDTHS: usize = 64;
+/// Rounds of choosing the test function and estimating what the choice depends on.
+const ROUNDS: usize = 6;
+/// Rows with the test function that was chosen.
+pub(crate) struct Chosen {
+    pub(crate) weak: WeakRows,
+    /// Inertia, damping and stiffness, about.
+    pub(crate) parameters: [f64; 3],
+    /// Whether the narrowest or widest was chosen of all that were tried.
+    pub(crate) at_end: bool,
+}
+
+impl Session<'_, '_, '_> {
+    /// A first estimate, in windows of a few test functions.
+    fn pilot(&mut self, weak: &WeakRows, model: &Model) -> Result<[f64; 3], Error> {
+        let problem = model.problem(&weak.rows, &weak.rows.rhs, self.noise[0], None);
+        let scales = Scale::all(weak.rows.len(), weak.reach());
+        let wanted = PILOT_WINDOW * weak.function.half_width() / weak.stride;
+        let scale = if model.windowed.is_empty() {
+            None
+        } else {
+            Some(scales[Scale::nearest(&scales, wanted).ok_or(self.too_short())?])
+        };
+        let any = Expected::UNKNOWN;
+        let fit = Fit::new(&problem, scale, any, self.options.instructions, &mut self.stages)?;
+        Ok(fit.map_or([0.0; 3], |fit| self.parameters(model, &fit)))
+    }
+
+    /// The rows in stretches of a long record; nothing where all of it is as good. `widest` is the half-width of the widest test function.
+    fn some_rows(&mut self, function: TestFunction, widest: usize) -> Result<Option<WeakRows>, Error> {
+        let samples = self.record.angle.len();
+        let length = (PILOT_SAMPLES / PILOT_STRETCHES).max(PILOT_WIDTHS * widest);
+        if samples <= 2 * PILOT_STRETCHES * length {
+            return Ok(None);
+        }
+        let most = PILOT_STRETCHES * length / function.stride();
+        let stretches = stretches_of_blocks(WeakRows::count(function, samples), most, PILOT_STRETCHES);
+        let (record, delta, workers) = (&self.record, self.options.delta, self.stages.workers);
+        self.stages.stage(|watch| WeakRows::build(record, function, delta, Some(&stretches), workers, watch)).map(Some)
+    }
+
+    /// What the choice of a test function is made from, with spectra of some length.
+    fn evidence(&mut self, length: usize) -> Result<Evidence, Error> {
+        Ok(Evidence {
+            power: power_in_pieces(self.record.angle, length, &mut self.stages)?,
+            samples: self.record.angle.len(),
+            noise: self.noise,
+            delta: self.options.delta,
+            unknown: std::array::from_fn(|index| matches!(self.record.coefficients[index], Coefficient::Unknown)),
+        })
+    }
+
+    /// Chooses half-width and exponent where they are not given, and estimates the coefficients on the way.
+    pub(crate) fn choose_test_function(&mut self, model: &Model) -> Result<Chosen, Error> {
+        let (samples, delta) = (self.record.angle.len(), self.options.delta);
+        let (width, exponent) = (self.options.half_width, self.options.exponent);
+        if let (Some(width), Some(exponent)) = (width, exponent) {
+            let weak = self.rows(TestFunction::new(width, exponent, delta)?)?;
+            let parameters = self.pilot(&weak, model)?;
+            return Ok(Chosen { weak, parameters, at_end: false });
+        }
+        // So many rows are left that windows of several test functions fit in.
+        let widest = samples / if model.windowed.is_empty() { 8 } else { 16 };
+        let typical = self.evidence(spectrum_length(samples, 200))?.period().min(widest as f64);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the record's length")]
+        let typical = (typical.round() as usize).max(1);
+        let widths = width.map_or_else(|| half_widths((4 * typical).min(widest)), |width| vec![width]);
+        let widest = *widths.last().ok_or(self.too_short())?;
+        let usable = Usable::new(&self.record);
+        let share = |half: usize| usable.share(half);
+        let evidence = self.evidence(spectrum_length(samples, widest))?;
+        let candidates = Candidates::new(evidence, &widths, exponent, share, &mut self.stages)?;
+        let start = width.unwrap_or_else(|| usable.widest(typical.max(LEAST_HALF_WIDTH), &widths));
+        let mut current = TestFunction::new(start, exponent.unwrap_or(9), delta)?;
+        let mut seen = Vec::new();
+        loop {
+            let thinned = self.some_rows(current, widest)?;
+            let weak = match thinned {
+                Some(weak) => weak,
+                None => self.rows(current)?,
+            };
+            let parameters = self.pilot(&weak, model)?;
+            match candidates.best(parameters) {
+                Some(best) if best != current && !seen.contains(&best) && seen.len() < ROUNDS => {
+                    seen.push(current);
+                    current = best;
+                }
+                _ => {
+                    let end = [widths.first(), widths.last()].contains(&Some(&current.half_width()));
+                    let weak =
+                        if weak.rows.len() < WeakRows::count(current, samples) { self.rows(current)? } else { weak };
+                    return Ok(Chosen { weak, parameters, at_end: width.is_none() && end });
+                }
+            }
+        }
+    }
+}

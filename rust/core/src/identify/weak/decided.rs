@@ -1,0 +1,84 @@
+//! What was decided of a record, and the fit it rests on.
+
+use std::sync::Arc;
+
+use crate::equation::rows::Rows;
+use crate::error::Error;
+use crate::exec::stages::Stages;
+use crate::inference::constancy::Test;
+use crate::inference::jumps::jump::Jump;
+use crate::inference::slowly_varying;
+use crate::regression::constants::Expected;
+use crate::regression::fit::Fit;
+use crate::regression::model::Model;
+use crate::regression::problem::{Correlated, Problem};
+use crate::regression::row_covariance::RowCovariance;
+use crate::regression::whitening::Whitening;
+use crate::regression::window_length::Scale;
+
+/// What was decided, and the fit it rests on.
+#[derive(Clone)]
+pub(crate) struct Decided {
+    /// What is windowed and what is constant.
+    pub(crate) model: Model,
+    /// Constants that turned out to change.
+    pub(crate) slow: Vec<usize>,
+    pub(crate) found: Option<slowly_varying::Found>,
+    /// Nothing where the constants are not determined.
+    pub(crate) fit: Option<Fit>,
+    /// The length of windows that predicts best while nothing changes slowly. What changes is looked for from there: windows that were chosen while
+    /// too little was free are so short that nothing else is found from them.
+    pub(crate) first: Option<Scale>,
+    /// Mean squared error of predicting a row from others, over the noise's.
+    pub(crate) error: f64,
+    pub(crate) tests: Vec<(usize, Test)>,
+    /// Lengths that were tried, in samples, and the error of each.
+    pub(crate) lengths: Vec<(usize, f64)>,
+    pub(crate) scales: Vec<Scale>,
+    pub(crate) covariance: RowCovariance,
+    /// What it makes of the windowed regressors, once a fit was made with it.
+    pub(crate) correlated: Option<Arc<Correlated>>,
+    pub(crate) expected: Expected,
+    /// Where what is windowed jumps.
+    pub(crate) jumps: Vec<Jump>,
+    /// All rows, also those over jumps; nothing without jumps.
+    pub(crate) whole: Option<Rows>,
+    /// Rows whose noise is white, and how they were made so, where the constants were taken from them.
+    pub(crate) white: Option<(Rows, Whitening)>,
+}
+
+/// How many rows lie in so many samples.
+pub(crate) fn rows_of(samples: usize, stride: usize) -> usize {
+    ((samples + stride / 2) / stride).max(1)
+}
+
+impl Decided {
+    /// The rows that the fit was made with.
+    pub(crate) fn rows<'a>(&'a self, rows: &'a Rows) -> &'a Rows {
+        self.white.as_ref().map_or(rows, |(white, _)| white)
+    }
+
+    /// Other rows of the record, made as white as those that the fit was made with.
+    pub(crate) fn as_white(&self, rows: Rows, stages: &mut Stages<'_, '_>) -> Result<Rows, Error> {
+        match &self.white {
+            Some((_, whitening)) => whitening.apply(&rows, stages),
+            None => Ok(rows),
+        }
+    }
+
+    /// The right-hand rhs without what changes slowly.
+    pub(crate) fn rhs<'a>(&'a self, rows: &'a Rows) -> &'a [f64] {
+        self.found.as_ref().map_or(&rows.rhs, |found| &found.rhs)
+    }
+
+    /// The equations for what does not change slowly. `noise` is the variance of the angle's.
+    pub(crate) fn problem<'a>(&'a self, rows: &'a Rows, noise: f64) -> Problem<'a> {
+        self.model.problem(rows, self.rhs(rows), noise, self.correlated.as_ref())
+    }
+
+    /// The model with what changes slowly before the other constants.
+    pub(crate) fn ordered(&self) -> Model {
+        let constant = self.slow.iter().chain(&self.model.constant).copied().collect();
+        Model { constant, ..self.model.clone() }
+    }
+}

@@ -1,0 +1,55 @@
+//! What was found in one record in weak form.
+
+use crate::identify::results::{Constant, SampleResults};
+use crate::identify::weak::lag::Lag;
+use crate::identify::weak::outside_mask::Outside;
+use crate::inference::missing_terms::Suspect;
+use crate::status::Status;
+use crate::weak_form::test_function::TestFunction;
+
+/// What was found in one record.
+#[derive(Clone, Debug)]
+pub(crate) struct WeakIdentified {
+    /// The test function.
+    pub(crate) function: TestFunction,
+    /// Variances of the noise of angle and torque.
+    pub(crate) noise: [f64; 2],
+    /// Samples spanned by the windows that windowed unknowns are eliminated in: those that predict best where none were given.
+    pub(crate) regression_window: usize,
+    /// Lengths of windows that were tried, in samples, and how well each predicts.
+    pub(crate) lengths: Vec<(usize, f64)>,
+    /// Mean squared error of predicting a row from others, over the noise's.
+    pub(crate) prediction_error: f64,
+    /// Whether equations were weighted by the inverse of their covariance: where nothing changes and the noise explains what is left.
+    pub(crate) weighted: bool,
+    /// Samples that coefficients which change slowly are taken from.
+    pub(crate) pooling: Option<f64>,
+    /// What turned out to be constant.
+    pub(crate) constants: Vec<Constant>,
+    /// The covariance of the constants, row by row.
+    pub(crate) covariance: Vec<f64>,
+    /// Condition number of the equations for the constants; infinite where they are not determined.
+    pub(crate) condition: f64,
+    /// How much each constant takes part in the combination that is determined worst, its column scaled to a norm of one.
+    pub(crate) weakest: Vec<f64>,
+    /// Whether that combination is mostly the angle's noise.
+    pub(crate) mostly_noise: bool,
+    /// What may have been left out.
+    pub(crate) suspects: Vec<Suspect>,
+    /// The lag that was estimated; nothing where it was given or is not determined.
+    pub(crate) lag: Option<Lag>,
+    /// What the rows say that the mask keeps out; nothing without a mask.
+    pub(crate) outside_mask: Option<Outside>,
+    /// Unknowns that change, in the order of the values at the samples.
+    pub(crate) changing: Vec<usize>,
+    /// Pairs of constants and their covariance.
+    pub(crate) constant_pairs: Vec<(usize, usize, f64)>,
+    /// Pairs of unknowns whose covariances are at the samples.
+    pub(crate) pairs: Vec<(usize, usize)>,
+    /// Samples before which what changes jumps.
+    pub(crate) jumps: Vec<usize>,
+    /// What holds for the whole record.
+    pub(crate) record_status: Status,
+    /// Numbers at the samples.
+    pub(crate) results: SampleResults,
+}

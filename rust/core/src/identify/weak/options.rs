@@ -1,0 +1,39 @@
+//! How one record is identified in weak form.
+
+use crate::identify::kinds::Kind;
+use crate::inference::missing_terms::Missing;
+use crate::simd::instructions::Instructions;
+
+/// How to identify.
+#[derive(Clone, Debug)]
+pub(crate) struct WeakOptions {
+    /// Seconds from one sample to the next.
+    pub(crate) delta: f64,
+    /// Samples on either rhs of a test function's centre; chosen from the spectra where not given.
+    pub(crate) half_width: Option<usize>,
+    /// Exponent of the test function; chosen likewise.
+    pub(crate) exponent: Option<usize>,
+    /// Samples that a window spans; chosen by cross-validation.
+    pub(crate) regression_window: Option<usize>,
+    /// Whether windows of many lengths, before, around and after a sample are averaged and, where nothing is windowed, equations are weighted by
+    /// their noise; otherwise ordinary least squares in windows of one length.
+    pub(crate) averaging: bool,
+    /// Whether what is windowed may grow linearly within a window.
+    pub(crate) linear: bool,
+    /// How each unknown comes about: unknown coefficients in the order inertia, damping, stiffness, then terms.
+    pub(crate) kinds: Vec<Kind>,
+    /// Variances of the noise of angle and torque; estimated where not given.
+    pub(crate) noise: [Option<f64>; 2],
+    /// By how many samples the torque comes late; estimated where not given.
+    pub(crate) lag: Option<f64>,
+    /// The step that the angle was rounded to, zero for none; looked for where not given.
+    pub(crate) quantisation: Option<f64>,
+    /// Every how many samples numbers are wanted.
+    pub(crate) step: usize,
+    /// Whether to look for what may have been left out, and for what not to look.
+    pub(crate) diagnose: bool,
+    /// What cannot be missing because it is there.
+    pub(crate) not_missing: Vec<Missing>,
+    /// Vector instructions.
+    pub(crate) instructions: Instructions,
+}

@@ -1,0 +1,168 @@
+//! What changes and its errors, put together at every row.
+
+use crate::error::Error;
+use crate::exec::stages::Stages;
+use crate::identify::results::RowResults;
+use crate::identify::weak::decided::Decided;
+use crate::identify::weak::report::errors::Errors;
+use crate::identify::weak::report::tracks::Tracks;
+use crate::identify::weak::session::Session;
+use crate::regression::fit::Fit;
+use crate::regression::layout::symmetric;
+use crate::regression::predictor::without_constants;
+use crate::regression::problem::Problem;
+use crate::regression::sandwich::joint_covariance;
+use crate::weak_form::weak_rows::WeakRows;
+
+/// Standard errors and covariances by row, and the pairs of unknowns that the latter belong to.
+type ErrorsAtRows = (Vec<Vec<f64>>, Vec<Vec<f64>>, Vec<(usize, usize)>);
+
+/// What was found of a record before its rows are put together.
+pub(crate) struct Fitted<'a> {
+    pub(crate) weak: &'a WeakRows,
+    pub(crate) problem: &'a Problem<'a>,
+    pub(crate) decided: &'a Decided,
+    /// The fit of all unknowns that do not belong to windows.
+    pub(crate) all: &'a Fit,
+    pub(crate) errors: &'a Errors,
+    /// Covariance and values of the constants, those that change slowly first.
+    pub(crate) covariance: &'a [f64],
+    pub(crate) constants: &'a [f64],
+}
+
+impl Session<'_, '_, '_> {
+    /// Puts together what changes and its errors, with the pairs of unknowns whose covariances are among them.
+    pub(crate) fn at_rows(
+        &mut self,
+        fitted: &Fitted<'_>,
+        tracks: Tracks,
+    ) -> Result<(RowResults, Vec<(usize, usize)>), Error> {
+        let Fitted { weak, problem, decided, all, constants, .. } = *fitted;
+        let slow = decided.slow.len();
+        // Residuals are those of the rows as they are, whose unit is the torque's.
+        let (ordered, rows) = (decided.ordered(), &weak.rows);
+        let plain = decided.white.as_ref().map(|_| ordered.problem(rows, &rows.rhs, self.noise[0], None));
+        let deviation = deviation(plain.as_ref().unwrap_or(problem), &tracks, constants, all.span, &mut self.stages)?;
+        let mut slowly = vec![vec![0.0; tracks.status.len()]; 2 * slow];
+        if let Some(found) = &decided.found {
+            self.stages.fill(&mut slowly, |places, columns| {
+                let (values, slopes) = columns.split_at_mut(slow);
+                for (coefficient, (values, slopes)) in values.iter_mut().zip(slopes).enumerate() {
+                    for (place, (value, slope)) in places.clone().zip(values.iter_mut().zip(slopes.iter_mut())) {
+                        (*value, *slope) = found.varying.at(coefficient, tracks.row(place));
+                    }
+                }
+            })?;
+        }
+        let slow_slopes = slowly.split_off(slow);
+        let (errors, covariances, pairs) = self.errors_at_rows(fitted, &tracks)?;
+        let Tracks { first, values, slopes, condition, status, .. } = tracks;
+        let results = RowResults {
+            first: weak.first as f64 + first as f64 * weak.stride as f64,
+            stride: weak.stride as f64,
+            values: values.into_iter().chain(slowly).collect(),
+            slopes: slopes.into_iter().chain(slow_slopes).collect(),
+            errors,
+            covariances,
+            deviation,
+            condition,
+            status,
+            jumps: decided.jumps.clone(),
+        };
+        Ok((results, pairs))
+    }
+
+    /// Standard errors of what changes, covariances of pairs of coefficients, and which pairs those are.
+    fn errors_at_rows(&mut self, fitted: &Fitted<'_>, tracks: &Tracks) -> Result<ErrorsAtRows, Error> {
+        let Fitted { problem, decided, all, errors, covariance, .. } = *fitted;
+        let count = problem.layout.constant;
+        let (windowed, slow) = (problem.layout.windowed, decided.slow.len());
+        let column = || vec![0.0; tracks.status.len()];
+        // A slow coefficient is taken from a part of the record only, so its error is larger.
+        let share = |constant: usize, place: usize| match &decided.found {
+            Some(found) if constant < slow => {
+                let whole = all.pooled.inverse[constant * (count + 1)];
+                (found.varying.variance(constant, tracks.row(place)) / whole).sqrt()
+            }
+            _ => 1.0,
+        };
+        let between = |one: usize, other: usize, place: usize| {
+            share(one, place) * share(other, place) * covariance[one * count + other]
+        };
+        let sensitive =
+            |unknown: usize, constant: usize, place: usize| tracks.sensitivities[unknown * count + constant][place];
+        let covariance = |one: usize, other: usize, place: usize| {
+            let own = |one, other| tracks.covariances[symmetric(one, other)][place] * errors.inflation;
+            let sensitive = |unknown, constant| sensitive(unknown, constant, place);
+            joint_covariance([one, other], [windowed, count], own, sensitive, |i, j| between(i, j, place))
+        };
+        let names: Vec<usize> =
+            decided.model.windowed.iter().chain(&decided.slow).chain(&decided.model.constant).copied().collect();
+        let changing = windowed + slow;
+        let all_pairs = (0..names.len()).flat_map(|one| (0..one).map(move |other| (one, other)));
+        let wanted = |&(one, other): &(usize, usize)| other < changing && names[one] < 3 && names[other] < 3;
+        let pairs: Vec<_> = all_pairs.filter(wanted).collect();
+        let (mut standard, mut covariances) = (vec![column(); changing], vec![column(); pairs.len()]);
+        self.stages.fill(standard.iter_mut().chain(&mut covariances), |places, columns| {
+            let (errors, covariances) = columns.split_at_mut(changing);
+            for (one, errors) in errors.iter_mut().enumerate() {
+                for (place, error) in places.clone().zip(errors.iter_mut()) {
+                    let variance = covariance(one, one, place);
+                    // Rounding may leave less than nothing; what is NaN stays NaN.
+                    *error = if variance < 0.0 { 0.0 } else { variance.sqrt() };
+                }
+            }
+            for (&(one, other), covariances) in pairs.iter().zip(covariances) {
+                places
+                    .clone()
+                    .zip(covariances.iter_mut())
+                    .for_each(|(place, entry)| *entry = covariance(one, other, place));
+            }
+        })?;
+        Ok((standard, covariances, pairs.into_iter().map(|(one, other)| (names[one], names[other])).collect()))
+    }
+}
+
+/// Standard deviation of what is left, over windows of so many rows.
+fn deviation(
+    problem: &Problem<'_>,
+    tracks: &Tracks,
+    constants: &[f64],
+    span: usize,
+    stages: &mut Stages<'_, '_>,
+) -> Result<Vec<f64>, Error> {
+    let mut errors = without_constants(problem, constants);
+    stages.fill([&mut errors], |rows, columns| {
+        for (row, error) in rows.zip(&mut *columns[0]) {
+            let place = (row.cast_signed() - tracks.first).unsigned_abs();
+            for unknown in 0..problem.layout.windowed {
+                *error -= tracks.values[unknown][place] * problem.windowed[unknown][row];
+                if problem.layout.linear {
+                    *error -= tracks.slopes[unknown][place] / problem.period * problem.companions[unknown][row];
+                }
+            }
+        }
+    })?;
+    let mut sums = vec![[0.0, 0.0]];
+    let (mut sum, mut count) = (0.0, 0.0);
+    sums.extend(errors.iter().zip(problem.usable).map(|(error, &usable)| {
+        if usable && error.is_finite() {
+            sum += error * error;
+            count += 1.0;
+        }
+        [sum, count]
+    }));
+    let mut deviation = vec![f64::NAN; tracks.status.len()];
+    stages.fill([&mut deviation], |places, columns| {
+        for (place, deviation) in places.zip(&mut *columns[0]) {
+            let row = (tracks.first + place.cast_signed()).max(0).unsigned_abs();
+            let rows = errors.len();
+            let (first, end) = (row.saturating_sub(span / 2).min(rows), (row + span.div_ceil(2)).min(rows));
+            let (sum, count) = (sums[end][0] - sums[first][0], sums[end][1] - sums[first][1]);
+            if count > 0.0 {
+                *deviation = (sum / count).max(0.0).sqrt();
+            }
+        }
+    })?;
+    Ok(deviation)
+}

@@ -1,0 +1,52 @@
+//! How errors are made: from the noise of the channels, or where that fails from what is left.
+
+use crate::error::Error;
+use crate::identify::weak::decided::Decided;
+use crate::identify::weak::session::Session;
+use crate::regression::constants::Expected;
+use crate::regression::fit::Fit;
+use crate::regression::limits::NOISE_MODEL_FAILS;
+use crate::regression::row_covariance::RowCovariance;
+use crate::status::Status;
+use crate::weak_form::weak_rows::WeakRows;
+
+/// How errors are made.
+pub(crate) struct Errors {
+    pub(crate) covariance: RowCovariance,
+    pub(crate) expected: Expected,
+    /// What variances are multiplied by.
+    pub(crate) inflation: f64,
+    /// Mean squared error of predicting rows, or of what is left of them where nothing is windowed, over the noise's variance.
+    pub(crate) error: f64,
+    /// What is wrong with the noise.
+    pub(crate) status: Status,
+}
+
+impl Session<'_, '_, '_> {
+    /// The covariance that errors are made from: that of the channels' noise, or where it fails to explain the residuals, theirs.
+    pub(crate) fn errors(&mut self, weak: &WeakRows, decided: &Decided, fit: &Fit) -> Result<Errors, Error> {
+        let mut errors = Errors {
+            covariance: decided.covariance.clone(),
+            expected: decided.expected,
+            inflation: decided.error.max(1.0),
+            error: decided.error,
+            status: Status::GOOD,
+        };
+        let (shown, coloured) = self.shown(weak, decided, fit)?;
+        if coloured {
+            errors.status |= Status::COLOURED;
+        }
+        let whole = decided.model.windowed.is_empty();
+        errors.error = if whole { shown.variance() / errors.expected.variance } else { decided.error };
+        if whole {
+            errors.inflation = errors.error.max(1.0);
+        }
+        if errors.error > NOISE_MODEL_FAILS {
+            errors.status |= Status::NOISE_MODEL;
+            errors.inflation = 1.0;
+            errors.expected = Expected::new(&shown, shown.variance());
+            errors.covariance = shown;
+        }
+        Ok(errors)
+    }
+}

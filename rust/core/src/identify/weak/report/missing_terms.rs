@@ -1,0 +1,80 @@
+//! What may have been left out of the equation, judged beside everything that was found.
+
+use crate::equation::terms::BUILT_IN_TERMS;
+use crate::error::Error;
+use crate::identify::weak::decided::Decided;
+use crate::identify::weak::report::errors::Errors;
+use crate::identify::weak::session::Session;
+use crate::inference::missing_terms::{JudgedTerm, Missing, Suspect};
+use crate::record::derived::Interpolated;
+use crate::regression::fit::Fit;
+use crate::regression::subsample::{holds, stretches_of_rows, thinned_column, thinned_rows};
+use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows};
+
+impl Session<'_, '_, '_> {
+    /// Looks for what may have been left out.
+    pub(crate) fn suspects(
+        &mut self,
+        weak: &mut WeakRows,
+        decided: &Decided,
+        fit: &Fit,
+        rhs: &[f64],
+        errors: &Errors,
+    ) -> Result<Vec<Suspect>, Error> {
+        if !self.options.diagnose {
+            return Ok(Vec::new());
+        }
+        let (velocity, samples) = (weak.rows.regressors[1].value.clone(), self.record.angle.len());
+        let velocity = Interpolated { values: &velocity, first: weak.first, stride: weak.stride, samples };
+        let candidates = self.candidates();
+        let mapped: Vec<_> = candidates.iter().map(|missing| missing.samples(self.record.angle, &velocity)).collect();
+        let terms = candidates.iter().zip(&mapped).map(|(missing, mapped)| match (missing, mapped) {
+            (Missing::Lag, _) => TermSamples::TorqueRate,
+            (Missing::Term(_), Some(mapped)) => TermSamples::Given(mapped),
+            (Missing::Term(_), None) => TermSamples::One,
+        });
+        let record = Record { terms: terms.collect(), ..self.record.clone() };
+        let (function, delta, workers) = (weak.function, self.options.delta, self.stages.workers);
+        let stretches = stretches_of_rows(weak.rows.len()).filter(|_| fit.scale.is_some_and(holds));
+        let mut rhs = rhs.to_vec();
+        if let Some(stretches) = &stretches {
+            (weak.rows, rhs) = (thinned_rows(&weak.rows, stretches), thinned_column(&rhs, stretches));
+        }
+        let stretches = stretches.as_deref();
+        let more = self.stages.stage(|watch| WeakRows::build(&record, function, delta, stretches, workers, watch))?;
+        let first = weak.rows.regressors.len();
+        weak.rows.regressors.extend(more.rows.regressors.into_iter().skip(3));
+        weak.rows.clear_unusable();
+        if decided.white.is_some() {
+            weak.rows = decided.as_white(std::mem::take(&mut weak.rows), &mut self.stages)?;
+            rhs.clone_from(&weak.rows.rhs);
+        }
+        let correlated = decided.model.correlated(&weak.rows, &errors.covariance, &mut self.stages)?;
+        let mut suspects = Vec::new();
+        for (place, missing) in candidates.iter().enumerate() {
+            let judged = JudgedTerm {
+                rows: &weak.rows,
+                model: &decided.model,
+                rhs: &rhs,
+                noise: self.noise[0],
+                fit,
+                covariance: &errors.covariance,
+                correlated: &correlated,
+                expected: errors.expected,
+                inflation: errors.inflation,
+                instructions: self.options.instructions,
+            };
+            if let Some((value, error)) = judged.factor(first + place, &mut self.stages)? {
+                let unit = if *missing == Missing::Lag { -1.0 / self.options.delta } else { 1.0 };
+                suspects.push(Suspect { missing: *missing, value: unit * value, error: unit.abs() * error });
+            }
+        }
+        Ok(suspects)
+    }
+    /// What may be missing: what the equation does not hold already.
+    fn candidates(&self) -> Vec<Missing> {
+        let terms = BUILT_IN_TERMS.iter().filter(|term| term.looked_for).map(Missing::Term);
+        let all = terms.chain(std::iter::once(Missing::Lag));
+        all.filter(|missing| !self.options.not_missing.contains(missing)).collect()
+    }
+}

@@ -1,0 +1,183 @@
+//! What is said of a record once it is decided what changes: values at every sample, their errors, and what looks wrong.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use crate::error::Error;
+use crate::identify::results::{Constant, SampleResults};
+use crate::identify::weak::choice::Chosen;
+use crate::identify::weak::decided::Decided;
+use crate::identify::weak::found::WeakIdentified;
+use crate::identify::weak::outside_mask::Inside;
+use crate::identify::weak::report::at_rows::Fitted;
+use crate::identify::weak::report::errors::Errors;
+use crate::identify::weak::session::Session;
+use crate::inference::constancy::NO_CHANCE;
+use crate::inference::identifiability::is_mostly_noise;
+use crate::inference::missing_terms::Missing;
+use crate::regression::constants::weakest;
+use crate::regression::fit::Fit;
+use crate::regression::limits::HARDLY_TOLD_APART;
+use crate::regression::problem::Problem;
+use crate::status::Status;
+use crate::weak_form::weak_rows::WeakRows;
+
+impl Session<'_, '_, '_> {
+    /// What there is to say of a record.
+    pub(crate) fn report(&mut self, chosen: Chosen, decided: &Decided) -> Result<WeakIdentified, Error> {
+        let Chosen { mut weak, at_end, .. } = chosen;
+        let stride = weak.stride;
+        let ordered = decided.ordered();
+        let mut found = self.nothing_yet(&weak, decided);
+        let Some(fit) = &decided.fit else { return Ok(self.undetermined(found, decided)) };
+        let given = self.options.regression_window.filter(|_| !self.options.averaging);
+        found.regression_window = given.unwrap_or(fit.span * stride).min(self.record.angle.len());
+        let errors = self.errors(&weak, decided, fit)?;
+        found.prediction_error = errors.error;
+        let rows = decided.rows(&weak.rows);
+        let correlated = match &decided.correlated {
+            Some(correlated) if errors.covariance == decided.covariance => Arc::clone(correlated),
+            _ => ordered.correlated(rows, &errors.covariance, &mut self.stages)?,
+        };
+        let problem = ordered.problem(rows, decided.rhs(rows), self.noise[0], Some(&correlated));
+        let all = self.all_unknowns(&problem, decided, fit, &errors)?;
+        let Some(all) = all.as_deref() else { return Ok(self.undetermined(found, decided)) };
+        found.condition = all.pooled.condition;
+        found.weakest = weakest(&all.full, &all.pooled.weights);
+        found.covariance = all.covariance(&problem, &errors.covariance, &mut self.stages)?;
+        let (rhs, expected) = (decided.rhs(rows), errors.expected);
+        if let Some(covariance) =
+            self.covariance_beside_lag(rows, &ordered, rhs, fit, expected, (&errors.covariance, &correlated))?
+        {
+            found.covariance = covariance;
+        }
+        found.covariance.iter_mut().for_each(|entry| *entry *= errors.inflation);
+
+        let slow = decided.slow.len();
+        let count = ordered.constant.len();
+        let mut values = vec![0.0; slow];
+        values.extend(&fit.pooled.values);
+        found.constants = constants(decided, &values, &found.covariance);
+        found.constant_pairs = pairs_of(&ordered.constant, slow, &found.covariance);
+        let weakest = &found.weakest;
+        let noise = self.noise[0];
+        found.mostly_noise = is_mostly_noise(&problem, rows, &ordered, all, weakest, noise, &mut self.stages)?;
+        let mut tracks = self.tracks(&problem, &weak, decided, (fit, all), &values, errors.expected)?;
+        let variances: Vec<f64> = (slow..count).map(|place| found.covariance[place * (count + 1)]).collect();
+        let outside = self.outside_mask(
+            &weak,
+            &Inside {
+                decided,
+                fit,
+                constants: &values[slow..],
+                variances: &variances,
+                covariance: &errors.covariance,
+                expected: errors.expected,
+                inflation: errors.inflation,
+            },
+        )?;
+        let usable = &decided.whole.as_ref().unwrap_or(&weak.rows).usable;
+        tracks.mark(usable, outside.as_ref());
+        found.outside_mask = outside;
+        let (covariance, constants) = (&found.covariance, values.as_slice());
+        let fitted = Fitted { weak: &weak, problem: &problem, decided, all, errors: &errors, covariance, constants };
+        let (results, pairs) = self.at_rows(&fitted, tracks)?;
+        found.pairs = pairs;
+        let rhs = decided.rhs(&weak.rows).to_vec();
+        found.suspects = self.suspects(&mut weak, decided, fit, &rhs, &errors)?;
+        found.record_status = errors.status | record_status(&found, decided, fit, at_end);
+        found.results = results.at_samples(self.record.angle.len(), self.options.step, &mut self.stages)?;
+        Ok(found)
+    }
+
+    /// What is known before anything is fitted.
+    fn nothing_yet(&self, weak: &WeakRows, decided: &Decided) -> WeakIdentified {
+        let stride = weak.stride;
+        WeakIdentified {
+            function: weak.function,
+            noise: self.noise,
+            regression_window: 0,
+            lengths: decided.lengths.clone(),
+            prediction_error: decided.error,
+            weighted: decided.white.is_some(),
+            pooling: decided.found.as_ref().map(|found| 2.0 * found.reach * stride as f64),
+            constants: Vec::new(),
+            covariance: Vec::new(),
+            condition: f64::INFINITY,
+            weakest: Vec::new(),
+            mostly_noise: false,
+            suspects: Vec::new(),
+            lag: None,
+            outside_mask: None,
+            changing: decided.model.windowed.iter().chain(&decided.slow).copied().collect(),
+            constant_pairs: Vec::new(),
+            pairs: Vec::new(),
+            jumps: decided.jumps.iter().map(|jump| jump.sample).collect(),
+            record_status: Status::GOOD,
+            results: SampleResults::default(),
+        }
+    }
+
+    /// The fit of all unknowns that do not belong to windows. The one at hand is, unless some change slowly or the noise fails to explain what
+    /// is left of the rows.
+    fn all_unknowns<'a>(
+        &mut self,
+        problem: &Problem<'_>,
+        decided: &Decided,
+        fit: &'a Fit,
+        errors: &Errors,
+    ) -> Result<Option<Cow<'a, Fit>>, Error> {
+        if decided.slow.is_empty() && errors.covariance == decided.covariance {
+            return Ok(Some(Cow::Borrowed(fit)));
+        }
+        let again = fit.again(problem, errors.expected, self.options.instructions, &mut self.stages)?;
+        Ok(again.map(Cow::Owned))
+    }
+
+    /// Nothing but a status.
+    fn undetermined(&self, mut found: WeakIdentified, decided: &Decided) -> WeakIdentified {
+        let elements = self.record.angle.len().div_ceil(self.options.step);
+        for &unknown in &decided.model.constant {
+            found.constants.push(Constant { unknown, value: f64::NAN, error: f64::NAN, test: None });
+        }
+        found.record_status = Status::RANK_DEFICIENT;
+        found.results = SampleResults::undetermined(found.changing.len(), elements);
+        found
+    }
+}
+
+/// The constants with their standard errors and tests.
+fn constants(decided: &Decided, values: &[f64], covariance: &[f64]) -> Vec<Constant> {
+    let (slow, count) = (decided.slow.len(), values.len());
+    let constant = |(place, &unknown): (usize, &usize)| {
+        let test = decided.tests.iter().find(|(one, _)| *one == unknown).map(|(_, test)| test.clone());
+        let variance = covariance[(place + slow) * (count + 1)];
+        Constant { unknown, value: values[place + slow], error: variance.sqrt(), test }
+    };
+    decided.model.constant.iter().enumerate().map(constant).collect()
+}
+
+/// Flags of the whole record, beside those of its noise.
+fn record_status(found: &WeakIdentified, decided: &Decided, fit: &Fit, at_end: bool) -> Status {
+    let mut status = Status::GOOD;
+    let contradicted = |one: &Constant| one.test.as_ref().is_some_and(|test| test.probability < NO_CHANCE);
+    if found.constants.iter().any(contradicted) {
+        status |= Status::KIND_CONTRADICTED;
+    }
+    if at_end || decided.scales.first().is_some_and(|first| Some(*first) == fit.scale) && decided.scales.len() > 1 {
+        status |= Status::WINDOW_LIMIT;
+    }
+    if found.condition > HARDLY_TOLD_APART || found.mostly_noise {
+        status |= Status::ILL_CONDITIONED;
+    }
+    for suspect in found.suspects.iter().filter(|suspect| suspect.is_conspicuous()) {
+        status |= if suspect.missing == Missing::Lag { Status::LAG_SUSPECTED } else { Status::TERM_SUSPECTED };
+    }
+    status
+}
+
+/// Pairs of constants, those that change slowly and come first left out, and their covariance.
+fn pairs_of(constants: &[usize], slow: usize, covariance: &[f64]) -> Vec<(usize, usize, f64)> {
+    let pairs = (slow..constants.len()).flat_map(|one| (slow..one).map(move |other| (one, other)));
+    pairs.map(|(one, other)| (constants[one], constants[other], covariance[one * constants.len() + other])).collect()
+}

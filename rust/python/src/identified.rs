@@ -1,0 +1,145 @@
+//! What an identification returns: frozen classes with a name for every number.
+
+use std::collections::HashMap;
+
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use tvident::identify::{Identification as Found, Kind, Outside, Unknown as FoundUnknown};
+use tvident::inference::Suspect as FoundSuspect;
+
+/// One unknown: what it turned out to be, its values and their standard errors, and what a test of its constancy said.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+pub(crate) struct Unknown {
+    kind: &'static str,
+    values: Py<PyArray1<f64>>,
+    stderr: Py<PyArray1<f64>>,
+    factor: f64,
+    test: Option<(f64, f64)>,
+    untested: bool,
+}
+
+/// Something that may have been left out of the equation.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+pub(crate) struct Suspect {
+    name: &'static str,
+    value: f64,
+    stderr: f64,
+    conspicuous: bool,
+}
+
+/// How a model fails outside the mask that it was found in.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+pub(crate) struct OutsideMask {
+    differing: Vec<(usize, f64, f64)>,
+    residual_ratio: Option<f64>,
+}
+
+/// What was found in one record. What only the weak form says is None or empty in strong form.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+pub(crate) struct Identification {
+    window_length: usize,
+    exponent: Option<usize>,
+    regression_window: usize,
+    unknowns: Vec<Py<Unknown>>,
+    covariances: HashMap<(usize, usize), Py<PyArray1<f64>>>,
+    condition: Py<PyArray1<f64>>,
+    residual_std: Py<PyArray1<f64>>,
+    status: Py<PyArray1<u16>>,
+    record_status: u16,
+    order: Py<PyArray1<u8>>,
+    jumps: Vec<usize>,
+    noise: Option<(f64, f64)>,
+    lengths: Vec<(usize, f64)>,
+    prediction_error: f64,
+    weighted: bool,
+    pooling: Option<f64>,
+    constants_condition: f64,
+    weakest: Vec<f64>,
+    mostly_noise: bool,
+    lag: Option<(f64, f64)>,
+    suspects: Vec<Py<Suspect>>,
+    outside_mask: Option<Py<OutsideMask>>,
+}
+
+impl Identification {
+    pub(crate) fn new(py: Python<'_>, found: Found) -> PyResult<Self> {
+        let array = |values: Vec<f64>| PyArray1::from_vec(py, values).unbind();
+        let unknown = |unknown: FoundUnknown| {
+            Py::new(
+                py,
+                Unknown {
+                    kind: name(unknown.kind),
+                    values: array(unknown.values),
+                    stderr: array(unknown.stderr),
+                    factor: unknown.factor,
+                    test: unknown.test.map(|test| (test.probability, test.spread)),
+                    untested: unknown.untested,
+                },
+            )
+        };
+        let suspect = |suspect: &FoundSuspect| {
+            Py::new(
+                py,
+                Suspect {
+                    name: suspect.missing.name(),
+                    value: suspect.value,
+                    stderr: suspect.error,
+                    conspicuous: suspect.is_conspicuous(),
+                },
+            )
+        };
+        let outside =
+            |outside: Outside| Py::new(py, OutsideMask { differing: outside.differing, residual_ratio: outside.left });
+        let weak = found.weak.as_ref();
+        Ok(Self {
+            window_length: found.window_length,
+            exponent: found.exponent,
+            regression_window: found.regression_window,
+            unknowns: found.unknowns.into_iter().map(unknown).collect::<PyResult<_>>()?,
+            covariances: found.covariances.into_iter().map(|one| (one.pair, array(one.values))).collect(),
+            condition: array(found.condition),
+            residual_std: array(found.residual_std),
+            status: PyArray1::from_vec(py, found.status).unbind(),
+            record_status: found.record_status.bits(),
+            order: PyArray1::from_vec(py, found.order).unbind(),
+            jumps: found.jumps,
+            noise: weak.map(|weak| weak.noise.into()),
+            lengths: weak.map(|weak| weak.lengths.clone()).unwrap_or_default(),
+            prediction_error: weak.map_or(1.0, |weak| weak.prediction_error),
+            weighted: weak.is_some_and(|weak| weak.weighted),
+            pooling: weak.and_then(|weak| weak.pooling),
+            constants_condition: weak.map_or(1.0, |weak| weak.condition),
+            weakest: weak.map(|weak| weak.weakest.clone()).unwrap_or_default(),
+            mostly_noise: weak.is_some_and(|weak| weak.mostly_noise),
+            lag: weak.and_then(|weak| weak.lag).map(|lag| (lag.value, lag.error)),
+            suspects: weak.map_or(Ok(Vec::new()), |weak| weak.suspects.iter().map(suspect).collect::<PyResult<_>>())?,
+            outside_mask: found
+                .weak
+                .and_then(|weak| weak.outside_mask)
+                .filter(Outside::fails)
+                .map(outside)
+                .transpose()?,
+        })
+    }
+}
+
+/// What a kind is called.
+fn name(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Windowed => "windowed",
+        Kind::Constant => "constant",
+        Kind::Automatic => "auto",
+        Kind::Varying => "varying",
+    }
+}
+
+/// A kind by its name.
+pub(crate) fn kind(name: &str) -> Option<Kind> {
+    match name {
+        "windowed" => Some(Kind::Windowed),
+        "constant" => Some(Kind::Constant),
+        "auto" => Some(Kind::Automatic),
+        "varying" => Some(Kind::Varying),
+        _ => None,
+    }
+}

@@ -1,0 +1,138 @@
+//! `tvident._core.identify` and the two forms that it takes.
+
+use std::num::NonZeroUsize;
+
+use numpy::PyReadonlyArray1;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use tvident::exec::workers as threads;
+use tvident::identify::{Kind, Method, Options, StrongForm as Strong, Task, WeakForm as Weak, identify_all};
+use tvident::simd::Instructions;
+
+use crate::identified::{Identification, kind};
+use crate::local_polynomials::LocalPolynomials;
+use crate::motions::Motions;
+use crate::watch::watched;
+
+/// Settings of the weak form, one of each a record. What is None is chosen from the record.
+#[pyclass(frozen, module = "tvident._core")]
+pub(crate) struct WeakForm {
+    settings: Vec<Weak>,
+}
+
+#[pymethods]
+impl WeakForm {
+    #[new]
+    #[pyo3(signature = (window_length, exponent, regression_window, *, averaging=true, linear=true, noise=(None, None)))]
+    fn new(
+        window_length: Vec<Option<usize>>,
+        exponent: Vec<Option<usize>>,
+        regression_window: Vec<Option<usize>>,
+        averaging: bool,
+        linear: bool,
+        noise: (Option<f64>, Option<f64>),
+    ) -> Self {
+        let each = window_length.into_iter().zip(exponent).zip(regression_window);
+        let settings = each.map(|((window_length, exponent), regression_window)| Weak {
+            window_length,
+            exponent,
+            regression_window,
+            averaging,
+            linear,
+            noise: noise.into(),
+        });
+        Self { settings: settings.collect() }
+    }
+}
+
+/// Settings of the strong form; the plan is one for the angle and its first two derivatives.
+#[pyclass(frozen, module = "tvident._core")]
+pub(crate) struct StrongForm {
+    plan: Py<LocalPolynomials>,
+    regression_window: usize,
+    filter_torque: bool,
+    linear: bool,
+}
+
+#[pymethods]
+impl StrongForm {
+    #[new]
+    #[pyo3(signature = (plan, regression_window, *, filter_torque=false, linear=false))]
+    fn new(plan: Py<LocalPolynomials>, regression_window: usize, filter_torque: bool, linear: bool) -> Self {
+        Self { plan, regression_window, filter_torque, linear }
+    }
+}
+
+/// One of the two forms.
+#[derive(FromPyObject)]
+pub(crate) enum Form<'py> {
+    Weak(PyRef<'py, WeakForm>),
+    Strong(PyRef<'py, StrongForm>),
+}
+
+impl Form<'_> {
+    /// The settings of one record.
+    fn of(&self, record: usize) -> PyResult<Method<'_>> {
+        match self {
+            Self::Weak(form) => {
+                let settings = form.settings.get(record).cloned();
+                settings
+                    .map(Method::Weak)
+                    .ok_or_else(|| PyValueError::new_err("weak form needs settings of every record"))
+            }
+            Self::Strong(form) => Ok(Method::Strong(Strong {
+                derivatives: form.plan.get().plan(),
+                regression_window: form.regression_window,
+                filter_torque: form.filter_torque,
+                linear: form.linear,
+            })),
+        }
+    }
+}
+
+/// Identifies every record. `kinds` holds one word an unknown, `lag` the samples by which the torque of each record comes late (None: estimate
+/// it), `masks` one mask a record.
+#[pyfunction]
+#[pyo3(signature = (
+    motions, kinds, method, *, delta, lag, quantisation=None, masks=None, propagate=false, step=1, diagnose=true, workers=None, progress=None
+))]
+pub(crate) fn identify<'py>(
+    py: Python<'py>,
+    motions: &Motions,
+    kinds: Vec<String>,
+    method: Form<'py>,
+    delta: f64,
+    lag: Vec<Option<f64>>,
+    quantisation: Option<f64>,
+    masks: Option<Vec<PyReadonlyArray1<'py, bool>>>,
+    propagate: bool,
+    step: usize,
+    diagnose: bool,
+    workers: Option<NonZeroUsize>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Vec<Identification>> {
+    let kind = |name: &String| kind(name).ok_or_else(|| PyValueError::new_err(format!("no kind is called {name:?}")));
+    let options = Options {
+        delta,
+        kinds: kinds.iter().map(kind).collect::<PyResult<Vec<Kind>>>()?,
+        quantisation,
+        propagate,
+        step,
+        diagnose,
+        instructions: Instructions::current(),
+    };
+    // A mask may be written by other threads while the interpreter's lock is away.
+    let masks: Option<Vec<Vec<bool>>> = masks.map(|masks| masks.iter().map(|mask| mask.as_array().to_vec()).collect());
+    let mut tasks = Vec::new();
+    for (record, motion) in motions.all()?.into_iter().enumerate() {
+        let lag = *lag.get(record).ok_or_else(|| PyValueError::new_err("every record needs a lag"))?;
+        let mask = masks.as_ref().and_then(|masks| masks.get(record)).map(Vec::as_slice);
+        tasks.push(Task { motion, mask, method: method.of(record)?, lag });
+    }
+    let mut found = Vec::new();
+    watched(py, progress, |watch| {
+        found = identify_all(&tasks, &options, threads(workers), watch)?;
+        Ok(())
+    })?;
+    found.into_iter().map(|one| Identification::new(py, one)).collect()
+}
