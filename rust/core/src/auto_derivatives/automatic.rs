@@ -1,8 +1,9 @@
-//! Window and order chosen together, for a record as a whole and then where they are used.
+//! Window length and order chosen together: for a record as a whole, then locally.
 //!
-//! For each derivative of each record: a survey (`survey.rs`) finds the window and the order of least mean squared error; a refinement
-//! (`refinement.rs`) weighs the candidates around them sample by sample; within half a window of the ends shrunk coefficients
-//! (`shrinkage.rs`) take over. A record's derivatives have windows of their own, since the best ones differ.
+//! For each derivative of each record `global_choice` finds the window and the order of least mean squared error.
+//! Around them `candidate_weights` weighs candidates sample by sample, and `local_average` averages them. Within half a
+//! window of the ends, `boundary` estimates with shrunk coefficients. Each derivative of a record has its own windows,
+//! since the best ones differ.
 
 use std::num::NonZeroUsize;
 
@@ -46,7 +47,7 @@ pub struct AutomaticOptions {
 pub struct AutomaticEstimates<'a> {
     /// The derivative.
     pub values: &'a mut [f64],
-    /// Its standard errors, with what the candidates disagree by.
+    /// Its standard errors, with the disagreement of the candidates.
     pub errors: &'a mut [f64],
     /// The order of most weight.
     pub order: &'a mut [u8],
@@ -69,15 +70,15 @@ const STEPS: f64 = 2.0;
 /// `6 ζ(3)/π³`: see [`crowding`].
 const CROWDING: f64 = 0.232_609;
 
-/// A signal rests where it stays so many times as long as it does on average before it moves: much longer than at the peak of a sine.
+/// A signal rests where it stays constant so many times longer than on average: much longer than at the peak of a sine.
 const REST: f64 = 32.0;
 
 /// Differences of neighbours that tell how fast a signal moves, at most, and in how many stretches.
 const MOST_DIFFERENCES: usize = 1 << 14;
 const STRETCHES: usize = 64;
 
-/// Estimates one derivative of one record with window and order chosen, and says which suit the record as a whole: nothing where no
-/// window holds only values that can be used.
+/// Estimates one derivative of one record with window and order chosen. Returns the pair that suits the record as a whole, or `None` if
+/// no window is free of unusable samples.
 ///
 /// The numbers do not depend on the number of workers.
 ///
@@ -103,7 +104,7 @@ pub fn estimate_automatically(
         return Err(Error::OrderTooLow { order: highest, derivative });
     }
     let (shortest, variance) = match samples_per_step(record, sigma) {
-        // Who said that nothing was rounded gave a noise that is less than rounding makes.
+        // A caller who denies quantisation may give less noise than rounding makes.
         Some((step, each)) => {
             let rounding = (sigma * sigma).min(step * step / 12.0);
             (shortest_window(each, samples), (sigma * sigma).max(rounding * crowding(each)))
@@ -129,7 +130,7 @@ pub fn estimate_automatically(
         let at_end = boundary::estimate(record, end, pair, &target, variance, &mut check_cancelled)?;
         for (place, (&value, &error)) in at_end.values.iter().zip(&at_end.errors).enumerate() {
             let sample = if end == End::First { place } else { samples - 1 - place };
-            // What the windows at the end cannot give may still come from shorter ones inside.
+            // Places that the windows at the end do not reach may still be reached by shorter ones inside.
             if !value.is_nan() {
                 put(estimates.values, sample, value);
                 put(estimates.errors, sample, error);
@@ -182,8 +183,8 @@ fn samples_per_step(record: &dyn Samples, sigma: f64) -> Option<(f64, f64)> {
     }
 }
 
-/// Half-width of the shortest window that may be looked at. The error of rounding is white only where the signal crosses a step or more
-/// from sample to sample; where it needs several samples to do so, shorter windows take the stairs for signal.
+/// Half-width of the shortest window that may be tried. Rounding errors are white only if the signal crosses a step or more from sample to
+/// sample. If it needs several samples to do so, shorter windows mistake the staircase for signal.
 fn shortest_window(samples_per_step: f64, samples: usize) -> usize {
     rounded(STEPS * samples_per_step).clamp(SHORTEST, (samples / 16).max(SHORTEST))
 }

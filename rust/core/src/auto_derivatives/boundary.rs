@@ -1,21 +1,22 @@
-//! The ends of a record where window and order are chosen: coefficients shrunk by what the record says of them.
+//! The ends of a record where window and order are chosen: coefficients shrunk by their covariance over the record.
 //!
-//! Towards the end of a window the noise of a derivative rises steeply with the order, and one window cannot tell by itself which of its
-//! coefficients are worth their noise. But the others can: over many windows of the same length near that end the coefficients have the
-//! covariance `C + σ²`, `C` that of the signal. So the coefficients `c` of the first or last window are replaced by
+//! Towards the end of a window the noise of a derivative rises steeply with the order. One window cannot tell which of
+//! its coefficients exceed their noise, but many can: over many windows of the same length near that end the coefficients
+//! have the covariance `C + σ²`, `C` that of the signal. So the coefficients `c` of the first or last window are replaced by
 //!
 //! ```text
 //! ĉ = U diag(λ/(λ + σ²)) Uᵀ c,   C = U diag(λ) Uᵀ,
 //! ```
 //!
-//! the estimate of least mean squared error that is linear in them (Wiener), with `λ` taken to be zero where the signal is below the noise. The
-//! constant is kept as it is, and coefficients of even and of odd degree are taken apart, as they are uncorrelated in windows of a signal that
-//! looks the same forwards and backwards. All derivatives at all places of the window follow from `ĉ`.
+//! the estimate of least mean squared error that is linear in them (Wiener), with `λ` taken to be zero where the signal
+//! is below the noise. The constant is kept as it is, and coefficients of even and of odd degree are taken apart, as
+//! they are uncorrelated in windows of a signal that looks the same forwards and backwards. All derivatives at all
+//! places of the window follow from `ĉ`.
 //!
-//! What this is worth at a place is measured: the same is done in all these windows, forwards and backwards, and compared there with an
-//! estimate from the centre of a window half as long as the record's best. In a record of a few windows the best one is chosen with
-//! little to go by and may smooth too much; what is half as long sees that, and is noisier, which is taken off. From windows of several
-//! lengths the estimates are averaged with weights that fall with the square of the risk so measured.
+//! The risk at each place is measured: the same is done in all these windows, forwards and backwards, and compared there with a
+//! reference from the centre of a window half as long as the record's best. In a record of few windows the best one is
+//! uncertain and may smooth too much; the reference shows that, and its larger noise is subtracted. The estimates from
+//! windows of several lengths are averaged with weights that fall with the square of the measured risk.
 
 use std::ops::Range;
 
@@ -32,17 +33,17 @@ use crate::record::samples::Samples;
 /// The windows over the record's best, in half steps of a doubling.
 const LADDER: Range<i32> = -4..5;
 
-/// What is compared with has a window so much shorter than the record's best.
+/// The reference has a window so much shorter than the record's best.
 const REFERENCE: f64 = 2.0;
 
 /// Half-width of the shortest window.
 const SHORTEST: usize = 8;
 
-/// Samples near an end that are looked at, in half-widths of the record's best window, and at least.
+/// Samples near an end that are used, in half-widths of the record's best window, and at least.
 const NEAR: usize = 64;
 const LEAST_NEAR: usize = 4096;
 
-/// Windows that are looked at, at most, and the fewest from which a risk is believed.
+/// The most windows that are used, and the fewest that give a risk.
 const MOST_WINDOWS: usize = 1024;
 const FEWEST_WINDOWS: usize = 20;
 
@@ -54,7 +55,7 @@ pub(crate) struct AtEnd {
     pub(crate) order: usize,
 }
 
-/// What one window length gives, by place from the end.
+/// The estimates of one window length, by place from the end.
 struct Shrunk {
     values: Vec<f64>,
     risks: Vec<f64>,
@@ -66,14 +67,15 @@ struct Near<'a> {
     record: &'a dyn Samples,
     end: End,
     samples: Range<usize>,
-    /// The estimate to compare with at every one of them, NaN where there is none.
+    /// The reference at every one of them, NaN where there is none.
     compare: Vec<f64>,
     kernel: Vec<f64>,
-    /// Variance of the estimate that is compared with.
+    /// Variance of the reference.
     gain: f64,
 }
 
-/// Estimates the samples within half of a record's best window of one end; NaN where nothing is known. `check_cancelled` is called now and then.
+/// Estimates the samples within half of a record's best window of one end; NaN where no window gives an estimate.
+/// `check_cancelled` is called repeatedly.
 ///
 /// # Errors
 /// Those of `check_cancelled`, at once.
@@ -104,7 +106,7 @@ pub(crate) fn estimate(
     Ok(average(&found, pair.half))
 }
 
-/// Averages what windows of several lengths give.
+/// Averages the estimates of windows of several lengths.
 fn average(found: &[Shrunk], count: usize) -> AtEnd {
     let mut at_end = AtEnd { values: vec![f64::NAN; count], errors: vec![f64::NAN; count], order: 0 };
     let mut largest = 0.0;
@@ -143,7 +145,7 @@ impl<'a> Near<'a> {
         Self { record, end, samples, compare, kernel: bank.kernel(*candidate), gain: bank.gains[*candidate] }
     }
 
-    /// What windows of one length give at the first `count` places, or nothing where the outermost window cannot be used.
+    /// The estimates of windows of one length at the first `count` places, or `None` if the outermost window cannot be used.
     fn shrink(&self, half: usize, count: usize, target: &Target, variance: f64) -> Option<Shrunk> {
         let length = 2 * half + 1;
         let (highest, count) = (target.highest(half), count.min(length));

@@ -1,4 +1,4 @@
-//! How much every candidate weighs in every block of a record, from the risk around it.
+//! The weight of every candidate in every block of a record, from its local risk.
 
 use std::ops::Range;
 
@@ -37,7 +37,7 @@ pub(crate) struct Refinement {
     pub(crate) orders: Vec<u8>,
 }
 
-/// What candidates are compared with.
+/// The reference that candidates are compared with.
 #[derive(Debug)]
 pub(crate) struct Reference {
     pub(crate) bank: Bank,
@@ -56,7 +56,7 @@ impl Reference {
     }
 }
 
-/// What is known of every candidate in every block, block by block.
+/// The weight and bias of every candidate, block by block.
 pub(crate) struct Weighed {
     /// Logarithms of weights.
     pub(crate) logarithms: Vec<f64>,
@@ -100,7 +100,7 @@ impl Refinement {
         Some(Self { banks, reference, blocks, reach, offsets, differences, temperatures, variances, orders })
     }
 
-    /// Blocks that are worked on together.
+    /// Ranges of blocks that form one piece of work.
     pub(crate) fn pieces(&self) -> impl Iterator<Item = Range<usize>> {
         let (count, together) = (self.blocks.count(), PIECE.div_ceil(self.blocks.length));
         (0..count).step_by(together).map(move |first| first..(first + together).min(count))
@@ -205,7 +205,7 @@ impl Refinement {
             };
             let (least, temperature) = (weights[best], self.temperatures[best]);
             for weight in weights {
-                // In this order, since what is too hot is nought, and nought times infinity is no number.
+                // In this order: for an infinite temperature the quotient is zero, and zero times infinity would be NaN.
                 *weight = (least - *weight) / (2.0 * temperature) * neighbourhood;
             }
         }
@@ -213,7 +213,7 @@ impl Refinement {
     }
 }
 
-/// What two ranges share.
+/// The intersection of two ranges.
 pub(crate) fn within(one: &Range<usize>, other: &Range<usize>) -> Range<usize> {
     let start = one.start.max(other.start);
     start..one.end.min(other.end).max(start)

@@ -1,7 +1,7 @@
-//! What windows of one length offer for a derivative: one estimate an order, all from the same coefficients.
+//! The candidates of windows of one length for a derivative: one estimate per order, all from the same coefficients.
 //!
-//! At a window's centre the `d`-th derivative is the same for orders `d + 2i` and `d + 2i + 1`, so the candidates are `d, d + 2, …`, and each
-//! of them has one more coefficient than the one before:
+//! At a window's centre the `d`-th derivative is the same for orders `d + 2i` and `d + 2i + 1`, so the candidates are
+//! `d, d + 2, …`, and each of them has one more coefficient than the one before:
 //!
 //! ```text
 //! d_i = Σ_{l≤i} w_l c_{d+2l},   w_l = q_{d+2l}^(d)(0) / Δ^d,   variance σ² g_i,   g_i = Σ_{l≤i} w_l².
@@ -14,7 +14,7 @@ use crate::local_polynomials::coefficients::{self, Coefficients, Projected};
 use crate::record::samples::Samples;
 use crate::simd::instructions::Instructions;
 
-/// What is to be estimated, and by which orders.
+/// The derivative to be estimated, and its orders.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Target {
     pub(crate) derivative: usize,
@@ -33,7 +33,7 @@ impl Target {
         self.delta.powi(i32::try_from(self.derivative).unwrap_or(i32::MAX)).recip()
     }
 
-    /// The highest order in a window: at least two samples are left to judge it by.
+    /// The highest order in a window: at least two degrees of freedom remain.
     pub(crate) fn highest(&self, half: usize) -> usize {
         self.highest.min(2 * half - 2)
     }
@@ -74,7 +74,7 @@ pub(crate) struct CandidateScratch {
 }
 
 impl Bank {
-    /// Prepares the tables, or nothing where windows of this length have no candidate.
+    /// Prepares the tables, or returns `None` if windows of this length have no candidate.
     pub(crate) fn new(half: usize, target: &Target) -> Option<Self> {
         let orders = target.orders(half);
         let (derivative, highest) = (target.derivative, *orders.last()?);
@@ -101,7 +101,7 @@ impl Bank {
         self.half..samples.saturating_sub(self.half).max(self.half)
     }
 
-    /// Estimates of every candidate at every `step`-th of some centres, a row each; NaN where a window holds what cannot be used.
+    /// Estimates of every candidate at every `step`-th of some centres, a row each; NaN where a window holds an unusable sample.
     pub(crate) fn estimates<'a>(
         &self,
         record: &dyn Samples,
@@ -114,7 +114,7 @@ impl Bank {
         self.coefficients.project(record, windows, step, projected, coefficients);
         let Projected { level: sums, coefficients: rows, .. } = projected;
         for sum in sums.iter_mut() {
-            // What is no number stays so.
+            // NaN stays NaN.
             *sum *= self.constant;
         }
         for (row, weight) in rows.iter_mut().zip(&self.weights) {

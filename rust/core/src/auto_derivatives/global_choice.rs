@@ -1,22 +1,25 @@
-//! Which window and order suit a record as a whole.
+//! The choice of one window and order for a whole record, by their estimated mean squared error.
 //!
-//! The mean squared error of a candidate `c` is `b_c² + σ² g_c`, and its bias is only known by comparison with an estimate `r` of less bias:
+//! The mean squared error of a candidate `c` is `b_c² + σ² g_c`, and its bias is only known by comparison with a
+//! reference estimate `r` of less bias:
 //!
 //! ```text
 //! risk_c = ⟨(d_c - d_r)²⟩ + 2 σ² ⟨k_c, k_r⟩ = b_c² + σ² g_c + what is the same for all c,   if b_r ≪ b_c,
 //! ```
 //!
-//! with `k` the weights of the samples: this is `Σ_f P|H_c - (iω)^d|² + σ²‖k_c‖²` with the spectrum `P` of what was recorded, summed in
-//! time. What is compared with must have less bias and yet no more noise than can be averaged out, so it climbs: it begins with the
-//! shortest window and its highest order; of the candidates that it can judge, those with at least a hundredth of its variance, the best is found, and the next
-//! to compare with is the window `√2` times shorter of the same order; until nothing changes. Since the least of many estimates
-//! of a risk is too small, the variance counts 1.3 times. At the end the window is found to 2 %.
+//! with `k` the weights of the samples. In the frequency domain this is `Σ_f P|H_c - (iω)^d|² + σ²‖k_c‖²`, `P` the spectrum
+//! of the record. The reference must have less bias than the candidates, and no more noise than can be averaged out.
+//! Therefore it is refined iteratively. It begins with the shortest window and its highest order. Among the candidates
+//! with at least a hundredth of its variance the best is found; the window `√2` times shorter, of the same order, is the
+//! next reference. This is repeated until nothing changes. Since the least of many estimated risks is too small, the
+//! variance counts 1.3 times. Finally the window is refined to 2 %.
 //!
-//! Windows of different lengths fit at different places, and the noise of what is compared with, up to a hundred times that of a
-//! candidate, adds another mean square at each set of places: over 200 places it varies by a tenth, ten times the variance that is sought.
-//! So a window is compared with the best of the shorter ones where both fit, and its risk is that one's and what it differs by there.
+//! Windows of different lengths fit at different places. The noise of the reference, up to a hundred times that of a
+//! candidate, has another mean square at each set of places: over 200 places it varies by a tenth, ten times the
+//! variance that is sought. So a window is compared with the best of the shorter ones where both fit. Its risk is the
+//! other one's plus their difference there.
 //!
-//! Long records are looked at in sixteen stretches.
+//! Long records are subsampled in sixteen stretches.
 
 use std::ops::Range;
 
@@ -27,10 +30,10 @@ use crate::record::samples::Samples;
 /// Half-width of the shortest window.
 pub(crate) const SHORTEST: usize = 4;
 
-/// Half-width of the longest that is looked at.
+/// Half-width of the longest window tried.
 const LONGEST: usize = 10_000;
 
-/// A record of more samples is looked at in stretches.
+/// Longer records are subsampled in stretches.
 const WHOLE: usize = 1 << 16;
 const STRETCHES: usize = 16;
 
@@ -38,16 +41,16 @@ const STRETCHES: usize = 16;
 const MOST_PLACES: usize = 1 << 14;
 const FEWEST_PLACES: usize = 16;
 
-/// The reference judges candidates of at least its variance over this.
+/// A reference judges candidates whose variance is at least its own over this.
 const JUDGED: f64 = 100.0;
 
-/// What the variance counts, since the least of many risks is taken.
+/// The factor on the variance, since the least of many estimated risks is taken.
 pub(crate) const OPTIMISM: f64 = 1.3;
 
 /// The steps, in halvings and doublings, with which the best window is refined.
 const REFINEMENTS: [f64; 4] = [0.25, 0.125, 0.0625, 0.031_25];
 
-/// Called now and then; an error ends the work.
+/// Called repeatedly; an error ends the work.
 pub(crate) type CheckCancelled<'a> = dyn FnMut() -> Result<(), Error> + 'a;
 
 /// Where candidates are compared.
@@ -88,7 +91,7 @@ impl<'a> Survey<'a> {
         Self { record, stretches, step: (count * length).div_ceil(MOST_PLACES) }
     }
 
-    /// The pair of least risk, or nothing where no window holds only what can be used. `check_cancelled` is called now and then.
+    /// The pair of least risk, or `None` if no window is free of unusable samples. `check_cancelled` is called repeatedly.
     ///
     /// # Errors
     /// Those of `check_cancelled`, at once.
@@ -121,7 +124,7 @@ impl<'a> Survey<'a> {
         reference: JudgedWindow<'_>,
         check_cancelled: &mut CheckCancelled<'_>,
     ) -> Result<Pair, Error> {
-        // The best of a window beside what is best so far.
+        // The best of a window, compared with the best so far.
         let best_of = |half: usize, best: Option<&(Surveyed, usize, f64)>| {
             let looked = self.look(Bank::new(half, target)?);
             let best = best.map(|&(ref looked, candidate, risk)| JudgedWindow { looked, candidate, risk });
@@ -175,7 +178,7 @@ impl<'a> Survey<'a> {
     }
 }
 
-/// Climbs to the best pair of a ladder. Returns it and the place of what it was compared with.
+/// The best pair of a ladder, by iterative refinement of the reference. Returns it with the place of its reference.
 fn best_of(ladder: &[Surveyed], variance: f64) -> Option<(Pair, (usize, usize))> {
     let mut reference = (0, ladder.first()?.bank.orders.len() - 1);
     let mut seen = Vec::new();
@@ -203,8 +206,8 @@ fn best_of(ladder: &[Surveyed], variance: f64) -> Option<(Pair, (usize, usize))>
     best.map(|best| (best, reference))
 }
 
-/// The risk of every candidate of a window, by comparison with a reference; infinite where they cannot be compared. Beside another
-/// candidate whose risk is known, it is that risk and what it differs by where both windows fit.
+/// The risk of every candidate of a window, by comparison with a reference; infinite where they cannot be compared. Given another
+/// candidate whose risk is known, it is that risk plus the difference where both windows fit.
 fn risks(reference: JudgedWindow<'_>, looked: &Surveyed, beside: Option<JudgedWindow<'_>>, variance: f64) -> Vec<f64> {
     let kernel = reference.looked.bank.kernel(reference.candidate);
     let compare = &reference.looked.rows[reference.candidate];
@@ -242,7 +245,7 @@ fn ladder_of_windows(samples: usize, shortest: usize) -> impl Iterator<Item = us
     (0..).map(half).take_while(move |&half| 2 * half < samples / 2 && half <= LONGEST)
 }
 
-/// The whole number nearest to one that is neither negative nor large.
+/// The nearest whole number, of one that is neither negative nor large.
 pub(crate) fn rounded(number: f64) -> usize {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "as the name says")]
     let whole = number.round() as usize;

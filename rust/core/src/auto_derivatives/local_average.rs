@@ -1,8 +1,9 @@
-//! Candidates weighed where they are used: a record's best window and order need not be the best everywhere in it.
+//! Candidates averaged locally: the best window and order of a record need not be the best everywhere in it.
 //!
-//! The risk of [`crate::auto_derivatives::global_choice`] is averaged over a neighbourhood of five half-widths of the record's best window, with the weight
-//! `(1 - u²)²`. There the candidates are the record's best window, one twice and others 2, 4 and 8 times as short, with all orders. None is
-//! chosen: with `S_c` the local risk, they are averaged with weights
+//! The risk of [`crate::auto_derivatives::global_choice`] is averaged over a neighbourhood of five half-widths of the
+//! record's best window, with the weight `(1 - u²)²`. There the candidates are the record's best window, one twice and
+//! others 2, 4 and 8 times as short, with all orders. None is chosen: with `S_c` the local risk, they are averaged with
+//! weights
 //!
 //! ```text
 //! w_c ∝ exp(-n (S_c - S_min) / (2 T)),   T = 3 σ² g / v,
@@ -11,10 +12,11 @@
 //! `n` the samples of the neighbourhood, `g` and `v` gain and leverage of the best there: `T` is the noise of the derivative per degree of
 //! freedom, for a fit has some `v` degrees of freedom a sample, and `σ² g/v` is a third of that of its highest frequency.
 //!
-//! The least error has bias: where `b² + v` is least over windows, with `b` of the power `p` of the half-width and `v` of the power
-//! `-(2d + 1)`, `b² = (2d + 1)/(2p) v`, a third of the variance for θ̈. So the standard error holds both. The squared bias of a
-//! candidate is its mean squared difference from the reference in the neighbourhood less the variance of that difference, or nothing
-//! where that is negative. The standard error of an average is `√Σ w_c (b_c² + σ² g_c + (d_c - d)²)` (Burnham and Anderson 2002, section 4.3.2).
+//! The least error has bias: where `b² + v` is least over windows, with `b` of the power `p` of the half-width and `v`
+//! of the power `-(2d + 1)`, `b² = (2d + 1)/(2p) v`, a third of the variance for θ̈. So the standard error holds both.
+//! The squared bias of a candidate is its mean squared difference from the reference in the neighbourhood less the
+//! variance of that difference, or zero if that is negative. The standard error of an average is `√Σ w_c (b_c² +
+//! σ² g_c + (d_c - d)²)` (Burnham and Anderson 2002, section 4.3.2).
 //!
 //! Sums are kept for blocks of a quarter of the half-width, and weights are linear between the blocks' centres.
 
@@ -127,7 +129,7 @@ impl Refinement {
         if missing.is_empty() {
             return;
         }
-        // Near the ends, and what cannot be used, the windows that are best do not fit: the best of those that do.
+        // Near the ends and near unusable samples the best windows do not fit: take the best of those that do.
         let rest: Vec<bool> = used.iter().map(|used| !used).collect();
         self.fill(record, &samples, &rest, scratch);
         let all = vec![true; candidates];
@@ -166,7 +168,7 @@ impl Refinement {
         }
     }
 
-    /// Writes the average of some candidates at one place, or NaN and the news that there is none.
+    /// Writes the average of some candidates at one place, or NaN. Returns whether there is one.
     fn mix(
         &self,
         weight: impl Fn(usize) -> f64,

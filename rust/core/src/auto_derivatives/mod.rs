@@ -1,4 +1,4 @@
-//! Window and order of a derivative chosen together from the record.
+//! Derivatives whose window length and order are both chosen from the record.
 
 pub(crate) mod automatic;
 pub(crate) mod boundary;

@@ -6,7 +6,7 @@ const HUGE: usize = 1 << 21;
 #[cfg(target_os = "linux")]
 const PAGE: usize = 1 << 12;
 
-/// So many zeros. Where there are many, the system is asked for huge pages, as NumPy asks for its arrays: a page that is touched first costs
+/// A column of zeros. For a long one the system is asked for huge pages, as NumPy asks for its arrays: a page that is touched first costs
 /// about as much as writing it, and an hour of results has 7000 small ones a column.
 pub(crate) fn zeros<T: Copy + Default>(count: usize) -> Vec<T> {
     let column = vec![T::default(); count];

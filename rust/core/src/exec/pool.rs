@@ -15,7 +15,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::Error;
 
-/// The calling thread looks up at least this often.
+/// The calling thread calls the watch at least this often.
 const WATCH: Duration = Duration::from_millis(50);
 
 /// Called on the calling thread, at least every 50 ms and at the end, with the work done so far and all of it. Returning `false`
@@ -38,7 +38,7 @@ pub(crate) struct Piece<P> {
     pub(crate) content: P,
 }
 
-/// Asked now and then by long pieces of work: whether to go on. What a piece leaves undone after a no is thrown away.
+/// Called repeatedly by long pieces of work: whether to go on. After `false` the results of a piece are discarded.
 pub(crate) type GoOn<'a> = dyn Fn() -> bool + 'a;
 
 /// Does every piece once, each thread with its own scratch. With one worker, or one piece, no other thread is bothered.

@@ -1,4 +1,4 @@
-//! The stages of one long call: who works on them, and who watches.
+//! The stages of one long call: their worker threads and their share of the progress.
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
@@ -6,13 +6,13 @@ use std::ops::Range;
 use crate::error::Error;
 use crate::exec::pool::{self, Piece, Watch, ranges};
 
-/// Workers and watch of a call that goes through a number of stages.
+/// Worker threads and progress of a call that consists of several stages.
 pub(crate) struct Stages<'a, 'b> {
     pub(crate) workers: NonZeroUsize,
     watch: &'a mut Watch<'b>,
-    /// What the watch is told at the end.
+    /// The total that the watch is told.
     total: usize,
-    /// Stages done, and about how many there will be.
+    /// Stages done, and the expected number of stages.
     done: usize,
     expected: usize,
 }

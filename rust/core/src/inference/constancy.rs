@@ -1,7 +1,7 @@
-//! Is what was taken to be constant the same in all parts of the record?
+//! A test of whether a constant coefficient is the same in all parts of the record.
 //!
-//! Each constant is estimated in eight blocks of the record on its own; the weighted squares of what they differ by, over the variances
-//! that the rows' noise explains, follow a χ² distribution where it does not change (Wald's test).
+//! Each constant is estimated separately in eight blocks of the record. If it does not change, the squared differences
+//! between the blocks, over the variances that the noise explains, follow a χ² distribution (Wald's test).
 
 use std::ops::Range;
 
@@ -17,19 +17,19 @@ use crate::simd::instructions::Instructions;
 /// Blocks that a record is cut into.
 const BLOCKS: usize = 8;
 
-/// Probability below which a difference is no chance: once in 2000 records.
+/// Probability below which a difference is significant: once in 2000 records.
 pub const NO_CHANCE: f64 = 5e-4;
 
-/// What became of one constant.
+/// The result of the test of one constant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Test {
-    /// Probability that a constant differs as much between the blocks.
+    /// Probability that a constant coefficient differs as much between the blocks.
     pub probability: f64,
     /// Standard deviation between the blocks beyond what noise explains, over the mean.
     pub spread: f64,
 }
 
-/// Tests every constant of a fit; nothing where the blocks do not determine it. `inflation` multiplies the variances.
+/// Tests every constant of a fit; the result is `None` if the blocks do not determine it. `inflation` multiplies the variances.
 pub(crate) fn test(
     problem: &Problem<'_>,
     fit: &Fit,
@@ -86,7 +86,7 @@ fn compare(parts: &[(f64, f64)]) -> Option<Test> {
     }
     let mut variances: Vec<f64> = usable.iter().map(|(_, variance)| *variance).collect();
     let middle = variances.len() / 2;
-    // A block that happens to look exact must not decide alone.
+    // A block with an accidentally small variance must not decide alone.
     let least = 0.5 * *variances.select_nth_unstable_by(middle, f64::total_cmp).1;
     let weight = |variance: f64| 1.0 / variance.max(least);
     let total: f64 = usable.iter().map(|(_, variance)| weight(*variance)).sum();

@@ -1,4 +1,4 @@
-//! Which length of windows predicts best what it has not seen.
+//! Cross-validation of window lengths: how well each predicts rows that it does not contain.
 
 use crate::error::Error;
 use crate::exec::stages::Stages;
@@ -9,10 +9,10 @@ use crate::regression::problem::Problem;
 use crate::regression::window_length::Scale;
 use crate::simd::instructions::Instructions;
 
-/// The largest squared error, over the noise's, that a single row counts with.
+/// Squared errors over the noise variance are clipped to this, so that single rows do not dominate.
 const MOST: f64 = 9.0;
 
-/// How well windows of one length predict the rows between them.
+/// A fit in windows of one length and its cross-validation error.
 #[derive(Clone, Debug)]
 pub(crate) struct Validated {
     pub(crate) fit: Fit,
@@ -20,8 +20,8 @@ pub(crate) struct Validated {
     pub(crate) error: f64,
 }
 
-/// Fits a problem in windows of every length and returns how well each predicts, in the order of the lengths; those whose constants are
-/// not determined are left out.
+/// Fits a problem in windows of every length and returns their cross-validation errors, in the order of the lengths.
+/// Lengths whose constants are not determined are left out.
 pub(crate) fn validate(
     problem: &Problem<'_>,
     scales: &[Scale],
@@ -50,7 +50,7 @@ pub(crate) fn validate(
     Ok(validated)
 }
 
-/// The one that predicts best; nothing where none predicts any row.
+/// The fit with the smallest error, or `None` if none predicts any row.
 pub(crate) fn best(validated: &[Validated]) -> Option<&Validated> {
     validated.iter().filter(|one| one.error.is_finite()).min_by(|a, b| a.error.total_cmp(&b.error))
 }

@@ -1,8 +1,9 @@
-//! Whether anything but noise tells the constants apart.
+//! Whether the constants are told apart by the motion or only by noise.
 //!
-//! A motion at a single frequency makes the regressors of inertia and stiffness proportional; only the angle's noise is not, and the
-//! equations look well conditioned the noisier it is. So what is left of the weakest combination of regressors, once what is windowed has
-//! been eliminated, is compared with what noise of the known variance would leave.
+//! A motion at a single frequency makes the regressors of inertia and stiffness proportional. Only the noise of the
+//! angle is not proportional, so the equations look the better conditioned the noisier the angle is. Therefore the
+//! weakest combination of the regressors, after the windowed unknowns are eliminated, is compared with what noise of
+//! the known variance would leave of it.
 
 use std::ops::Range;
 
@@ -15,10 +16,10 @@ use crate::regression::model::Model;
 use crate::regression::problem::Problem;
 use crate::regression::solved::sensitivity;
 
-/// What is left, in units of what noise leaves, below which noise is all there is: twice itself would mean as much signal as noise.
+/// Remainder below which a combination is mostly noise, in units of what noise alone leaves: at two there is as much signal as noise.
 const MOSTLY_NOISE: f64 = 2.0;
 
-/// Whether the weakest combination of constants, given by their parts, each of a column of norm one, is mostly noise. `variance` is that
+/// Whether the weakest combination of constants is mostly noise. It is given by its entries for columns of norm one. `variance` is that
 /// of the angle's noise.
 pub(crate) fn is_mostly_noise(
     problem: &Problem<'_>,

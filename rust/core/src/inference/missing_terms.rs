@@ -1,6 +1,7 @@
-//! What may have been left out of the equation of motion: friction, an offset, a hardening spring, a lag of the torque.
+//! Tests for terms that are missing from the equation of motion: friction, an offset, a hardening spring, a lag of the
+//! torque.
 //!
-//! Each is added to the constants on its own and judged by its standard error (a score test, near enough).
+//! Each term is added to the constants on its own and judged by its standard error (similar to a score test).
 
 use std::sync::Arc;
 
@@ -18,24 +19,24 @@ use crate::regression::problem::Correlated;
 use crate::regression::row_covariance::RowCovariance;
 use crate::simd::instructions::Instructions;
 
-/// A term is suspected where its factor exceeds its standard error so many times.
+/// A term is suspected if its coefficient exceeds its standard error so many times.
 const CONSPICUOUS: f64 = 5.0;
 
-/// Something that may have been left out.
+/// A term that may be missing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Missing {
     /// A built-in term.
     Term(&'static BuiltInTerm),
-    /// The torque comes late.
+    /// The torque lags behind.
     Lag,
 }
 
-/// What was left out and its factor.
+/// A missing term and its coefficient.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Suspect {
     /// What it is.
     pub missing: Missing,
-    /// Its factor, in the unit of the term, or samples.
+    /// Its coefficient, in the unit of the term, or samples.
     pub value: f64,
     /// Its standard error.
     pub error: f64,
@@ -61,14 +62,14 @@ impl Missing {
 }
 
 impl Suspect {
-    /// Whether it is more than chance.
+    /// Whether it is significant.
     #[must_use]
     pub fn is_conspicuous(&self) -> bool {
         self.value.abs() > CONSPICUOUS * self.error
     }
 }
 
-/// What a fit was made with.
+/// The fit that a term is added to.
 pub(crate) struct JudgedTerm<'a> {
     pub(crate) rows: &'a Rows,
     pub(crate) model: &'a Model,
@@ -79,13 +80,13 @@ pub(crate) struct JudgedTerm<'a> {
     pub(crate) covariance: &'a RowCovariance,
     pub(crate) correlated: &'a Arc<Correlated>,
     pub(crate) expected: Expected,
-    /// What variances are multiplied by.
+    /// The factor on all variances.
     pub(crate) inflation: f64,
     pub(crate) instructions: Instructions,
 }
 
 impl JudgedTerm<'_> {
-    /// Adds one regressor to the constants and returns its factor with its standard error; nothing where it is not determined.
+    /// Adds one regressor to the constants and returns its coefficient with its standard error, or `None` if it is not determined.
     pub(crate) fn factor(&self, regressor: usize, stages: &mut Stages<'_, '_>) -> Result<Option<(f64, f64)>, Error> {
         let mut model = self.model.clone();
         model.constant.push(regressor);

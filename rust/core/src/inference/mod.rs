@@ -1,4 +1,4 @@
-//! What changes, and how surely: prediction of rows not seen, constancy, jumps, what is not determined, what is missing.
+//! Statistical inference: cross-validation, tests of constancy, jumps, identifiability and missing terms.
 
 pub(crate) mod constancy;
 pub(crate) mod cross_validation;

@@ -1,6 +1,6 @@
-//! A coefficient that changes slowly, by its values at points in time.
+//! Slowly varying coefficients as curves over time, given by their values at equidistant points.
 
-/// Slow coefficients over time.
+/// Slowly varying coefficients over time.
 #[derive(Clone, Debug)]
 pub(crate) struct Varying {
     /// Row of the first point, and rows from one to the next.
@@ -10,12 +10,12 @@ pub(crate) struct Varying {
     pub(crate) values: Vec<Vec<f64>>,
     /// Their variances over that of a row's noise, as if all equations were independent.
     pub(crate) variances: Vec<Vec<f64>>,
-    /// What is constant beside them.
+    /// The constants that were estimated with them.
     pub(crate) constants: Vec<f64>,
 }
 
 impl Varying {
-    /// A coefficient at a row and how much it grows from there to the next row.
+    /// A coefficient at a row and its growth per row.
     pub(crate) fn at(&self, coefficient: usize, row: f64) -> (f64, f64) {
         interpolate(&self.values[coefficient], (row - self.first) / self.spacing, self.spacing)
     }

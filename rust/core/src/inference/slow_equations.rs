@@ -1,4 +1,5 @@
-//! What windows leave for slow coefficients, and local polynomials in time fitted to it.
+//! Equations for slowly varying coefficients, left by windows whose own unknowns are eliminated, and local polynomials
+//! in time fitted to them.
 
 use crate::inference::slow_curve::Varying;
 use crate::regression::constants::{Expected, pool};
@@ -17,17 +18,17 @@ use crate::simd::vectors::{Kernel, Lanes, dispatch};
 /// Coefficients of the polynomials in time.
 const TERMS: usize = 3;
 
-/// Points within one reach.
+/// Points within one bandwidth.
 const DENSITY: usize = 8;
 
-/// The equations that windows left for slow coefficients, which come first among their constants.
+/// The equations that windows leave for slow coefficients, which come first among their constants.
 pub(crate) struct Slow<'a> {
     pub(crate) fit: &'a Fit,
     /// Number of slow coefficients.
     pub(crate) coefficients: usize,
-    /// What their growth multiplies, by coefficient.
+    /// The regressors of their growth, by coefficient.
     pub(crate) companions: Vec<&'a [f64]>,
-    /// Slow coefficients so far, which were taken off the right-hand side.
+    /// The slow coefficients of the previous round, which were subtracted from the right-hand side.
     pub(crate) current: Option<&'a Varying>,
     /// Weight of every window.
     pub(crate) weights: &'a [f64],
@@ -36,8 +37,8 @@ pub(crate) struct Slow<'a> {
 }
 
 impl Slow<'_> {
-    /// Fits the slow coefficients with equations up to `reach` rows away, those nearer than `hole` rows left out; nothing where they
-    /// do not determine them.
+    /// Fits the slow coefficients to equations up to `reach` rows away, leaving out those nearer than `hole` rows. Returns `None` if they
+    /// are not determined.
     pub(crate) fn fit(&self, reach: f64, hole: f64, instructions: Instructions) -> Option<Varying> {
         let spacing = reach / DENSITY as f64;
         let last = self.rows as f64 - 1.0;
@@ -66,7 +67,7 @@ impl Slow<'_> {
     }
 }
 
-/// Fills gaps from the nearest number; nothing where there is none.
+/// Fills gaps with the nearest number, or returns `None` if there is none.
 fn fill(values: &[Option<f64>]) -> Option<Vec<f64>> {
     let known: Vec<(usize, f64)> =
         values.iter().enumerate().filter_map(|(place, value)| value.map(|value| (place, value))).collect();
@@ -149,12 +150,12 @@ impl Kernel for Points<'_, '_> {
     }
 }
 
-/// The largest squared error, over the noise's, that a single row counts with.
+/// Squared errors over the noise variance are clipped to this, so that single rows do not dominate.
 const MOST: f64 = 25.0;
 
 impl Slow<'_> {
-    /// Mean squared error of predicting rows, over the noise's variance: slow coefficients from equations that the row had no part in,
-    /// what is windowed from windows on both sides of it.
+    /// Mean squared error of predicting rows, over the noise's variance: slow coefficients from equations without the row,
+    /// windowed ones from windows on both sides of it.
     pub(crate) fn error(
         &self,
         problem: &Problem<'_>,

@@ -1,8 +1,9 @@
-//! Coefficients that change more slowly than what is windowed: local polynomials in time of what the windows left for them.
+//! Coefficients that vary more slowly than the windowed ones, estimated by local polynomials in time.
 //!
-//! What the windows of one length leave once their own unknowns are eliminated are equations for the slow coefficients, around each
-//! window's centre. A quadratic in time is fitted to those within reach of a point, the nearer the more; how far the reach is says
-//! cross-validation. A point's own neighbourhood can be left out, to predict what happens there.
+//! Windows of one length, with their own unknowns eliminated, leave equations for the slow coefficients around each
+//! window's centre. A quadratic in time is fitted to the equations within a bandwidth of each point, with weights that
+//! fall with the distance. The bandwidth is chosen by cross-validation: a point's own neighbourhood is left out to
+//! predict its rows.
 
 use crate::equation::rows::Rows;
 use crate::error::Error;
@@ -16,27 +17,27 @@ use crate::regression::model::Model;
 use crate::regression::window_length::Scale;
 use crate::simd::instructions::Instructions;
 
-/// Multiples of what a prediction leaves out that are tried as reach.
+/// Bandwidths tried, as multiples of the neighbourhood that a prediction leaves out.
 const REACHES: [f64; 10] = [1.6, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 23.0, 32.0];
 
-/// Rounds of estimating the slow coefficients, each with what the last one found taken off.
+/// Rounds of estimating the slow coefficients, each starting from the last one's result.
 const ROUNDS: usize = 3;
 
-/// A model whose first constants are slow coefficients, and what was found of them.
+/// The slow coefficients found.
 #[derive(Clone, Debug)]
 pub(crate) struct Found {
     pub(crate) varying: Varying,
     /// The right-hand side without them.
     pub(crate) rhs: Vec<f64>,
-    /// The length of windows that predicts best.
+    /// The length of windows with the smallest cross-validation error.
     pub(crate) scale: Scale,
     /// Mean squared error of predicting rows, over the noise's variance.
     pub(crate) error: f64,
-    /// Rows on either side that they are taken from.
+    /// Bandwidth: rows on either side that they are estimated from.
     pub(crate) reach: f64,
 }
 
-/// Where slow coefficients are looked for.
+/// The data in which slow coefficients are estimated.
 pub(crate) struct SlowSearch<'a> {
     pub(crate) rows: &'a Rows,
     /// The slow coefficients come first among its constants.
@@ -45,12 +46,12 @@ pub(crate) struct SlowSearch<'a> {
     /// Variance of the angle's noise.
     pub(crate) noise: f64,
     pub(crate) expected: Expected,
-    /// Lengths of windows for what is windowed.
+    /// Lengths of windows for the windowed coefficients.
     pub(crate) scales: &'a [Scale],
     pub(crate) instructions: Instructions,
 }
 
-/// Finds slow coefficients; nothing where they are not determined. `first` is the length of windows to begin with.
+/// Estimates slow coefficients, or returns `None` if they are not determined. `first` is the length of windows to begin with.
 pub(crate) fn find(search: &SlowSearch<'_>, first: Scale, stages: &mut Stages<'_, '_>) -> Result<Option<Found>, Error> {
     let &SlowSearch { rows, model, coefficients, noise, expected, scales, instructions } = search;
     let slow = &model.constant[..coefficients];

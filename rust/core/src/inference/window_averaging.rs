@@ -1,8 +1,10 @@
-//! What changes, at every row: windows of many lengths before, around and after it, averaged by how well each predicts nearby.
+//! Windowed coefficients at every row: windows of many lengths before, around and after it, averaged by their local
+//! cross-validation error.
 //!
-//! A window predicts the rows that it has not seen. The weight of one at a row is `exp(-½ (n e + n₀ ē))`, where `e` is its mean squared
-//! error around the row over the noise's variance, `n` the number of independent rows in that mean, and `ē` and `n₀` the same over the
-//! record. So a jump is followed from both sides, and where nothing happens long windows rule.
+//! A window predicts rows that it does not contain. Its weight at a row is `exp(-½ (n e + n₀ ē))`. Here `e` is its mean
+//! squared error around the row over the noise variance, `n` the number of independent rows in that mean, and `ē` and
+//! `n₀` the same over the record. So jumps are followed from both sides, and long windows dominate where nothing
+//! changes.
 
 use std::ops::Range;
 
@@ -16,25 +18,25 @@ use crate::regression::subsample::holds;
 use crate::regression::window_length::{Cells, Scale};
 use crate::simd::instructions::Instructions;
 
-/// The largest squared error, over the noise's, that a single row counts with.
+/// Squared errors over the noise variance are clipped to this, so that single rows do not dominate.
 const MOST: f64 = 16.0;
 /// Independent rows that the errors over the record count as, at least, and per length of the best window.
 const RECORD: [f64; 2] = [16.0, 5.0];
 /// Cells of at least so many rows are solved once for all pieces.
 const COARSE: usize = 8;
-/// Of the lengths that thinned rows hold, so many of the longest must be hopeless for all longer ones to be so.
+/// If so many of the longest lengths in the subsample are negligible, all longer ones are assumed to be.
 const OVERLAP: usize = 2;
-/// A window that predicts so much worse over the record than the best one weighs nothing anywhere.
+/// A window whose exponent over the record is so much larger than the best one's gets no weight anywhere.
 const HOPELESS: f64 = 24.0;
 
-/// What changes, at every row.
+/// Windowed coefficients at every row.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Averages {
-    /// Windowed unknowns, by row; NaN where no window says anything.
+    /// Windowed unknowns, by row; NaN where no window determines them.
     pub(crate) values: Vec<Vec<f64>>,
-    /// What they grow by in a second.
+    /// Their growth per second.
     pub(crate) slopes: Vec<Vec<f64>>,
-    /// Their standard errors for the constants that were taken off.
+    /// Their standard errors for given constants.
     pub(crate) errors: Vec<Vec<f64>>,
 }
 
@@ -49,21 +51,21 @@ impl Averages {
     }
 }
 
-/// Which windows of a scale: before a row, around it, after it.
+/// Positions of a window relative to a row: before it, around it, after it.
 const POSITIONS: usize = 3;
 
-/// A scale and what is known of it beforehand.
+/// A length of windows and its error over the record.
 struct Candidate {
     scale: Scale,
-    /// All cells, where they are few.
+    /// All cells, if they are few.
     cells: Option<Cells>,
-    /// Mean squared error over the record, by position; infinite where it takes no part.
+    /// Mean squared error over the record, by position; infinite if the length is not used there.
     record: [f64; POSITIONS],
 }
 
-/// Averages windows of several lengths at every row of a problem without constants. `best` is the length of the windows that predict best, in
-/// rows. Where `thinned` rows stand for a long record, how well windows predict over the record is learnt from them, as far as they
-/// hold windows so long.
+/// Averages windows of several lengths at every row of a problem without constants. `best` is the length of windows
+/// with the smallest error, in rows. If `thinned` is a subsample of a long record, errors over the record are estimated
+/// from it, for all lengths that it holds.
 pub(crate) fn average(
     problem: &Problem<'_>,
     thinned: Option<&Problem<'_>>,
@@ -114,13 +116,13 @@ pub(crate) fn average(
     Ok(averages)
 }
 
-/// Windows of the candidates whose cells are all there, ready to predict in every piece.
+/// Windows of the candidates whose cells are all solved, ready to predict in every piece.
 fn ready(candidates: &[Candidate]) -> Vec<Option<Around<'_>>> {
     let all = candidates.iter();
     all.map(|candidate| Some(Around::new(candidate.scale, candidate.cells.as_ref()?, &[]))).collect()
 }
 
-/// Rows around a row that its errors are averaged over, to either side, and how many independent ones that makes.
+/// Rows on either side of a row over which its errors are averaged, and the number of independent rows among them.
 #[derive(Clone, Copy)]
 struct Nearby {
     rows: usize,
@@ -131,13 +133,13 @@ struct Nearby {
 struct View<'a, 'b> {
     problem: &'a Problem<'b>,
     variance: f64,
-    /// Rows that a test function reaches to either side.
+    /// Rows that a test function reaches on either side.
     reach: usize,
     instructions: Instructions,
 }
 
 impl View<'_, '_> {
-    /// Finds how well candidates predict some rows of the record.
+    /// Computes the errors of the candidates over some rows of the record.
     fn judge(
         &self,
         candidates: &mut [Candidate],
@@ -235,7 +237,7 @@ impl View<'_, '_> {
         let mut least = vec![f64::INFINITY; width];
         let mut sums = vec![0.0; width * numbers];
         let mut numbers_here = vec![0.0; numbers];
-        // Where no window with hope reaches, near an end or a gap, the others serve.
+        // Rows that no promising window reaches, near an end or a gap, use the others.
         for hope in [true, false] {
             let wanted: Vec<bool> = weights.iter().map(|&weight| hope || weight == 0.0).collect();
             if !wanted.contains(&true) {
@@ -268,7 +270,7 @@ impl View<'_, '_> {
                         let first = row.saturating_sub(nearby.rows).max(wide.start) - wide.start;
                         let last = (row + nearby.rows + 1).min(wide.end) - wide.start;
                         let (sum, count) = (errors[last][0] - errors[first][0], errors[last][1] - errors[first][1]);
-                        // Within a gap nothing is known nearby, and the record decides.
+                        // Within a gap there are no errors nearby, and those over the record decide.
                         let here = if count == 0.0 { 0.0 } else { nearby.independent * sum / count };
                         let exponent = 0.5 * (here + record * candidate.record[which].min(MOST));
                         self.numbers_at_row(&window, &mut numbers_here);
@@ -295,7 +297,7 @@ impl View<'_, '_> {
         }
     }
 
-    /// What a window says at a row: values, slopes and standard errors.
+    /// The values, slopes and standard errors of a window at a row.
     fn numbers_at_row(&self, window: &WindowAtRow<'_, '_>, numbers: &mut [f64]) {
         let windowed = self.problem.layout.windowed;
         for unknown in 0..windowed {

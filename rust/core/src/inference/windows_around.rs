@@ -1,4 +1,4 @@
-//! Windows before, around and after a row: what they predict there without having seen it, and what they say of it.
+//! Windows before, around and after a row: they predict the row without containing it, and give the coefficients there.
 
 use crate::regression::predictor::Predictor;
 use crate::regression::problem::Problem;
@@ -12,7 +12,8 @@ pub(crate) struct Around<'a> {
     full: Predictor<'a>,
 }
 
-/// One window as seen from a row: what predicts the row, what is believed there, and how much later the row is than either's centre.
+/// A window at a row: the candidate, which predicts the row without containing it, the reference, whose coefficients
+/// are used there, and the time of the row after their centre.
 pub(crate) struct WindowAtRow<'a, 'b> {
     candidate: &'b Predictor<'a>,
     reference: &'b Predictor<'a>,
@@ -27,7 +28,7 @@ impl<'a> Around<'a> {
         Self { scale, one_sided: of(&cells.one_sided), leave_gap_out: of(&cells.leave_gap_out), full: of(&cells.full) }
     }
 
-    /// The window of one scale before (0), around (1) or after (2) a row, if there is one and no jump lies between.
+    /// The window before (0), around (1) or after (2) a row, or `None` if it does not exist or a jump lies between.
     pub(crate) fn at_row(&self, problem: &Problem<'_>, row: usize, which: usize) -> Option<WindowAtRow<'a, '_>> {
         let cell = self.scale.cell(row);
         let later = |centre: f64| (row as f64 - centre) * problem.period;
@@ -64,7 +65,7 @@ impl<'a> Around<'a> {
 }
 
 impl WindowAtRow<'_, '_> {
-    /// What is believed of a windowed unknown at the row, per second and how uncertain it is.
+    /// The reference's value of a windowed unknown at the row.
     pub(crate) fn value(&self, unknown: usize) -> f64 {
         self.reference.value(self.reference_place, unknown, self.later)
     }
@@ -78,7 +79,7 @@ impl WindowAtRow<'_, '_> {
         self.reference.variance(self.reference_place, unknown, self.later)
     }
 
-    /// What the windowed unknowns add to the row's right-hand side, from windows that have not seen it.
+    /// The candidate's prediction of the row's right-hand side.
     pub(crate) fn predict(&self, problem: &Problem<'_>, row: usize) -> f64 {
         self.candidate.predict(problem, self.place, row, self.later)
     }

@@ -1,4 +1,4 @@
-//! Many windows side by side, one a lane: how samples are laid out for them, and how their results are written.
+//! Many windows side by side, one per lane: the layout of their samples and the output of their results.
 
 pub(crate) mod interleaved;
 pub(crate) mod output;

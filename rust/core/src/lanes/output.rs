@@ -1,4 +1,4 @@
-//! Where results go: which samples the elements of an output belong to, and how outputs are cut into pieces.
+//! Outputs: which samples their elements belong to, and how they are cut into pieces.
 
 use std::ops::Range;
 
@@ -53,7 +53,7 @@ impl Elements {
     }
 }
 
-/// Where kernels write, field by field. An empty slice stands for what is not wanted.
+/// The outputs of a kernel, field by field. Outputs that are not wanted are empty.
 #[derive(Debug)]
 pub(crate) struct Outputs<'a> {
     pub(crate) elements: Elements,

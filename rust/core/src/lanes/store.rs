@@ -1,4 +1,4 @@
-//! The kernel that writes finished windows out.
+//! The kernel that writes finished windows to the outputs.
 
 use std::ops::Range;
 

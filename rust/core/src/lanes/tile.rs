@@ -17,7 +17,7 @@ pub(crate) struct Tile {
 }
 
 impl Tile {
-    /// Room for so many fields of so many windows, a power of two.
+    /// Room for some fields of some windows, whose number is a power of two.
     pub(crate) fn new(fields: usize, places: usize, lanes: usize) -> Self {
         debug_assert!(places.is_power_of_two() && places <= TILE, "{places} places");
         Self { places, values: Aligned::zeros(fields * places * lanes) }

@@ -1,4 +1,4 @@
-//! The triangular factor of a few columns: append a row, merge two factors, solve. One factor a lane.
+//! The triangular factor of a few columns by Givens rotations: append a row, merge two factors, solve. One factor per lane.
 //!
 //! Rows `[a | b]` of a least-squares problem are summarised by the factor `R` of their QR decomposition. It is kept free of square
 //! roots as `R = W^{1/2} U` with `W` diagonal and `U` unit upper triangular (Gentleman 1973): appending a row costs one division a
@@ -8,16 +8,16 @@ use std::ops::IndexMut;
 
 use crate::simd::vectors::Lanes;
 
-/// What the weight of a column starts from, so that no division is by zero. Squares of samples are far above it or mean nothing.
+/// The initial weight of a column, so that no division is by zero. Squares of samples that matter are far above it.
 const NOTHING: f64 = 1e-300;
 
-/// Weights up to this are those of columns that no row said anything about.
+/// Weights up to this belong to columns that are zero in every row.
 const UNDETERMINED: f64 = 1e-290;
 
 /// The most regressors a problem may have.
 pub(crate) const MOST_REGRESSORS: usize = 16;
 
-/// How many regressors and right-hand sides a problem has: known when compiling, or not.
+/// Number of regressors and right-hand sides, known at compile time or not.
 pub(crate) trait Dimensions: Copy + Send + Sync {
     /// The numbers of one factor, as many as [`Dimensions::size`].
     type Factor<V: Copy>: Clone + IndexMut<usize, Output = V>;
@@ -110,7 +110,7 @@ pub(crate) fn empty<S: Lanes, H: Dimensions>(simd: S, shape: H) -> H::Factor<S::
     factor
 }
 
-/// Appends a row of each lane, `weight` times over, of which the columns before `first` are zero. The row is used up.
+/// Appends a row of each lane, `weight` times over, of which the columns before `first` are zero. The row is overwritten.
 #[inline(always)]
 pub(crate) fn append<S: Lanes, H: Dimensions>(
     simd: S,
@@ -145,7 +145,7 @@ pub(crate) fn append<S: Lanes, H: Dimensions>(
     }
 }
 
-/// Merges the rows of another factor into this one. `row` is scratch.
+/// Merges the rows of another factor into this one. `row` is scratch memory.
 #[inline(always)]
 pub(crate) fn merge<S: Lanes, H: Dimensions>(
     simd: S,
@@ -187,7 +187,7 @@ pub(crate) fn solve<S: Lanes, H: Dimensions>(
     }
 }
 
-/// `U⁻¹` in the place of `U`, and the inverse of every weight in its place: infinite where no row said anything about a column.
+/// `U⁻¹` in the place of `U`, and the inverse of every weight in its place: infinite for columns that are zero in every row.
 ///
 /// `(AᵀA)⁻¹` is `U⁻¹ W⁻¹ U⁻ᵀ`: see [`covariance`].
 #[inline(always)]

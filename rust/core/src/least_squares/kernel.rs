@@ -17,7 +17,7 @@ use crate::least_squares::side_by_side::{RollingRun, RollingScratch, SEGMENT};
 use crate::simd::vectors::{Kernel, Lanes, MOST_LANES};
 use crate::status::Status;
 
-/// Rows of every lane between two questions whether to go on: with 16 regressors some 10 ms.
+/// Rows of every lane between two calls of `go_on`: some 10 ms with 16 regressors.
 const ASK: usize = 256;
 
 /// The kernel of a run.
@@ -67,7 +67,7 @@ impl<H: Dimensions> Kernel for RollingKernel<'_, '_, '_, H> {
                 self.append(simd, &mut suffix, offset, 0, &mut row);
                 store(simd, self.shape, &mut self.scratch.suffixes[(offset - rows.start) * size..], &suffix);
             }
-            // Merging waits for the step before, solving for nothing: apart, each keeps the processor busy.
+            // Merging depends on the step before, solving does not: in separate loops each keeps the processor busy.
             let mut first = rows.start;
             while first < rows.end {
                 if first % ASK == 0 && !(self.go_on)() {
@@ -128,7 +128,7 @@ impl<H: Dimensions> RollingKernel<'_, '_, '_, H> {
         let slots = Slots::of(plan);
         let freedom = self.freedom(simd, offset, full);
         let tile = &mut self.scratch.tile;
-        // The squared condition number comes first: where it has no digits nothing has.
+        // The condition number comes first: where it exceeds the precision, no result has any digits.
         invert(simd, shape, factor, values);
         let mut squares = simd.splat_f64s(0.0);
         for i in 0..p {

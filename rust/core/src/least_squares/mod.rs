@@ -1,4 +1,4 @@
-//! Least squares of rows that are given: in sliding windows, and over a whole record.
+//! Least squares of given rows: in sliding windows, and over a whole record.
 
 pub(crate) mod givens_factor;
 pub(crate) mod kernel;

@@ -1,7 +1,7 @@
 //! The plan of least squares in every window of rows: how long windows are, what their rows hold and where results go.
 //!
-//! Windows are numbered by their first row, which may lie up to a window before the record; rows that do not exist are zero and say
-//! nothing. Blocks lie on a grid of absolute row numbers and lanes keep apart, so any cutting of a record gives the same bits.
+//! Windows are numbered by their first row, which may lie up to a window before the record; rows that do not exist are zero and have
+//! no effect. Blocks lie on a grid of absolute row numbers and lanes keep apart, so any cutting of a record gives the same bits.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use crate::least_squares::givens_factor::MOST_REGRESSORS;
 use crate::record::samples::Samples;
 use crate::simd::instructions::Instructions;
 
-/// A condition number from which on parameters have lost half of their digits.
+/// The condition number at which parameters have lost half of their digits.
 pub const HALF_OF_THE_DIGITS: f64 = 1e8;
 
 /// The plan of least squares with some regressors and right-hand sides in windows of some rows.
@@ -29,7 +29,7 @@ pub struct RollingLeastSquares {
 pub struct Equations<'a> {
     /// All of the same length.
     pub columns: Vec<&'a dyn Samples>,
-    /// The rows that are equations; those before and after do not count.
+    /// The rows that are equations; rows before and after are ignored.
     pub rows: Range<usize>,
 }
 
@@ -97,7 +97,7 @@ impl RollingLeastSquares {
         Ok(Self { window, regressors, rhs_count, covariances, ill_conditioned, instructions })
     }
 
-    /// Windows that are worked on side by side: a record may be cut anywhere, but multiples of this waste nothing.
+    /// Number of windows computed side by side. A record may be cut anywhere, but multiples of this waste no work.
     #[must_use]
     pub fn stride(&self) -> usize {
         self.window * self.instructions.lanes()

@@ -58,7 +58,7 @@ impl RollingLeastSquares {
         self.solve_while(equations, rows, regressions, scratch, &|| true);
     }
 
-    /// The same, given up where `go_on` says no: it is asked every few hundred rows of every lane.
+    /// The same, stopped once `go_on` returns false. It is called every few hundred rows of every lane.
     pub(crate) fn solve_while(
         &self,
         equations: &Equations<'_>,

@@ -1,4 +1,4 @@
-//! Blocks of windows that are worked on side by side: their rows, their memory, and which of their windows are incomplete.
+//! Blocks of windows that are computed side by side: their rows, their memory and their incomplete windows.
 
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ use crate::simd::aligned::Aligned;
 use crate::simd::vectors::Lanes;
 use crate::status::Status;
 
-/// Suffix factors kept at a time. Longer windows keep one in so many and build the others again.
+/// Suffix factors that are kept at a time. Longer windows keep one of so many and recompute the others.
 pub(crate) const SEGMENT: usize = 2048;
 
 /// Memory of one thread.
@@ -20,7 +20,7 @@ pub(crate) const SEGMENT: usize = 2048;
 pub struct RollingScratch {
     /// One column of a run's rows.
     column: Vec<f64>,
-    /// Rows of the run that hold a value that cannot be used, in order.
+    /// Rows of the run with an unusable value, in order.
     pub(crate) unusable: Vec<usize>,
     pub(crate) strips: Vec<Strips>,
     pub(crate) suffixes: Aligned,
@@ -55,7 +55,7 @@ pub(crate) struct RollingRun<'a> {
 }
 
 impl RollingRun<'_> {
-    /// Lays out the rows of the run. Those that are no equations, or hold what cannot be used, become zero.
+    /// Lays out the rows of the run. Rows that are no equations, or hold an unusable value, become zero.
     #[inline(always)]
     pub(crate) fn load<S: Lanes>(&self, simd: S, equations: &Equations<'_>, scratch: &mut RollingScratch) {
         let RollingScratch { column, unusable, strips, .. } = scratch;
@@ -99,8 +99,8 @@ impl RollingRun<'_> {
         self.count(self.base) == self.plan.window && self.count(self.first(lanes) - 1) == self.plan.window
     }
 
-    /// Says of the windows with missing rows that they lie at an edge, and takes back those that are less than half full or hold what
-    /// cannot be used.
+    /// Flags windows with missing rows as lying at an edge, and invalidates those that are less than half full or hold an unusable
+    /// value.
     pub(crate) fn mark(&self, unusable: &[usize], full: bool, outputs: &mut Outputs<'_>) {
         if full && unusable.is_empty() {
             return;

@@ -1,13 +1,13 @@
-//! Parameters that are the same over the whole record: one least-squares problem with very many rows.
+//! Least squares over the whole record: one problem with very many rows.
 //!
-//! The rows are summarised piece by piece by the triangular factor of their QR decomposition, and the factors of pieces are stacked and
-//! decomposed again. Factors of other records, or of other machines, could be stacked in the same way. The pieces lie on a grid of
-//! absolute sample numbers and are stacked in its order, so the result does not depend on who worked on which.
+//! The rows of each piece are summarised by the triangular factor of their QR decomposition. The factors are stacked
+//! and decomposed again. Pieces lie on a grid of absolute sample numbers and are stacked in its order, so the result
+//! does not depend on which thread computed which.
 
 use faer::linalg::solvers::Qr;
 use faer::{Mat, MatRef};
 
-/// The triangular factor `R` of rows `[a | b]`, of which there were `rows`.
+/// The triangular factor `R` of rows `[a | b]`, and their number.
 #[derive(Clone, Debug)]
 pub(crate) struct Summary {
     factor: Mat<f64>,
@@ -19,8 +19,7 @@ pub(crate) struct Summary {
 pub struct SharedParameters {
     /// The values.
     pub values: Vec<f64>,
-    /// Their covariance, row by row. Out of a summary it is that of ordinary least squares, for residuals that are independent and of
-    /// one variance.
+    /// Their covariance, row by row. From a summary it is that of ordinary least squares, for independent residuals of one variance.
     pub covariance: Vec<f64>,
     /// Standard deviation of the residuals.
     pub residual: f64,
@@ -29,7 +28,7 @@ pub struct SharedParameters {
 }
 
 impl Summary {
-    /// Summarises no rows of so many columns, the right-hand side included.
+    /// The summary of no rows, with so many columns, the right-hand side included.
     pub(crate) fn empty(columns: usize) -> Self {
         Self { factor: Mat::zeros(0, columns), rows: 0 }
     }
@@ -47,7 +46,7 @@ impl Summary {
     }
 
     /// Solves with each column scaled by the square root of a number: the values, the inverse of the normal matrix row by row and the
-    /// condition number of the scaled columns. Nothing where they do not determine the values.
+    /// condition number of the scaled columns. Returns `None` if the rows do not determine the values.
     pub(crate) fn solution(&self, squared: &[f64]) -> Option<(Vec<f64>, Vec<f64>, f64)> {
         let p = self.factor.ncols() - 1;
         if self.factor.nrows() < p || squared.iter().any(|norm| *norm <= 0.0) {
@@ -61,7 +60,7 @@ impl Summary {
         Some((self.values(&inverse, &norms), normal, condition))
     }
 
-    /// The inverse of the factor with each column divided by a number, and its condition number; nothing where rounding decides.
+    /// The inverse of the factor with each column divided by a number, and its condition number, or `None` if rounding dominates.
     fn scaled_inverse(&self, norms: &[f64]) -> Option<(Mat<f64>, f64)> {
         let p = norms.len();
         let scaled = Mat::from_fn(p, p, |i, j| self.factor[(i, j)] / norms[j]);
@@ -94,7 +93,7 @@ impl Summary {
         (0..p).map(|i| decomposed.U()[(i, 0)]).collect()
     }
 
-    /// Adds the rows that another summary stands for.
+    /// Adds the rows of another summary.
     pub(crate) fn add(&mut self, other: &Self) {
         let (above, below) = (self.factor.nrows(), other.factor.nrows());
         let stacked = Mat::from_fn(above + below, self.factor.ncols(), |row, column| {
@@ -104,7 +103,7 @@ impl Summary {
         self.rows += other.rows;
     }
 
-    /// Solves, or gives nothing where the rows do not determine the parameters.
+    /// Solves for the parameters, or returns `None` if the rows do not determine them.
     pub(crate) fn solve(&self) -> Option<SharedParameters> {
         let p = self.factor.ncols() - 1;
         if self.rows <= p || self.factor.nrows() < p {

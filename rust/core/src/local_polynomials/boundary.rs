@@ -10,7 +10,8 @@
 //!
 //! Orders below the derivative's are left out where the window's own order is not one of them: zero with an error of zero is no estimate.
 //!
-//! Where several orders share in a window (see [`crate::local_polynomials::order_selection`]), each of them is `top` in its turn, and what comes of it is averaged.
+//! Where several orders share in a window (see [`crate::local_polynomials::order_selection`]), each of them is `top` in
+//! its turn, and what comes of it is averaged.
 
 use std::ops::Range;
 
@@ -37,7 +38,7 @@ pub(crate) struct Ends {
     order: Order,
     derivatives: Vec<usize>,
     delta: f64,
-    /// No residual is taken to be smaller.
+    /// Residuals are at least this.
     floor: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The bare coefficients of every window, for whatever chooses an order with more than one window in view.
+//! The coefficients of every window, for selections of the order that look at more than one window.
 
 use std::ops::Range;
 
@@ -26,10 +26,10 @@ pub(crate) struct Coefficients {
 #[derive(Debug)]
 pub(crate) struct CoefficientScratch(engine::EngineScratch);
 
-/// What is known of some windows, one row a number.
+/// The results of some windows, one row per number.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Projected {
-    /// What was taken off the samples; NaN where the window holds a value that cannot be used.
+    /// The reference that was subtracted from the samples; NaN if the window holds an unusable value.
     pub(crate) level: Vec<f64>,
     /// The coefficients wanted, by degree.
     pub(crate) coefficients: Vec<Vec<f64>>,
@@ -61,7 +61,7 @@ impl Coefficients {
         CoefficientScratch(self.engine.scratch())
     }
 
-    /// Projects windows, known by their first samples: all of them, or every so manyth from the first on.
+    /// Projects windows, known by their first samples: all of them, or every `step`-th from the first on.
     pub(crate) fn project(
         &self,
         record: &dyn Samples,

@@ -1,8 +1,8 @@
 //! Numbers of twice the precision: an unevaluated sum of two `f64`, about 32 decimal digits.
 //!
-//! Only tables are computed with it (see [`crate::local_polynomials::basis`]): three-term recurrences lose digits from degree to degree, and a
-//! table that is rounded once, at the end, leaves every later error to the arithmetic on the samples.
-//! The operations are the classic error-free transformations of Dekker and Knuth.
+//! Only tables are computed with it (see [`crate::local_polynomials::basis`]): three-term recurrences lose digits from
+//! degree to degree, and a table that is rounded once, at the end, leaves every later error to the arithmetic on the
+//! samples. The operations are the classic error-free transformations of Dekker and Knuth.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

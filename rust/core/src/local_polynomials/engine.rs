@@ -68,7 +68,7 @@ pub(crate) struct Engine<const D: usize, const RESIDUAL: bool> {
 pub(crate) struct EngineScratch {
     stretch: Stretch,
     strips: Strips,
-    /// What is taken off each lane's samples.
+    /// The reference that is subtracted from each lane's samples.
     references: [f64; MOST_LANES],
     /// The start of each lane's block, and the windows that a sweep has come to.
     start: Aligned,
@@ -253,7 +253,7 @@ impl<const D: usize, const RESIDUAL: bool> EngineRun<'_, D, RESIDUAL> {
         if end <= block { first..end } else { 0..block }
     }
 
-    /// Makes the windows that hold a sample that cannot be used NaN.
+    /// Makes windows with an unusable sample NaN.
     fn invalidate(&self, unusable: &[usize], outputs: &mut Outputs<'_>) {
         let (before, length) = (self.engine.before_centre(), self.engine.projection.length());
         let mut from = self.windows.start;

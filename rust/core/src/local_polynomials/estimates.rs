@@ -1,4 +1,4 @@
-//! Where estimates of every window are written.
+//! The outputs of local polynomials.
 
 use crate::lanes::output::{Elements, split_off};
 use crate::status::Status;
@@ -19,7 +19,7 @@ pub struct Estimates<'a> {
 }
 
 impl Estimates<'_> {
-    /// Writes what is known of a window beside its derivatives.
+    /// Writes the order, flags and noise of a window.
     pub(crate) fn diagnose(&mut self, element: usize, order: usize, status: Status, sigma: f64) {
         put(self.order, element, u8::try_from(order).unwrap_or(u8::MAX));
         put(self.status, element, status.bits());

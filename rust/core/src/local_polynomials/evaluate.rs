@@ -1,4 +1,4 @@
-//! What becomes of a window's coefficients: its order, its noise and linear functions such as derivatives.
+//! Results from the coefficients of a window: its order, its noise, and linear functionals such as derivatives.
 
 use crate::lanes::tile::Tile;
 use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
@@ -20,7 +20,7 @@ pub(crate) struct Functional {
     constant: f64,
 }
 
-/// The plan of what is made of every window.
+/// The plan of the results of every window.
 #[derive(Debug)]
 pub(crate) struct Finish {
     functionals: Vec<Functional>,
@@ -42,7 +42,7 @@ impl Functional {
         Self { weights, odd: derivative % 2 == 1, constant: f64::from(u8::from(derivative == 0)) }
     }
 
-    /// What was taken off the window's samples before they were projected.
+    /// The reference that was subtracted from the window's samples before they were projected.
     fn level() -> Self {
         Self { weights: [0.0; MOST_DEGREES], odd: false, constant: 1.0 }
     }
@@ -101,7 +101,7 @@ impl Finish {
         Self { functionals: options.derivatives.iter().map(functional).collect(), tables, fixed_order }
     }
 
-    /// Gives, instead of derivatives, what was taken off the window's samples and then the coefficients of some degrees.
+    /// Gives, instead of derivatives, the reference of the window's samples and then the coefficients of some degrees.
     pub(crate) fn bare(mut self, degrees: &[usize]) -> Self {
         self.functionals = vec![Functional::level()];
         self.functionals.extend(degrees.iter().copied().map(Functional::coefficient));

@@ -1,4 +1,4 @@
-//! The kernels that go from a start through a block of windows.
+//! The kernels that step from a start through a block of windows.
 
 use std::ops::Range;
 
@@ -8,8 +8,8 @@ use crate::local_polynomials::evaluate::Finish;
 use crate::local_polynomials::sliding_projection::{Projection, State};
 use crate::simd::vectors::{Kernel, Lanes};
 
-/// Windows that are stepped to before they are finished. Stepping waits for the step before, finishing for nothing: apart, each keeps the
-/// processor busy, and so few states stay in its nearest cache.
+/// Windows that are stepped to before they are finished. Each step depends on the one before, finishing does not: in separate loops each
+/// keeps the processor busy, and so few states stay in the nearest cache.
 pub(crate) const STEPS: usize = 8;
 
 /// Numbers that so many states take.

@@ -1,4 +1,4 @@
-//! A polynomial fitted in every window, its order chosen by a criterion, and the derivatives that follow from it.
+//! Local polynomials: a fit in every window, its order chosen by a criterion, and the derivatives of the fit.
 
 pub(crate) mod basis;
 pub(crate) mod boundary;

@@ -10,14 +10,14 @@ use std::ops::Range;
 #[derive(Debug, Default)]
 pub(crate) struct Pool {
     windows: Range<usize>,
-    /// Windows on either side of one that count.
+    /// Windows on either side of a window that its sum includes.
     reach: usize,
     lowest: Vec<f64>,
     order: Vec<u8>,
     /// Sums from an entry to the end of its block, and from the beginning of its block to it. Entry `e` is window `e - R`.
     suffix: Vec<f64>,
     prefix: Vec<f64>,
-    /// What was summed last.
+    /// The last sums.
     totals: Vec<f64>,
 }
 
@@ -29,7 +29,7 @@ impl Pool {
         entries.start.saturating_sub(reach).min(windows.start)..(entries.end - reach).min(count)
     }
 
-    /// Begins with no order tried.
+    /// Starts a new search for the best order.
     pub(crate) fn begin(&mut self, windows: &Range<usize>, length: usize) {
         self.windows = windows.clone();
         self.reach = length - 1;
@@ -76,7 +76,7 @@ impl Pool {
         }));
     }
 
-    /// What was summed last, one number for each of the windows begun with.
+    /// The last sums, one for each of the windows begun with.
     pub(crate) fn totals(&self) -> &[f64] {
         &self.totals
     }

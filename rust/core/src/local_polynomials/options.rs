@@ -1,4 +1,4 @@
-//! What to estimate in every window, and how its order comes about.
+//! Options of local polynomials: the estimates wanted in every window, and the choice of its order.
 
 use crate::local_polynomials::criterion::Criterion;
 use crate::simd::instructions::Instructions;
@@ -6,7 +6,7 @@ use crate::simd::instructions::Instructions;
 /// The highest polynomial order that is offered.
 pub const HIGHEST_ORDER: usize = 15;
 
-/// How the order of a window comes about.
+/// How the order of a window is determined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
     /// The same in every window: the classic filter of Savitzky and Golay.
@@ -25,7 +25,7 @@ pub enum Order {
 pub struct Options {
     /// Samples in a window, `M`.
     pub window_length: usize,
-    /// How the order comes about.
+    /// How the order is determined.
     pub order: Order,
     /// What chooses the order of a window, where it is chosen.
     pub selection: Selection,
@@ -35,14 +35,14 @@ pub struct Options {
     pub delta: f64,
     /// Whether the noise is wanted too, where the order is fixed. It is always known where the order is chosen.
     pub noise: bool,
-    /// Step of the samples' quantisation, or zero: its noise is the least that a residual is taken to hold.
+    /// Step of the samples' quantisation, or zero. Its noise is a lower bound of residuals.
     pub quantisation: f64,
     /// Instructions to use.
     pub instructions: Instructions,
 }
 
 impl Options {
-    /// The residual sum of squares of a window that holds nothing but quantisation: `M q²/12`.
+    /// The residual sum of squares of a window with quantisation noise only: `M q²/12`.
     pub(crate) fn quantisation_floor(&self) -> f64 {
         self.window_length as f64 * self.quantisation * self.quantisation / 12.0
     }

@@ -1,4 +1,4 @@
-//! Every order's share in the estimate of a window: by the criterion of the window alone, or pooled over its neighbours.
+//! The share of every order in the estimate of a window: by the window's own criterion, or pooled over its neighbours.
 
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ use crate::record::samples::Samples;
 /// An order whose criterion is twice this much above the best has no share: it would be less than 1e-17.
 const NEGLIGIBLE: f64 = 40.0;
 
-/// What is written in the place of derivatives.
+/// What is written to the outputs of derivatives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Wanted {
     Derivatives,
@@ -28,7 +28,7 @@ pub(crate) struct Selector {
     /// What residuals are multiplied by before orders are compared.
     pub(crate) weights: Vec<f64>,
     pub(crate) derivatives: Vec<Derivative>,
-    /// No residual is taken to be smaller.
+    /// Residuals are at least this.
     floor: f64,
 }
 
@@ -50,7 +50,7 @@ pub(crate) struct SelectionScratch {
     pub(crate) floor: Vec<f64>,
     /// Every order's share in the estimate, one row an order.
     pub(crate) shares: Vec<Vec<f64>>,
-    /// How many windows a sum over neighbours goes over.
+    /// Number of windows in each sum over neighbours.
     neighbours: Vec<f64>,
     /// The order of the largest share.
     pub(crate) chosen: Vec<usize>,
@@ -60,7 +60,7 @@ pub(crate) struct SelectionScratch {
 }
 
 impl Selector {
-    /// Prepares the tables, or nothing where the order is given.
+    /// Prepares the tables, or returns `None` if the order is fixed.
     pub(crate) fn new(options: &Options, basis: &Basis) -> Option<Self> {
         let Order::Chosen { criterion, .. } = options.order else { return None };
         let (length, degrees) = (basis.length(), basis.degrees());
@@ -102,7 +102,8 @@ impl Selector {
         if self.selection == Selection::Pooled { 8 * self.length } else { 0 }
     }
 
-    /// Finds the shares of every `step`-th of some windows. Returns the place of the first in every row, and the places from one to the next.
+    /// Finds the shares of every `step`-th of some windows. Returns the place of the first in every row, and the places
+    /// from one to the next.
     pub(crate) fn share(
         &self,
         record: &dyn Samples,
@@ -135,7 +136,7 @@ impl Selector {
                 *sum += c * c;
             }
         }
-        // With the coefficient of a constant the sum is the window's energy. One of nothing but zeros must keep a logarithm.
+        // With the constant's coefficient the sum is the window's energy. For a window of zeros the logarithm must stay finite.
         let least = self.floor.max(f64::MIN_POSITIVE);
         floor.clear();
         floor.extend(sum.iter().map(|energy| least.max(ROUNDING * energy)));
@@ -159,7 +160,7 @@ impl Selector {
             self.weights.iter().enumerate().zip(residuals.iter().zip(&mut *shares))
         {
             scores.clear();
-            // A window that holds a value that cannot be used says nothing.
+            // A window with an unusable value does not count.
             let score = |(residual, level): (&f64, &f64)| if level.is_nan() { 0.0 } else { (residual * weight).ln() };
             scores.extend(residuals.iter().zip(&projected.level).map(score));
             pool.add(order, scores, first);
@@ -215,7 +216,7 @@ impl Selector {
             }
         }
         let half = self.length as f64 / 2.0;
-        // Orders whose share is negligible are told by their residuals, without a logarithm.
+        // Negligible shares are recognised by their residuals, without a logarithm.
         let negligible = (NEGLIGIBLE / half).exp();
         for ((residuals, weight), shares) in residuals.iter().zip(&self.weights).zip(&mut *shares) {
             shares.clear();
@@ -252,7 +253,7 @@ pub(crate) fn choose(scratch: &mut SelectionScratch) {
     }
 }
 
-/// How many windows that share no sample hold what `count` neighbouring ones of some length do.
+/// The number of independent windows that carry the information of `count` neighbouring ones.
 fn worth(count: f64, length: f64) -> f64 {
     let (short, long) = (count.min(length), count.max(length));
     short * long * long / (length * (short * long - (short * short - 1.0) / 3.0))

@@ -35,7 +35,7 @@ pub struct LocalPolynomials {
     selector: OnceLock<Option<Selector>>,
 }
 
-/// What one thread needs to work: made once, used for any number of pieces.
+/// Memory of one thread: made once, used for any number of pieces.
 #[derive(Debug)]
 pub struct PolynomialScratch {
     walk: crate::local_polynomials::engine::EngineScratch,
@@ -84,7 +84,7 @@ impl LocalPolynomials {
         Ok(Self { options, basis, ends, engine, selector: OnceLock::new() })
     }
 
-    /// What was asked for.
+    /// The options that it was made with.
     #[must_use]
     pub fn options(&self) -> &Options {
         &self.options
@@ -120,7 +120,7 @@ impl LocalPolynomials {
         self.selector.get_or_init(|| Selector::new(&self.options, &self.basis)).as_ref()
     }
 
-    /// Windows that are worked on side by side: a record may be cut anywhere, but multiples of this waste nothing.
+    /// Number of windows computed side by side. A record may be cut anywhere, but multiples of this waste no work.
     #[must_use]
     pub fn stride(&self) -> usize {
         self.engine.block() * self.options.instructions.lanes()
@@ -129,7 +129,7 @@ impl LocalPolynomials {
     /// Estimates at the samples `samples` of a record that is at least one window long, with equations (2), (8) and (9).
     ///
     /// Samples nearer to an end than half a window are evaluated off the centre of the first or last full window, each derivative
-    /// with the order that has the least estimated squared bias plus variance there. Windows that hold a value that is no number are
+    /// with the order that has the least estimated squared bias plus variance there. Windows with an unusable value are
     /// NaN, and no others.
     ///
     /// # Errors
@@ -255,8 +255,8 @@ impl LocalPolynomials {
 
     /// Standard errors in the place of derivatives, at all samples of several records, in parallel.
     ///
-    /// They are the noise times the gain of the order that is given; where it was chosen, `Σ w_n √(σ_n² g_n² + (d_n - d)²)`, `d` the estimate.
-    /// The plan must know the noise, and all outputs must be wanted.
+    /// They are the noise times the gain of the order that is given; where it was chosen, `Σ w_n √(σ_n² g_n² + (d_n -
+    /// d)²)`, `d` the estimate. The plan must know the noise, and all outputs must be wanted.
     ///
     /// # Errors
     /// As [`LocalPolynomials::run`].

@@ -1,4 +1,4 @@
-//! One window on its own, projected directly: for the ends of a record and for a look at the criterion.
+//! A single window, projected directly: for the ends of a record and for the values of the criterion.
 
 use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::criterion::Criterion;
@@ -9,18 +9,18 @@ use crate::record::samples::is_usable;
 /// The projection of one window.
 #[derive(Clone, Debug)]
 pub(crate) struct Window {
-    /// What was taken off the samples: the one at the centre.
+    /// The sample at the centre, which was subtracted from all samples.
     pub(crate) reference: f64,
     /// Projections on the orthonormal polynomials.
     pub(crate) coefficients: Vec<f64>,
     /// Residual sum of squares of every order.
     pub(crate) residuals: Vec<f64>,
-    /// Where residuals meet rounding or quantisation.
+    /// The floor of the residuals, from rounding or quantisation.
     pub(crate) floor: f64,
 }
 
 impl Window {
-    /// Projects a window, or gives nothing where a sample cannot be used. No residual is taken to be below `floor`.
+    /// Projects a window, or returns `None` if it holds an unusable sample. Residuals are at least `floor`.
     pub(crate) fn project(basis: &Basis, samples: &[f64], floor: f64) -> Option<Self> {
         if !samples.iter().all(|&value| is_usable(value)) {
             return None;

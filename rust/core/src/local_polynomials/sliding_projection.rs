@@ -24,7 +24,7 @@ use crate::simd::vectors::Lanes;
 /// Blocks hold at least so many windows, so that vectors of any path are filled and written whole.
 const SHORTEST_BLOCK: usize = 8;
 
-/// Below this fraction of the window's energy a residual is rounding noise.
+/// Below this fraction of the window's energy a residual is rounding error.
 ///
 /// The residual that slides along is wrong by some 1e-8 of itself where noise is 1e-6 of the signal and by 4e-4 at 1e-10, that is by
 /// about 1e-24 of the energy: (κ ε)² with κ = 1e4.
@@ -57,7 +57,7 @@ pub(crate) struct Projection<const D: usize> {
     step_gain: f64,
 }
 
-/// What is known of one window in each lane.
+/// The state of one window in each lane.
 #[derive(Clone, Copy)]
 pub(crate) struct State<S: Lanes, const D: usize> {
     /// Projections on the orthonormal polynomials, after the reference was taken off.
@@ -183,8 +183,8 @@ impl<const D: usize> Projection<D> {
         State { coefficients, residual: simd.add_f64s(residuals[0], residuals[1]), energy }
     }
 
-    /// One sample on. Returns where a lane must start afresh, because what left was so much larger than what stays that its rounding
-    /// errors would stay too. A lane judges by its own numbers only.
+    /// One sample on. Returns the lanes that must start afresh, because the sample that left was so much larger than
+    /// the rest that its rounding errors would remain. Each lane decides by its own numbers only.
     ///
     /// Without `RESIDUAL` the residual is not followed.
     #[inline(always)]

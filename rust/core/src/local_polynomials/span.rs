@@ -1,4 +1,4 @@
-//! How many windows may be reached from one start before rounding errors matter.
+//! The span: how many windows may be reached from one start before rounding errors matter.
 
 use crate::local_polynomials::basis::Basis;
 

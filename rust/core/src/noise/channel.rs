@@ -1,15 +1,18 @@
-//! The noise of a channel, from what no signal reaches: the highest of many polynomials in short windows.
+//! The noise of a channel, from coefficients that the signal does not reach: the highest degrees of polynomials in
+//! short windows.
 //!
-//! In a window of `M` samples white noise of variance `σ²` puts `σ²` into every coefficient `c_j`, while a smooth signal puts next to
-//! nothing into those of high degree. So, with windows of half-width 12, 20 and 35,
+//! White noise of variance `σ²` puts `σ²` into every coefficient `c_j` of a window of `M` samples, while a smooth
+//! signal puts next to nothing into those of high degree. With windows of half-width 12, 20 and 35,
 //!
 //! ```text
 //! σ² = min over the windows' lengths of the mean of (c_16² + … + c_19²)/4.
 //! ```
 //!
-//! The longest window knows the noise best, the shortest is reached by the least of the signal. Coloured noise is underestimated.
+//! The longest window has the smallest variance, the shortest the least bias from the signal. Coloured noise is
+//! underestimated.
 //!
-//! A channel that was rounded to a step `q` holds noise of at least `q²/12`, also while it rests and all its coefficients are zero.
+//! A channel that was rounded to a step `q` has noise of at least `q²/12`, also at rest, where all coefficients are
+//! zero.
 
 use crate::error::Error;
 use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
@@ -20,16 +23,16 @@ use crate::record::samples::{Samples, is_usable};
 use crate::record::subsample::stretches;
 use crate::simd::instructions::Instructions;
 
-/// Half-widths of the windows that the noise is read from.
+/// Half-widths of the windows that the noise is estimated from.
 const HALVES: [usize; 3] = [12, 20, 35];
 
 /// The degrees whose coefficients are noise: four of them.
 const LOWEST_DEGREE: usize = MOST_DEGREES - 4;
 
-/// The fewest samples that noise can be read from: one of the shortest windows.
+/// The fewest samples that noise can be estimated from: one of the shortest windows.
 pub const FEWEST_SAMPLES: usize = 2 * HALVES[0] + 1;
 
-/// Windows that are looked at, at most: so many know the variance to 0.7 %.
+/// The most windows that are used: so many determine the variance to 0.7 %.
 const MOST_WINDOWS: usize = 1 << 17;
 
 /// Bands of frequencies that are searched for one without signal, samples of a segment whose spectrum is taken, and how many segments a
@@ -38,10 +41,11 @@ const BANDS: usize = 16;
 const SEGMENT: usize = 512;
 const FEWEST_SEGMENTS: usize = 8;
 
-/// So many standard deviations are added to the power of the quietest band: of sixteen bands of white noise one is two of them too quiet by chance.
+/// So many standard deviations are added to the power of the quietest band: of sixteen bands of white noise one is two
+/// of them too quiet by chance.
 const CHANCE: f64 = 3.0;
 
-/// What a channel's noise is.
+/// The noise of a channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     /// Its standard deviation: at least that of quantisation and rounding.
@@ -50,10 +54,9 @@ pub struct Noise {
     pub quantisation: f64,
 }
 
-/// The noise of a channel, whose quantisation is looked for where it is not known. NaN where no window is without values that cannot be
-/// used.
+/// Estimates the noise of a channel, and its quantisation where that is not given. NaN if no window is free of unusable samples.
 ///
-/// Costs `O(n)`, some 60 ns a sample up to 130 000 samples and nothing more beyond.
+/// Costs `O(n)`, some 60 ns per sample, for up to 130 000 samples, and no more for longer records.
 ///
 /// # Errors
 /// If there are fewer than [`FEWEST_SAMPLES`].
@@ -70,9 +73,9 @@ pub fn noise(record: &dyn Samples, quantisation: Option<f64>, instructions: Inst
     Ok(Noise { sigma, quantisation })
 }
 
-/// The variance of a channel's noise for whoever weighs equations by it: as [`noise`] finds it, but no more than the power in the quietest
-/// band of frequencies, which bounds it where a signal with only a few samples a cycle reaches even the shortest windows. Zero for a
-/// record that is too short to tell.
+/// The variance of a channel's noise for the weights of equations: that of [`noise`], but at most the power in the
+/// quietest frequency band. This bound holds where a signal with only a few samples per cycle reaches even the shortest
+/// windows. Zero for a record that is too short.
 pub(crate) fn channel_variance(record: &dyn Samples, quantisation: Option<f64>, instructions: Instructions) -> f64 {
     let Ok(found) = noise(record, quantisation, instructions) else { return 0.0 };
     if found.sigma.is_nan() {
@@ -82,7 +85,7 @@ pub(crate) fn channel_variance(record: &dyn Samples, quantisation: Option<f64>, 
     (found.sigma * found.sigma).min(quietest_band(record)).max(least)
 }
 
-/// The most that the mean power in the quietest band of frequencies may be, chance aside; infinite for a record that is too short.
+/// An upper confidence bound of the mean power in the quietest frequency band; infinite for a record that is too short.
 fn quietest_band(record: &dyn Samples) -> f64 {
     if record.len() < FEWEST_SEGMENTS * SEGMENT {
         return f64::INFINITY;
@@ -118,7 +121,7 @@ fn variance(record: &dyn Samples, half: usize, instructions: Instructions) -> f6
     if count == 0 { f64::NAN } else { sum / f64::from(count) }
 }
 
-/// The largest number of a record in magnitude, as far as it can be used.
+/// The largest magnitude of a usable sample.
 pub(crate) fn largest(record: &dyn Samples) -> f64 {
     let mut samples = Vec::new();
     let mut largest = 0.0_f64;
@@ -135,8 +138,8 @@ mod tests {
     use super::*;
     use crate::noise::quantisation::tests::uniform;
 
-    /// 6000 samples tell the variance to 5 to 8 %, by the length of the windows, and the smallest of three such is some 3 % too small; 20 of them
-    /// tell that to 2 %. The quietest of sixteen bands would be 13 % too small.
+    /// 6000 samples tell the variance to 5 to 8 %, by the length of the windows, and the smallest of three such is some
+    /// 3 % too small; 20 of them tell that to 2 %. The quietest of sixteen bands would be 13 % too small.
     #[test]
     fn the_quietest_band_of_white_noise_is_no_bound() {
         let samples = uniform(20 * 6000);

@@ -1,25 +1,25 @@
-//! The step that a channel was rounded to, found from the differences of neighbouring samples.
+//! The quantisation step of a channel, found from the differences of neighbouring samples.
 
 use crate::record::samples::{Samples, is_usable};
 use crate::record::subsample::stretches;
 
-/// Differences that a step is sought in, at most, and those that must be whole steps before it is believed.
+/// The most differences that are searched for a step, and the fewest from which a step is inferred.
 const MOST_DIFFERENCES: usize = 1 << 12;
 const FEWEST_DIFFERENCES: usize = 16;
 
-/// Stretches that a longer record is looked at in.
+/// Number of stretches in the subsample of a longer record.
 pub(crate) const STRETCHES: usize = 64;
 
 /// Rounding of differences of numbers of single and of double precision, in units of the largest number. Single precision comes first,
 /// since its own last place is a step too.
 const PRECISIONS: [f64; 2] = [8.0 * f32::EPSILON as f64, 8.0 * f64::EPSILON];
 
-/// A step must be so many times as large as rounding.
+/// The least ratio of a step to rounding.
 const ABOVE_ROUNDING: f64 = 64.0;
 
 /// The step that all differences of neighbouring samples are multiples of, or zero where there is none.
 ///
-/// Costs nothing to speak of: at most 4096 differences are looked at.
+/// The cost is negligible: at most 4096 differences are searched.
 #[must_use]
 pub fn quantisation_step(record: &dyn Samples) -> f64 {
     let mut differences = Vec::new();
@@ -49,7 +49,7 @@ fn common_step(differences: &[f64], rounding: f64) -> Option<f64> {
         if step < ABOVE_ROUNDING * rounding {
             return None;
         }
-        // The larger the multiple, the better it knows the step.
+        // The larger the multiple, the more precise the step.
         let mut known = step;
         for &difference in differences {
             let multiple = (difference / known).round();

@@ -11,7 +11,7 @@ use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
 use crate::record::samples::{Samples, all_usable, is_usable};
 
-/// Segments that are averaged at most, spread over the record: so many, or fewer long ones that hold so many samples together.
+/// The most segments that are averaged, spread over the record: so many, or fewer long ones with so many samples together.
 const MOST_SEGMENTS: usize = 256;
 const MOST_SAMPLES: usize = 1 << 20;
 const FEWEST_SEGMENTS: usize = 32;
@@ -30,7 +30,7 @@ impl Transform {
     /// Frequencies from zero to half the sample rate, real and imaginary parts. The samples are used up.
     pub(crate) fn of(&self, samples: &mut [f64]) -> Vec<[f64; 2]> {
         let mut values = self.0.make_output_vec();
-        // It fails for another length only, and is all zero then.
+        // It fails only for another length; the result is zero then.
         let done = self.0.process(samples, &mut values);
         debug_assert!(done.is_ok(), "a transform is for sequences of its length");
         values.iter().map(|value| [value.re, value.im]).collect()
@@ -49,15 +49,15 @@ impl Transform {
 }
 
 /// The power of a record by frequency, so that its mean over all frequencies, both signs, is the mean square: of segments of `length`
-/// samples that overlap by half and fade in and out. Samples that cannot be used are bridged by a line, and segments where
-/// they are the greater part are left out.
+/// samples that overlap by half and fade in and out. Unusable samples are bridged by a line, and segments with a majority of them
+/// are left out.
 ///
 /// Only the changes are of interest, so the mean of each segment is taken off.
 pub(crate) fn power(record: &dyn Samples, length: usize) -> Vec<f64> {
     Segments::new(record, length).power().0
 }
 
-/// The same of segments without a sample that cannot be used only, and how many these are: a line in place of samples has no noise.
+/// The same from segments without unusable samples only, and their number: a line that bridges samples has no noise.
 pub(crate) fn power_of_whole_segments(record: &dyn Samples, length: usize) -> (Vec<f64>, usize) {
     Segments { whole: true, ..Segments::new(record, length) }.power()
 }
@@ -74,7 +74,7 @@ pub(crate) fn power_in_pieces(
     Ok(segments.mean(sums.into_iter()).0)
 }
 
-/// The segments of a record that a spectrum is the average of.
+/// The segments of a record whose power is averaged.
 struct Segments<'a> {
     record: &'a dyn Samples,
     length: usize,
@@ -82,10 +82,10 @@ struct Segments<'a> {
     count: usize,
     every: usize,
     fade: Vec<f64>,
-    /// The sum of the squares of what they fade with.
+    /// The sum of squares of the taper.
     energy: f64,
     transform: Transform,
-    /// Whether segments with a sample that cannot be used are left out.
+    /// Whether segments with unusable samples are left out.
     whole: bool,
 }
 
@@ -106,12 +106,12 @@ impl<'a> Segments<'a> {
         (0..count).step_by(TOGETHER).map(move |first| first..count.min(first + TOGETHER))
     }
 
-    /// The mean power of all segments that count, and how many these are.
+    /// The mean power of all segments that count, and their number.
     fn power(&self) -> (Vec<f64>, usize) {
         self.mean(self.parts().map(|part| self.sum(part)))
     }
 
-    /// The power of some segments together, and how many of them count.
+    /// The sum of the power of some segments, and how many of them count.
     fn sum(&self, segments: Range<usize>) -> (Vec<f64>, usize) {
         let mut sum = vec![0.0; self.length / 2 + 1];
         let mut count = 0;
@@ -131,7 +131,7 @@ impl<'a> Segments<'a> {
         (sum, count)
     }
 
-    /// The mean of all segments that count, and how many these are.
+    /// The mean of all segments that count, and their number.
     fn mean(&self, sums: impl Iterator<Item = (Vec<f64>, usize)>) -> (Vec<f64>, usize) {
         let (mut mean, mut all) = (vec![0.0; self.length / 2 + 1], 0);
         for (sum, count) in sums {
@@ -142,7 +142,7 @@ impl<'a> Segments<'a> {
     }
 }
 
-/// Puts a line where samples cannot be used; whether at least half of them can.
+/// Bridges unusable samples by a line. Returns whether at least half of the samples are usable.
 fn bridge(samples: &mut [f64]) -> bool {
     if samples.iter().all(|&value| is_usable(value)) {
         return true;

@@ -1,16 +1,16 @@
-//! A stretch of a record in memory, with what cannot be used set aside.
+//! A stretch of a record in memory, with unusable samples set to zero and listed.
 
 use std::ops::Range;
 
 use crate::record::samples::{Samples, all_usable, is_usable};
 
-/// Consecutive samples; those that do not exist or cannot be used are zero.
+/// Consecutive samples; missing and unusable ones are zero.
 #[derive(Debug, Default)]
 pub(crate) struct Stretch {
     /// Sample number of the first; negative before the record.
     first: isize,
     samples: Vec<f64>,
-    /// Sample numbers that hold what cannot be used, in order.
+    /// Numbers of the unusable samples, in order.
     unusable: Vec<usize>,
 }
 
@@ -47,7 +47,7 @@ impl Stretch {
         &self.samples[place..place + count]
     }
 
-    /// Sample numbers among some that hold what cannot be used, in order.
+    /// Numbers of the unusable samples among some, in order.
     pub(crate) fn unusable(&self, samples: Range<isize>) -> &[usize] {
         let place = |sample: isize| self.unusable.partition_point(|&bad| bad.cast_signed() < sample);
         &self.unusable[place(samples.start)..place(samples.end)]

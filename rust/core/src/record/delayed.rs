@@ -1,13 +1,13 @@
-//! A channel that comes late, by whole samples or a fraction.
+//! A channel with its delay removed: by whole samples or fractions of a sample.
 
 use crate::record::samples::{Samples, read_around};
 
 /// Neighbours that a fraction of a sample is interpolated from.
 const NEIGHBOURS: usize = 8;
 
-/// A channel as it would be without its delay: sample `i` is what was recorded `lag` sample periods later.
+/// A channel without its delay: sample `i` is the one recorded `lag` sample periods later.
 ///
-/// Between samples the polynomial through the nearest eight is read. What would lie beyond an end is missing.
+/// Between samples the polynomial through the nearest eight is evaluated. Samples beyond an end are missing.
 pub(crate) struct Delayed<'a> {
     channel: &'a dyn Samples,
     /// The first neighbour, relative to the sample.

@@ -1,4 +1,4 @@
-//! Channels that are made from others as they are read: nothing of a long record is held twice.
+//! Channels computed from other channels while they are read, so that no long record is held twice.
 
 use crate::record::samples::{Samples, read_around};
 
@@ -28,7 +28,7 @@ impl Samples for Whole<'_> {
     }
 }
 
-/// A channel that comes late by whole samples. What would lie beyond its ends is missing.
+/// A channel that is delayed by whole samples. Samples beyond its ends are missing.
 pub(crate) struct Late<'a> {
     pub(crate) channel: &'a dyn Samples,
     pub(crate) samples: isize,

@@ -1,4 +1,4 @@
-//! Samples of a record, known by absolute number: read, derived from other channels, delayed, held in memory, in parts of a long record.
+//! Samples of a record, addressed by absolute sample number.
 
 pub(crate) mod buffer;
 pub(crate) mod delayed;

@@ -1,4 +1,4 @@
-//! Where samples come from: anything that can copy a stretch of a record, known by absolute sample numbers.
+//! The source of samples: anything that can copy a stretch of a record, addressed by absolute sample number.
 
 /// The largest magnitude a sample may have: its square, summed over a long window and weighted, must not overflow.
 ///
@@ -32,7 +32,7 @@ impl Samples for &[f64] {
     }
 }
 
-/// Copies samples from a place on that may lie before the record or reach beyond its end: what is not there is missing.
+/// Copies samples from a place that may lie before the record or reach beyond its end; samples that do not exist are missing.
 pub(crate) fn read_around(channel: &dyn Samples, begin: isize, into: &mut [f64]) {
     let end = begin + into.len().cast_signed();
     let present = begin.max(0)..end.min(channel.len().cast_signed());
@@ -44,7 +44,7 @@ pub(crate) fn read_around(channel: &dyn Samples, begin: isize, into: &mut [f64])
     }
 }
 
-/// Whether all samples can be worked with.
+/// Whether all samples are usable.
 #[inline]
 #[must_use]
 pub(crate) fn all_usable(values: &[f64]) -> bool {
@@ -52,7 +52,7 @@ pub(crate) fn all_usable(values: &[f64]) -> bool {
     values.iter().fold(true, |usable, &value| usable & is_usable(value))
 }
 
-/// Whether a sample can be worked with: neither missing, nor infinite, nor so large that its square is.
+/// Whether a sample is usable: neither missing, nor infinite, nor so large that its square is.
 #[inline]
 #[must_use]
 pub(crate) fn is_usable(value: f64) -> bool {

@@ -1,10 +1,10 @@
-//! Parts of a long record that stand for all of it, where something is only to be chosen.
+//! Subsamples of a long record: hyperparameters are chosen from them, estimates use all data.
 //!
-//! A choice is as good after minutes as after hours: its cost must not grow with the record.
+//! A choice from minutes of data is as good as one from hours, so its cost must not grow with the record.
 
 use std::ops::Range;
 
-/// All places, or so many of them in a number of stretches evenly spread.
+/// All places, or so many of them in evenly spread stretches.
 pub(crate) fn stretches(places: usize, most: usize, count: usize) -> impl Iterator<Item = Range<usize>> {
     let (count, length) = if places <= most { (1, places) } else { (count, most / count) };
     let room = places - length;

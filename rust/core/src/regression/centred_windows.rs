@@ -1,6 +1,8 @@
-//! A window of a given length around every row, as in the paper: shorter near the ends of the record, down to half of its length.
+//! A window of a given length centred on every row, as in the paper. Near the ends of the record it is shorter, down to
+//! half of its length.
 //!
-//! The record ends where its equations do. Between them rows that are no equations, masked or missing, leave a window with fewer.
+//! The record ends at its first and last equation. Between them, masked or missing rows leave a window with fewer
+//! equations.
 
 use std::ops::Range;
 
@@ -16,23 +18,23 @@ use crate::regression::solved::Solved;
 use crate::simd::instructions::Instructions;
 use crate::status::Status;
 
-/// The condition number of a window is at least the number of its unknowns, but for rounding; a column of zeros takes its share away.
+/// The condition number of a window is at least the number of its unknowns, apart from rounding; a column of zeros lowers it by one.
 const LEAST_CONDITION: f64 = 0.999;
 
 /// Rows in a piece of work.
 const PIECE: usize = 2048;
 
-/// What a window around every row says.
+/// Results of the windows around every row.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct EveryWindow {
     /// Windowed unknowns, by row.
     pub(crate) values: Vec<Vec<f64>>,
     /// Their covariance for given constants, the lower half row by row.
     pub(crate) covariances: Vec<Vec<f64>>,
-    /// How they change with each constant: unknown by unknown, constant by constant.
+    /// Their derivatives with respect to each constant: unknown by unknown, constant by constant.
     pub(crate) sensitivities: Vec<Vec<f64>>,
     pub(crate) condition: Vec<f64>,
-    /// Standard deviation of what is left.
+    /// Standard deviation of the residuals.
     pub(crate) deviation: Vec<f64>,
     pub(crate) status: Vec<u16>,
 }

@@ -1,7 +1,8 @@
-//! Constant unknowns from all windows together.
+//! Constant unknowns, estimated from all windows together.
 //!
-//! Once a window's own unknowns are eliminated, what is left of its rows speaks of the constant ones only (Speckman 1988): a few rows,
-//! stacked over all windows and decomposed again. A window over a jump fits badly and counts less (Huber's rule on its misfit).
+//! Once a window's own unknowns are eliminated, the rest of its rows depends on the constant unknowns only (Speckman
+//! 1988): a few rows, which are stacked over all windows and decomposed again. A window over a jump fits badly and gets
+//! a smaller weight (Huber's rule on its misfit).
 
 use std::ops::Range;
 
@@ -14,36 +15,36 @@ use crate::simd::f64x8::{Packet, WIDTH};
 use crate::simd::instructions::Instructions;
 use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
-/// Windows whose misfit exceeds the median by more than so many standard deviations count less.
+/// Windows whose misfit exceeds the median by more than so many standard deviations get less weight.
 const TOLERATED: f64 = 4.0;
 
 /// Rounds of weighting.
 const ROUNDS: usize = 3;
 
-/// What all windows together say of the constant unknowns.
+/// Estimates of the constant unknowns from all windows.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Pooled {
     pub(crate) values: Vec<f64>,
     /// The inverse of the normal matrix, row by row.
     pub(crate) inverse: Vec<f64>,
-    /// Condition number of what the windows left of the columns, each scaled to its norm before.
+    /// Condition number of the columns after elimination, each scaled by its norm before.
     pub(crate) condition: f64,
     /// Weight of every window.
     pub(crate) weights: Vec<f64>,
 }
 
-/// What a row's noise is expected to leave.
+/// The expected noise of a row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Expected {
     /// Variance of a row, and the part of it that is the torque's.
     pub(crate) variance: f64,
     pub(crate) torque: f64,
-    /// Rows that stand for one independent row.
+    /// Variance inflation: the number of rows that carry the information of one independent row.
     pub(crate) variance_inflation: f64,
 }
 
 impl Expected {
-    /// Nothing is known of the noise, so no window is told from the others by its misfit.
+    /// For unknown noise: all windows keep their weights, whatever their misfit.
     pub(crate) const UNKNOWN: Self = Self { variance: f64::NAN, torque: 0.0, variance_inflation: 1.0 };
 
     pub(crate) fn new(covariance: &RowCovariance, torque: f64) -> Self {
@@ -51,7 +52,7 @@ impl Expected {
     }
 }
 
-/// Solves for the constant unknowns from some windows; nothing where they are not determined.
+/// Solves for the constant unknowns from some windows, or returns `None` if they are not determined.
 pub(crate) fn pool(
     full: &Solved,
     windows: Range<usize>,
@@ -91,7 +92,7 @@ pub(crate) fn pool(
     Some(Pooled { weights, ..pooled })
 }
 
-/// The residual sums of squares of some windows over what their noise should leave.
+/// The residual sums of squares of some windows over their expectation.
 pub(crate) fn misfits(full: &Solved, windows: &Range<usize>, values: &[f64], expected: Expected) -> Vec<f64> {
     let field = |field: usize| &full.field(field)[windows.clone()];
     let (counts, freedoms) = (field(full.fields.count()), field(full.fields.freedom()));
@@ -104,7 +105,7 @@ pub(crate) fn misfits(full: &Solved, windows: &Range<usize>, values: &[f64], exp
     misfits
 }
 
-/// The residual sums of squares of some windows for given constants, the angle's noise taken off.
+/// The residual sums of squares of some windows for given constants, corrected for the noise of the angle.
 pub(crate) fn sums_of_squares(full: &Solved, windows: &Range<usize>, values: &[f64]) -> Vec<f64> {
     let (fields, constants) = (full.fields, full.fields.layout.constant);
     let left = |row: usize, column: usize| &full.field(fields.left(row, column))[windows.clone()];
@@ -119,7 +120,7 @@ pub(crate) fn sums_of_squares(full: &Solved, windows: &Range<usize>, values: &[f
     sums
 }
 
-/// How much each constant takes part in the combination that all windows together determine worst, its column scaled to its norm.
+/// The combination of constants that all windows together determine worst, each column scaled to its norm: one entry per constant.
 pub(crate) fn weakest(full: &Solved, weights: &[f64]) -> Vec<f64> {
     let constants = full.fields.layout.constant;
     if constants == 0 {
@@ -140,7 +141,7 @@ fn solve(full: &Solved, windows: &Range<usize>, weights: &[f64], instructions: I
     Some(Pooled { values, inverse, condition, weights: Vec::new() })
 }
 
-/// Stacks what windows left for the constants and decomposes it, eight windows at a time.
+/// Stacks the rows that windows leave for the constants and decomposes them, eight windows at a time.
 struct Stack<'a> {
     full: &'a Solved,
     windows: &'a Range<usize>,

@@ -1,8 +1,9 @@
-//! Windows of rows of one record: summaries by doubling, and what solving them gives.
+//! Solves windows of rows: summaries of blocks are merged by doubling, and each window is merged from them.
 //!
-//! Rows are grouped into blocks of `step`, and a window is a whole number of consecutive blocks. Summaries of `1, 2, 4, …` blocks from every
-//! block on are merged from each other, and any window from those of its length's binary digits. Eight neighbouring windows are
-//! worked on side by side. A window's numbers depend only on the rows in it, so every way of cutting gives the same bits.
+//! Rows are grouped into blocks of `step`, and a window is a whole number of consecutive blocks. Summaries of `1, 2, 4,
+//! …` blocks are merged from each other, and a window of any length from the summaries that its binary digits name.
+//! Eight neighbouring windows are computed side by side. The numbers of a window depend only on its rows, so every way
+//! of cutting the work gives the same bits.
 
 use std::cell::RefCell;
 use std::ops::Range;
@@ -16,7 +17,7 @@ use crate::simd::f64x8::{Packet, WIDTH};
 use crate::simd::instructions::Instructions;
 use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
-/// Numbers of one length of windows whose memory a thread keeps for its next piece of work.
+/// A thread keeps the memory of a table with at most so many numbers for its next piece of work.
 const MOST_KEPT: usize = 1 << 17;
 
 /// Rows absorbed at a time.
@@ -30,7 +31,7 @@ struct Table {
 }
 
 impl Table {
-    /// Makes room for so many. What is beyond those that are stored does not matter.
+    /// Makes room for `count` summaries. Entries beyond those stored are arbitrary.
     fn resize(&mut self, size: usize, count: usize) {
         // A packet may begin at any window, so the last may reach beyond.
         self.padded = count.next_multiple_of(WIDTH) + WIDTH;
@@ -54,7 +55,7 @@ impl Table {
     }
 }
 
-/// A window of blocks relative to the block it is counted from: parts that are merged, and where it is solved.
+/// The shape of a window, in blocks from its first: the parts that are merged, and the time at which it is solved.
 #[derive(Clone, Debug)]
 pub(crate) struct WindowShape {
     /// Blocks of every part.
@@ -75,7 +76,7 @@ impl WindowShape {
         self.parts.iter().map(|part| part.end).max().unwrap_or(0)
     }
 
-    /// Parts whose numbers of blocks are powers of two: where they begin and the logarithm.
+    /// The parts cut into pieces of 2ⁿ blocks: the first block of each piece, and n.
     fn pieces(&self) -> Vec<(usize, usize)> {
         let mut pieces = Vec::new();
         for part in &self.parts {
@@ -90,7 +91,7 @@ impl WindowShape {
     }
 }
 
-/// Solves windows of several shapes from every block of some on. Block `b` holds the rows `b · step …`, which need not exist.
+/// Solves windows of several shapes, one of each for every block in `blocks`. Block `b` holds the rows `b · step …`, which need not exist.
 pub(crate) fn solve_windows(
     problem: &Problem<'_>,
     step: usize,
@@ -154,7 +155,7 @@ impl Kernel for DyadicKernel<'_, '_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, _simd: S) -> Vec<Solved> {
-        // Columns as most problems have them are known to the compiler, which unrolls their loops: half the time.
+        // The most frequent layouts are constants, so that the compiler unrolls their loops: half the time.
         match self.problem.layout {
             ALONE => self.with(ALONE),
             BESIDE_TWO => self.with(BESIDE_TWO),
@@ -183,7 +184,7 @@ impl DyadicKernel<'_, '_> {
 
         let mut memory = Memory::new(layout);
         let Memory { rows, summary, other, fields } = &mut memory;
-        // The lengths are said again where the compiler sees them.
+        // Lengths repeated for the compiler.
         let rows = &mut rows[..layout.columns().max(BATCH) * layout.columns()];
         let (summary, other) = (&mut summary[..layout.size()], &mut other[..layout.size()]);
         let fields = &mut fields[..Fields { layout }.size()];

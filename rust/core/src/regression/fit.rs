@@ -1,4 +1,4 @@
-//! What windows of one length, or the whole record, say of a model.
+//! A fit: a model solved in windows of one length, or over the whole record at once.
 
 use std::ops::Range;
 
@@ -20,14 +20,14 @@ const BLOCKS: usize = 64;
 /// Windows that begin within the length of one.
 const DENSITY: usize = 8;
 
-/// What windows of one length, or the whole record, say of a model.
+/// A model solved in windows of one length, or over the whole record.
 #[derive(Clone, Debug)]
 pub(crate) struct Fit {
-    /// Nothing where the windows' length was given, or no unknown belongs to a window.
+    /// `None` if the windows' length was given, or no unknown is windowed.
     pub(crate) scale: Option<Scale>,
-    /// Windows on both sides of the rows between them, where they are wanted.
+    /// Windows that leave a gap out around the rows that they predict, if they are wanted.
     pub(crate) leave_gap_out: Option<Solved>,
-    /// The windows that all unknowns are taken from.
+    /// The windows that all unknowns are estimated from.
     pub(crate) full: Solved,
     pub(crate) pooled: Pooled,
     /// Rows from one window to the next, and rows of a window.
@@ -36,7 +36,7 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
-    /// Solves a problem in windows of one length, or in one piece; nothing where the constants are not determined.
+    /// Solves a problem in windows of one length, or in one piece. Returns `None` if the constants are not determined.
     pub(crate) fn new(
         problem: &Problem<'_>,
         scale: Option<Scale>,
@@ -54,7 +54,7 @@ impl Fit {
         Ok(pooled.map(|pooled| Self { scale, leave_gap_out: None, full, pooled, step, span }))
     }
 
-    /// As [`Fit::new`], with windows on both sides of the rows between them as well.
+    /// As [`Fit::new`], together with windows that leave a gap out.
     pub(crate) fn with_leave_gap_out(
         problem: &Problem<'_>,
         scale: Scale,
@@ -106,7 +106,7 @@ impl Fit {
         Ok(between(&products.concat(), &self.pooled.inverse, columns.len()))
     }
 
-    /// The same for constants that were taken from some of the windows.
+    /// The same for constants estimated from some of the windows.
     pub(crate) fn covariance_of(
         &self,
         problem: &Problem<'_>,
@@ -120,7 +120,7 @@ impl Fit {
         sandwich(&columns, &pooled.inverse, covariance)
     }
 
-    /// How every row within some windows moves a constant that was taken from them.
+    /// The influence of every row within some windows on a constant estimated from them.
     pub(crate) fn influence(
         &self,
         problem: &Problem<'_>,
@@ -172,7 +172,7 @@ impl Fit {
         place
     }
 
-    /// The median over all windows of what they say of a windowed unknown.
+    /// The median of a windowed unknown over all windows.
     pub(crate) fn median(&self, unknown: usize) -> f64 {
         let windows = (0..self.full.len()).filter(|&window| is_determined(&self.full, window));
         let mut values: Vec<f64> = windows

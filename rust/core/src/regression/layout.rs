@@ -1,18 +1,18 @@
-//! Where the numbers of a summary of rows, and of a solved window, are.
+//! The layout of the numbers in a summary of rows and in a solved window.
 
 /// Which columns rows have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Layout {
-    /// Regressors of what is wanted in every window.
+    /// Number of windowed regressors.
     pub(crate) windowed: usize,
-    /// Whether what is wanted may grow linearly within a window.
+    /// Whether windowed coefficients may grow linearly within a window.
     pub(crate) linear: bool,
-    /// Regressors of what is constant over the record.
+    /// Number of regressors whose coefficients are constant over the record.
     pub(crate) constant: usize,
 }
 
 impl Layout {
-    /// Unknowns that belong to one window.
+    /// Number of unknowns of one window.
     pub(crate) fn local(self) -> usize {
         self.windowed * if self.linear { 2 } else { 1 }
     }
@@ -84,7 +84,7 @@ impl Fields {
         self.layout.local() * (self.layout.constant + 1) + symmetric(i, j)
     }
 
-    /// Entry of the factor that is left for the constant unknowns once the local ones are eliminated, `row ≤ column`; in the last
+    /// Entry of the factor that remains for the constant unknowns once the local ones are eliminated, `row ≤ column`; in the last
     /// place the residual sum of squares.
     #[inline(always)]
     pub(crate) fn left(self, row: usize, column: usize) -> usize {
@@ -98,7 +98,7 @@ impl Fields {
         self.left(self.layout.constant, self.layout.constant) + 1 + constant
     }
 
-    /// What the rows' noise would leave of itself in the local unknowns: the residual's expectation is that much smaller.
+    /// The share of the rows' noise that the local unknowns absorb: the expected residual is smaller by it.
     #[inline(always)]
     pub(crate) fn freedom(self) -> usize {
         self.norm(self.layout.constant)

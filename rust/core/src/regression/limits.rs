@@ -1,10 +1,10 @@
-//! Limits from which on a fit is not to be believed as it is.
+//! Limits beyond which a fit is not trusted as it is.
 
 use crate::status::Status;
 
-/// A condition number of the equations of motion from which on they hardly tell the parameters apart.
+/// A condition number of the equations of motion beyond which they hardly tell the parameters apart.
 ///
-/// Under a multisine windows have 10 … 100; under a single sine only noise tells inertia from stiffness, and they have 1000 and more.
+/// Under a multisine, windows have 10 … 100. Under a single sine only noise tells inertia from stiffness, and they have 1000 and more.
 pub const HARDLY_TOLD_APART: f64 = 500.0;
 
 /// A cross-validation error beyond which the rows hold more than the noise of the channels explains.

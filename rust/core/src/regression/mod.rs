@@ -1,4 +1,4 @@
-//! Unknowns that belong to windows beside unknowns that the whole record shares: their fit, with the noise of the regressors taken off.
+//! Regression with windowed and constant unknowns, corrected for the noise of the regressors.
 
 pub(crate) mod centred_windows;
 pub(crate) mod constants;

@@ -1,4 +1,4 @@
-//! Which unknowns of the equation of motion belong to every window and which are the same over the record.
+//! The model: which unknowns of the equation of motion are windowed, and which are constant over the record.
 
 use std::sync::Arc;
 
@@ -10,12 +10,12 @@ use crate::regression::noise_correction::RowNoise;
 use crate::regression::problem::{Correlated, Problem};
 use crate::regression::row_covariance::RowCovariance;
 
-/// Regressors of the rows by what is known of their factors.
+/// The regressors of the rows, by the kind of their coefficients.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Model {
     pub(crate) windowed: Vec<usize>,
     pub(crate) constant: Vec<usize>,
-    /// Whether windowed factors may grow linearly within a window.
+    /// Whether windowed coefficients may grow linearly within a window.
     pub(crate) linear: bool,
 }
 
@@ -33,7 +33,7 @@ impl Model {
         Layout { windowed: self.windowed.len(), linear: self.linear, constant: self.constant.len() }
     }
 
-    /// What the covariance of rows makes of the windowed regressors.
+    /// The windowed regressors times the covariance of the rows.
     pub(crate) fn correlated(
         &self,
         rows: &Rows,
@@ -47,7 +47,7 @@ impl Model {
         covariance.correlated(&values, &companions, rows.period, stages).map(Arc::new)
     }
 
-    /// The least-squares problem of some rows, with a right-hand side. `noise` is the variance of the angle's.
+    /// The least-squares problem of some rows, with a right-hand side. `noise` is the variance of the angle's noise.
     pub(crate) fn problem<'a>(
         &self,
         rows: &'a Rows,
@@ -72,7 +72,7 @@ impl Model {
         }
     }
 
-    /// What is left of a problem once the constants are known: the same windows with fewer columns, whose numbers are the same.
+    /// The problem that remains once the constants are known: the same windows with fewer columns and the same numbers.
     pub(crate) fn without_constants<'a>(
         &self,
         rows: &Rows,

@@ -1,19 +1,20 @@
-//! How much larger standard errors are because rows near each other share samples: how far ordinary least squares is off.
+//! Standard errors of the strong form: corrected for the correlation of rows that share samples.
 //!
-//! Rows of the strong form are made from derivatives of windows that overlap, so their residuals are correlated. With their covariance Γ,
-//! read off the residuals, least squares have the covariance `N⁻¹ Xᵀ Γ X N⁻¹` instead of `σ² N⁻¹` (Newey and West 1987).
+//! Rows of the strong form are made from derivatives in overlapping windows, so their residuals are correlated. With
+//! the covariance Γ of the rows, estimated from the residuals, least squares have the covariance `N⁻¹ Xᵀ Γ X N⁻¹`
+//! instead of `σ² N⁻¹` (Newey and West 1987).
 
 use crate::least_squares::stacked_qr::Summary;
 use crate::regression::row_covariance::RowCovariance;
 use crate::regression::sandwich::sandwich;
 
-/// Rows of stretches of a record, column by column, apart from each other.
+/// Rows of several stretches of a record, column by column, separated by unusable rows.
 #[derive(Clone, Debug)]
 pub(crate) struct Stretched {
     /// Unknowns, then the right-hand side.
     columns: Vec<Vec<f64>>,
     usable: Vec<bool>,
-    /// Rows so far apart are taken to be independent.
+    /// Rows farther apart than this are assumed independent.
     reach: usize,
 }
 
@@ -34,14 +35,15 @@ impl Stretched {
         }
     }
 
-    /// The covariance of rows that the first column shows, which holds residuals.
+    /// The covariance of the rows, if the first column holds residuals.
     pub(crate) fn covariance(&self) -> RowCovariance {
         RowCovariance::of_residuals(&self.columns[0], &self.usable, self.reach)
     }
 
-    /// By how much the standard error of each unknown exceeds that of ordinary least squares; nothing where they are not determined.
+    /// The factor by which the standard error of each unknown exceeds that of ordinary least squares, or `None` if the
+    /// unknowns are not determined.
     ///
-    /// The unknowns are taken as constant over all rows. It is never less than one.
+    /// The unknowns are assumed constant over all rows. No factor is less than one.
     pub(crate) fn factors(mut self) -> Option<Vec<f64>> {
         let solved = Summary::of(&self.columns, |row| self.usable[row]).solve()?;
         let mut residuals = self.columns.pop()?;
@@ -64,7 +66,7 @@ impl Stretched {
 /// The square roots of the diagonal of one covariance over that of another, row by row; none is less than one.
 fn factors(honest: &[f64], ordinary: &[f64], unknowns: usize) -> Vec<f64> {
     let diagonal = (0..unknowns).map(|unknown| unknown * (unknowns + 1));
-    // Where nothing is left there is nothing to be correlated, and the quotient is no number.
+    // If all residuals are zero the quotient is NaN, and `max` makes it one.
     diagonal.map(|place| (honest[place] / ordinary[place]).sqrt().max(1.0)).collect()
 }
 

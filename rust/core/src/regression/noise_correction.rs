@@ -1,16 +1,17 @@
-//! What the angle's noise adds to the normal matrix, and how it is taken off inside the triangular factor.
+//! The noise of the angle in the normal matrix, and its removal inside the triangular factor.
 //!
-//! Where the regressors carry noise of a known covariance, it is taken off *inside* the factor: with `R` the factor, `E` the expected
-//! noise in `RᵀR` and `W = R⁻ᵀ E R⁻¹`, the corrected normal matrix is `Rᵀ (1 - W) R = (U R)ᵀ (U R)` with `UᵀU = 1 - W`. So `U R` is the
-//! corrected factor, the condition number is never squared, and the correction is kept positive definite by bounding `W`.
+//! Where the regressors carry noise of a known covariance, it is removed *inside* the factor. With `R` the factor, `E`
+//! the expected noise in `RᵀR` and `W = R⁻ᵀ E R⁻¹`, the corrected normal matrix is `Rᵀ (1 - W) R = (U R)ᵀ (U R)` with
+//! `UᵀU = 1 - W`. So `U R` is the corrected factor. The condition number is never squared, and the correction stays
+//! positive definite because `W` is bounded.
 
 use crate::regression::layout::Layout;
 use crate::simd::f64x8::Packet;
 
-/// The largest part of a window's information that is ever believed to be noise.
+/// The largest share of a window's information that is attributed to noise.
 const GUARD: f64 = 0.9;
 
-/// Covariance of the noise that the angle's noise makes in one row: of all regressors' values, of the companions of the windowed ones
+/// Covariance in one row of the noise that comes from the angle: of the values of all regressors, the companions of the windowed ones
 /// and of the right-hand side, in the order of [`Layout`].
 #[derive(Clone, Debug)]
 pub(crate) struct RowNoise {
@@ -59,7 +60,7 @@ impl RowNoise {
     }
 }
 
-/// Takes the expected noise off a factor and a right-hand side: see the head of this file.
+/// Removes the expected noise from a factor and a right-hand side, as the head of this file says.
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "the parts of one scratch")]
 pub(crate) fn correct(
@@ -98,7 +99,7 @@ pub(crate) fn correct(
     // No eigenvalue of W exceeds its norm.
     let part = Packet::ONE.min(Packet::splat(GUARD) * norm.sqrt().inverse_or_zero()).max(Packet::ZERO);
     let part = zero_where_zero(norm, part);
-    // g = R⁻ᵀ e, and the side that goes with the corrected factor: U⁻ᵀ (d - g).
+    // g = R⁻ᵀ e, and the right-hand side of the corrected factor: U⁻ᵀ (d - g).
     let mut before = Packet::ZERO;
     for i in 0..p {
         let mut value = part * noise.expected(layout, summary, i, p);
@@ -146,7 +147,7 @@ pub(crate) fn correct(
     *residual = (*residual + before - after - part * noise.expected(layout, summary, p, p)).max(Packet::ZERO);
 }
 
-/// A number, but zero where another one is.
+/// `value`, or zero in lanes where `zero` is zero.
 #[inline(always)]
 fn zero_where_zero(zero: Packet, value: Packet) -> Packet {
     let mut result = value;

@@ -1,9 +1,9 @@
-//! Rows predicted from what windows say of their own unknowns.
+//! Predictions of rows from the windowed unknowns of solved windows.
 
 use crate::regression::problem::Problem;
 use crate::regression::solved::{Solved, is_determined};
 
-/// What windows say of their own unknowns, for given constants, ready to predict rows.
+/// The windowed unknowns of solved windows for given constants, ready to predict rows.
 #[derive(Clone, Debug)]
 pub(crate) struct Predictor<'a> {
     solved: &'a Solved,
@@ -28,7 +28,7 @@ impl<'a> Predictor<'a> {
         Self { solved, values, usable }
     }
 
-    /// Where a window is, if it is there and determined.
+    /// The place of a window, or `None` if it is not there or not determined.
     pub(crate) fn place(&self, window: isize) -> Option<usize> {
         self.solved.place(window).filter(|&place| self.usable[place])
     }
@@ -52,7 +52,7 @@ impl<'a> Predictor<'a> {
         variance
     }
 
-    /// What the windowed unknowns add to a row's right-hand side.
+    /// The contribution of the windowed unknowns to a row's right-hand side.
     pub(crate) fn predict(&self, problem: &Problem<'_>, place: usize, row: usize, later: f64) -> f64 {
         let layout = problem.layout;
         let mut sum = 0.0;
@@ -66,7 +66,7 @@ impl<'a> Predictor<'a> {
     }
 }
 
-/// What is left of a right-hand side once the constants are taken off.
+/// The right-hand side minus the contribution of the constants.
 pub(crate) fn without_constants(problem: &Problem<'_>, constants: &[f64]) -> Vec<f64> {
     let mut rhs = problem.rhs.to_vec();
     for (column, value) in problem.constants.iter().zip(constants) {

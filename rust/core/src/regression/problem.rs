@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::regression::layout::Layout;
 use crate::regression::noise_correction::RowNoise;
 
-/// Rows of a record. Those that are no equations are zero in every column.
+/// Rows of a record. Rows that are no equations are zero in every column.
 #[derive(Clone, Debug)]
 pub(crate) struct Problem<'a> {
     pub(crate) layout: Layout,
@@ -16,13 +16,13 @@ pub(crate) struct Problem<'a> {
     pub(crate) constants: Vec<&'a [f64]>,
     pub(crate) rhs: &'a [f64],
     pub(crate) usable: &'a [bool],
-    /// The first rows after jumps of what is windowed, in order. A window over a jump counts as one without rows.
+    /// The first rows after jumps of windowed coefficients, in order. A window over a jump counts as one without rows.
     pub(crate) jumps: &'a [usize],
     /// Seconds from one row to the next.
     pub(crate) period: f64,
-    /// What the angle's noise does in a row.
+    /// The noise of the angle in a row.
     pub(crate) noise: RowNoise,
-    /// What the covariance of the rows makes of the windowed regressors; without it errors are those of ordinary least squares.
+    /// The windowed regressors times the covariance of the rows; without it standard errors are those of ordinary least squares.
     pub(crate) correlated: Option<Arc<Correlated>>,
 }
 
@@ -41,7 +41,7 @@ impl Problem<'_> {
         self.rhs.len()
     }
 
-    /// Rows from the first that can be used to the last.
+    /// The rows from the first usable one to the last.
     pub(crate) fn inside(&self) -> Range<usize> {
         let first = self.usable.iter().position(|&usable| usable).unwrap_or(0);
         first..self.usable.iter().rposition(|&usable| usable).map_or(first, |last| last + 1)

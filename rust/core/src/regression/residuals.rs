@@ -1,4 +1,4 @@
-//! What a fit leaves of the rows.
+//! Residuals of a fit, row by row.
 
 use crate::error::Error;
 use crate::exec::stages::Stages;
@@ -7,7 +7,7 @@ use crate::regression::predictor::{Predictor, without_constants};
 use crate::regression::problem::Problem;
 use crate::regression::solved::is_determined;
 
-/// What a fit leaves of every row, and where it says anything; zero where it says nothing.
+/// The residual of every row and whether the fit determines it; zero where it does not.
 pub(crate) fn residuals(
     problem: &Problem<'_>,
     fit: &Fit,

@@ -1,4 +1,4 @@
-//! The covariance of rows: known from the noise of both channels, or taken from the residuals.
+//! The covariance of rows: known from the noise of both channels, or estimated from the residuals.
 
 use std::ops::Range;
 
@@ -7,19 +7,19 @@ use crate::exec::stages::Stages;
 use crate::regression::problem::Correlated;
 use crate::weak_form::test_function::Kernels;
 
-/// Correlations that exceed their standard deviation so many times are no chance.
+/// Correlations that exceed their standard deviation so many times are significant.
 const CHANCE: f64 = 5.0;
 
 /// Covariance of rows by their distance.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RowCovariance {
-    /// By distance in rows, from the variance on.
+    /// By distance in rows, beginning with the variance.
     pub(crate) lags: Vec<f64>,
 }
 
 impl RowCovariance {
-    /// What noise of both channels makes of rows `stride` samples apart. `parameters` are inertia, damping and stiffness; the noise is
-    /// given by its variance, that of the angle first.
+    /// The covariance that the noise of both channels gives rows `stride` samples apart. `parameters` are inertia,
+    /// damping and stiffness; the noise is given by its variance, that of the angle first.
     pub(crate) fn known(
         kernels: &Kernels,
         torque: &[f64],
@@ -37,12 +37,12 @@ impl RowCovariance {
         Self { lags: lags.collect() }
     }
 
-    /// That of rows with independent noise of variance one.
+    /// The covariance of rows with independent noise of variance one.
     pub(crate) fn white() -> Self {
         Self { lags: vec![1.0] }
     }
 
-    /// The covariance that residuals show up to some distance, tapered so that it stays one.
+    /// The covariance estimated from residuals up to some distance, tapered to stay positive semidefinite.
     pub(crate) fn of_residuals(residuals: &[f64], usable: &[bool], farthest: usize) -> Self {
         let whole = usable.iter().all(|&usable| usable);
         let missing = |(residual, usable): (&f64, &bool)| if *usable { *residual } else { 0.0 };
@@ -58,13 +58,13 @@ impl RowCovariance {
         Self { lags: lags.collect() }
     }
 
-    /// Whether rows so far apart that they share no sample are correlated, by more than a part of the variance and than chance.
+    /// Whether rows that share no sample are correlated: by more than a share of the variance, and significantly.
     pub(crate) fn is_coloured(&self, reach: usize, part: f64, rows: usize) -> bool {
         let chance = CHANCE * (self.variance_inflation() / rows.max(1) as f64).sqrt();
         self.lags.iter().skip(reach + 1).any(|lag| lag.abs() > part.max(chance) * self.lags[0])
     }
 
-    /// The squares of the correlations that residuals show, without the taper, together.
+    /// The sum of the squared correlations of the residuals, without the taper.
     pub(crate) fn squared_correlations(&self) -> f64 {
         let taper = |lag: usize| 1.0 - lag as f64 / self.lags.len() as f64;
         (1..self.lags.len()).map(|lag| (self.lags[lag] / taper(lag) / self.lags[0]).powi(2)).sum()
@@ -75,7 +75,7 @@ impl RowCovariance {
         self.lags[0]
     }
 
-    /// How many rows stand for one independent row: the sum of the squared correlations.
+    /// The variance inflation, the number of rows that carry the information of one independent row: the sum of the squared correlations.
     pub(crate) fn variance_inflation(&self) -> f64 {
         let squared = |lag: &f64| (lag / self.lags[0]).powi(2);
         1.0 + 2.0 * self.lags[1..].iter().map(squared).sum::<f64>()
@@ -88,7 +88,7 @@ impl RowCovariance {
         result
     }
 
-    /// The covariance times windowed regressors and their companions, whose times count from their own row.
+    /// The covariance times the windowed regressors and their companions, whose times count from their own row.
     pub(crate) fn correlated(
         &self,
         windowed: &[&[f64]],
@@ -127,7 +127,7 @@ impl RowCovariance {
     }
 }
 
-/// The dot product of two columns, in eight sums side by side: one alone waits for every addition.
+/// The dot product of two columns, in eight sums side by side: a single one would wait for every addition.
 fn sum_of_products(one: &[f64], other: &[f64]) -> f64 {
     let ((one, one_rest), (other, other_rest)) = (one.as_chunks::<8>(), other.as_chunks::<8>());
     let mut sums = [0.0; 8];

@@ -6,7 +6,7 @@ use crate::regression::problem::Problem;
 use crate::regression::row_covariance::RowCovariance;
 use crate::regression::solved::Solved;
 
-/// How every row within some windows moves a constant: a column of `X̃`, so that the constants are `N⁻¹ X̃ᵀ b`.
+/// The influence of every row within some windows on a constant: a column of `X̃`, so that the constants are `N⁻¹ X̃ᵀ b`.
 ///
 /// `step` and `span` are the rows from one window to the next and the rows of a window, `centre` where each is solved.
 pub(crate) fn influence(
@@ -72,13 +72,13 @@ pub(crate) fn sandwich(influence: &[Vec<f64>], inverse: &[f64], covariance: &Row
     between(&middle.collect::<Vec<_>>(), inverse, influence.len())
 }
 
-/// What the rows' covariance makes of a constant and every other: a row of `X̃ᵀ Γ X̃`.
+/// A row of `X̃ᵀ Γ X̃`, for one constant.
 pub(crate) fn products(influence: &[Vec<f64>], constant: usize, covariance: &RowCovariance) -> Vec<f64> {
     let noisy = covariance.times(&influence[constant]);
     influence.iter().map(|other| other.iter().zip(&noisy).map(|(a, b)| a * b).sum()).collect()
 }
 
-/// A square matrix of so many rows between the inverse of the normal matrix and itself.
+/// The product `inverse · middle · inverse` of square matrices, made symmetric.
 pub(crate) fn between(middle: &[f64], inverse: &[f64], size: usize) -> Vec<f64> {
     let product = |a: &[f64], b: &[f64]| -> Vec<f64> {
         let entry = |i: usize, j: usize| (0..size).map(|k| a[i * size + k] * b[k * size + j]).sum();

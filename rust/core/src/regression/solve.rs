@@ -1,4 +1,4 @@
-//! Solves what a summary says: the window's own unknowns, what is left for the constant ones, covariances, condition number.
+//! Solves a summary of rows: windowed unknowns, what remains for the constant ones, covariances and condition number.
 
 use crate::regression::layout::{Fields, Layout, symmetric};
 use crate::regression::noise_correction::{RowNoise, correct};
@@ -13,7 +13,7 @@ pub(crate) struct SolveScratch {
     rhs: Vec<Packet>,
     column: Vec<Packet>,
     inverse: Vec<Packet>,
-    /// One over every pivot: divisions are what takes longest.
+    /// The reciprocal of every pivot: divisions take longest.
     pivots: Vec<Packet>,
 }
 
@@ -31,7 +31,7 @@ impl SolveScratch {
     }
 }
 
-/// Solves what a summary says. `variance` is that of a row's noise; without one the residuals say it (ordinary least squares).
+/// Solves a summary. `variance` is that of a row's noise; without it, it is estimated from the residuals (ordinary least squares).
 #[inline(always)]
 pub(crate) fn solve(
     layout: Layout,
@@ -89,7 +89,7 @@ pub(crate) fn solve(
     errors(layout, summary, factor, pivots, residual, variance, inverse, column, fields);
 }
 
-/// Covariance of the local unknowns, what they take of the residual, and how hard they are to tell apart.
+/// Covariance of the local unknowns, the degrees of freedom that they take, and their condition number.
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "the parts of one scratch")]
 fn errors(
@@ -140,7 +140,7 @@ fn errors(
         fields[names.freedom()] = Packet::splat(local as f64);
         return;
     };
-    // N = R⁻ᵀ M R⁻¹ is the noise in the coordinates of the factor; its trace is what the local unknowns take of the residual.
+    // N = R⁻ᵀ M R⁻¹ is the noise in the coordinates of the factor; its trace is the expected reduction of the residual.
     let mut freedom = Packet::ZERO;
     let variance = Packet::splat(variance);
     for i in 0..local {
@@ -164,7 +164,7 @@ fn errors(
             }
             if a == b {
                 freedom += value;
-                // Rows that agree with each other cannot make a window better than independent ones would.
+                // Correlated rows cannot give a smaller variance than independent ones.
                 value = value.max(variance);
             }
             for i in 0..=a {

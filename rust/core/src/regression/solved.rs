@@ -1,4 +1,4 @@
-//! The numbers of solved windows, field by field, and what they say of a window's own unknowns.
+//! The results of solved windows, field by field, and the windowed unknowns that follow from them.
 
 use crate::regression::layout::{Fields, Layout};
 use crate::simd::f64x8::{Packet, WIDTH};
@@ -30,12 +30,12 @@ impl Solved {
         &self.values[field * self.padded..][..self.count]
     }
 
-    /// Where a window is in the fields, if it is there.
+    /// The place of a window in the fields, or `None` if it is not there.
     pub(crate) fn place(&self, window: isize) -> Option<usize> {
         usize::try_from(window - self.first).ok().filter(|&place| place < self.count)
     }
 
-    /// Puts windows that follow these after them.
+    /// Joins consecutive windows.
     pub(crate) fn join(parts: &[&Self]) -> Self {
         let mut all = Self::new(parts[0].fields.layout, parts[0].first, parts.iter().map(|part| part.count).sum());
         for field in 0..all.fields.size() {
@@ -48,7 +48,7 @@ impl Solved {
         all
     }
 
-    /// Makes a window one without rows.
+    /// Marks a window as one without rows.
     pub(crate) fn disregard(&mut self, place: usize) {
         self.values[self.fields.count() * self.padded + place] = 0.0;
     }
@@ -61,7 +61,7 @@ impl Solved {
     }
 }
 
-/// What a window says of its own unknown at its centre, and per second, for given constants.
+/// A window's own unknown for given constants: a value at the centre, or its growth per second.
 pub(crate) fn local(full: &Solved, window: usize, values: &[f64], local: usize) -> f64 {
     let fields = full.fields;
     let mut value = full.field(fields.solution(local, fields.layout.constant))[window];
@@ -71,7 +71,7 @@ pub(crate) fn local(full: &Solved, window: usize, values: &[f64], local: usize) 
     value
 }
 
-/// How a window's own unknown changes with a constant at a time, in seconds after the window's centre.
+/// The derivative of a window's own unknown with respect to a constant, `later` seconds after the window's centre.
 pub(crate) fn sensitivity(full: &Solved, window: usize, local: usize, constant: usize, later: f64) -> f64 {
     let (fields, layout) = (full.fields, full.fields.layout);
     let mut value = full.field(fields.solution(local, constant))[window];

@@ -1,4 +1,4 @@
-//! Rows of parts of a long record that stand for all of them, where something is only to be chosen.
+//! Subsamples of the rows of a long record, for the choice of hyperparameters.
 
 use std::ops::Range;
 
@@ -45,12 +45,12 @@ pub(crate) fn thinned_rows(rows: &Rows, stretches: &[Range<usize>]) -> Rows {
     }
 }
 
-/// Rows of a record with more are thinned where something is only to be chosen: to so many, in so many stretches.
+/// Records with more rows than this are subsampled to so many, in so many stretches, to choose hyperparameters.
 const LONG: usize = 1 << 15;
 const MOST_ROWS: usize = 1 << 14;
 const STRETCHES: usize = 8;
 
-/// The stretches that stand for so many rows, where those are many.
+/// The stretches that represent so many rows, or `None` if the rows are few.
 pub(crate) fn stretches_of_rows(rows: usize) -> Option<Vec<Range<usize>>> {
     (rows > LONG).then(|| stretches_of_blocks(rows, MOST_ROWS, STRETCHES))
 }

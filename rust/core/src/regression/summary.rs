@@ -1,15 +1,16 @@
-//! Summaries of rows of equations: the triangular factor of their QR decomposition, and what the errors need. Eight at once.
+//! Summaries of rows: the triangular factor of their QR decomposition and what standard errors need, eight windows at
+//! once.
 //!
-//! A row holds, in this order, the regressors of what is wanted in every window, their companions where it may grow linearly within
-//! the window, the regressors of what is constant over the record, and the right-hand side. Summaries are merged, never subtracted
-//! from, so a sum of millions of rows and a window next to a glitch keep their digits.
+//! A row holds, in this order: the windowed regressors, their companions if they may grow linearly within the window,
+//! the constant regressors, and the right-hand side. Summaries are only merged, never subtracted, so a sum over
+//! millions of rows and a window next to a glitch keep their digits.
 
 use crate::regression::layout::{Layout, symmetric, triangle};
 use crate::simd::f64x8::Packet;
 
-/// Adds rows to a factor by Householder reflections. `rows` holds them one after another and is used up.
+/// Adds rows to a factor by Householder reflections. `rows` holds them one after another and is overwritten.
 ///
-/// With `triangular` row `i` has nothing before column `i`.
+/// If `triangular`, row `i` is zero before column `i`.
 #[inline(always)]
 pub(crate) fn absorb(layout: Layout, factor: &mut [Packet], rows: &mut [Packet], count: usize, triangular: bool) {
     let columns = layout.columns();
@@ -22,7 +23,7 @@ pub(crate) fn absorb(layout: Layout, factor: &mut [Packet], rows: &mut [Packet],
             below += value * value;
         }
         let squared = pivot * pivot + below;
-        // The new pivot gets the sign that does not cancel.
+        // The sign of the new pivot avoids cancellation.
         let turned = -squared.sqrt().with_sign_of(pivot);
         let head = pivot - turned;
         let weight = (squared - turned * pivot).inverse_or_zero();
@@ -43,7 +44,7 @@ pub(crate) fn absorb(layout: Layout, factor: &mut [Packet], rows: &mut [Packet],
     }
 }
 
-/// Counts a row in, at a time after the summary's own.
+/// Counts a row, at a time after the summary's origin.
 #[inline(always)]
 pub(crate) fn count(layout: Layout, summary: &mut [Packet], usable: Packet, time: f64) {
     let sums = layout.sums();
@@ -52,7 +53,7 @@ pub(crate) fn count(layout: Layout, summary: &mut [Packet], usable: Packet, time
     summary[sums + 2] += usable * Packet::splat(time * time);
 }
 
-/// Adds a summary whose rows begin `later` seconds after this one's. `rows` is scratch for as many rows as there are columns.
+/// Adds a summary whose rows begin `later` seconds after this one's. `rows` is scratch memory for as many rows as there are columns.
 #[inline(always)]
 pub(crate) fn merge(layout: Layout, summary: &mut [Packet], other: &[Packet], later: f64, rows: &mut [Packet]) {
     let columns = layout.columns();
@@ -84,7 +85,7 @@ pub(crate) fn merge(layout: Layout, summary: &mut [Packet], other: &[Packet], la
     }
 }
 
-/// Moves the time that a summary's rows are counted from to `later` seconds after it.
+/// Moves the origin of a summary's times by `later` seconds.
 #[inline(always)]
 pub(crate) fn recentre(layout: Layout, summary: &mut [Packet], later: f64, noise: &mut [Packet]) {
     let shift = Packet::splat(-later);

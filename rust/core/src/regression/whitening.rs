@@ -1,13 +1,14 @@
-//! Rows whose noise is white: each freed from what the rows before it already say of its noise.
+//! Whitening: rows are transformed so that their noise is uncorrelated.
 //!
-//! Rows that share samples have correlated noise, and where the angle's noise dominates, hardly any of it lies at the resonance, where
-//! `I θ̈ + C θ̇ + K θ` is small. Least squares that weigh all rows alike throw that away. With the factor `Γ = L Lᵀ` of the rows' covariance,
-//! the rows `L⁻¹ X` and `L⁻¹ b` have noise of variance one, and their least squares are those of maximum likelihood in the frequency domain
-//! (Aitken 1935) as far as the test function lets frequencies through.
+//! Rows that share samples have correlated noise. Where the noise of the angle dominates, it is smallest near the
+//! resonance, where `I θ̈ + C θ̇ + K θ` is small; least squares with equal weights ignore that. With the factor `Γ = L
+//! Lᵀ` of the rows' covariance, the rows `L⁻¹ X` and `L⁻¹ b` have noise of variance one, and their least squares are
+//! generalised least squares (Aitken 1935). They equal maximum likelihood in the frequency domain, within the band that
+//! the test function passes.
 //!
-//! Γ has a few diagonals only, so has L, and its rows settle a while after a gap. What the angle's noise adds to the normal matrix is
-//! `tr(Γ⁻¹ G)` for the products `G` of two kernels, the derivative of `log det Γ` in the direction of `G`: it is found row by row, exactly, by
-//! differentiating the factorisation.
+//! Γ is banded and so is L; its rows become stationary some rows after a gap. The noise of the angle adds `tr(Γ⁻¹ G)`
+//! to the normal matrix for the products `G` of two kernels. This is the derivative of `log det Γ` in the direction of
+//! `G`, and it is computed exactly, row by row, by differentiating the factorisation.
 
 use std::collections::VecDeque;
 
@@ -17,21 +18,21 @@ use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
 use crate::regression::row_covariance::{RowCovariance, products};
 
-/// What is added to the variance of a row, so that frequencies that a test function lets next to nothing of through do not count.
+/// Added to the variance of a row, relative to it, so that frequencies that the test function suppresses do not count.
 const RIDGE: f64 = 1e-6;
 
-/// Rows of the factor have settled where they change by less than this part.
+/// The rows of the factor are stationary once they change by less than this, relative to the diagonal.
 const SETTLED: f64 = 1e-8;
 
-/// Rows after a gap until the factor is taken to have settled, at most.
+/// The most rows after a gap before the factor is assumed stationary.
 const MOST: usize = 1 << 13;
 
-/// How rows are made white.
+/// The transformation that whitens rows.
 #[derive(Clone, Debug)]
 pub(crate) struct Whitening {
-    /// Rows of the factor after a gap, until they have settled: the entry of the row itself, then of the rows before it, nearest first.
+    /// Rows of the factor after a gap, until they are stationary: the diagonal entry, then those of the rows before it, nearest first.
     factor: Vec<Vec<f64>>,
-    /// What noise of variance one adds to the products of every two kernels in these rows.
+    /// What noise of variance one adds in these rows to the product of every pair of kernels.
     grams: Vec<Vec<f64>>,
 }
 
@@ -42,7 +43,7 @@ struct Factored {
 }
 
 impl Whitening {
-    /// How rows with some covariance are made white; nothing where it is none.
+    /// The whitening of rows with a given covariance, or `None` if it is not positive definite.
     pub(crate) fn new(covariance: &RowCovariance, rows: &Rows, stride: usize) -> Option<Self> {
         let mut lags = covariance.lags.clone();
         lags[0] *= 1.0 + RIDGE;
@@ -69,7 +70,7 @@ impl Whitening {
         (!factor.is_empty()).then_some(Self { factor, grams })
     }
 
-    /// Rows made white.
+    /// The whitened rows.
     pub(crate) fn apply(&self, rows: &Rows, stages: &mut Stages<'_, '_>) -> Result<Rows, Error> {
         let columns = rows.regressors.iter().map(|regressor| &regressor.value).chain([&rows.rhs]);
         let pieces = columns.map(|column| Piece { size: rows.len(), content: column });
@@ -106,7 +107,7 @@ impl Whitening {
         &self.factor[since.min(self.factor.len() - 1)]
     }
 
-    /// Vectors in place of the kernels, whose products are what noise of variance one adds to a row on average.
+    /// Vectors that replace the kernels: their products are what noise of variance one adds to a row on average.
     fn noise(&self, rows: &Rows) -> Vec<Vec<f64>> {
         let size = kernels(rows).len();
         let (mut mean, mut count) = (vec![0.0; size * (size + 1) / 2], 0.0_f64);
@@ -121,7 +122,7 @@ impl Whitening {
 }
 
 impl Factored {
-    /// The row of the factor after some others, the last of which comes first; nothing where the covariance is none.
+    /// The row of the factor that follows some others, the nearest first, or `None` if the covariance is not positive definite.
     fn after(before: &VecDeque<Self>, lags: &[f64], directions: &[Vec<f64>]) -> Option<Self> {
         let depth = before.len();
         let mut entries = vec![0.0; depth + 1];
@@ -150,24 +151,24 @@ impl Factored {
     }
 }
 
-/// The kernels that the angle's noise enters by: of regressors, then of the right-hand side, as far as it does.
+/// The kernels by which the noise of the angle enters: of the regressors, then of the right-hand side. Columns without noise have none.
 fn kernels(rows: &Rows) -> Vec<&[f64]> {
     let all = rows.regressors.iter().map(|regressor| &regressor.noise[0]).chain([&rows.rhs_noise]);
     all.filter(|kernel| !kernel.is_empty()).map(Vec::as_slice).collect()
 }
 
-/// The lower half of a square of so many rows.
+/// Indices of the lower triangle of a square matrix, row by row.
 fn pairs(size: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..size).flat_map(|i| (0..=i).map(move |j| (i, j)))
 }
 
-/// The covariance that noise of variance one gives two columns, by the distance of the rows, either before the other.
+/// The covariance that noise of variance one gives two columns, by the distance of the rows; the mean of either row coming first.
 fn both(one: &[f64], other: &[f64], lags: usize, stride: usize) -> Vec<f64> {
     let either = |lag: usize| f64::midpoint(products(one, other, lag * stride), products(other, one, lag * stride));
     (0..lags).map(either).collect()
 }
 
-/// For every row that can be used, how many have come before it since the last gap.
+/// For every usable row, how many usable rows precede it since the last gap.
 fn since_gaps(rows: &Rows) -> impl Iterator<Item = Option<usize>> {
     let mut since = 0;
     rows.usable.iter().map(move |&usable| {
@@ -184,7 +185,7 @@ fn square_root(products: &[f64], size: usize) -> Vec<Vec<f64>> {
         let left = products[place] - (0..j).map(|k| root[i][k] * root[j][k]).sum::<f64>();
         let scale = products[place];
         root[i][j] = if i == j {
-            // What others say already has nothing left but rounding.
+            // A vector that depends on the others leaves only rounding errors.
             if left > f64::EPSILON.sqrt() * scale { left.sqrt() } else { 0.0 }
         } else if root[j][j] > 0.0 {
             left / root[j][j]

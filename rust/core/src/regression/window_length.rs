@@ -1,8 +1,8 @@
-//! Windows of one length around a row: one that ends before it, one that begins after it, both of them, and all between as well.
+//! Windows of one length at a row: before it, after it, on both sides of it, and over it.
 //!
-//! What a window says is checked against rows it has not seen: the torque of a row is predicted from the window before it, the window
-//! after it and both together, each at least the test function's half-width away. The row's own neighbourhood is used as well where an
-//! estimate is wanted. `step` neighbouring rows share their windows, a *cell*.
+//! A window is validated on rows that it does not contain: the torque of a row is predicted from the window before it,
+//! the window after it and both together, each at least the test function's half-width away. Where an estimate is
+//! wanted, the row's own neighbourhood is included. `step` neighbouring rows share their windows: they form a *cell*.
 
 use std::ops::Range;
 
@@ -20,13 +20,13 @@ const PIECE: usize = 512;
 /// Rows of the smallest blocks: a third of a test function's half-width.
 const FINEST: usize = 2;
 
-/// Lengths of windows on one side, in blocks of two rows, then of four and so on.
+/// Lengths of one-sided windows, in blocks of two rows, then of four and so on.
 const BLOCKS: [usize; 2] = [6, 9];
 
-/// Shorter windows on one side: rows of a block, and blocks. They only serve two at a time.
+/// Shorter one-sided windows: rows of a block, and blocks. They only serve in pairs.
 const SHORT: [[usize; 2]; 4] = [[1, 3], [FINEST, 2], [FINEST, 3], [FINEST, 4]];
 
-/// The shortest window that may serve alone, in rows: two and a half half-widths.
+/// The shortest one-sided window that may serve alone, in rows: two and a half half-widths.
 pub(crate) const SHORTEST_ALONE: usize = 15;
 
 /// One length of windows.
@@ -34,23 +34,23 @@ pub(crate) const SHORTEST_ALONE: usize = 15;
 pub(crate) struct Scale {
     /// Rows of a cell, and of a block.
     pub(crate) step: usize,
-    /// Blocks of a window on one side.
+    /// Blocks of a one-sided window.
     blocks: usize,
-    /// Blocks between the windows on both sides.
+    /// Blocks in the gap between the two sides.
     gap: usize,
-    /// Rows that a window keeps away from the row it predicts.
+    /// Rows between a window and the row that it predicts.
     pub(crate) reach: usize,
 }
 
 /// The windows of consecutive cells.
 #[derive(Clone, Debug)]
 pub(crate) struct Cells {
-    /// Windows on one side: that of cell `g` comes before its rows. They reach further than the cells, so that those that come after
-    /// are there too.
+    /// One-sided windows: that of cell `g` lies before its rows. They reach beyond the cells, so that the windows after the last cells
+    /// are included.
     pub(crate) one_sided: Solved,
-    /// Both sides without what lies between.
+    /// Both sides, with the gap between them left out.
     pub(crate) leave_gap_out: Solved,
-    /// Everything.
+    /// Both sides and the gap.
     pub(crate) full: Solved,
 }
 
@@ -84,7 +84,7 @@ impl Scale {
         (0..scales.len()).min_by(|&a, &b| distance(&scales[a]).total_cmp(&distance(&scales[b])))
     }
 
-    /// Rows of a window on one side.
+    /// Rows of a one-sided window.
     pub(crate) fn one_sided(self) -> usize {
         self.blocks * self.step
     }
@@ -94,7 +94,7 @@ impl Scale {
         (2 * self.blocks + self.gap) * self.step
     }
 
-    /// Whether a window on one side is long enough to serve alone.
+    /// Whether a one-sided window is long enough to serve alone.
     pub(crate) fn stands_alone(self) -> bool {
         self.one_sided() >= SHORTEST_ALONE
     }
@@ -110,7 +110,7 @@ impl Scale {
         (self.one_sided() + self.reach + slack).cast_signed() - 1
     }
 
-    /// The window on one side that comes after the rows of a cell, as the number of its own cell.
+    /// The one-sided window after the rows of a cell, given by the number of its own cell.
     pub(crate) fn after(self, cell: isize) -> isize {
         cell + (self.blocks + self.gap).cast_signed()
     }
@@ -137,7 +137,7 @@ impl Scale {
         first..(first + self.full_cells(rows).len() * self.step).min(rows)
     }
 
-    /// The middle of a cell's windows, in rows: before it, and the full one, which is also that of both sides.
+    /// The centres of a cell's windows, in rows: of the one before it, and of the full one, with or without the gap.
     pub(crate) fn centres(self, cell: isize) -> [f64; 2] {
         let first = (cell * self.step.cast_signed()) as f64;
         [first + (self.one_sided() as f64 - 1.0) / 2.0, first + (self.span() as f64 - 1.0) / 2.0]
@@ -175,7 +175,7 @@ impl Scale {
         Ok(self.solve_shapes(problem, &[full], instructions, stages)?.swap_remove(0))
     }
 
-    /// Solves the full windows and the same without what lies between both sides, in parallel: those that leave the gap out come first.
+    /// Solves the windows that leave the gap out and the full ones, in parallel.
     pub(crate) fn solve_leave_gap_out(
         self,
         problem: &Problem<'_>,
@@ -213,7 +213,7 @@ impl Scale {
         join(&[self.part(problem, &self.shapes(), cells, &(cells.start..self.after(cells.end)), instructions)])
     }
 
-    /// Before the rows of a cell, on both sides of them, and everything.
+    /// The shapes of a cell's windows: one-sided, with the gap left out, and full.
     fn shapes(self) -> [WindowShape; 3] {
         let (second, all) = (self.blocks + self.gap, 2 * self.blocks + self.gap);
         let full = WindowShape::of(0..all, self.step);
@@ -221,7 +221,7 @@ impl Scale {
         [WindowShape::of(0..self.blocks, self.step), leave_gap_out, full]
     }
 
-    /// Solves the windows from some blocks on. The windows that come after the last cells belong to no cell that is wanted.
+    /// Solves the windows that begin at some blocks. Beyond the last cell only one-sided windows are needed.
     fn part(
         self,
         problem: &Problem<'_>,
@@ -241,7 +241,7 @@ impl Scale {
     }
 }
 
-/// Puts the parts of each shape together.
+/// Joins the parts of each shape.
 fn join(parts: &[Vec<Solved>]) -> Cells {
     Cells { one_sided: join_shape(parts, 0), leave_gap_out: join_shape(parts, 1), full: join_shape(parts, 2) }
 }

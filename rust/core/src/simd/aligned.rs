@@ -1,4 +1,4 @@
-//! Memory that vectors are read from and written to without crossing cache lines.
+//! Memory aligned to cache lines, so that no vector crosses one.
 
 use std::ops::{Deref, DerefMut};
 
@@ -14,7 +14,7 @@ pub(crate) struct Aligned {
 }
 
 impl Aligned {
-    /// So many zeros.
+    /// A column of zeros.
     pub(crate) fn zeros(len: usize) -> Self {
         let values = vec![0.0; len + LINE / size_of::<f64>()];
         let first = values.as_ptr().align_offset(LINE).min(values.len() - len);

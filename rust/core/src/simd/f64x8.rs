@@ -1,7 +1,8 @@
-//! Eight numbers worked on side by side, for small dense algebra on eight problems at once.
+//! Eight numbers side by side, for small dense algebra on eight problems at once.
 //!
-//! Plain arithmetic on arrays of a fixed length becomes vector instructions of whatever width the kernel around it is compiled for (see
-//! [`crate::simd::vectors::dispatch`]). Nothing is fused or reordered, so every width gives the same bits.
+//! Plain arithmetic on arrays of a fixed length becomes vector instructions of whatever width the kernel around it is
+//! compiled for (see [`crate::simd::vectors::dispatch`]). Nothing is fused or reordered, so every width gives the same
+//! bits.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -22,14 +23,14 @@ impl Packet {
         Self([value; WIDTH])
     }
 
-    /// The first numbers of a column, which must hold as many. A copy of a slice whose length is not known would be a call.
+    /// The first eight numbers of a column, which must hold as many. A copy of a slice whose length is not known would be a call.
     #[inline(always)]
     pub(crate) fn load(from: &[f64]) -> Self {
         debug_assert!(from.len() >= WIDTH, "eight numbers are read");
         Self(from.first_chunk().copied().unwrap_or_default())
     }
 
-    /// Every so-manieth number of a column from a place on; zero where there is none.
+    /// Every `step`-th number of a column from a place on; zero beyond its ends.
     ///
     /// A plain loop: closures over arrays are not inlined into vector kernels and cost a third of the time.
     #[inline(always)]
@@ -87,13 +88,13 @@ impl Packet {
         self.zip(other, |a, b| if a > b { a } else { b })
     }
 
-    /// One over it, or zero where it is zero.
+    /// The reciprocal, or zero where the number is zero.
     #[inline(always)]
     pub(crate) fn inverse_or_zero(self) -> Self {
         self.map(|a| if a == 0.0 { 0.0 } else { 1.0 / a })
     }
 
-    /// Its magnitude with the sign of another number.
+    /// The magnitude with the sign of another number.
     #[inline(always)]
     pub(crate) fn with_sign_of(self, sign: Self) -> Self {
         self.zip(sign, f64::copysign)

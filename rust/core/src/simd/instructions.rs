@@ -1,4 +1,4 @@
-//! Which vector instructions a processor has, and which of them are used.
+//! The instruction sets that a processor has, and the one that is used.
 
 use std::sync::atomic::{AtomicU8, Ordering};
 
@@ -19,13 +19,13 @@ pub enum Instructions {
 impl Instructions {
     const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Neon, Self::Scalar];
 
-    /// What this processor can run, the fastest first.
+    /// The instruction sets that this processor can run, the fastest first.
     #[must_use]
     pub fn available() -> Vec<Self> {
         Self::ALL.into_iter().filter(|instructions| instructions.runs_here()).collect()
     }
 
-    /// What the next call will use: the fastest this processor has, unless [`Instructions::force`] said otherwise.
+    /// The instruction set that the next call uses: the fastest that this processor has, unless [`Instructions::force`] chose another.
     #[must_use]
     pub fn current() -> Self {
         let forced = FORCED.load(Ordering::Relaxed);
@@ -79,5 +79,5 @@ impl Instructions {
     }
 }
 
-/// Zero, or the path that every call must take.
+/// Zero, or the instruction set that every call must use.
 static FORCED: AtomicU8 = AtomicU8::new(0);

@@ -1,4 +1,4 @@
-//! Vectors of numbers, with the instructions that the processor has, chosen at run time.
+//! SIMD vectors, with instructions chosen at run time.
 
 pub(crate) mod aligned;
 pub(crate) mod f64x8;

@@ -1,4 +1,4 @@
-//! Loops that are unrolled whole.
+//! Loops that the compiler unrolls completely.
 
 /// Writes a block of code once for every `J` below a bound known when compiling, upwards or downwards.
 ///

@@ -1,17 +1,17 @@
-//! Vector instructions, chosen at run time, and the little that the kernels need beyond what `pulp` offers.
+//! Vectors of 64-bit numbers for every instruction set, and the operations that kernels need beyond `pulp`.
 //!
-//! Every kernel is written once over [`Lanes`] and keeps its lanes apart: no lane ever reads another, so a window's numbers do not
-//! depend on which lane worked on it or on what its neighbours held. Multiplications and additions are fused where they are written
-//! fused, on every path.
+//! Every kernel is written once over [`Lanes`] and keeps its lanes apart: no lane ever reads another. So the numbers of
+//! a window do not depend on its lane or on its neighbours. Multiplications and additions are fused where they are
+//! written fused, on every path.
 
 use pulp::{NullaryFnOnce, Scalar, Simd};
 
 use crate::simd::instructions::Instructions;
 
-/// The longest vector of any path, in numbers of 64 bits.
+/// The longest vector of any instruction set, in numbers of 64 bits.
 pub(crate) const MOST_LANES: usize = 8;
 
-/// A path's vectors of 64-bit numbers.
+/// Vectors of 64-bit numbers of one instruction set.
 pub(crate) trait Lanes: Simd {
     /// Transposes a square of [`Simd::F64_LANES`] rows in place.
     fn transpose(self, rows: &mut [Self::f64s]);
@@ -19,7 +19,7 @@ pub(crate) trait Lanes: Simd {
     /// A mask as bits, that of the first lane lowest.
     fn bits(self, mask: Self::m64s) -> u32;
 
-    /// Looks up an entry of a table by whole numbers below 16.
+    /// Looks up entries of a table by whole numbers below 16.
     #[inline(always)]
     fn table_lookup(self, table: &[f64; TABLE], index: Self::f64s) -> Self::f64s {
         let mut values = [0.0; MOST_LANES];

@@ -1,20 +1,20 @@
-//! How many rows of a record hold no missing sample, by the half-width of their test function.
+//! The share of rows without a missing sample, by the half-width of the test function.
 
 use crate::record::samples::is_usable;
 use crate::weak_form::weak_rows::Record;
 
-/// A width that leaves less than this part of the rows that the narrowest leaves is no place to begin.
+/// A half-width is no start if it leaves less than this share of the rows that the narrowest one leaves.
 const FEW: f64 = 0.5;
 
-/// Samples that are looked at together.
+/// Samples that are read together.
 const PIECE: usize = 4096;
 
 /// Where samples are missing and where centres may lie.
 pub(crate) struct Usable {
     samples: usize,
-    /// Missing samples before each sample, and in all; nothing where none is missing.
+    /// Missing samples before each sample, and in all; `None` if none is missing.
     missing: Vec<u32>,
-    /// Samples that may be centres, where not all may.
+    /// Samples that may be centres, or `None` if all may.
     centres: Option<Vec<usize>>,
 }
 
@@ -42,7 +42,7 @@ impl Usable {
         Self { samples, missing, centres }
     }
 
-    /// The part of all rows of a half-width that can be used.
+    /// The usable share of all rows of a half-width.
     pub(crate) fn share(&self, half: usize) -> f64 {
         let samples = self.samples;
         if samples <= 2 * half {
@@ -61,7 +61,7 @@ impl Usable {
         count as f64 / inside.len() as f64
     }
 
-    /// The half-width nearest to one below it, of some in rising order, that gaps leave enough rows.
+    /// The nearest half-width below a given one for which gaps leave enough rows. `halves` rise.
     pub(crate) fn widest(&self, wanted: usize, widths: &[usize]) -> usize {
         let Some(&narrowest) = widths.first() else { return wanted };
         let enough = FEW * self.share(narrowest);

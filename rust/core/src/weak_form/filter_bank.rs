@@ -1,8 +1,9 @@
-//! Dot products of a channel with several kernels, around every so-manieth sample.
+//! Dot products of a channel with several kernels, around every `stride`-th sample.
 //!
-//! A fixed kernel as wide as a window carries all its information at every sixth of its half-width or so, so all rows of a block are one
-//! product of matrices: the Hankel matrix of the samples, which is only a view of them, and the kernels side by side. Blocks lie on a
-//! grid of absolute row numbers and always have the same shape, so the numbers do not depend on how the work is cut.
+//! A kernel as wide as a window carries all its information at every sixth of its half-width or so. Therefore all rows
+//! of a block are one matrix product: the Hankel matrix of the samples, which is only a view of them, times the
+//! kernels. Blocks lie on a grid of absolute row numbers and always have the same shape, so the numbers do not depend
+//! on how the work is cut.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
@@ -16,7 +17,7 @@ use crate::weak_form::test_function::sum;
 pub(crate) struct FilterBank {
     /// One column a kernel.
     kernels: Mat<f64>,
-    /// Their sums: what they make of a constant.
+    /// Their sums: their response to a constant.
     sums: Vec<f64>,
     stride: usize,
 }
@@ -53,7 +54,7 @@ impl FilterBank {
     }
 
     /// Applies the kernels in the rows from `first` on, of which row `r` begins at sample `r · stride`; `first` must be a multiple of
-    /// [`BLOCK`]. One output a kernel; rows that hold a sample that cannot be used are marked in `usable`.
+    /// [`BLOCK`]. One output a kernel; rows with an unusable sample are marked in `usable`.
     pub(crate) fn apply(
         &self,
         channel: &dyn Samples,
@@ -79,7 +80,7 @@ impl FilterBank {
         }
     }
 
-    /// All products of one block. What lies beyond the record counts as zero.
+    /// All products of one block. Samples beyond the record count as zero.
     fn block(&self, channel: &dyn Samples, first: usize, scratch: &mut FilterScratch) {
         let FilterScratch { samples, unusable, products } = scratch;
         let length = self.kernels.nrows();
@@ -95,7 +96,7 @@ impl FilterBank {
                 unusable.push(place);
             }
         }
-        // An offset would cost digits: a typical sample is taken off, and what the kernels make of it is added at the end.
+        // An offset would cost digits: a typical sample is subtracted, and its response is added at the end.
         let last = present.max(1) - 1;
         let reference = middle([samples[0], samples[last / 2], samples[last]]);
         for value in samples.iter_mut() {
@@ -115,7 +116,7 @@ impl FilterBank {
     }
 }
 
-/// The one of three numbers that lies between the others: a single glitch is never it.
+/// The median of three numbers: never a single glitch.
 fn middle([a, b, c]: [f64; 3]) -> f64 {
     a.max(b).min(a.min(b).max(c))
 }

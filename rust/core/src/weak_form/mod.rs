@@ -1,4 +1,4 @@
-//! Rows of the equation of motion in weak form: products of channels with the derivatives of a test function.
+//! The weak form: rows of the equation of motion as dot products of the channels with the kernels of a test function.
 
 pub(crate) mod coverage;
 pub(crate) mod filter_bank;

@@ -6,16 +6,17 @@
 //! beyond the sample rate, which falls as the power `p + 1` of the half-width; differences of a sampled `φ` would be wrong by the square
 //! of the frequency instead.
 //!
-//! What narrow test functions still get wrong hurts most where an angle has a large constant part: multiplied with a sum of `φ″` that is
-//! not quite zero it looks like a torque. So each kernel is corrected by a multiple of `φ` until a constant is exact. At half-width 10 this
-//! takes 0.5 N off the error of a 3.2 N offset of a carriage of 95 kg at 0.2 m; from half-width 80 on it changes nothing beyond the
-//! tenth digit. (A quadratic times `φ`, which makes parabolas exact as well, is worse where there are only nine samples a cycle.)
+//! The remaining error of narrow test functions matters most where an angle has a large constant part: multiplied with
+//! a sum of `φ″` that is not quite zero, it looks like a torque. So each kernel is corrected by a multiple of `φ` to be
+//! exact for constants. At half-width 10 this takes 0.5 N off the error of a 3.2 N offset of a carriage of 95 kg at 0.2
+//! m; from half-width 80 on it changes nothing beyond the tenth digit. (A quadratic times `φ`, which makes parabolas
+//! exact as well, is worse where there are only nine samples a cycle.)
 
 use crate::error::Error;
 
 /// The lowest exponent for which `φ″` vanishes at the ends.
 const LEAST_EXPONENT: usize = 3;
-/// The highest exponent: beyond it most of the window is as good as zero.
+/// The highest exponent: beyond it most of the window is almost zero.
 const MOST_EXPONENT: usize = 20;
 /// The fewest samples on either side of the centre.
 pub(crate) const LEAST_HALF_WIDTH: usize = 4;
@@ -81,8 +82,8 @@ impl TestFunction {
         2 * self.half_width + 1
     }
 
-    /// Samples from one row to the next that carry all the information of every row: from half their rate on the spectrum of `φ″` is below a
-    /// hundredth of its largest value, for exponents from 5 to 12.
+    /// Samples from one row to the next that carry all the information of every row: from half their rate on the
+    /// spectrum of `φ″` is below a hundredth of its largest value, for exponents from 5 to 12.
     #[must_use]
     pub fn stride(&self) -> usize {
         Self::stride_of(self.half_width)
@@ -121,7 +122,7 @@ impl TestFunction {
             let left = sum(kernel) / total;
             kernel.iter_mut().zip(&weight).for_each(|(value, weight)| *value -= left * weight);
         }
-        // Only φ itself leaves anything of a constant: all of it.
+        // Of a constant, φ alone must keep its sum of one.
         kernels.values[2].iter_mut().for_each(|value| *value /= total);
     }
 
@@ -143,7 +144,7 @@ impl TestFunction {
     }
 }
 
-/// The sum of a kernel from both ends inwards, so that what is odd sums to zero exactly.
+/// The sum of a kernel from both ends inwards, so that an odd kernel sums to exactly zero.
 pub(crate) fn sum(kernel: &[f64]) -> f64 {
     let half = kernel.len() / 2;
     let pairs = kernel[..half].iter().zip(kernel.iter().rev()).map(|(left, right)| left + right);

@@ -1,10 +1,12 @@
-//! Which test function: half-width and exponent that leave inertia, damping and stiffness the smallest error.
+//! The choice of the test function: the half-width and exponent with the smallest error of inertia, damping and
+//! stiffness.
 //!
-//! From the angle's spectrum `P` and the noise of both channels the covariance of the three and two kinds of bias follow for any test
-//! function. With `F = (φ̂, -φ̂′, φ̂″)` the responses of its kernels, `S = σ_T²|F_0|² + σ_θ²|K F_0 + C F_1 + I F_2|²` the noise of a row,
-//! `A = Σ F*Fᵀ P` and `M = Σ F*Fᵀ P S`, the covariance is `A⁻¹ M A⁻¹`; the sums are wrong by what `φ″` and `-φ′` differ from the derivatives of
-//! `φ` at the sampled frequencies; and a tenth of what the angle's noise adds to `A` is taken to remain after it was corrected for. The
-//! determinant of their sum is made smallest.
+//! From the spectrum `P` of the angle and the noise of both channels, the covariance of the three and two kinds of bias
+//! follow for any test function. With `F = (φ̂, -φ̂′, φ̂″)` the responses of its kernels, `S = σ_T²|F_0|² + σ_θ²|K F_0
+//! + C F_1 + I F_2|²` the noise of a row, `A = Σ F*Fᵀ P` and `M = Σ F*Fᵀ P S`, the covariance is `A⁻¹ M A⁻¹`. The first
+//! bias is the difference between `φ″` and `-φ′` and the derivatives of `φ` at the sampled frequencies. The second is a
+//! tenth of what the noise of the angle adds to `A`, which is assumed to remain after the correction. The choice
+//! minimises the determinant of the sum.
 
 use faer::Mat;
 use faer::linalg::solvers::{DenseSolveCore, Llt, Solve};
@@ -18,14 +20,14 @@ use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 /// Exponents tried.
 const EXPONENTS: [usize; 2] = [5, 9];
 
-/// The part of the angle's noise that its correction is taken to leave.
+/// The share of the angle's noise that is assumed to remain after its correction.
 const LEFT_BY_CORRECTION: f64 = 0.1;
 
-/// A frequency holds signal where its power exceeds the noise's so many times: the mean of as few as three segments does so once in ten
-/// million by chance.
+/// A frequency holds signal if its power exceeds that of the noise so many times: the mean of as few as three segments
+/// does so by chance once in ten million.
 const ABOVE_NOISE: f64 = 8.0;
 
-/// What the choice is made from.
+/// The data that the choice is made from.
 #[derive(Clone, Debug)]
 pub(crate) struct Evidence {
     /// The angle's power by frequency.
@@ -41,13 +43,13 @@ pub(crate) struct Evidence {
 }
 
 impl Evidence {
-    /// Samples in a typical cycle of what is not noise, the velocity's mean frequency deciding.
+    /// Samples in a typical cycle of the signal, by the mean frequency of its velocity.
     pub(crate) fn period(&self) -> f64 {
         let length = 2 * (self.power.len() - 1);
         let (mut sum, mut weights) = (0.0, 0.0);
         for (bin, &power) in self.power.iter().enumerate().skip(1) {
             let frequency = bin as f64 / length as f64;
-            // What scatters about the noise does not count: high frequencies are many, and weigh most.
+            // Power that scatters about the noise does not count: high frequencies are many and weigh most.
             let signal = if power > ABOVE_NOISE * self.noise[0] { power - self.noise[0] } else { 0.0 };
             let weight = signal * frequency * frequency;
             sum += weight * frequency;
@@ -57,7 +59,7 @@ impl Evidence {
     }
 }
 
-/// Length of the spectra that tell test functions up to a half-width apart.
+/// Length of spectra that resolve test functions up to a half-width.
 pub(crate) fn spectrum_length(samples: usize, widest: usize) -> usize {
     let wanted = (8 * (2 * widest + 1)).next_power_of_two();
     let possible = 1 << samples.max(1).ilog2();
@@ -79,7 +81,7 @@ pub(crate) fn half_widths(widest: usize) -> Vec<usize> {
     widths
 }
 
-/// Test functions that are tried, with what does not depend on the parameters.
+/// The test functions that are tried, with all that does not depend on the parameters.
 pub(crate) struct Candidates {
     evidence: Evidence,
     tried: Vec<Tried>,
@@ -87,21 +89,21 @@ pub(crate) struct Candidates {
 
 struct Tried {
     function: TestFunction,
-    /// Responses of the kernels for inertia, damping and stiffness, by frequency, as far as they let anything through.
+    /// Responses of the kernels for inertia, damping and stiffness, by frequency, within their passband.
     responses: [Vec<[f64; 2]>; 3],
     /// Products of the kernels with each other.
     gram: [[f64; 3]; 3],
-    /// The part of its rows that can be used.
+    /// The usable share of its rows.
     share: f64,
 }
 
-/// A response below this part of the largest one lets nothing through.
+/// The passband ends where the response falls below this share of its maximum.
 const NOTHING: f64 = 1e-9;
 
 impl Candidates {
     /// Test functions of some half-widths, and of one exponent or all that are tried.
     ///
-    /// `share` tells which part of the rows of a half-width holds no sample that is missing.
+    /// `share` gives the share of a half-width's rows without a missing sample.
     pub(crate) fn new(
         evidence: Evidence,
         widths: &[usize],
@@ -122,8 +124,8 @@ impl Candidates {
         Ok(Self { evidence, tried })
     }
 
-    /// The test function that leaves the smallest error for given inertia, damping and stiffness, the narrowest among those that are as
-    /// good; nothing where the angle's noise leaves nothing with any.
+    /// The test function with the smallest error for given inertia, damping and stiffness, the narrowest of equals, or
+    /// `None` if every one is dominated by the noise of the angle.
     pub(crate) fn best(&self, parameters: [f64; 3]) -> Option<TestFunction> {
         let scores: Vec<f64> = self.tried.iter().map(|tried| tried.score(&self.evidence, parameters)).collect();
         let least = scores.iter().copied().fold(f64::INFINITY, f64::min);
@@ -150,7 +152,7 @@ impl Tried {
         Self { function, responses, gram, share }
     }
 
-    /// Half the logarithm of the determinant of the expected squared errors; infinite where the angle's noise leaves nothing.
+    /// Half the logarithm of the determinant of the expected squared errors; infinite if the noise of the angle dominates.
     fn score(&self, evidence: &Evidence, parameters: [f64; 3]) -> f64 {
         let length = 2 * (evidence.power.len() - 1);
         let [angle_noise, torque_noise] = evidence.noise;
@@ -166,7 +168,7 @@ impl Tried {
             let mixed: [f64; 2] = std::array::from_fn(|part| (0..3).map(|i| parameters[i] * at[i][part]).sum());
             let row = torque_noise * (stiffness[0].powi(2) + stiffness[1].powi(2))
                 + angle_noise * (mixed[0].powi(2) + mixed[1].powi(2));
-            // What is left of I θ̈ + C θ̇ when the kernels stand in for the derivatives of φ.
+            // The error of I θ̈ + C θ̇ when the kernels replace the derivatives of φ.
             let error = [
                 parameters[0] * (inertia[0] + omega * omega * stiffness[0])
                     + parameters[1] * (damping[0] + omega * stiffness[1]),
@@ -202,7 +204,7 @@ impl Tried {
             + &left * left.transpose();
         let Ok(errors) = Llt::new(errors.as_ref(), faer::Side::Lower) else { return f64::INFINITY };
         let factor = errors.L();
-        // Half the rows make every variance twice as large; without any the sum is infinite.
+        // Half the rows double every variance; without rows the sum is infinite.
         (0..size).map(|i| factor[(i, i)].ln() + scale[i].ln() - 0.5 * self.share.ln()).sum()
     }
 }

@@ -1,9 +1,9 @@
 //! Rows of the equation of motion in weak form: dot products of the channels with the kernels of a test function.
 //!
-//! Row `r` belongs to sample `h + r · stride` and reads the samples within `h` of it. What is known moves to the right-hand side; a known
-//! coefficient that changes is multiplied with the angle sample by sample and its product is integrated by parts:
-//! `⟨φ Cθ̇⟩ = -⟨φ′ Cθ⟩ - ⟨φ Ċθ⟩` and `⟨φ Iθ̈⟩ = ⟨φ″ Iθ⟩ + 2⟨φ′ İθ⟩ + ⟨φ Ïθ⟩`. Terms that are not linear in the angle are evaluated sample by
-//! sample and then multiplied with `φ`.
+//! Row `r` belongs to sample `h + r · stride` and reads the samples within `h` of it. What is known moves to the
+//! right-hand side; a known coefficient that changes is multiplied with the angle sample by sample and its product is
+//! integrated by parts: `⟨φ Cθ̇⟩ = -⟨φ′ Cθ⟩ - ⟨φ Ċθ⟩` and `⟨φ Iθ̈⟩ = ⟨φ″ Iθ⟩ + 2⟨φ′ İθ⟩ + ⟨φ Ïθ⟩`. Terms that are not
+//! linear in the angle are evaluated sample by sample and then multiplied with `φ`.
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
@@ -28,24 +28,24 @@ pub(crate) enum TermSamples<'a> {
     One,
     /// Given at every sample.
     Given(&'a dyn Samples),
-    /// The rate at which the torque changes: what a lag of the torque multiplies.
+    /// The rate of the torque, which is the regressor of its lag.
     TorqueRate,
 }
 
-/// The record that rows are made of.
+/// The record that rows are built from.
 #[derive(Clone)]
 pub(crate) struct Record<'a> {
     pub(crate) angle: &'a dyn Samples,
     pub(crate) torque: &'a dyn Samples,
     pub(crate) coefficients: [Coefficient<'a>; 3],
     pub(crate) terms: Vec<TermSamples<'a>>,
-    /// By how many samples the torque comes late.
+    /// Lag of the torque in samples.
     pub(crate) lag: f64,
     /// Where a sample may be the centre of a row.
     pub(crate) mask: Option<&'a [bool]>,
 }
 
-/// All rows of a record, and what they were made with.
+/// All rows of a record, and the test function that they were built with.
 #[derive(Clone, Debug)]
 pub(crate) struct WeakRows {
     pub(crate) function: TestFunction,
@@ -67,7 +67,7 @@ struct Task<'a> {
 }
 
 impl WeakRows {
-    /// How many rows a record of so many samples has.
+    /// Number of rows of a record of so many samples.
     pub(crate) fn count(function: TestFunction, samples: usize) -> usize {
         (samples + function.stride()).saturating_sub(function.window_length()) / function.stride()
     }
@@ -180,7 +180,7 @@ impl WeakRows {
         }
     }
 
-    /// Rows that a test function reaches to either side.
+    /// Rows that a test function reaches on either side.
     pub(crate) fn reach(&self) -> usize {
         self.function.half_width().div_ceil(self.stride)
     }
@@ -200,7 +200,7 @@ impl<'a> Tasks<'a> {
     }
 }
 
-/// What has to be computed, in the order in which [`WeakRows::assemble`] takes it.
+/// The channels and kernels to be computed, in the order in which [`WeakRows::assemble`] takes their results.
 fn tasks<'a>(
     record: &Record<'a>,
     kernels: &Kernels,
@@ -247,7 +247,7 @@ fn tasks<'a>(
     tasks
 }
 
-/// The mean of the samples that can be used.
+/// The mean of the usable samples.
 pub(crate) fn mean(samples: &dyn Samples) -> f64 {
     let mut buffer = vec![0.0; samples.len()];
     samples.read(0, &mut buffer);

@@ -1,4 +1,4 @@
-//! A jump, and what jumps are looked for in.
+//! A jump, and the data in which jumps are searched.
 
 use crate::record::samples::Samples;
 use crate::regression::constants::Expected;
@@ -6,27 +6,27 @@ use crate::regression::problem::Problem;
 use crate::regression::window_length::Scale;
 use crate::simd::instructions::Instructions;
 
-/// A place of a jump that is less probable does not count.
+/// Places of a jump that are less probable are ignored.
 pub(crate) const UNLIKELY: f64 = 1e-3;
 
-/// A jump of what is windowed.
+/// A jump of the windowed coefficients.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Jump {
     /// The first sample after it.
     pub(crate) sample: usize,
-    /// The probability that it has happened at the samples from `first` on.
+    /// The probability that it has happened by each sample from `first` on.
     pub(crate) first: usize,
     pub(crate) happened: Vec<f64>,
 }
 
-/// What jumps are looked for in.
+/// The data in which jumps are searched.
 pub(crate) struct JumpSearch<'a> {
-    /// Rows once the constants are known.
+    /// The rows minus the contribution of the constants.
     pub(crate) problem: &'a Problem<'a>,
     /// All rows, also those over jumps that are known, and their right-hand side without constants.
     pub(crate) whole: &'a Problem<'a>,
     pub(crate) rhs: &'a [f64],
-    /// What the windowed coefficients multiply, sample by sample.
+    /// The factors of the windowed coefficients, sample by sample.
     pub(crate) signals: &'a [&'a dyn Samples],
     /// The test function at its samples.
     pub(crate) function: &'a [f64],
@@ -34,9 +34,9 @@ pub(crate) struct JumpSearch<'a> {
     pub(crate) first: usize,
     pub(crate) stride: usize,
     pub(crate) expected: Expected,
-    /// What variances are multiplied by.
+    /// The factor on all variances.
     pub(crate) inflation: f64,
-    /// All lengths of windows, and those that jumps are looked for with.
+    /// All lengths of windows, and those used to search jumps.
     pub(crate) scales: &'a [Scale],
     pub(crate) lengths: &'a [Scale],
     pub(crate) instructions: Instructions,

@@ -1,4 +1,4 @@
-//! Where a windowed coefficient jumps.
+//! Jumps of windowed coefficients.
 
 pub(crate) mod jump;
 pub(crate) mod placement;

@@ -1,4 +1,4 @@
-//! What a jump before each of many samples would leave of the rows that reach over it, eight neighbouring rows side by side.
+//! The sum of squares that a jump leaves, for each sample at which it may lie; eight neighbouring rows side by side.
 
 use std::ops::Range;
 
@@ -7,18 +7,18 @@ use crate::record::samples::all_usable;
 use crate::simd::f64x8::{Packet, WIDTH};
 use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
-/// Where a jump is sought: a line before it, which counts from a row, and one after it, which counts from the row before.
+/// The candidates for a jump: a line before it, whose origin is `row`, and a line after it, whose origin is the row before.
 pub(crate) struct JumpPlace<'a> {
     pub(crate) lines: &'a [Lines; 2],
     pub(crate) row: usize,
-    /// Rows that it is judged by.
+    /// Rows over which its residuals are summed.
     pub(crate) over: &'a Range<usize>,
-    /// Samples that it may come before.
+    /// Samples before which it may lie.
     pub(crate) candidates: &'a Range<usize>,
 }
 
 impl JumpSearch<'_> {
-    /// The sums of squares that jumps before each candidate leave in the rows; nothing where too few of them can be used.
+    /// The residual sum of squares of the rows for a jump before each candidate, or `None` if too few rows are usable.
     pub(crate) fn left(&self, place: &JumpPlace<'_>) -> Option<Vec<f64>> {
         let (length, over) = (self.function.len(), place.over);
         let begin = self.begin(over.start);

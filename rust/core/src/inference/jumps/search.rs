@@ -1,15 +1,15 @@
 //! Where a windowed coefficient jumps.
 //!
-//! A window over a jump says nothing of either side, so windows should end there. A jump is suspected at rows where the window before and
-//! the window after say different things. It is placed between two samples by the rows that reach over it: with `k₋` and `k₊` the lines
+//! A window over a jump describes neither side, so windows should end there. A jump is suspected at rows where the window before and
+//! the window after differ. It is placed between two samples by the rows that reach over it: with `k₋` and `k₊` the lines
 //! on both sides, they are predicted by
 //!
 //! ```text
 //! Σ_{t<τ} φ(t - c) θ(t) k₋(t) + Σ_{t≥τ} φ(t - c) θ(t) k₊(t),
 //! ```
 //!
-//! and `τ` leaves the smallest sum of squares. It is believed where that is smaller than what the same windows leave when they predict
-//! the rows between them without a jump, by more than chance.
+//! and `τ` minimises the sum of squares. It is accepted if this is significantly smaller than what the same windows leave when they predict
+//! the rows between them without a jump.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -22,13 +22,13 @@ use crate::inference::jumps::placement::JumpPlace;
 use crate::inference::windows_around::Around;
 use crate::regression::window_length::{Cells, SHORTEST_ALONE, Scale};
 
-/// Squared differences between the windows before and after a row, over their variance, from which on a jump is looked for.
+/// Squared difference between the windows before and after a row, over its variance, above which a jump is searched.
 const SUSPECTED: f64 = 36.0;
 
-/// By how much a jump must lessen the sum of squares, over the noise of one independent row.
+/// Least reduction of the sum of squares by a jump, over the noise of one independent row.
 const BELIEVED: f64 = 40.0;
 
-/// The most that a jump may leave of the sum of squares: a steep slope is no jump.
+/// Largest share of the sum of squares that a jump may leave: a steep slope is no jump.
 const LEFT: f64 = 0.5;
 
 /// Windows that hold a jump follow it in part: so much more is left of the rows without them.
@@ -37,11 +37,11 @@ const CONSPICUOUS: f64 = 2.0;
 /// Rounds of placing a jump and taking the windows beside it again.
 const ROUNDS: usize = 4;
 
-/// The part of a test function that may reach over a jump unnoticed.
+/// The share of a test function that may reach over a jump unnoticed.
 const UNNOTICED: f64 = 1e-4;
 
 impl JumpSearch<'_> {
-    /// The jumps of the record, in order: those that are known placed again, and new ones. `errors` are what is left of the rows.
+    /// The jumps of the record, in order: known ones, placed again, and new ones. `errors` are the residuals of the rows.
     pub(crate) fn find(&self, errors: &[f64], known: &[Jump], stages: &mut Stages<'_, '_>) -> Result<Vec<Jump>, Error> {
         let room = self.apart() * self.stride;
         let samples = self.first * 2 + (self.problem.rows() - 1) * self.stride;
@@ -60,7 +60,7 @@ impl JumpSearch<'_> {
         Ok(jumps.into_values().collect())
     }
 
-    /// Places a jump that is known again. What is known to be there moves a little at most: by less than a quarter of the room between jumps.
+    /// Places a known jump again. It moves by less than a quarter of the least distance between jumps.
     fn again(&self, jump: &Jump, room: usize) -> Jump {
         let row = (jump.sample - self.first).div_ceil(self.stride);
         let solved = self.solve(&(row..row + 1));
@@ -88,7 +88,7 @@ impl JumpSearch<'_> {
         jumps
     }
 
-    /// Stretches of rows around which so much is left that a jump could be believed to make it less.
+    /// Stretches of rows whose residuals are large enough for a jump to be accepted there.
     fn conspicuous(&self, errors: &[f64]) -> Vec<Range<usize>> {
         let reach = 2 * (self.function.len() / 2).div_ceil(self.stride);
         let least = BELIEVED * self.noise(0.0, 1.0) / CONSPICUOUS;
@@ -121,12 +121,12 @@ impl JumpSearch<'_> {
         self.lengths.iter().map(solve).collect()
     }
 
-    /// Rows that jumps must be apart, so that a window that serves alone fits between them.
+    /// Least distance between jumps, in rows, so that a one-sided window fits between them.
     fn apart(&self) -> usize {
         SHORTEST_ALONE + 4 * self.function.len() / 2 / self.stride
     }
 
-    /// Rows where the windows before and after differ most, by how much, and the scale that says so.
+    /// Rows where the windows before and after differ most: the difference, the row, and the index of the length.
     fn suspected(&self, windows: &[Around<'_>], rows: &Range<usize>) -> Vec<(f64, usize, usize)> {
         let mut found = Vec::new();
         for (scale, windows) in windows.iter().enumerate() {
@@ -146,7 +146,7 @@ impl JumpSearch<'_> {
         found
     }
 
-    /// The squared difference between what the windows before and after a row say of it, over its variance: that of the coefficient that
+    /// The squared difference between the windows before and after a row, over its variance, for the coefficient that
     /// differs most.
     fn differs(&self, windows: &Around<'_>, row: usize) -> Option<f64> {
         let before = windows.at_row(self.problem, row, 0)?;
@@ -158,13 +158,13 @@ impl JumpSearch<'_> {
         Some(squared.fold(0.0, f64::max))
     }
 
-    /// Places a jump near a row, if there is one.
+    /// Places a jump near a row, or returns `None` if there is none.
     fn place(&self, windows: &Around<'_>, row: usize) -> Option<Jump> {
         let (jump, (over, left)) = self.placed(windows, self.first + row * self.stride)?;
         self.is_believed(&over, left).then_some(jump)
     }
 
-    /// Places a jump near a sample. Returns it with the rows that it was judged by and the sum of squares that it leaves there.
+    /// Places a jump near a sample. Returns it with the rows over which residuals are summed, and their sum of squares.
     fn placed(&self, windows: &Around<'_>, sample: usize) -> Option<(Jump, (Range<usize>, f64))> {
         let rows = self.problem.rows();
         let half = self.function.len() / 2;
@@ -187,18 +187,18 @@ impl JumpSearch<'_> {
         }
     }
 
-    /// What the windows on one side say at a row.
+    /// The lines of the window before or after a row.
     fn lines(&self, windows: &Around<'_>, row: usize, which: usize) -> Option<Lines> {
         let window = windows.at_row(self.problem, row, which)?;
         let line = |unknown| [window.value(unknown), window.slope(unknown) * self.problem.period];
         Some((0..self.problem.layout.windowed).map(line).collect())
     }
 
-    /// Whether a jump is more than chance: windows of no length may predict the rows around it nearly as well without one.
+    /// Whether a jump is significant: windows of no length may predict the rows around it nearly as well without one.
     fn is_believed(&self, over: &Range<usize>, left: f64) -> bool {
         let rows: Vec<usize> = over.clone().filter(|&row| self.whole.usable[row]).collect();
         let noise = self.noise(left, rows.len() as f64);
-        // Short windows follow what is steep but no jump, so they end most suspicions.
+        // Short windows follow steep slopes, so they reject most candidates.
         let mut tried = false;
         let beaten = |without: f64| (without - left) / noise < BELIEVED || left > LEFT * without;
         for without in self.scales.iter().filter_map(|scale| self.without(*scale, over, &rows)) {
@@ -210,7 +210,7 @@ impl JumpSearch<'_> {
         tried
     }
 
-    /// The sum of squares that windows of one length leave in rows between them; nothing where they do not reach all of them.
+    /// The sum of squares that windows of one length leave in the rows between them, or `None` if they do not reach all rows.
     fn without(&self, scale: Scale, over: &Range<usize>, rows: &[usize]) -> Option<f64> {
         let all = scale.one_sided_cells(self.problem.rows());
         let cells = scale.cell(over.start).max(all.start)..(scale.cell(over.end) + 1).min(all.end);
@@ -226,12 +226,12 @@ impl JumpSearch<'_> {
         rows.iter().map(error).sum()
     }
 
-    /// The variance of the sum of squares of rows that stand for one independent row, at least that of the noise.
+    /// The variance of one independent row: from the sum of squares, at least that of the noise.
     fn noise(&self, left: f64, count: f64) -> f64 {
         self.expected.variance_inflation * (self.inflation * self.expected.variance).max(left / count)
     }
 
-    /// A jump with the probability of every place of it.
+    /// A jump with the probability of each of its places.
     fn jump(&self, left: &[f64], best: usize, first: usize, count: f64) -> Jump {
         let noise = self.noise(left[best], count);
         let weights: Vec<f64> = left.iter().map(|one| (-(one - left[best]) / (2.0 * noise)).exp()).collect();
