@@ -55,27 +55,27 @@ class Case:
         return [name for name in NAMES if name not in self.windowed and name not in self.known]
 
 
-def identified(case: Case) -> dict[str, Any]:
+def identified(case: Case) -> _core.Identification:
     """Identify with everything fixed, the noise's variances too."""
     known: list[Any] = [case.known.get(name) for name in NAMES[:3]]
     motions = _core.Motions(case.angle[None], case.torque[None], known, ["offset"])
     kinds = ["windowed" if name in case.windowed else "constant" for name in NAMES if name not in case.known]
-    return _core.identify_weak(
-        motions,
-        0,
-        kinds,
-        delta=DELTA,
-        half_width=case.half,
-        exponent=case.exponent,
-        equations=case.equations,
-        average=False,
+    form = _core.WeakForm(
+        [2 * case.half + 1],
+        [case.exponent],
+        [case.equations],
+        averaging=False,
         linear=case.linear,
         noise=case.noise,
-        lag=0.0,
-        quantisation=0.0,
-        mask=case.mask,
-        step=1,
     )
+    masks = None if case.mask is None else [case.mask]
+    (found,) = _core.identify(motions, kinds, form, delta=DELTA, lag=[0.0], quantisation=0.0, masks=masks)
+    return found
+
+
+def of_kind(found: _core.Identification, kind: str) -> list[_core.Unknown]:
+    """Give the unknowns of a kind."""
+    return [one for one in found.unknowns if one.kind == kind]
 
 
 def rows_of(case: Case) -> Rows:
@@ -209,14 +209,15 @@ def test_the_noise_of_the_angle_is_taken_off_every_window(drawn: dict[str, Any])
     inflation = max(1.0, float(np.mean(found.misfits)))
     norms = np.sqrt([np.mean(one.values**2) for one in rows.constant])
     scale = np.sqrt(np.mean(rows.side.values**2)) / norms
-    for place, (_, value, error, _) in enumerate(result["constants"]):
+    for place, constant in enumerate(of_kind(result, "constant")):
+        value, error = constant.values[0], constant.stderr[0]
         assert abs(value - found.values[place]) <= allowed * (scale[place] + abs(found.values[place]))
         if case.windowed:
             assert error == pytest.approx(np.sqrt(inflation) * errors[place], rel=allowed)
     # A window around every row, for these constants.
     for row in range(0, rows.usable.size if case.windowed else 0, 7):
         sample = case.half + row * case.stride
-        if result["status"][sample] & Status.INVALID:
+        if result.status[sample] & Status.INVALID:
             continue
         before = row - case.span // 2
         held = np.arange(max(before, 0), min(before + case.span, rows.usable.size))
@@ -225,7 +226,8 @@ def test_the_noise_of_the_angle_is_taken_off_every_window(drawn: dict[str, Any])
         covariance, sizes = one.covariance(gamma[0, 0])
         between = covariance + one.dependence @ found.covariance @ one.dependence.T
         exact = ROUNDING * max(one.condition, found.condition)
-        for place, (values, deviations) in enumerate(zip(result["values"], result["errors"], strict=True)):
+        for place, windowed in enumerate(of_kind(result, "windowed")):
+            values, deviations = windowed.values, windowed.stderr
             assert abs(values[sample] - own[place]) <= exact * (abs(own[place]) + np.linalg.norm(own)), row
             # A sum that is less than nothing, of rows that agree with their neighbours, counts as nothing.
             variance, size = max(0.0, between[place, place]), sizes[place, place] + between[place, place]
@@ -243,7 +245,8 @@ def test_windows_that_fit_badly_count_less(seed: int, linear: bool) -> None:
     assert 0 < (found.weights < 1).mean() < 0.5
     condition, norms = found.condition, np.array([np.mean(one.values**2) for one in rows.constant])
     scale = np.sqrt(np.mean(rows.side.values**2) / norms)
-    for place, (_, value, error, _) in enumerate(identified(case)["constants"]):
+    for place, constant in enumerate(of_kind(identified(case), "constant")):
+        value, error = constant.values[0], constant.stderr[0]
         assert abs(value - found.values[place]) <= ROUNDING * condition * (scale[place] + abs(found.values[place]))
         if np.mean(found.misfits) < 4:  # beyond, errors come from the residuals
             spread = np.sqrt(max(1.0, float(np.mean(found.misfits))) * found.covariance[place, place])

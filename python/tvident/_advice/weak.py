@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -33,7 +32,7 @@ class Explained:
 
     Parameters
     ----------
-    found : Identified
+    found : _core.Identification
         What the core returned.
     names : sequence of str
         What the core's unknowns are called.
@@ -45,7 +44,7 @@ class Explained:
         Seconds from one sample to the next.
     """
 
-    found: Any
+    found: _core.Identification
     names: Sequence[str]
     chosen: Collection[str]
     tested: Collection[str]
@@ -78,7 +77,7 @@ class Explained:
         advice = (*advice, *self._told_apart(flags))
         return Words(reasons, (*advice, *self._limits(flags)))
 
-    def _constants(self) -> list[tuple[str, Any]]:
+    def _constants(self) -> list[tuple[str, _core.Unknown]]:
         """Return the constants by name."""
         return [
             (name, one) for name, one in zip(self.names, self.found.unknowns, strict=True) if one.kind == "constant"
@@ -89,7 +88,7 @@ class Explained:
         return [name for name, one in zip(self.names, self.found.unknowns, strict=True) if one.kind != "constant"]
 
     def _noise(self) -> str:
-        angle, torque = np.sqrt(self.found.noise)
+        angle, torque = np.sqrt(self.found.noise or (np.nan, np.nan))
         return f"noise, taken to be white: {angle:.2g} rad in the angle, {torque:.2g} N m in the torque"
 
     def _test_function(self) -> str:

@@ -1,0 +1,87 @@
+"""Built-in terms of the equation of motion."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import tvident
+from calls import paper
+from tvident import _core
+from tvident._equation import BUILT_IN
+
+Array = npt.NDArray[np.float64]
+
+FUNCTIONS = {
+    "offset": lambda _t, angle, _velocity: np.ones_like(angle),
+    "coulomb": lambda _t, _angle, velocity: np.sign(velocity),
+    "cubic": lambda _t, angle, _velocity: angle**3,
+    "gravity": lambda _t, angle, _velocity: np.sin(angle),
+}
+INERTIA, DAMPING, GRAVITY, OFFSET = 0.02, 0.05, 1.5, 0.3
+
+
+def swings(n: int = 8000) -> tuple[Array, Array]:
+    """Give angle and torque of a pendulum that is driven far round: without a spring."""
+    t = np.arange(n) / 1000
+    angle, velocity, acceleration = np.zeros((3, n))
+    for amplitude, frequency, phase in ((1.2, 0.5, 0.3), (0.5, 1.3, 1.0), (0.2, 2.9, 2.0)):
+        omega = 2 * np.pi * frequency
+        angle += amplitude * np.sin(omega * t + phase)
+        velocity += amplitude * omega * np.cos(omega * t + phase)
+        acceleration -= amplitude * omega**2 * np.sin(omega * t + phase)
+    torque = INERTIA * acceleration + DAMPING * velocity + GRAVITY * np.sin(angle) + OFFSET
+    return angle, torque
+
+
+def test_there_is_one_table_here_and_one_in_the_core() -> None:
+    assert list(BUILT_IN) == _core.built_in_terms()
+    assert list(BUILT_IN) == list(FUNCTIONS)
+    for term in BUILT_IN.values():
+        assert "{amount}" in term.suspicion
+        assert term.unit
+        assert term.meaning
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_built_in_term_is_like_a_term_of_ones_own(name: str) -> None:
+    angle, torque = swings(2000)
+    own = tvident.Term("own", FUNCTIONS[name])
+    call: dict[str, Any] = {"sample_rate": 1000, "window_length": 51, "regression_window": 400, "stiffness": 0}
+    expected = tvident.identify(angle, torque, **paper(terms=[own], **call))
+    found = tvident.identify(angle, torque, **paper(terms=[name], **call))
+    np.testing.assert_allclose(found.terms[name], expected.terms["own"], rtol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["auto", tvident.StrongForm(window_length=51)])
+def test_gravity_is_found(method: Any) -> None:
+    angle, torque = swings()
+    generator = np.random.default_rng(0)
+    torque = torque + 0.01 * generator.standard_normal(torque.size)
+    angle = angle + 1e-5 * generator.standard_normal(angle.size)
+    result = tvident.identify(
+        angle,
+        torque,
+        sample_rate=1000,
+        method=method,
+        inertia="constant",
+        damping="constant",
+        stiffness=0,
+        terms=["gravity", "offset"],
+    )
+    truth = {"inertia": INERTIA, "damping": DAMPING, "gravity": GRAVITY, "offset": OFFSET}
+    for name, true in truth.items():
+        value, error = result.constants[name]
+        # Six standard errors, and what smoothing of the angle takes from its second derivative in strong form.
+        assert abs(value - true) < 6 * error + 1e-3 * true, name
+    assert "N m" in result.summary().split("gravity")[1].splitlines()[0]
+
+
+def test_a_missing_pendulum_is_suspected_or_the_noise_model_fails() -> None:
+    angle, torque = swings()
+    torque = torque + 0.01 * np.random.default_rng(0).standard_normal(torque.size)
+    result = tvident.identify(angle, torque, sample_rate=1000, inertia="constant", damping="constant", stiffness=0)
+    assert result.record_status & (tvident.Status.NOISE_MODEL | tvident.Status.TERM_SUSPECTED)
