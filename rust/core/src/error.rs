@@ -108,6 +108,33 @@ pub enum Error {
         /// The shortest allowed, samples.
         least: usize,
     },
+    /// Channels, a mask or a known parameter of another length than the angle.
+    #[error(
+        "every channel must have as many samples as the angle; got {other} for an angle of {samples}; cut or resample one of them"
+    )]
+    LengthsDiffer {
+        /// Samples of the angle.
+        samples: usize,
+        /// Samples of another channel.
+        other: usize,
+    },
+    /// A sample rate that is no positive number.
+    #[error("sample_rate must be positive and finite; got {sample_rate}; give the samples per second")]
+    SampleRate {
+        /// What was given.
+        sample_rate: f64,
+    },
+    /// A term that has no such name.
+    #[error("a term must be one of {known}; got {name:?}; use one of these")]
+    NoSuchTerm {
+        /// What was given.
+        name: String,
+        /// All names.
+        known: String,
+    },
+    /// A call in which everything is known.
+    #[error("at least one parameter must be unknown; all are given; let one be windowed or constant")]
+    NothingUnknown,
     /// Equations that do not determine what is constant.
     #[error("the record must determine what is constant; it does not; excite the system, or leave a parameter out")]
     NotDetermined,

@@ -1,5 +1,4 @@
-//! Identification of time-varying inertia, damping and stiffness from a recorded angle and torque, and on the way the
-//! differentiation of noisy recordings with a polynomial order chosen in every window.
+#![doc = include_str!("../README.md")]
 
 pub mod auto_derivatives;
 pub mod equation;
@@ -18,4 +17,5 @@ mod status;
 pub mod weak_form;
 
 pub use error::Error;
+pub use identify::builder::identify;
 pub use status::Status;

@@ -36,7 +36,7 @@ pub struct AutomaticOptions {
     pub fixed: bool,
     /// Sample period in seconds.
     pub delta: f64,
-    /// Standard deviation of the noise: see [`crate::noise::channel`].
+    /// Standard deviation of the noise: see [`crate::noise`].
     pub sigma: f64,
     /// Instructions to use.
     pub instructions: Instructions,

@@ -70,7 +70,9 @@ fn cube(value: f64) -> f64 {
 
 /// Applies a function to every value.
 fn each(values: &mut [f64], function: impl Fn(f64) -> f64) {
-    values.iter_mut().for_each(|value| *value = function(*value));
+    for value in values {
+        *value = function(*value);
+    }
 }
 
 #[cfg(test)]

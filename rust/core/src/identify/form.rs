@@ -32,7 +32,7 @@ impl Found {
     fn unknowns(&mut self, asked: &[Kind], regressors: &[usize]) -> Vec<Unknown> {
         let unknown = |(&asked, &number): (&Kind, &usize)| {
             if let Some(found) = self.constants.iter().find(|constant| constant.unknown == number) {
-                let unknown = Unknown::constant(found.value, found.error);
+                let unknown = Unknown::constant(number, found.value, found.error);
                 return Unknown { test: found.test.clone(), ..unknown };
             }
             let place = self.changing.iter().position(|&one| one == number);
@@ -45,7 +45,7 @@ impl Found {
                 kind => kind,
             };
             let (values, stderr) = (take(&mut self.results.values), take(&mut self.results.errors));
-            Unknown { kind, ..Unknown::windowed(values, stderr, 1.0) }
+            Unknown { kind, ..Unknown::windowed(number, values, stderr, 1.0) }
         };
         asked.iter().zip(regressors).map(unknown).collect()
     }

@@ -10,6 +10,8 @@ use crate::status::Status;
 /// What was found of one unknown. Places of unknowns count coefficients that are not known, then terms.
 #[derive(Clone, Debug)]
 pub struct Unknown {
+    /// Which unknown of the equation of motion it is: 0 inertia, 1 damping, 2 stiffness, then terms.
+    pub number: usize,
     /// How it came about in the end.
     pub kind: Kind,
     /// One value for every wanted sample, or one for the record.
@@ -26,8 +28,9 @@ pub struct Unknown {
 
 impl Unknown {
     /// A value for the record.
-    pub(crate) fn constant(value: f64, stderr: f64) -> Self {
+    pub(crate) fn constant(number: usize, value: f64, stderr: f64) -> Self {
         Self {
+            number,
             kind: Kind::Constant,
             values: vec![value],
             stderr: vec![stderr],
@@ -38,8 +41,8 @@ impl Unknown {
     }
 
     /// Values for every wanted sample, with standard errors that are still to be multiplied.
-    pub(crate) fn windowed(values: Vec<f64>, stderr: Vec<f64>, factor: f64) -> Self {
-        Self { kind: Kind::Windowed, values, stderr, factor, test: None, untested: false }
+    pub(crate) fn windowed(number: usize, values: Vec<f64>, stderr: Vec<f64>, factor: f64) -> Self {
+        Self { number, kind: Kind::Windowed, values, stderr, factor, test: None, untested: false }
     }
 
     /// Whether it has one value for the record.
@@ -112,4 +115,34 @@ pub struct Identification {
     pub jumps: Vec<usize>,
     /// What only the weak form says.
     pub weak: Option<WeakDetails>,
+}
+
+impl Identification {
+    /// The inertia; `None` if it was known.
+    #[must_use]
+    pub fn inertia(&self) -> Option<&Unknown> {
+        self.unknown(0)
+    }
+
+    /// The damping; `None` if it was known.
+    #[must_use]
+    pub fn damping(&self) -> Option<&Unknown> {
+        self.unknown(1)
+    }
+
+    /// The stiffness; `None` if it was known.
+    #[must_use]
+    pub fn stiffness(&self) -> Option<&Unknown> {
+        self.unknown(2)
+    }
+
+    /// The factor of a term, counted in the order in which terms were given.
+    #[must_use]
+    pub fn term(&self, place: usize) -> Option<&Unknown> {
+        self.unknown(3 + place)
+    }
+
+    fn unknown(&self, number: usize) -> Option<&Unknown> {
+        self.unknowns.iter().find(|unknown| unknown.number == number)
+    }
 }

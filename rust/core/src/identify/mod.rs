@@ -1,5 +1,6 @@
 //! One record, from samples to numbers with errors and a status.
 
+pub(crate) mod builder;
 pub(crate) mod form;
 pub(crate) mod identification;
 pub(crate) mod kinds;
@@ -10,6 +11,7 @@ pub(crate) mod route;
 pub(crate) mod strong;
 pub(crate) mod weak;
 
+pub use builder::{Identify, Parameter, StrongSettings};
 pub use identification::{Covariance, Identification, Unknown, WeakDetails};
 pub use kinds::Kind;
 pub use options::{Method, Options, StrongForm, Task, WeakForm};

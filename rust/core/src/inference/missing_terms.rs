@@ -45,7 +45,7 @@ pub struct Suspect {
 impl Missing {
     /// What it is called.
     #[must_use]
-    pub fn name(&self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Term(term) => term.name,
             Self::Lag => "lag",
@@ -53,7 +53,7 @@ impl Missing {
     }
 
     /// The samples of a term, `None` if they are one everywhere or it is none.
-    pub(crate) fn samples<'a>(&self, angle: &'a dyn Samples, velocity: &'a dyn Samples) -> Option<Mapped<'a>> {
+    pub(crate) fn samples<'a>(self, angle: &'a dyn Samples, velocity: &'a dyn Samples) -> Option<Mapped<'a>> {
         match self {
             Self::Term(term) => term.function.samples(angle, velocity),
             Self::Lag => None,

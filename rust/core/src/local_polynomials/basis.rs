@@ -118,7 +118,7 @@ impl Basis {
     /// How sums over the polynomials change when they are shifted by one sample.
     ///
     /// With `δf(x) = f(x + ½) - f(x - ½)` and `μf(x) = (f(x + ½) + f(x - ½))/2` the basis obeys, like Legendre's polynomials and their
-    /// derivatives, `μq_j = (b_{j+1}/(j+1)) δq_{j+1} - (b_j/j) δq_{j-1}`. See [`Differences`] for what follows.
+    /// derivatives, `μq_j = (b_{j+1}/(j+1)) δq_{j+1} - (b_j/j) δq_{j-1}`. See `Differences` for what follows.
     #[must_use]
     pub fn differences(&self) -> Differences {
         let rate = |j: usize| self.recurrence.get(j).map_or(DoubleDouble::ZERO, |&b| DoubleDouble::from(j as f64) / b);

@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
-use crate::equation::motion::Motion;
+use crate::equation::motion::{Motion, unknowns};
 use crate::error::Error;
 use crate::exec::huge_pages::zeros;
 use crate::exec::pool;
@@ -129,7 +129,8 @@ fn identification(
     order: Vec<u8>,
     mut status: Vec<u16>,
 ) -> Identification {
-    let count = motion.unknowns();
+    let numbers = unknowns(&motion.coefficients, motion.terms.len());
+    let count = numbers.len();
     let nan = vec![f64::NAN; count * count];
     let solved = solved.unwrap_or_else(|| SharedParameters {
         values: nan[..count].to_vec(),
@@ -139,7 +140,9 @@ fn identification(
     });
     let record_status = status_of(solved.condition);
     if record_status.contains(Status::RANK_DEFICIENT) {
-        status.iter_mut().for_each(|status| *status |= (Status::INVALID | Status::RANK_DEFICIENT).bits());
+        for status in &mut status {
+            *status |= (Status::INVALID | Status::RANK_DEFICIENT).bits();
+        }
     }
     let entry = |one: usize, other: usize| solved.covariance[one * count + other];
     let pairs = pairs(motion).into_iter();
@@ -147,7 +150,11 @@ fn identification(
         window_length: form.derivatives.options().window_length,
         exponent: None,
         regression_window: form.regression_window,
-        unknowns: (0..count).map(|one| Unknown::constant(solved.values[one], entry(one, one).sqrt())).collect(),
+        unknowns: numbers
+            .iter()
+            .enumerate()
+            .map(|(one, &number)| Unknown::constant(number, solved.values[one], entry(one, one).sqrt()))
+            .collect(),
         covariances: pairs.map(|pair| Covariance { pair, values: vec![entry(pair.0, pair.1)] }).collect(),
         condition: vec![solved.condition],
         residual_std: vec![solved.residual],

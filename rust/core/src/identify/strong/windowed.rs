@@ -2,7 +2,7 @@
 
 use std::num::NonZeroUsize;
 
-use crate::equation::motion::Motion;
+use crate::equation::motion::{Motion, unknowns as unknowns_of};
 use crate::error::Error;
 use crate::exec::huge_pages::zeros;
 use crate::exec::pool::Watch;
@@ -85,13 +85,16 @@ pub(crate) fn windows(
     } else {
         identify_with_scatter(derivatives, &least_squares, records, workers, watch)?
     };
+    let numbers = unknowns_of(&first.coefficients, first.terms.len());
     let found = columns.into_iter().zip(factors).map(|(columns, factors)| {
-        let unknowns = columns.values.into_iter().zip(columns.stderr).zip(factors);
+        let unknowns = columns.values.into_iter().zip(columns.stderr).zip(factors).zip(&numbers);
         Identification {
             window_length: derivatives.options().window_length,
             exponent: None,
             regression_window: rows,
-            unknowns: unknowns.map(|((values, stderr), factor)| Unknown::windowed(values, stderr, factor)).collect(),
+            unknowns: unknowns
+                .map(|(((values, stderr), factor), &number)| Unknown::windowed(number, values, stderr, factor))
+                .collect(),
             covariances: pairs
                 .iter()
                 .zip(columns.covariances)
