@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -86,3 +87,9 @@ def test_every_room_begins_with_its_purpose(name: str) -> None:
     first = purpose.splitlines()[0]
     assert first.endswith(".")
     assert len(first) > 20
+
+
+def test_the_design_names_every_room_in_this_order() -> None:
+    design = (HOUSE.parents[1] / "DESIGN.md").read_text(encoding="utf-8")
+    named = [name for line in design.splitlines() for name in re.findall(r"^\| `(_\w+)/` \|", line)]
+    assert named == [name for name in ROOMS if name.startswith("_")]
