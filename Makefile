@@ -47,10 +47,14 @@ soak: $(BUILT)  ## the properties of both languages with many more cases, drawn 
 	TVIDENT_HYPOTHESIS=soak $(BIN)/python -m pytest --hypothesis-show-statistics
 
 .PHONY: docs
-docs: $(BUILT)  ## make anew what documents show of the program: the picture, the command line's help
+docs: $(BUILT) rooms  ## make anew what documents show of the program: the picture, the command line's help, the rooms
 	$(BIN)/tvident demo
 	cp tvident-demo/parameters.png docs/identified.png
 	$(BIN)/python docs/command_line_reference.py docs/command-line.md
+
+.PHONY: rooms
+rooms: $(BUILT)  ## make anew what DESIGN.md shows of the rooms: their tables, who uses whom
+	PYTHONPATH=tests $(BIN)/python docs/rooms.py docs/rooms.svg
 
 .PHONY: format
 format: $(READY)  ## format all sources

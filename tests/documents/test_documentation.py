@@ -12,6 +12,7 @@ from contextlib import redirect_stdout
 from importlib.util import module_from_spec, spec_from_file_location
 from io import StringIO
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import click
@@ -131,14 +132,26 @@ def test_tables_of_statuses_have_every_flag(name: str) -> None:
         assert Status(flag).advice != "all is well"
 
 
-def test_the_command_line_reference_is_what_the_commands_say() -> None:
-    spec = spec_from_file_location("command_line_reference", ROOT / "docs" / "command_line_reference.py")
+def script(name: str) -> ModuleType:
+    """Load a script of `docs`."""
+    spec = spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = module_from_spec(spec)
     spec.loader.exec_module(module)
+    return module
+
+
+def test_the_command_line_reference_is_what_the_commands_say() -> None:
     page = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
-    assert page == module.reference(), "run `make docs`"
+    assert page == script("command_line_reference").reference(), "run `make docs`"
+
+
+def test_the_rooms_in_the_design_are_those_of_the_sources() -> None:
+    rooms, page = script("rooms"), (ROOT / "DESIGN.md").read_text(encoding="utf-8")
+    assert page.count("| What happens there |") == len(["core", "package"])
+    assert page == rooms.design(page), "run `make rooms`"
+    assert (ROOT / "docs" / "rooms.svg").read_text(encoding="utf-8") == rooms.drawing(), "run `make rooms`"
 
 
 @pytest.mark.parametrize(
