@@ -1,6 +1,7 @@
 """Write what DESIGN.md shows of the rooms, from the sources: the tables of rooms, and who uses whom. ``make rooms``."""
 
 import ast
+import itertools
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,7 +26,9 @@ def used_rooms() -> set[tuple[str, str]]:
 
 def picture(rooms: Sequence[str], uses: set[tuple[str, str]]) -> str:
     """Return rooms below each other: arrows on the right lead to earlier rooms, those on the left, in red, to later ones."""
-    left = max([rooms.index(used) - rooms.index(user) for user, used in uses if used not in rooms[: rooms.index(user)]] + [0])
+    left = max(
+        [rooms.index(used) - rooms.index(user) for user, used in uses if used not in rooms[: rooms.index(user)]] + [0]
+    )
     start = MARGIN + left * ROW // 2
     width, height = start + BOX + (len(rooms) - 1) * ROW // 2 + 2 * MARGIN, len(rooms) * ROW + MARGIN
     lines = [HEAD.format(width=width, height=height)]
@@ -39,7 +42,9 @@ def picture(rooms: Sequence[str], uses: set[tuple[str, str]]) -> str:
         leaves, arrives = (MARGIN + rooms.index(name) * ROW + shift for name, shift in ((user, 8), (used, 15)))
         bend = f"{abs(apart) * ROW // 2} {abs(leaves - arrives) // 2}"
         path = f"M{side} {leaves}A{bend} 0 0 0 {side} {arrives}"
-        lines.append(f'<path d="{path}" fill="none" stroke="{colour}" marker-end="url(#arrow)"><title>{user} uses {used}</title></path>')
+        lines.append(
+            f'<path d="{path}" fill="none" stroke="{colour}" marker-end="url(#arrow)"><title>{user} uses {used}</title></path>'
+        )
     return "\n".join([*lines, "</svg>"]) + "\n"
 
 
@@ -47,7 +52,7 @@ def core_rooms() -> str:
     """Return the table of the core's rooms."""
     files = test_rust_rooms.FILES
     rows = []
-    for room in test_rust_rooms.ROOMS:
+    for room in test_rust_rooms.ROOMS[:-1]:  # the last is the crate's front door
         purpose = _comment(files.get(f"{room}::mod", files.get(room, Path())))
         names = [name.partition("::")[2] for name in files if test_rust_rooms.room(name) == room]
         inside = sorted({name.replace("::", "/") for name in names if name.split("::")[-1] not in {"", "mod"}})
@@ -85,8 +90,8 @@ def drawing() -> str:
 
 def _comment(path: Path) -> str:
     """Return the first sentence of a file of the core."""
-    lines = path.read_text(encoding="utf-8").splitlines()
-    words = " ".join(line.removeprefix("//! ") for line in lines[: next(i for i, line in enumerate(lines) if len(line) < 4)])
+    lines = itertools.takewhile(lambda line: line.startswith("//! "), path.read_text(encoding="utf-8").splitlines())
+    words = " ".join(line.removeprefix("//! ") for line in lines)
     return words.partition(". ")[0].rstrip(".") + "."
 
 
@@ -95,12 +100,18 @@ def _together(files: list[str]) -> str:
     plain = [name for name in files if "/" not in name]
     folders = sorted({name.rpartition("/")[0] for name in files if "/" in name})
     cells = [", ".join(plain)] if plain else []
-    cells += [f"`{folder}/`: " + ", ".join(n.rpartition("/")[2] for n in files if n.rpartition("/")[0] == folder) for folder in folders]
+    cells += [
+        f"`{folder}/`: " + ", ".join(n.rpartition("/")[2] for n in files if n.rpartition("/")[0] == folder)
+        for folder in folders
+    ]
     return "; ".join(cells)
 
 
 def _table(rows: list[tuple[str, str, str]]) -> str:
-    return "\n".join(["| Room | What happens there | Files |", "|-|-|-|", *(f"| {' | '.join(row)} |" for row in rows)]) + "\n"
+    return (
+        "\n".join(["| Room | What happens there | Files |", "|-|-|-|", *(f"| {' | '.join(row)} |" for row in rows)])
+        + "\n"
+    )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Says in words what was chosen and why, and what to do next."""
+"""Puts into words what was chosen, why, and what to do next."""
 
 from tvident._advice.strong import ExplainedStrong
 from tvident._advice.weak import Explained

@@ -1,4 +1,4 @@
-"""Is the command ``tvident``: one file a command."""
+"""Provides the command ``tvident``: one file per command."""
 
 from tvident._command_line import demo, derivatives, identify, info, simulate  # noqa: F401 - each adds its command
 from tvident._command_line.group import main

@@ -1,4 +1,4 @@
-"""Differentiates noisy samples: local polynomials whose order or window is chosen, and the Savitzky–Golay filter."""
+"""Differentiates noisy samples: local polynomials of chosen order or window, and the Savitzky–Golay filter."""
 
 from tvident._derivatives.fit import LocalPolynomialFit
 from tvident._derivatives.local_polynomials import fit_local_polynomials

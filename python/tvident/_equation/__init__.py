@@ -1,4 +1,4 @@
-"""Says what stands in the equation of motion: coefficients of a kind, terms, their units."""
+"""Describes the equation of motion: kinds of parameters, terms with a name, terms of one's own, units."""
 
 from tvident._equation.built_in import BUILT_IN, TERM_NAMES
 from tvident._equation.kinds import COEFFICIENTS, Kind, Parameter, parameter

@@ -1,4 +1,4 @@
-"""Takes one call apart: what is given, what is chosen, what the core is to do."""
+"""Turns a call of ``identify`` into a task for the core: forms, settings, the task, its numbers by name."""
 
 from tvident._identify.call import identify
 from tvident._identify.methods import Method, StrongForm, Variation, WeakForm

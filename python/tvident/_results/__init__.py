@@ -1,4 +1,4 @@
-"""Holds what an identification found, and what follows from it."""
+"""Holds the result of an identification: parameters by name, standard errors, natural frequency, the summary."""
 
 from tvident._results.estimates import Estimates
 from tvident._results.result import Identification

@@ -1,4 +1,4 @@
-"""Says what is known of a number beside its value: flags, what they mean, how often they occur."""
+"""Names the flags of samples and of records: what they mean, what to do, how often they occur."""
 
 from tvident._status.counts import describe
 from tvident._status.flags import DOUBTFUL, DOUBTFUL_RECORD, RECORD_FLAGS, Status

@@ -1,4 +1,4 @@
-//! What happened in one window. Data never raises: it gets a status, and the rest of the record goes on.
+//! Flags of samples and of records. Data never raises: it gets a status, and the rest of the record goes on.
 
 use std::ops::{BitOr, BitOrAssign};
 
