@@ -116,3 +116,78 @@ fn status(solved: &Solved, fields: Fields, place: usize, [window, inside]: [usiz
     }
     status
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::equation::rows::Rows;
+    use crate::regression::simulated::{CONSTANTS, PERIOD, assert_near, least_squares, model, rows, staged};
+
+    const ROWS: usize = 90;
+    const WINDOW: usize = 21;
+
+    fn noisy() -> Rows {
+        let mut rows = rows(ROWS, |time| [time.sin(), time.cos()], 0.2);
+        rows.exclude([40, 41].into_iter());
+        rows
+    }
+
+    fn found(rows: &Rows, range: Range<isize>) -> EveryWindow {
+        let problem = model().problem(rows, &rows.rhs, 0.0, None);
+        staged(|stages| every_window(&problem, WINDOW, range, &CONSTANTS, 500.0, Instructions::Scalar, stages))
+    }
+
+    #[test]
+    fn a_window_around_every_row_is_least_squares_of_its_rows() {
+        let rows = noisy();
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let rest = crate::regression::predictor::without_constants(&problem, &CONSTANTS);
+        let found = found(&rows, 0..ROWS.cast_signed());
+        for row in 0..ROWS {
+            let held: Vec<usize> = (row.saturating_sub(WINDOW / 2)..(row + WINDOW / 2 + 1).min(ROWS))
+                .filter(|&row| rows.usable[row])
+                .collect();
+            let value: Vec<f64> = held.iter().map(|&row| rows.regressors[0].value[row]).collect();
+            let time = |one: usize| (one as f64 - row as f64) * PERIOD;
+            let companion =
+                held.iter().map(|&one| rows.regressors[0].companion[one] + time(one) * rows.regressors[0].value[one]);
+            let columns = [value.clone(), companion.collect(), held.iter().map(|&row| rest[row]).collect()];
+            let expected = least_squares(&columns);
+            assert_near(found.values[0][row], expected[0], 1e-9);
+            let left =
+                (0..held.len()).map(|i| columns[2][i] - expected[0] * columns[0][i] - expected[1] * columns[1][i]);
+            let deviation = (left.map(|left| left * left).sum::<f64>() / (held.len() as f64 - 2.0)).sqrt();
+            assert_near(found.deviation[row], deviation, 1e-9);
+        }
+    }
+
+    #[test]
+    fn flags_say_what_a_window_lacks() {
+        let rows = noisy();
+        let status = |range: Range<isize>| found(&rows, range).status;
+        let (edge, gap) = (Status::EDGE.bits(), Status::GAP.bits());
+        let all = status(0..ROWS.cast_signed());
+        for (row, &status) in all.iter().enumerate() {
+            let near_end = row < WINDOW / 2 || row + WINDOW / 2 >= ROWS;
+            assert_eq!(status & edge != 0, near_end, "{row}");
+            // Windows that hold one of the rows 40 and 41 that are no equations.
+            assert_eq!(status & gap != 0, (30..=51).contains(&row), "{row}");
+            assert_eq!(status & Status::INVALID.bits(), 0, "{row}");
+        }
+        // Beyond the record half of a window must be left.
+        let beyond = status(-3..0);
+        assert!(beyond.iter().all(|status| status & Status::INVALID.bits() != 0));
+    }
+
+    #[test]
+    fn a_regressor_that_rests_determines_nothing() {
+        let mut rows = noisy();
+        rows.regressors[0].value.fill(0.0);
+        rows.regressors[0].companion.fill(0.0);
+        let found = found(&rows, 20..30);
+        let nothing = (Status::INVALID | Status::RANK_DEFICIENT).bits();
+        assert!(found.status.iter().all(|status| status & nothing == nothing));
+        assert!(found.values[0].iter().all(|value| value.is_nan()));
+        assert!(found.condition.iter().all(|condition| condition.is_infinite()));
+    }
+}

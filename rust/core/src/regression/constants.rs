@@ -189,3 +189,114 @@ impl Kernel for Stack<'_> {
         (Summary::from_rows(WIDTH * columns, columns, entry), norms)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::equation::rows::Rows;
+    use crate::regression::dyadic_windows::{WindowShape, solve_windows};
+    use crate::regression::simulated::{CONSTANTS, assert_near, model, random, rows, staged, white};
+
+    const SPAN: usize = 40;
+    const ROWS: usize = 800;
+
+    /// Windows of 40 rows that share none.
+    fn windows(rows: &Rows) -> Solved {
+        let problem = model().problem(rows, &rows.rhs, 0.0, None);
+        let shapes = [WindowShape::of(0..1, SPAN)];
+        let count = (ROWS / SPAN).cast_signed();
+        solve_windows(&problem, SPAN, &(0..count), &shapes, Instructions::Scalar).swap_remove(0)
+    }
+
+    /// A line in every window, another one in each.
+    fn steps(time: f64) -> [f64; 2] {
+        let window = (time / crate::regression::simulated::PERIOD / SPAN as f64).floor();
+        [3.0 * window.sin() + 0.1 * window * time, 0.1 * window]
+    }
+
+    #[test]
+    fn constants_are_exact_whatever_the_windows_hold() {
+        let rows = rows(ROWS, steps, 0.0);
+        let pooled = pool(&windows(&rows), 0..20, white(1.0), Instructions::Scalar).expect("constants");
+        for (found, expected) in pooled.values.iter().zip(CONSTANTS) {
+            assert_near(*found, expected, 1e-11);
+        }
+        assert_eq!(pooled.weights, vec![1.0; 20]);
+        assert!((2.0..2.5).contains(&pooled.condition), "white columns: {}", pooled.condition);
+    }
+
+    #[test]
+    fn a_window_that_fits_badly_counts_less() {
+        let mut rows = rows(ROWS, steps, 0.1);
+        for (row, more) in random(5, SPAN).iter().enumerate() {
+            rows.rhs[7 * SPAN + row] += 30.0 * more;
+        }
+        let full = windows(&rows);
+        let found = pool(&full, 0..20, white(0.01), Instructions::Scalar).expect("constants");
+        let alike = pool(&full, 0..20, Expected::UNKNOWN, Instructions::Scalar).expect("constants");
+        for (window, weight) in found.weights.iter().enumerate() {
+            assert_eq!(*weight < 1.0, window == 7, "{window}: {weight}");
+        }
+        assert_eq!(alike.weights, vec![1.0; 20]);
+        // Its square errors are a hundred thousand times too large, and its weight as much too small.
+        assert!(found.weights[7] < 1e-6);
+        let off = |pooled: &Pooled| pooled.values.iter().zip(CONSTANTS).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off(&found) < 5.0 * 0.1 / (720.0_f64).sqrt());
+        assert!(off(&alike) > 10.0 * off(&found));
+    }
+
+    #[test]
+    fn constants_come_from_the_windows_that_are_asked_for() {
+        let mut rows = rows(ROWS, steps, 0.0);
+        let first: Vec<f64> = rows.regressors[1].value[..10 * SPAN].to_vec();
+        rows.rhs.iter_mut().zip(first).for_each(|(rhs, value)| *rhs += 5.0 * value);
+        let full = windows(&rows);
+        for (asked, expected) in [(0..10, CONSTANTS[0] + 5.0), (10..20, CONSTANTS[0])] {
+            let pooled = pool(&full, asked, white(1.0), Instructions::Scalar).expect("constants");
+            assert_near(pooled.values[0], expected, 1e-11);
+        }
+    }
+
+    #[test]
+    fn misfits_of_windows_that_hold_the_expected_noise_are_one() {
+        let rows = rows(ROWS, steps, 0.1);
+        // What the windows' own unknowns take up is counted with the rows' covariance.
+        let covariance = RowCovariance { lags: vec![0.01] };
+        let correlated = staged(|stages| model().correlated(&rows, &covariance, stages));
+        let problem = model().problem(&rows, &rows.rhs, 0.0, Some(&correlated));
+        let shapes = [WindowShape::of(0..1, SPAN)];
+        let full = solve_windows(&problem, SPAN, &(0..20), &shapes, Instructions::Scalar).swap_remove(0);
+        let misfits = misfits(&full, &(0..20), &CONSTANTS, white(0.01));
+        let mean = misfits.iter().sum::<f64>() / 20.0;
+        // Squares of even noise scatter by √0.8; some 760 of them are left.
+        assert!((mean - 1.0).abs() < 5.0 * (0.8_f64 / 760.0).sqrt(), "{mean}");
+    }
+
+    #[test]
+    fn squares_for_other_constants_are_those_of_the_rows() {
+        let rows = rows(ROWS, |_| [0.0, 0.0], 0.0);
+        let mut model = model();
+        (model.windowed, model.linear) = (Vec::new(), false);
+        let problem = model.problem(&rows, &rows.rhs, 0.0, None);
+        let shapes = [WindowShape::of(0..1, SPAN)];
+        let full = solve_windows(&problem, SPAN, &(0..20), &shapes, Instructions::Scalar).swap_remove(0);
+        let [one, other] = [1.5, 0.4];
+        let left =
+            |row: usize| rows.rhs[row] - one * rows.regressors[1].value[row] - other * rows.regressors[2].value[row];
+        for (window, found) in sums_of_squares(&full, &(0..20), &[one, other]).into_iter().enumerate() {
+            assert_near(found, (window * SPAN..(window + 1) * SPAN).map(|row| left(row).powi(2)).sum(), 1e-12);
+        }
+    }
+
+    #[test]
+    fn constants_with_the_same_regressor_are_not_determined() {
+        let mut rows = rows(ROWS, steps, 0.1);
+        rows.regressors[2] = rows.regressors[1].clone();
+        let full = windows(&rows);
+        assert!(pool(&full, 0..20, white(0.01), Instructions::Scalar).is_none());
+        let weakest = weakest(&full, &[1.0; 20]);
+        // Their difference is what nothing tells.
+        assert_near((weakest[0] / weakest[1]).abs(), 1.0, 1e-6);
+        assert!(weakest[0] * weakest[1] < 0.0);
+    }
+}

@@ -284,3 +284,148 @@ fn summarise(
         absorb(layout, summary, rows, batch, false);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::equation::rows::Rows;
+    use crate::regression::simulated::{PERIOD, assert_near, least_squares, model, random, rows};
+    use crate::regression::solved::local;
+
+    const ROWS: usize = 150;
+    /// Windows of some hundred rows with five unknowns and columns that grow with time.
+    const ROUNDING: f64 = 1e-9;
+
+    fn noisy() -> Rows {
+        let mut rows = rows(ROWS, |time| [1.0 + 0.1 * time, 0.1], 0.3);
+        rows.exclude([3, 40, 41, 90].into_iter());
+        rows
+    }
+
+    /// A window's unknowns by least squares of its rows, for no constants at all: value and rate at its centre.
+    fn slowly(rows: &Rows, held: &[usize], centre: f64) -> [f64; 2] {
+        let of = |column: &Vec<f64>| held.iter().map(|&row| column[row]).collect::<Vec<f64>>();
+        let value = of(&rows.regressors[0].value);
+        let times = held.iter().map(|&row| (row as f64 - centre) * PERIOD);
+        let companion = of(&rows.regressors[0].companion).into_iter().zip(&value).zip(times);
+        let companion = companion.map(|((own, value), time)| own + time * value).collect();
+        let found = least_squares(&[value, companion, of(&rows.rhs)]);
+        [found[0], found[1]]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(40))]
+        #[test]
+        fn windows_of_any_shape_are_least_squares_of_their_rows(
+            step in 1_usize..6,
+            first in -4_isize..12,
+            parts in [4_usize..9, 0_usize..5, 0_usize..7],
+        ) {
+            let rows = noisy();
+            let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+            let [before, hole, after] = parts;
+            let shape = if after == 0 {
+                WindowShape::of(0..before, step)
+            } else {
+                let all = before + hole + after;
+                WindowShape { parts: vec![0..before, before + hole..all], centre: (all * step - 1) as f64 / 2.0 }
+            };
+            let blocks = first..first + 9;
+            let shapes = [WindowShape::of(1..3, step), shape.clone()];
+            for instructions in Instructions::available() {
+                let solved = &solve_windows(&problem, step, &blocks, &shapes, instructions)[1];
+                for (place, block) in blocks.clone().enumerate() {
+                    let begin = block * step.cast_signed();
+                    let all = shape.parts.iter().flat_map(|part| part.start * step..part.end * step);
+                    let held: Vec<usize> = all
+                        .filter_map(|offset| usize::try_from(begin + offset.cast_signed()).ok())
+                        .filter(|&row| row < ROWS && rows.usable[row])
+                        .collect();
+                    prop_assert_eq!(solved.field(solved.fields.count())[place], held.len() as f64);
+                    if held.len() > 4 {
+                        let expected = slowly(&rows, &held, begin as f64 + shape.centre);
+                        for (unknown, expected) in expected.into_iter().enumerate() {
+                            assert_near(local(solved, place, &[], unknown), expected, ROUNDING);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_window_over_a_jump_counts_as_one_without_rows() {
+        let mut rows = noisy();
+        rows.jumps = vec![60];
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let shapes = [WindowShape::of(0..5, 4)];
+        let solved = &solve_windows(&problem, 4, &(0..25), &shapes, Instructions::Scalar)[0];
+        let counts = solved.field(solved.fields.count());
+        // Blocks from 11 on begin before row 60 and end at it or behind; that from 10 ends with row 59.
+        let over: Vec<usize> = (0..25).filter(|&block| counts[block] == 0.0).collect();
+        assert_eq!(over, (11..15).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn the_same_bits_however_windows_are_cut() {
+        let rows = noisy();
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let shapes = [WindowShape::of(0..13, 2)];
+        for instructions in Instructions::available() {
+            let whole = &solve_windows(&problem, 2, &(0..60), &shapes, instructions)[0];
+            for first in [0_isize, 1, 5, 8, 31] {
+                let part = &solve_windows(&problem, 2, &(first..first + 21), &shapes, instructions)[0];
+                for field in 0..whole.fields.size() {
+                    assert_eq!(part.field(field), &whole.field(field)[first.unsigned_abs()..][..21]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_the_covariance_of_rows_makes_of_a_window_is_summed_with_its_own_time() {
+        // Independent rows of variance 0.7 make 0.7 times the products of the columns.
+        let rows = noisy();
+        let covariance = crate::regression::row_covariance::RowCovariance { lags: vec![0.7] };
+        let correlated = crate::regression::simulated::staged(|stages| model().correlated(&rows, &covariance, stages));
+        let problem = model().problem(&rows, &rows.rhs, 0.0, Some(&correlated));
+        let plain = model().problem(&rows, &rows.rhs, 0.0, None);
+        let shapes = [WindowShape::of(0..11, 3)];
+        let [with, without] = [&problem, &plain]
+            .map(|problem| solve_windows(problem, 3, &(0..20), &shapes, Instructions::Scalar).swap_remove(0));
+        let (fields, counts) = (with.fields, with.field(with.fields.count()));
+        for (place, &count) in counts.iter().enumerate() {
+            // Two unknowns take up the noise of two rows.
+            assert_near(with.field(fields.freedom())[place], 1.4, ROUNDING);
+            let unknowns = [local(&without, place, &[], 0), local(&without, place, &[], 1)];
+            assert!(unknowns.iter().all(|value| value.is_finite()) && count > 28.0);
+            let residual = residual(&without, place) / (count - 2.0);
+            for (i, j) in [(0, 0), (1, 0), (1, 1)] {
+                let ordinary = without.field(fields.covariance(i, j))[place] / residual;
+                assert_near(with.field(fields.covariance(i, j))[place] / 0.7, ordinary, ROUNDING);
+            }
+        }
+    }
+
+    /// What all unknowns together leave of a window.
+    fn residual(solved: &Solved, place: usize) -> f64 {
+        let constants = solved.fields.layout.constant;
+        solved.field(solved.fields.left(constants, constants))[place]
+    }
+
+    #[test]
+    fn powers_of_two_make_any_length() {
+        for length in 1..40 {
+            let shape = WindowShape::of(3..3 + length, 1);
+            let mut next = 3;
+            for (first, level) in shape.pieces() {
+                assert_eq!(first, next);
+                next += 1 << level;
+            }
+            assert_eq!(next, shape.end());
+        }
+        assert!(random(1, 8).iter().all(|value| value.abs() < 1.8));
+    }
+}

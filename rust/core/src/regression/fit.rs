@@ -186,3 +186,73 @@ impl Fit {
         *values.select_nth_unstable_by(middle, f64::total_cmp).1
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::simulated::{CONSTANTS, assert_near, model, rows, staged, white};
+
+    /// Lines are followed exactly, and so are constants beside them.
+    fn line(time: f64) -> [f64; 2] {
+        [5.0 - 0.02 * time, -0.02]
+    }
+
+    #[test]
+    fn a_line_is_found_in_windows_of_any_length_and_in_the_record() {
+        let rows = rows(500, line, 0.0);
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let scales = Scale::all(500, 3);
+        for scale in std::iter::once(None).chain(scales.into_iter().map(Some)) {
+            let fit = staged(|stages| Fit::new(&problem, scale, white(1.0), Instructions::Scalar, stages));
+            let fit = fit.expect("constants");
+            for (found, expected) in fit.pooled.values.iter().zip(CONSTANTS) {
+                assert_near(*found, expected, 1e-9);
+            }
+            for window in (0..fit.full.len()).filter(|&window| is_determined(&fit.full, window)) {
+                let [value, rate] = line(fit.centre(window) * problem.period);
+                assert_near(local(&fit.full, window, &fit.pooled.values, 0), value, 1e-8);
+                assert_near(local(&fit.full, window, &fit.pooled.values, 1), rate, 1e-8);
+            }
+        }
+    }
+
+    #[test]
+    fn windows_of_a_given_number_of_rows_begin_eight_in_their_length() {
+        let rows = rows(500, line, 0.0);
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let fit = Fit::in_rows(&problem, 83, white(1.0), Instructions::Scalar).expect("constants");
+        assert_eq!((fit.step, fit.span, fit.full.len()), (10, 80, 43));
+        assert_eq!((fit.centre(0), fit.centre(42)), (39.5, 459.5));
+        assert_eq!([0, 44, 45, 250, 499].map(|row| fit.nearest(row)), [0, 0, 1, 21, 42]);
+        // The line in the middle of the record.
+        assert_near(fit.median(0), line(fit.centre(21) * problem.period)[0], 1e-8);
+    }
+
+    #[test]
+    fn the_same_windows_serve_another_problem() {
+        let (one, other) = (rows(300, line, 0.0), rows(300, |_| [7.0, 0.0], 0.0));
+        let problem = |rows| model().problem(rows, &rows.rhs, 0.0, None);
+        let fit = Fit::in_rows(&problem(&one), 40, white(1.0), Instructions::Scalar).expect("constants");
+        let again = staged(|stages| fit.again(&problem(&other), white(1.0), Instructions::Scalar, stages));
+        let again = again.expect("constants");
+        assert_eq!((again.step, again.span, again.full.len()), (fit.step, fit.span, fit.full.len()));
+        assert_near(again.median(0), 7.0, 1e-9);
+    }
+
+    #[test]
+    fn constants_of_independent_rows_have_the_errors_of_least_squares() {
+        let mut rows = rows(400, |_| [0.0, 0.0], 0.5);
+        let mut model = model();
+        (model.windowed, model.linear) = (Vec::new(), false);
+        rows.rhs.iter_mut().for_each(|rhs| *rhs *= 2.0);
+        let problem = model.problem(&rows, &rows.rhs, 0.0, None);
+        let fit =
+            staged(|stages| Fit::new(&problem, None, white(1.0), Instructions::Scalar, stages)).expect("constants");
+        let covariance = RowCovariance { lags: vec![3.0] };
+        let found = staged(|stages| fit.covariance(&problem, &covariance, stages));
+        for (found, inverse) in found.iter().zip(&fit.pooled.inverse) {
+            assert_near(*found, 3.0 * inverse, 1e-12);
+        }
+        assert_eq!(fit.covariance_of(&problem, 0..1, &fit.pooled, &covariance), found);
+    }
+}

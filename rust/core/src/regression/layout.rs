@@ -121,3 +121,50 @@ impl Fields {
         self.freedom() + 3
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LAYOUTS: [Layout; 4] = [
+        Layout { windowed: 1, linear: true, constant: 2 },
+        Layout { windowed: 2, linear: true, constant: 0 },
+        Layout { windowed: 0, linear: false, constant: 3 },
+        Layout { windowed: 3, linear: false, constant: 1 },
+    ];
+
+    /// Every place from zero on exactly once.
+    fn assert_fills(mut places: Vec<usize>, size: usize) {
+        places.sort_unstable();
+        assert_eq!(places, (0..size).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn every_number_of_a_summary_has_a_place_of_its_own() {
+        for layout in LAYOUTS {
+            let columns = layout.columns();
+            let factor = (0..columns).flat_map(|row| (row..columns).map(move |column| layout.entry(row, column)));
+            let sums = layout.sums()..layout.sums() + 3;
+            let noise = (0..layout.local()).flat_map(|i| (0..=i).map(move |j| layout.noise() + symmetric(i, j)));
+            assert_fills(factor.chain(sums).chain(noise).collect(), layout.size());
+        }
+    }
+
+    #[test]
+    fn every_number_of_a_solved_window_has_a_place_of_its_own() {
+        for layout in LAYOUTS {
+            let (fields, local, constant) = (Fields { layout }, layout.local(), layout.constant);
+            let mut places = vec![fields.freedom(), fields.count(), fields.condition()];
+            places.extend((0..local).flat_map(|one| (0..=constant).map(move |other| fields.solution(one, other))));
+            places.extend((0..local).flat_map(|i| (0..=i).map(move |j| fields.covariance(i, j))));
+            places.extend((0..=constant).flat_map(|i| (i..=constant).map(move |j| fields.left(i, j))));
+            places.extend((0..constant).map(|one| fields.norm(one)));
+            assert_fills(places, fields.size());
+        }
+    }
+
+    #[test]
+    fn a_symmetric_matrix_is_kept_once() {
+        assert!((0..5).all(|i| (0..5).all(|j| symmetric(i, j) == symmetric(j, i))));
+    }
+}

@@ -14,6 +14,8 @@ pub(crate) mod problem;
 pub(crate) mod residuals;
 pub(crate) mod row_covariance;
 pub(crate) mod sandwich;
+#[cfg(test)]
+pub(crate) mod simulated;
 pub(crate) mod solve;
 pub(crate) mod solved;
 pub(crate) mod subsample;

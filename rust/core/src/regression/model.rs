@@ -100,3 +100,55 @@ impl Model {
         RowNoise::new(&[windowed.concat(), kernels(&self.constant, 0), vec![rhs]].concat(), noise)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::dyadic_windows::{WindowShape, solve_windows};
+    use crate::regression::predictor::without_constants;
+    use crate::regression::simulated::{CONSTANTS, assert_near, model, rows};
+    use crate::regression::solved::local;
+    use crate::simd::instructions::Instructions;
+
+    #[test]
+    fn unknowns_are_sorted_by_what_they_belong_to() {
+        let model = Model::new(&[0, 2, 3, 5], [false, true, false, true].into_iter(), true);
+        assert_eq!((model.windowed.as_slice(), model.constant.as_slice()), ([2, 5].as_slice(), [0, 3].as_slice()));
+        assert_eq!(model.layout(), Layout { windowed: 2, linear: true, constant: 2 });
+    }
+
+    #[test]
+    fn a_problem_has_the_columns_of_its_unknowns() {
+        let rows = rows(9, |_| [1.0, 0.0], 0.0);
+        let model = Model { windowed: vec![2], constant: vec![0], linear: false };
+        let problem = model.problem(&rows, &rows.rhs, 0.0, None);
+        assert_eq!(problem.windowed, [rows.regressors[2].value.as_slice()]);
+        assert_eq!(problem.companions, [rows.regressors[2].companion.as_slice()]);
+        assert_eq!(problem.constants, [rows.regressors[0].value.as_slice()]);
+        assert!(problem.noise.is_zero());
+    }
+
+    #[test]
+    fn windows_without_known_constants_have_the_same_numbers() {
+        let mut rows = rows(60, |time| [1.0 + 0.1 * time, 0.1], 0.3);
+        for (index, regressor) in rows.regressors.iter_mut().enumerate() {
+            regressor.noise = [vec![1.0, index as f64, 0.5], vec![0.0, 1.0, -1.0]];
+        }
+        let model = model();
+        // The noise of a constant's regressor is that of the right-hand side once it is taken off.
+        for noise in [0.0, 0.01] {
+            let whole = model.problem(&rows, &rows.rhs, noise, None);
+            let rhs = without_constants(&whole, &CONSTANTS);
+            let rest = model.without_constants(&rows, &whole, &rhs, &CONSTANTS, noise);
+            let shapes = [WindowShape::of(0..20, 1)];
+            let [whole, rest] = [&whole, &rest]
+                .map(|problem| solve_windows(problem, 1, &(0..40), &shapes, Instructions::Scalar).swap_remove(0));
+            for window in 0..40 {
+                for unknown in 0..2 {
+                    let expected = local(&whole, window, &CONSTANTS, unknown);
+                    assert_near(local(&rest, window, &[], unknown), expected, 1e-10);
+                }
+            }
+        }
+    }
+}

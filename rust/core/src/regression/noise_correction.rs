@@ -156,3 +156,107 @@ fn zero_where_zero(zero: Packet, value: Packet) -> Packet {
     }
     result
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::layout::Layout;
+    use crate::regression::simulated::{assert_near, products, random};
+    use crate::regression::summary::{absorb, count};
+
+    const LAYOUT: Layout = Layout { windowed: 1, linear: true, constant: 1 };
+    const ROWS: usize = 12;
+    const ROUNDING: f64 = 1e-12;
+
+    /// Kernels of the value, its companion, the constant and the right-hand side.
+    const KERNELS: [&[f64]; 4] = [&[1.0, 2.0, -1.0], &[0.5, 0.0, 1.0], &[0.0, 1.0, 1.0], &[1.0, 0.0, 0.0]];
+
+    fn columns() -> Vec<Vec<f64>> {
+        let value = random(1, ROWS);
+        let companion = (0..ROWS).map(|row| random(2, ROWS)[row] + row as f64 * value[row]).collect();
+        vec![value, companion, random(3, ROWS), random(4, ROWS)]
+    }
+
+    fn summary() -> Vec<Packet> {
+        let columns = columns();
+        let mut summary = vec![Packet::ZERO; LAYOUT.size()];
+        let mut rows: Vec<Packet> =
+            (0..ROWS).flat_map(|row| columns.iter().map(move |one| Packet::splat(one[row]))).collect();
+        absorb(LAYOUT, &mut summary, &mut rows, ROWS, false);
+        (0..ROWS).for_each(|row| count(LAYOUT, &mut summary, Packet::ONE, row as f64));
+        summary
+    }
+
+    /// What noise adds to the products of two columns: row by row, the companion's kernel with the row's time.
+    fn added(i: usize, j: usize, variance: f64) -> f64 {
+        let kernel = |column: usize, row: usize, k: usize| {
+            let own = KERNELS[column].get(k).copied().unwrap_or(0.0);
+            own + if column == 1 { row as f64 * KERNELS[0][k] } else { 0.0 }
+        };
+        (0..ROWS).map(|row| (0..3).map(|k| variance * kernel(i, row, k) * kernel(j, row, k)).sum::<f64>()).sum()
+    }
+
+    #[test]
+    fn noise_adds_the_products_of_kernels_row_by_row() {
+        let (noise, summary) = (RowNoise::new(&KERNELS, 0.3), summary());
+        for i in 0..4 {
+            for j in 0..4 {
+                assert_near(noise.expected(LAYOUT, &summary, i, j).0[5], added(i, j, 0.3), ROUNDING);
+            }
+        }
+        assert!(!noise.is_zero());
+        assert!(RowNoise::new(&KERNELS, 0.0).is_zero());
+        assert!(RowNoise::new(&[&[], &[], &[], &[]], 1.0).is_zero());
+    }
+
+    /// The factor without the noise, as products of its columns; its right-hand side; and the squares that are left.
+    fn corrected(variance: f64) -> (Vec<Vec<f64>>, Vec<f64>, f64) {
+        let (summary, p) = (summary(), LAYOUT.regressors());
+        let mut factor = vec![Packet::ZERO; p * p];
+        let (mut rhs, mut pivots) = (vec![Packet::ZERO; p], vec![Packet::ZERO; p]);
+        for i in 0..p {
+            rhs[i] = summary[LAYOUT.entry(i, p)];
+            pivots[i] = summary[LAYOUT.entry(i, i)].inverse_or_zero();
+            (i..p).for_each(|j| factor[i * p + j] = summary[LAYOUT.entry(i, j)]);
+        }
+        let (mut square, mut column) = (vec![Packet::ZERO; p * p], vec![Packet::ZERO; p]);
+        let last = summary[LAYOUT.entry(p, p)];
+        let mut residual = last * last;
+        let noise = RowNoise::new(&KERNELS, variance);
+        correct(LAYOUT, &summary, &noise, &mut square, &mut factor, &mut rhs, &mut column, &mut pivots, &mut residual);
+        let columns: Vec<Vec<f64>> = (0..p).map(|j| (0..=j).map(|i| factor[i * p + j].0[0]).collect()).collect();
+        let sides = columns.iter().map(|one| one.iter().zip(&rhs).map(|(a, b)| a * b.0[0]).sum()).collect();
+        (products(&columns), sides, residual.0[0])
+    }
+
+    #[test]
+    fn the_corrected_factor_is_that_of_the_products_without_the_noise() {
+        let (raw, variance) = (products(&columns()), 0.005);
+        let (normal, sides, residual) = corrected(variance);
+        for i in 0..3 {
+            for j in 0..3 {
+                assert_near(normal[i][j], raw[i][j] - added(i, j, variance), ROUNDING);
+            }
+            assert_near(sides[i], raw[i][3] - added(i, 3, variance), ROUNDING);
+        }
+        let best = crate::regression::simulated::solved(normal, sides.clone());
+        let explained: f64 = best.iter().zip(&sides).map(|(value, side)| value * side).sum();
+        assert_near(residual, raw[3][3] - added(3, 3, variance) - explained, 100.0 * ROUNDING);
+    }
+
+    #[test]
+    fn noise_that_would_be_all_there_is_is_believed_in_part() {
+        let raw = products(&columns());
+        let (normal, _, residual) = corrected(1e6);
+        // The same part is taken off every product, and a tenth of each direction is left at least.
+        let part = (raw[0][0] - normal[0][0]) / added(0, 0, 1e6);
+        assert!(part > 0.0 && part < 1e-3);
+        for i in 0..3 {
+            for j in 0..3 {
+                assert_near(normal[i][j], raw[i][j] - part * added(i, j, 1e6), 1e3 * ROUNDING);
+            }
+            assert!(normal[i][i] >= (1.0 - GUARD) * (1.0 - 1e-9) * raw[i][i]);
+        }
+        assert!(residual >= 0.0);
+    }
+}

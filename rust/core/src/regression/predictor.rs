@@ -74,3 +74,63 @@ pub(crate) fn without_constants(problem: &Problem<'_>, constants: &[f64]) -> Vec
     }
     rhs
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::dyadic_windows::{WindowShape, solve_windows};
+    use crate::regression::row_covariance::RowCovariance;
+    use crate::regression::simulated::{CONSTANTS, PERIOD, assert_near, model, rows, staged};
+    use crate::simd::instructions::Instructions;
+
+    const SPAN: usize = 16;
+
+    fn line(time: f64) -> [f64; 2] {
+        [4.0 + 0.3 * time, 0.3]
+    }
+
+    #[test]
+    fn rows_that_follow_a_line_are_predicted_exactly() {
+        let rows = rows(64, line, 0.0);
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let solved = solve_windows(&problem, 1, &(-4..49), &[WindowShape::of(0..SPAN, 1)], Instructions::Scalar);
+        let predictor = Predictor::new(&solved[0], &CONSTANTS);
+        let rest = without_constants(&problem, &CONSTANTS);
+        let place = predictor.place(10).expect("a window");
+        let centre = 10.0 + (SPAN as f64 - 1.0) / 2.0;
+        for (row, rest) in rest.into_iter().enumerate() {
+            let later = (row as f64 - centre) * PERIOD;
+            assert_near(predictor.value(place, 0, later), line(row as f64 * PERIOD)[0], 1e-10);
+            assert_near(predictor.predict(&problem, place, row, later), rest, 1e-10);
+        }
+        assert_eq!(predictor.place(-5), None);
+        assert_eq!(predictor.place(49), None);
+    }
+
+    #[test]
+    fn a_window_of_too_few_rows_predicts_nothing() {
+        let mut rows = rows(64, line, 0.0);
+        rows.exclude(0..SPAN - 5);
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let solved = solve_windows(&problem, 1, &(0..2), &[WindowShape::of(0..SPAN, 1)], Instructions::Scalar);
+        let predictor = Predictor::new(&solved[0], &CONSTANTS);
+        // Five rows for four unknowns are not one more than these, six are.
+        assert_eq!([0, 1].map(|window| predictor.place(window)), [None, Some(1)]);
+    }
+
+    #[test]
+    fn the_variance_of_a_line_is_least_near_its_middle() {
+        let rows = rows(64, line, 0.1);
+        let covariance = RowCovariance { lags: vec![0.01] };
+        let correlated = staged(|stages| model().correlated(&rows, &covariance, stages));
+        let problem = model().problem(&rows, &rows.rhs, 0.0, Some(&correlated));
+        let solved = solve_windows(&problem, 1, &(0..40), &[WindowShape::of(0..SPAN, 1)], Instructions::Scalar);
+        let (predictor, fields) = (Predictor::new(&solved[0], &CONSTANTS), solved[0].fields);
+        let entry = |i, j| solved[0].field(fields.covariance(i, j))[3];
+        for later in [-3.0, 0.0, 2.5] {
+            let expected = entry(0, 0) + 2.0 * later * entry(1, 0) + later * later * entry(1, 1);
+            assert_near(predictor.variance(3, 0, later), expected, 1e-15);
+        }
+        assert!(predictor.variance(3, 0, 20.0) > 4.0 * predictor.variance(3, 0, 0.0));
+    }
+}

@@ -53,3 +53,30 @@ impl Problem<'_> {
         self.jumps.get(next).is_some_and(|&jump| jump.cast_signed() <= rows.end)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::regression::simulated::{model, rows};
+
+    #[test]
+    fn jumps_lie_between_two_rows() {
+        let mut rows = rows(20, |_| [1.0, 0.0], 0.0);
+        rows.jumps = vec![5, 12];
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        // Rows 4 and 5 have a jump between them, rows 5 and 11 have not.
+        for (range, within) in
+            [(0..4, false), (4..5, true), (5..11, false), (5..12, true), (12..19, false), (-9..30, true)]
+        {
+            assert_eq!(problem.jumps_within(&range), within, "{range:?}");
+        }
+    }
+
+    #[test]
+    fn equations_reach_from_the_first_to_the_last() {
+        let mut rows = rows(10, |_| [1.0, 0.0], 0.0);
+        rows.exclude([0, 1, 5, 9].into_iter());
+        assert_eq!(model().problem(&rows, &rows.rhs, 0.0, None).inside(), 2..9);
+        rows.exclude(0..10);
+        assert!(model().problem(&rows, &rows.rhs, 0.0, None).inside().is_empty());
+    }
+}

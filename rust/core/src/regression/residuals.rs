@@ -30,3 +30,39 @@ pub(crate) fn residuals(
     let usable = problem.usable.iter().enumerate().map(says).collect();
     Ok((left, usable))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::simulated::{model, rows, staged, white};
+    use crate::simd::instructions::Instructions;
+
+    #[test]
+    fn nothing_is_left_of_rows_that_follow_lines_and_all_of_the_noise_of_others() {
+        for deviation in [0.0, 0.1] {
+            let mut rows = rows(600, |time| [1.0 + 0.01 * time, 0.01], deviation);
+            rows.exclude([0, 30, 31].into_iter());
+            let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+            let fit = Fit::in_rows(&problem, 80, white(0.01), Instructions::Scalar).expect("constants");
+            let (left, usable) = staged(|stages| residuals(&problem, &fit, stages));
+            assert_eq!(usable, rows.usable);
+            assert!((0..600).filter(|&row| !usable[row]).all(|row| left[row] == 0.0));
+            let mean = left.iter().map(|left| left * left).sum::<f64>() / 597.0;
+            // Two unknowns in 80 rows; squares of even noise scatter by √0.8.
+            let (expected, scatter) =
+                (deviation * deviation * 78.0 / 80.0, deviation * deviation * (0.8_f64 / 597.0).sqrt());
+            assert!((mean - expected).abs() <= 4.0 * scatter + 1e-20, "{mean}");
+        }
+    }
+
+    #[test]
+    fn rows_whose_window_holds_too_few_equations_say_nothing() {
+        let mut rows = rows(400, |_| [1.0, 0.0], 0.1);
+        rows.exclude((100..200).filter(|row| row % 40 != 0));
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let fit = Fit::in_rows(&problem, 40, white(0.01), Instructions::Scalar).expect("constants");
+        let (left, usable) = staged(|stages| residuals(&problem, &fit, stages));
+        assert!(!usable[160] && left[160] == 0.0);
+        assert!(usable[20] && usable[380]);
+    }
+}

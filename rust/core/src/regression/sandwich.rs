@@ -113,3 +113,88 @@ pub(crate) fn joint_covariance(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::fit::Fit;
+    use crate::regression::simulated::{assert_near, model, random, rows, staged, white};
+    use crate::regression::window_length::Scale;
+    use crate::simd::instructions::Instructions;
+
+    /// A fit in windows that overlap.
+    fn fitted(problem: &Problem<'_>) -> Fit {
+        let scale = Scale::all(problem.rows(), 3)[6];
+        let fit = staged(|stages| Fit::new(problem, Some(scale), white(0.01), Instructions::Scalar, stages));
+        fit.expect("constants")
+    }
+
+    #[test]
+    fn constants_are_what_rows_move_them_by() {
+        let mut rows = rows(300, |time| [time.sin(), time.cos()], 0.1);
+        rows.exclude([17, 100, 101].into_iter());
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let fit = fitted(&problem);
+        let columns: Vec<Vec<f64>> =
+            (0..2).map(|one| fit.influence(&problem, &(0..fit.full.len()), &fit.pooled.weights, one)).collect();
+        let moved: Vec<f64> =
+            columns.iter().map(|column| column.iter().zip(&rows.rhs).map(|(a, b)| a * b).sum()).collect();
+        for constant in 0..2 {
+            let found: f64 = (0..2).map(|other| fit.pooled.inverse[2 * constant + other] * moved[other]).sum();
+            assert_near(found, fit.pooled.values[constant], 1e-11);
+        }
+    }
+
+    #[test]
+    fn the_covariance_is_what_correlated_noise_of_the_rows_makes() {
+        let rows = rows(60, |_| [1.0, 0.0], 0.0);
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let fit =
+            staged(|stages| Fit::new(&problem, None, white(1.0), Instructions::Scalar, stages)).expect("constants");
+        let columns: Vec<Vec<f64>> =
+            (0..2).map(|one| fit.influence(&problem, &(0..1), &fit.pooled.weights, one)).collect();
+        let covariance = RowCovariance { lags: vec![1.0, 0.4, -0.2] };
+        let found = sandwich(&columns, &fit.pooled.inverse, &covariance);
+        // Row by row: what each moves the constants by, times the covariance of two rows.
+        let weight = |constant: usize, row: usize| -> f64 {
+            (0..2).map(|other| fit.pooled.inverse[2 * constant + other] * columns[other][row]).sum()
+        };
+        for (one, other) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            let mut expected = 0.0;
+            for i in 0..60_usize {
+                for j in 0..60_usize {
+                    let lag = covariance.lags.get(i.abs_diff(j)).copied().unwrap_or(0.0);
+                    expected += weight(one, i) * lag * weight(other, j);
+                }
+            }
+            assert_near(found[2 * one + other], expected, 1e-12);
+        }
+        let independent = sandwich(&columns, &fit.pooled.inverse, &RowCovariance::white());
+        for (found, expected) in independent.iter().zip(&fit.pooled.inverse) {
+            assert_near(*found, *expected, 1e-12);
+        }
+    }
+
+    #[test]
+    fn what_depends_on_constants_inherits_their_covariance() {
+        // Two windowed unknowns and two constants: x = own - S β.
+        let own = [[2.0, 0.5], [0.5, 1.0]];
+        let between = [[4.0, 1.0], [1.0, 3.0]];
+        let sensitive = [[0.3, -1.0], [2.0, 0.7]];
+        let joint = |one, other| {
+            joint_covariance([one, other], [2, 2], |i, j| own[i][j], |i, j| sensitive[i][j], |i, j| between[i][j])
+        };
+        let passed =
+            |one: usize, constant: usize| -> f64 { (0..2).map(|k| sensitive[one][k] * between[k][constant]).sum() };
+        for one in 0..2 {
+            for other in 0..2 {
+                assert_eq!(joint(2 + one, 2 + other), between[one][other]);
+                assert_near(joint(one, 2 + other), passed(one, other), 1e-15);
+                assert_near(joint(2 + other, one), passed(one, other), 1e-15);
+                let both: f64 = (0..2).map(|k| passed(one, k) * sensitive[other][k]).sum();
+                assert_near(joint(one, other), own[one][other] + both, 1e-15);
+            }
+        }
+        assert_eq!(random(1, 3), random(1, 3));
+    }
+}

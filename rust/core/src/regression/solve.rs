@@ -186,3 +186,79 @@ fn inverse_normal(inverse: &[Packet], local: usize, i: usize, j: usize) -> Packe
     }
     sum
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::simulated::{assert_near, least_squares, products, random};
+    use crate::regression::summary::{absorb, count};
+
+    const LAYOUT: Layout = Layout { windowed: 1, linear: true, constant: 1 };
+    const ROWS: usize = 20;
+    const ROUNDING: f64 = 1e-12;
+
+    fn columns() -> Vec<Vec<f64>> {
+        (1..5).map(|seed| random(seed, ROWS)).collect()
+    }
+
+    /// A window of these rows, its noise being the products of its local columns times a variance.
+    fn window(variance: Option<f64>) -> Vec<f64> {
+        let columns = columns();
+        let mut summary = vec![Packet::ZERO; LAYOUT.size()];
+        let mut rows: Vec<Packet> =
+            (0..ROWS).flat_map(|row| columns.iter().map(move |one| Packet::splat(one[row]))).collect();
+        absorb(LAYOUT, &mut summary, &mut rows, ROWS, false);
+        (0..ROWS).for_each(|row| count(LAYOUT, &mut summary, Packet::ONE, row as f64));
+        let products = products(&columns);
+        for (i, j) in [(0, 0), (1, 0), (1, 1)] {
+            summary[LAYOUT.noise() + symmetric(i, j)] = Packet::splat(variance.unwrap_or(0.0) * products[i][j]);
+        }
+        let mut fields = vec![Packet::ZERO; Fields { layout: LAYOUT }.size()];
+        let noise = RowNoise::new(&[&[], &[], &[], &[]], 0.0);
+        solve(LAYOUT, &summary, &noise, variance, &mut SolveScratch::new(LAYOUT), &mut fields);
+        fields.iter().map(|field| field.0[6]).collect()
+    }
+
+    #[test]
+    fn unknowns_of_a_window_depend_on_the_constant_as_least_squares_do() {
+        let (fields, names, columns) = (window(None), Fields { layout: LAYOUT }, columns());
+        for constant in [0.0, 1.0, -3.0] {
+            let rest = (0..ROWS).map(|row| columns[3][row] - constant * columns[2][row]).collect();
+            let expected = least_squares(&[columns[0].clone(), columns[1].clone(), rest]);
+            for local in 0..2 {
+                let found = fields[names.solution(local, 1)] - constant * fields[names.solution(local, 0)];
+                assert_near(found, expected[local], ROUNDING);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_left_gives_the_constant_and_the_sum_of_squares() {
+        let (fields, names, columns) = (window(None), Fields { layout: LAYOUT }, columns());
+        let expected = least_squares(&columns);
+        assert_near(fields[names.left(0, 1)] / fields[names.left(0, 0)], expected[2], ROUNDING);
+        let left = |row: usize| columns[3][row] - (0..3).map(|one| expected[one] * columns[one][row]).sum::<f64>();
+        assert_near(fields[names.left(1, 1)], (0..ROWS).map(|row| left(row).powi(2)).sum(), ROUNDING);
+        assert_near(fields[names.norm(0)], columns[2].iter().map(|x| x * x).sum(), ROUNDING);
+        assert_near(fields[names.count()], ROWS as f64, 0.0);
+    }
+
+    #[test]
+    fn errors_are_those_of_independent_rows_where_rows_are_independent() {
+        let (names, normal) = (Fields { layout: LAYOUT }, products(&columns()));
+        let [a, b, d] = [normal[0][0], normal[0][1], normal[1][1]];
+        let determinant = a * d - b * b;
+        let inverse = [[d, -b], [-b, a]].map(|row| row.map(|entry| entry / determinant));
+        let (known, ordinary) = (window(Some(0.3)), window(None));
+        let residual = ordinary[names.left(1, 1)] / (ROWS as f64 - 2.0);
+        for (i, j) in [(0, 0), (1, 0), (1, 1)] {
+            assert_near(known[names.covariance(i, j)], 0.3 * inverse[i][j], ROUNDING);
+            assert_near(ordinary[names.covariance(i, j)], residual * inverse[i][j], ROUNDING);
+        }
+        // Two unknowns take up the noise of two rows.
+        assert_near(known[names.freedom()], 0.6, ROUNDING);
+        assert_near(ordinary[names.freedom()], 2.0, 0.0);
+        let condition = (2.0 * (a * inverse[0][0] + d * inverse[1][1])).sqrt();
+        assert_near(known[names.condition()], condition, ROUNDING);
+    }
+}

@@ -86,3 +86,55 @@ pub(crate) fn is_determined(solved: &Solved, window: usize) -> bool {
     let Fields { layout } = solved.fields;
     solved.field(solved.fields.count())[window] > (layout.regressors() + 1) as f64
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::layout::Layout;
+
+    const LAYOUT: Layout = Layout { windowed: 1, linear: true, constant: 1 };
+
+    /// Windows of which every field of window `w` is `w` plus a hundred times the field's number.
+    fn windows(first: isize, count: usize) -> Solved {
+        let mut solved = Solved::new(LAYOUT, first, count);
+        for place in (0..count).step_by(WIDTH) {
+            let window = |lane: usize| first as f64 + (place + lane) as f64;
+            let field = |field: usize| Packet(std::array::from_fn(|lane| window(lane) + 100.0 * field as f64));
+            solved.put(place, &(0..solved.fields.size()).map(field).collect::<Vec<_>>());
+        }
+        solved
+    }
+
+    #[test]
+    fn windows_are_where_they_were_put_and_joined() {
+        let parts = [windows(-3, 11), windows(8, 2), windows(10, 17)];
+        let all = Solved::join(&parts.iter().collect::<Vec<_>>());
+        assert_eq!(all.len(), 30);
+        for field in 0..all.fields.size() {
+            let expected: Vec<f64> = (-3..27).map(|window| f64::from(window) + 100.0 * field as f64).collect();
+            assert_eq!(all.field(field), expected);
+        }
+        assert_eq!([-4, -3, 26, 27].map(|window| all.place(window)), [None, Some(0), Some(29), None]);
+    }
+
+    #[test]
+    fn a_window_is_determined_by_more_rows_than_unknowns_and_one() {
+        let mut solved = windows(0, 8);
+        let counts = Packet(std::array::from_fn(|lane| lane as f64));
+        solved.put(0, &vec![counts; solved.fields.size()]);
+        assert_eq!((0..8).filter(|&window| is_determined(&solved, window)).collect::<Vec<_>>(), [5, 6, 7]);
+        solved.disregard(6);
+        assert!(!is_determined(&solved, 6));
+    }
+
+    #[test]
+    fn unknowns_of_a_window_follow_from_the_constants_and_the_time() {
+        let (solved, window) = (windows(0, 8), 5);
+        let at = |field: usize| solved.field(field)[window];
+        let fields = solved.fields;
+        let expected = at(fields.solution(1, 1)) - 0.5 * at(fields.solution(1, 0));
+        assert_eq!(local(&solved, window, &[0.5], 1), expected);
+        let expected = -(at(fields.solution(0, 0)) + 2.0 * at(fields.solution(1, 0)));
+        assert_eq!(sensitivity(&solved, window, 0, 0, 2.0), expected);
+    }
+}

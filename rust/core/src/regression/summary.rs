@@ -125,3 +125,99 @@ fn moved_noise(layout: Layout, summary: &[Packet], shift: Packet, i: usize, j: u
         (true, true) => at(i, j) + shift * (at(i - q, j) + at(i, j - q)) + shift * shift * at(i - q, j - q),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::regression::simulated::{assert_near, products, random};
+
+    const LAYOUT: Layout = Layout { windowed: 1, linear: true, constant: 1 };
+    /// Householder reflections of some dozen rows.
+    const ROUNDING: f64 = 1e-13;
+
+    /// Columns of rows whose times count from some second: value, companion, constant, right-hand side.
+    fn columns(rows: std::ops::Range<usize>, from: f64) -> Vec<Vec<f64>> {
+        let column = |seed| random(seed, 64)[rows.clone()].to_vec();
+        let value: Vec<f64> = column(1);
+        let times = rows.clone().map(|row| row as f64 - from);
+        let companion =
+            column(2).iter().zip(&value).zip(times).map(|((own, value), time)| own + time * value).collect();
+        vec![value, companion, column(3), column(4)]
+    }
+
+    /// The summary of rows, the noise being twice the products of the local columns.
+    fn summary(rows: std::ops::Range<usize>, from: f64) -> Vec<Packet> {
+        let columns = columns(rows.clone(), from);
+        let mut found = vec![Packet::ZERO; LAYOUT.size()];
+        let mut scratch: Vec<Packet> =
+            (0..rows.len()).flat_map(|row| columns.iter().map(move |one| Packet::splat(one[row]))).collect();
+        absorb(LAYOUT, &mut found, &mut scratch, rows.len(), false);
+        for row in rows {
+            count(LAYOUT, &mut found, Packet::ONE, row as f64 - from);
+        }
+        let products = products(&columns);
+        for i in 0..2 {
+            for j in 0..=i {
+                found[LAYOUT.noise() + symmetric(i, j)] = Packet::splat(2.0 * products[i][j]);
+            }
+        }
+        found
+    }
+
+    /// What a summary says of the rows, whatever the signs of its factor.
+    fn assert_is_of(found: &[Packet], rows: std::ops::Range<usize>, from: f64) {
+        let expected = products(&columns(rows.clone(), from));
+        let at = |row: usize, column: usize| if row <= column { found[LAYOUT.entry(row, column)].0[3] } else { 0.0 };
+        for i in 0..4 {
+            for j in 0..4 {
+                let product: f64 = (0..4).map(|k| at(k, i) * at(k, j)).sum();
+                assert_near(product, expected[i][j], ROUNDING * (1.0 + expected[j][j] + expected[i][i]));
+            }
+        }
+        let sum = |power: i32| rows.clone().map(|row| (row as f64 - from).powi(power)).sum::<f64>();
+        for power in 0..3 {
+            let place = usize::try_from(power).expect("three sums");
+            assert_near(found[LAYOUT.sums() + place].0[3], sum(power), ROUNDING);
+        }
+        for (i, j) in [(0, 0), (1, 0), (1, 1)] {
+            let noise = found[LAYOUT.noise() + symmetric(i, j)].0[3];
+            assert_near(noise, 2.0 * expected[i][j], ROUNDING * (1.0 + expected[1][1]));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_summary_has_the_products_of_its_rows(begin in 0_usize..20, count in 1_usize..40, from in -5.0..50.0) {
+            assert_is_of(&summary(begin..begin + count, from), begin..begin + count, from);
+        }
+
+        #[test]
+        fn merging_summaries_is_adding_rows(begin in 0_usize..10, one in 1_usize..25, other in 1_usize..25) {
+            let (middle, end) = (begin + one, begin + one + other);
+            let mut found = summary(begin..middle, begin as f64);
+            let mut scratch = vec![Packet::ZERO; 16];
+            merge(LAYOUT, &mut found, &summary(middle..end, middle as f64), one as f64, &mut scratch);
+            assert_is_of(&found, begin..end, begin as f64);
+        }
+
+        #[test]
+        fn times_may_count_from_anywhere(begin in 0_usize..10, count in 1_usize..40, later in -30.0..30.0) {
+            let mut found = summary(begin..begin + count, 4.0);
+            let mut noise = vec![Packet::ZERO; LAYOUT.size()];
+            recentre(LAYOUT, &mut found, later, &mut noise);
+            assert_is_of(&found, begin..begin + count, 4.0 + later);
+        }
+    }
+
+    #[test]
+    fn rows_of_zeros_change_nothing() {
+        let mut found = summary(0..9, 0.0);
+        let before: Vec<[f64; 8]> = found.iter().map(|one| one.0).collect();
+        absorb(LAYOUT, &mut found, &mut [Packet::ZERO; 8], 2, false);
+        for (found, before) in found.iter().zip(before) {
+            assert_near(found.0[0].abs(), before[0].abs(), ROUNDING);
+        }
+    }
+}

@@ -249,3 +249,80 @@ fn join(parts: &[Vec<Solved>]) -> Cells {
 fn join_shape(parts: &[Vec<Solved>], shape: usize) -> Solved {
     Solved::join(&parts.iter().map(|part| &part[shape]).collect::<Vec<_>>())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::simulated::{model, rows, staged};
+
+    #[test]
+    fn windows_keep_a_test_functions_reach_away_from_the_row_that_they_predict() {
+        for (count, reach) in [(300, 3), (1000, 6), (90, 1)] {
+            let scales = Scale::all(count, reach);
+            assert!(scales.len() > 4);
+            for scale in scales {
+                let (full, reach) = (scale.full_rows(count), reach.cast_signed());
+                assert!(full.start < full.end && full.end <= count);
+                for row in full {
+                    let cell = scale.cell(row);
+                    assert!(scale.full_cells(count).contains(&cell));
+                    let (before, after) = (scale.one_sided_rows(cell), scale.one_sided_rows(scale.after(cell)));
+                    let row = row.cast_signed();
+                    assert!(before.start >= 0 && before.end + reach <= row + 1, "{scale:?}, row {row}: {before:?}");
+                    assert!(after.start >= row + reach && after.end <= count.cast_signed(), "{scale:?}, row {row}");
+                    assert_eq!(before.len(), scale.one_sided());
+                    assert_eq!((after.end - before.start).unsigned_abs(), scale.span());
+                    let [one, all] = scale.centres(cell);
+                    assert_eq!(one, (before.start + before.end - 1) as f64 / 2.0);
+                    assert_eq!(all, (before.start + after.end - 1) as f64 / 2.0);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn lengths_grow_up_to_half_of_the_rows() {
+        let scales = Scale::all(2000, 6);
+        assert!(scales.windows(2).all(|pair| pair[0].span() < pair[1].span()));
+        let longest = scales.last().expect("lengths").span();
+        assert!((500..=1000).contains(&longest), "{longest}");
+        assert!(Scale::all(Scale::fewest_rows(6) - 1, 6).is_empty());
+        assert_eq!(Scale::all(Scale::fewest_rows(6), 6).len(), 1);
+        for (place, scale) in scales.iter().enumerate() {
+            assert_eq!(Scale::nearest(&scales, scale.span()), Some(place));
+        }
+        assert_eq!(Scale::nearest(&[], 100), None);
+    }
+
+    #[test]
+    fn windows_are_the_same_whether_solved_together_or_in_parts() {
+        let rows = rows(900, |time| [time.sin(), time.cos()], 0.1);
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        for scale in Scale::all(900, 6) {
+            let all = scale.one_sided_cells(900);
+            let whole = staged(|stages| scale.solve(&problem, &all, Instructions::Scalar, stages));
+            let some = 5.min(all.end - 1)..9.min(all.end);
+            let part = scale.solve_here(&problem, &some, Instructions::Scalar);
+            let (gap, full) = staged(|stages| scale.solve_leave_gap_out(&problem, Instructions::Scalar, stages));
+            for cell in some {
+                let pairs = [
+                    (&whole.one_sided, &part.one_sided),
+                    (&whole.leave_gap_out, &part.leave_gap_out),
+                    (&whole.full, &part.full),
+                ];
+                for (whole, part) in pairs {
+                    let (one, other) = (whole.place(cell).expect("a cell"), part.place(cell).expect("a cell"));
+                    for field in 0..whole.fields.size() {
+                        assert_eq!(whole.field(field)[one], part.field(field)[other], "{scale:?}, cell {cell}");
+                    }
+                }
+                if let (Some(place), Some(same)) = (full.place(cell), whole.full.place(cell)) {
+                    let count = full.fields.count();
+                    assert_eq!(full.field(count)[place], whole.full.field(count)[same]);
+                    assert_eq!(full.field(count)[place], scale.span() as f64);
+                    assert_eq!(gap.field(count)[place], 2.0 * scale.one_sided() as f64);
+                }
+            }
+        }
+    }
+}
