@@ -12,11 +12,11 @@
 //! `n` the samples of the neighbourhood, `g` and `v` gain and leverage of the best there: `T` is the noise of the derivative per degree of
 //! freedom, for a fit has some `v` degrees of freedom a sample, and `σ² g/v` is a third of that of its highest frequency.
 //!
-//! The least error has bias: where `b² + v` is least over windows, with `b` of the power `p` of the half-width and `v`
-//! of the power `-(2d + 1)`, `b² = (2d + 1)/(2p) v`, a third of the variance for θ̈. So the standard error holds both.
-//! The squared bias of a candidate is its mean squared difference from the reference in the neighbourhood less the
-//! variance of that difference, or zero if that is negative. The standard error of an average is `√Σ w_c (b_c² +
-//! σ² g_c + (d_c - d)²)` (Burnham and Anderson 2002, section 4.3.2).
+//! The least error has bias: where `b² + v` is least over windows, with `b` of the power `p` of the half-width and `v` of the
+//! power `-(2d + 1)`, `b² = (2d + 1)/(2p) v`, a third of the variance for θ̈. So the standard error holds both. The squared
+//! bias of a candidate is its mean squared difference from the reference in the neighbourhood less the variance of that
+//! difference, or zero if that is negative. The standard error of an average is `√Σ w_c (b_c² + σ² g_c + (d_c - d)²)` (Burnham
+//! and Anderson 2002, section 4.3.2).
 //!
 //! Sums are kept for blocks of a quarter of the half-width, and weights are linear between the blocks' centres.
 

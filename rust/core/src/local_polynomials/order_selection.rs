@@ -9,13 +9,13 @@
 //!   estimates `d_n` with Akaike's weights `w_n ∝ exp(-Δ_n/2)`, and its standard error `Σ w_n √(σ_n² g_n² + (d_n - d)²)`, `g_n` the gain
 //!   of noise (Burnham and Anderson 2002, sections 2.9 and 4.3.2).
 //!
-//! Where one order is chosen, its own noise is not all of its error: another recording would have chosen another. On
-//! the same rig the error of θ̈ is 1.4 to 2.2 times `σ_n g_n` where every window chooses, 1.1 to 1.5 times where
-//! neighbours are pooled. The standard error is that of the average, but around the estimate `d` of the order chosen:
-//! `Σ w_n √(σ_n² g_n² + (d_n - d)²)`, the weights from what chose it. A sum over `C` windows of `M` samples counts most
-//! samples many times. With `v` how often a sample is in it, it holds what `(Σv)²/(M Σv²) = s l²/(M (s l - (s² -
-//! 1)/3))` windows that share no sample do, `s` and `l` the smaller and the larger of `C` and `M`: 1 for one window and
-//! 2.4 for all that share a sample with a window. The weights are `exp(-Δ_n/2)` of that many times the mean criterion.
+//! Where one order is chosen, its own noise is not all of its error: another recording would have chosen another. On the same
+//! rig the error of θ̈ is 1.4 to 2.2 times `σ_n g_n` where every window chooses, 1.1 to 1.5 times where neighbours are pooled.
+//! The standard error is that of the average, but around the estimate `d` of the order chosen:
+//! `Σ w_n √(σ_n² g_n² + (d_n - d)²)`, the weights from what chose it. A sum over `C` windows of `M` samples counts most samples
+//! many times. With `v` how often a sample is in it, it holds what `(Σv)²/(M Σv²) = s l²/(M (s l - (s² - 1)/3))` windows that
+//! share no sample do, `s` and `l` the smaller and the larger of `C` and `M`: 1 for one window and 2.4 for all that share a
+//! sample with a window. The weights are `exp(-Δ_n/2)` of that many times the mean criterion.
 
 use std::ops::Range;
 

@@ -255,8 +255,8 @@ impl LocalPolynomials {
 
     /// Standard errors in the place of derivatives, at all samples of several records, in parallel.
     ///
-    /// They are the noise times the gain of the order that is given; where it was chosen, `Σ w_n √(σ_n² g_n² + (d_n -
-    /// d)²)`, `d` the estimate. The plan must know the noise, and all outputs must be wanted.
+    /// They are the noise times the gain of the order that is given; where it was chosen, `Σ w_n √(σ_n² g_n² + (d_n - d)²)`,
+    /// `d` the estimate. The plan must know the noise, and all outputs must be wanted.
     ///
     /// # Errors
     /// As [`LocalPolynomials::run`].

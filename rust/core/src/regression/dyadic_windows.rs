@@ -1,9 +1,9 @@
 //! Solves windows of rows: summaries of blocks are merged by doubling, and each window is merged from them.
 //!
-//! Rows are grouped into blocks of `step`, and a window is a whole number of consecutive blocks. Summaries of `1, 2, 4,
-//! …` blocks are merged from each other, and a window of any length from the summaries that its binary digits name.
-//! Eight neighbouring windows are computed side by side. The numbers of a window depend only on its rows, so every way
-//! of cutting the work gives the same bits.
+//! Rows are grouped into blocks of `step`, and a window is a whole number of consecutive blocks. Summaries of `1, 2, 4, …`
+//! blocks are merged from each other, and a window of any length from the summaries that its binary digits name. Eight
+//! neighbouring windows are computed side by side. The numbers of a window depend only on its rows, so every way of cutting the
+//! work gives the same bits.
 
 use std::cell::RefCell;
 use std::ops::Range;

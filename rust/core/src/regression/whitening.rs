@@ -1,10 +1,9 @@
 //! Whitening: rows are transformed so that their noise is uncorrelated.
 //!
-//! Rows that share samples have correlated noise. Where the noise of the angle dominates, it is smallest near the
-//! resonance, where `I θ̈ + C θ̇ + K θ` is small; least squares with equal weights ignore that. With the factor `Γ = L
-//! Lᵀ` of the rows' covariance, the rows `L⁻¹ X` and `L⁻¹ b` have noise of variance one, and their least squares are
-//! generalised least squares (Aitken 1935). They equal maximum likelihood in the frequency domain, within the band that
-//! the test function passes.
+//! Rows that share samples have correlated noise. Where the noise of the angle dominates, it is smallest near the resonance,
+//! where `I θ̈ + C θ̇ + K θ` is small; least squares with equal weights ignore that. With the factor `Γ = L Lᵀ` of the rows'
+//! covariance, the rows `L⁻¹ X` and `L⁻¹ b` have noise of variance one, and their least squares are generalised least squares
+//! (Aitken 1935). They equal maximum likelihood in the frequency domain, within the band that the test function passes.
 //!
 //! Γ is banded and so is L; its rows become stationary some rows after a gap. The noise of the angle adds `tr(Γ⁻¹ G)`
 //! to the normal matrix for the products `G` of two kernels. This is the derivative of `log det Γ` in the direction of

@@ -1,12 +1,11 @@
-//! The choice of the test function: the half-width and exponent with the smallest error of inertia, damping and
-//! stiffness.
+//! The choice of the test function: the half-width and exponent with the smallest error of inertia, damping and stiffness.
 //!
 //! From the spectrum `P` of the angle and the noise of both channels, the covariance of the three and two kinds of bias
-//! follow for any test function. With `F = (φ̂, -φ̂′, φ̂″)` the responses of its kernels, `S = σ_T²|F_0|² + σ_θ²|K F_0
-//! + C F_1 + I F_2|²` the noise of a row, `A = Σ F*Fᵀ P` and `M = Σ F*Fᵀ P S`, the covariance is `A⁻¹ M A⁻¹`. The first
-//! bias is the difference between `φ″` and `-φ′` and the derivatives of `φ` at the sampled frequencies. The second is a
-//! tenth of what the noise of the angle adds to `A`, which is assumed to remain after the correction. The choice
-//! minimises the determinant of the sum.
+//! follow for any test function. With `F = (φ̂, -φ̂′, φ̂″)` the responses of its kernels, the noise of a row is
+//! `S = σ_T²|F_0|² + σ_θ²|K F_0 + C F_1 + I F_2|²`. With `A = Σ F*Fᵀ P` and `M = Σ F*Fᵀ P S` the covariance is `A⁻¹ M A⁻¹`.
+//! The first bias is the difference between `φ″` and `-φ′` and the derivatives of `φ` at the sampled frequencies. The
+//! second is a tenth of what the noise of the angle adds to `A`, which is assumed to remain after the correction. The
+//! choice minimises the determinant of the sum.
 
 use faer::Mat;
 use faer::linalg::solvers::{DenseSolveCore, Llt, Solve};

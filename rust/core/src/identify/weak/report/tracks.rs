@@ -30,6 +30,20 @@ pub(crate) struct Tracks {
 }
 
 impl Tracks {
+    /// The tracks of no coefficient: only condition and status.
+    fn of_no_coefficient(rows: usize) -> Self {
+        let nothing = || Vec::new();
+        Self {
+            first: 0,
+            values: nothing(),
+            slopes: nothing(),
+            covariances: nothing(),
+            sensitivities: nothing(),
+            condition: vec![1.0; rows],
+            status: vec![0; rows],
+        }
+    }
+
     /// The row of a place.
     pub(crate) fn row(&self, place: usize) -> f64 {
         (self.first + place.cast_signed()) as f64
@@ -63,16 +77,7 @@ impl Session<'_, '_, '_> {
         let instructions = self.options.instructions;
         let windowed = problem.layout.windowed;
         if windowed == 0 {
-            let nothing = || Vec::new();
-            return Ok(Tracks {
-                first: 0,
-                values: nothing(),
-                slopes: nothing(),
-                covariances: nothing(),
-                sensitivities: nothing(),
-                condition: vec![1.0; rows.len()],
-                status: vec![0; rows.len()],
-            });
+            return Ok(Tracks::of_no_coefficient(rows.len()));
         }
         if !self.options.averaging {
             // Rows that would lie before and after the record have windows too, as long as half of them is there.
