@@ -20,9 +20,10 @@
 
 use std::ops::Range;
 
+use faer::Mat;
+
 use crate::auto_derivatives::candidate_weights::Reference;
 use crate::auto_derivatives::candidates::{Target, product};
-use crate::auto_derivatives::eigen;
 use crate::auto_derivatives::global_choice::{CheckCancelled, Pair, rounded};
 use crate::error::Error;
 use crate::local_polynomials::basis::Basis;
@@ -240,26 +241,70 @@ fn shrinkage(projected: &Projected, variance: f64) -> Vec<Vec<f64>> {
     for first in [1, 2] {
         let degrees: Vec<usize> = (first..rows.len()).step_by(2).collect();
         let size = degrees.len();
-        let moment = |i: usize, j: usize| {
-            let sum: f64 = usable.iter().map(|&window| rows[degrees[i]][window] * rows[degrees[j]][window]).sum();
-            sum / usable.len() as f64 - if i == j { variance } else { 0.0 }
-        };
-        let mut moments = vec![0.0; size * size];
-        for i in 0..size {
-            for j in 0..=i {
-                moments[i * size + j] = moment(i, j);
-                moments[j * size + i] = moments[i * size + j];
-            }
-        }
-        let (values, vectors) = eigen::symmetric(moments, size);
-        for (k, &value) in values.iter().enumerate().filter(|(_, value)| **value > variance) {
-            let factor = value / (value + variance);
-            for i in 0..size {
-                for j in 0..size {
-                    matrix[degrees[i]][degrees[j]] += factor * vectors[i * size + k] * vectors[j * size + k];
+        // Singular values of the coefficients rather than eigenvalues of their moments: squares would lose what is small beside the rest.
+        let coefficients = Mat::from_fn(usable.len(), size, |row, j| rows[degrees[j]][usable[row]]);
+        let Ok(decomposed) = coefficients.thin_svd() else { continue };
+        let (singular, vectors) = (decomposed.S().column_vector(), decomposed.V());
+        for k in 0..singular.nrows() {
+            let value = singular[k] * singular[k] / usable.len() as f64 - variance;
+            if value > variance {
+                let factor = value / (value + variance);
+                for i in 0..size {
+                    for j in 0..size {
+                        matrix[degrees[i]][degrees[j]] += factor * vectors[(i, k)] * vectors[(j, k)];
+                    }
                 }
             }
         }
     }
     matrix
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An orthonormal pair.
+    const PAIR: [[f64; 2]; 2] = [[0.6, 0.8], [0.8, -0.6]];
+
+    /// Four windows of which the coefficients of degrees 1 and 3 have moments of these eigenvalues, and one that cannot be used.
+    fn projected(eigenvalues: [f64; 2]) -> Projected {
+        let along = |window: usize, direction: usize| {
+            let sign = if window < 2 { 1.0 } else { -1.0 };
+            if window % 2 == direction { sign * (2.0 * eigenvalues[direction]).sqrt() } else { 0.0 }
+        };
+        let row = |place: usize| (0..4).map(|window| (0..2).map(|d| along(window, d) * PAIR[d][place]).sum()).collect();
+        let mut coefficients: Vec<Vec<f64>> = vec![vec![5.0; 4], row(0), vec![0.0; 4], row(1)];
+        for row in &mut coefficients {
+            row.push(1e9);
+        }
+        Projected { level: vec![0.0, 0.0, 0.0, 0.0, f64::NAN], coefficients, residual: Vec::new() }
+    }
+
+    /// Compares with what two eigenvalues leave of the coefficients along each of the pair.
+    fn assert_shrinks(matrix: &[Vec<f64>], factors: [f64; 2]) {
+        for (i, row) in matrix.iter().enumerate() {
+            for (j, &found) in row.iter().enumerate() {
+                let expected = match (i, j) {
+                    (0, 0) => 1.0,
+                    (1 | 3, 1 | 3) => (0..2).map(|d| factors[d] * PAIR[d][i / 2] * PAIR[d][j / 2]).sum(),
+                    _ => 0.0,
+                };
+                assert!((found - expected).abs() < 8.0 * f64::EPSILON, "{i} {j}: {found} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn coefficients_shrink_as_wiener_says() {
+        // Moments of 10 and 4 are signals of 9 and 3 beside noise of 1; a signal below the noise counts as none.
+        assert_shrinks(&shrinkage(&projected([10.0, 4.0]), 1.0), [0.9, 0.75]);
+        assert_shrinks(&shrinkage(&projected([10.0, 1.9]), 1.0), [0.9, 0.0]);
+    }
+
+    #[test]
+    fn without_noise_small_coefficients_stay_beside_large_ones() {
+        // The square of the smaller one is below the rounding of the larger one's.
+        assert_shrinks(&shrinkage(&projected([1.0, 1e-20]), 0.0), [1.0, 1.0]);
+    }
 }

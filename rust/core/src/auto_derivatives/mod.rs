@@ -4,7 +4,6 @@ pub(crate) mod automatic;
 pub(crate) mod boundary;
 pub(crate) mod candidate_weights;
 pub(crate) mod candidates;
-pub(crate) mod eigen;
 pub(crate) mod global_choice;
 pub(crate) mod local_average;
 pub(crate) mod symmetric_grid;
