@@ -10,6 +10,7 @@ from house import test_python_rooms, test_rust_rooms
 
 ROOT = Path(__file__).parents[1]
 BOX, ROW, MARGIN = 160, 34, 12
+ROOMS = ("Room", "What happens there", "Files")
 HEAD = """<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" font-family="sans-serif" font-size="13">
 <defs>
 <marker id="arrow" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="7" markerHeight="7" orient="auto"><path d="M0 0L8 4L0 8z"/></marker>
@@ -57,7 +58,7 @@ def core_rooms() -> str:
         names = [name.partition("::")[2] for name in files if test_rust_rooms.room(name) == room]
         inside = sorted({name.replace("::", "/") for name in names if name.split("::")[-1] not in {"", "mod"}})
         rows.append((f"`{room}/`" if inside else f"`{room}.rs`", purpose, _together(inside)))
-    return _table(rows)
+    return _table(ROOMS, rows)
 
 
 def python_rooms() -> str:
@@ -70,12 +71,18 @@ def python_rooms() -> str:
         inside = sorted(name.split(".")[-1] for name in files if name.startswith(f"tvident.{room}."))
         place = "__init__.py" if room == "tvident" else f"{room}/" if inside else f"{room}.py"
         rows.append((f"`{place}`", purpose.replace("``", "`"), _together(inside)))
-    return _table(rows)
+    return _table(ROOMS, rows)
+
+
+def binding() -> str:
+    """Return the table of the binding's files."""
+    files = sorted((test_rust_rooms.RUST / "python" / "src").glob("*.rs"))
+    return _table(["File", "What it is"], [(f"`{path.name}`", _comment(path)) for path in files])
 
 
 def design(page: str) -> str:
     """Return DESIGN.md with its tables made anew."""
-    for name, content in (("core", core_rooms()), ("package", python_rooms())):
+    for name, content in (("core", core_rooms()), ("binding", binding()), ("package", python_rooms())):
         before, begin, rest = page.partition(f"<!-- rooms of the {name}: `make rooms` -->\n")
         _, end, after = rest.partition("<!-- end -->")
         page = f"{before}{begin}\n{content}\n{end}{after}"
@@ -107,11 +114,9 @@ def _together(files: list[str]) -> str:
     return "; ".join(cells)
 
 
-def _table(rows: list[tuple[str, str, str]]) -> str:
-    return (
-        "\n".join(["| Room | What happens there | Files |", "|-|-|-|", *(f"| {' | '.join(row)} |" for row in rows)])
-        + "\n"
-    )
+def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [headings, ["-"] * len(headings), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
 if __name__ == "__main__":

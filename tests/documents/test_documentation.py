@@ -149,9 +149,15 @@ def test_the_command_line_reference_is_what_the_commands_say() -> None:
 
 def test_the_rooms_in_the_design_are_those_of_the_sources() -> None:
     rooms, page = script("rooms"), (ROOT / "DESIGN.md").read_text(encoding="utf-8")
-    assert page.count("| What happens there |") == len(["core", "package"])
+    assert page.count("`make rooms` -->") == len(["core", "binding", "package"])
     assert page == rooms.design(page), "run `make rooms`"
     assert (ROOT / "docs" / "rooms.svg").read_text(encoding="utf-8") == rooms.drawing(), "run `make rooms`"
+
+
+def test_files_that_the_design_names_exist() -> None:
+    named = set(re.findall(r"`([\w/]+\.(?:rs|py))`", (ROOT / "DESIGN.md").read_text(encoding="utf-8")))
+    files = [path for folder in ("rust", "python", "tests") for path in (ROOT / folder).rglob("*.*")]
+    assert not {name for name in named if not any(path.as_posix().endswith(f"/{name}") for path in files)}
 
 
 @pytest.mark.parametrize(

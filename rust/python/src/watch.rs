@@ -1,4 +1,4 @@
-//! Work without the interpreter's lock, watched from the thread that called.
+//! Long calls: the interpreter's lock is released, and taken back at times for Ctrl-C and progress.
 
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
