@@ -25,7 +25,7 @@ const ROUNDS: usize = 3;
 
 /// The slow coefficients found.
 #[derive(Clone, Debug)]
-pub(crate) struct Found {
+pub(crate) struct SlowCoefficients {
     pub(crate) varying: Varying,
     /// The right-hand side without them.
     pub(crate) rhs: Vec<f64>,
@@ -52,12 +52,16 @@ pub(crate) struct SlowSearch<'a> {
 }
 
 /// Estimates slow coefficients, or returns `None` if they are not determined. `first` is the length of windows to begin with.
-pub(crate) fn find(search: &SlowSearch<'_>, first: Scale, stages: &mut Stages<'_, '_>) -> Result<Option<Found>, Error> {
+pub(crate) fn find(
+    search: &SlowSearch<'_>,
+    first: Scale,
+    stages: &mut Stages<'_, '_>,
+) -> Result<Option<SlowCoefficients>, Error> {
     let &SlowSearch { rows, model, coefficients, noise, expected, scales, instructions } = search;
     let slow = &model.constant[..coefficients];
     let rest = Model { constant: model.constant[coefficients..].to_vec(), ..model.clone() };
     let mut scale = first;
-    let mut found: Option<Found> = None;
+    let mut found: Option<SlowCoefficients> = None;
     for _ in 0..ROUNDS {
         let current = found.as_ref().map(|found| &found.varying);
         let rhs = found.as_ref().map_or_else(|| rows.rhs.clone(), |found| found.rhs.clone());
@@ -89,7 +93,7 @@ pub(crate) fn find(search: &SlowSearch<'_>, first: Scale, stages: &mut Stages<'_
         let Some(next) = validated.iter().min_by(|a, b| a.error.total_cmp(&b.error)) else { return Ok(None) };
         let error = next.error;
         scale = next.fit.scale.unwrap_or(scale);
-        found = Some(Found { varying, rhs, scale, error, reach });
+        found = Some(SlowCoefficients { varying, rhs, scale, error, reach });
     }
     Ok(found)
 }

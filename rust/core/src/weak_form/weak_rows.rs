@@ -60,7 +60,7 @@ pub(crate) struct WeakRows {
 }
 
 /// One channel, the kernels that are applied to it, and the columns that they give.
-struct Task<'a> {
+struct ChannelKernels<'a> {
     channel: Box<dyn Samples + 'a>,
     bank: FilterBank,
     columns: Range<usize>,
@@ -187,7 +187,7 @@ impl WeakRows {
 }
 
 struct Tasks<'a> {
-    tasks: Vec<Task<'a>>,
+    tasks: Vec<ChannelKernels<'a>>,
     /// Number of columns.
     width: usize,
 }
@@ -196,7 +196,7 @@ impl<'a> Tasks<'a> {
     fn add(&mut self, channel: Box<dyn Samples + 'a>, kernels: &[&[f64]], stride: usize) {
         let columns = self.width..self.width + kernels.len();
         self.width = columns.end;
-        self.tasks.push(Task { channel, bank: FilterBank::new(kernels, stride), columns });
+        self.tasks.push(ChannelKernels { channel, bank: FilterBank::new(kernels, stride), columns });
     }
 }
 

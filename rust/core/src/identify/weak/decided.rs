@@ -23,7 +23,7 @@ pub(crate) struct Decided {
     pub(crate) model: Model,
     /// Constants that turned out to change.
     pub(crate) slow: Vec<usize>,
-    pub(crate) found: Option<slowly_varying::Found>,
+    pub(crate) found: Option<slowly_varying::SlowCoefficients>,
     /// Nothing where the constants are not determined.
     pub(crate) fit: Option<Fit>,
     /// The length of windows that predicts best while nothing changes slowly. What changes is looked for from there: windows that were chosen while

@@ -64,7 +64,7 @@ pub(crate) fn identify_weak(
     identify(record, options, workers, watch)
 }
 
-/// The velocity at every sample, from local polynomials an eighth of a typical cycle to either rhs.
+/// The velocity at every sample, from local polynomials an eighth of a typical cycle to either side.
 fn velocity(
     angle: &dyn Samples,
     options: &WeakOptions,

@@ -9,7 +9,7 @@ use crate::simd::instructions::Instructions;
 pub(crate) struct WeakOptions {
     /// Seconds from one sample to the next.
     pub(crate) delta: f64,
-    /// Samples on either rhs of a test function's centre; chosen from the spectra where not given.
+    /// Samples on either side of a test function's centre; chosen from the spectra where not given.
     pub(crate) half_width: Option<usize>,
     /// Exponent of the test function; chosen likewise.
     pub(crate) exponent: Option<usize>,

@@ -49,7 +49,7 @@ pub(crate) struct Inside<'a> {
 }
 
 impl Session<'_, '_, '_> {
-    /// Looks at the rows outside the mask; nothing where there is no mask, or no row on one rhs of it.
+    /// Looks at the rows outside the mask; nothing where there is no mask, or no row on one side of it.
     pub(crate) fn outside_mask(&mut self, weak: &WeakRows, inside: &Inside<'_>) -> Result<Option<Outside>, Error> {
         if self.record.mask.is_none() {
             return Ok(None);
