@@ -1,4 +1,4 @@
-//! The equation of motion: what stands in it, and its rows.
+//! The equation of motion: its terms and its rows.
 
 pub(crate) mod motion;
 pub(crate) mod rows;

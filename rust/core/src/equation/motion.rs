@@ -1,6 +1,6 @@
 //! Rows of the equation of motion `I θ̈ + C θ̇ + K θ + terms = T`, from derivatives of the angle.
 //!
-//! What is unknown becomes a column of regressors; what is known moves to the right-hand rhs.
+//! Unknown coefficients have a column of regressors; known terms move to the right-hand side.
 
 use crate::equation::terms::{BuiltInTerm, TermFunction};
 use crate::record::samples::Samples;
@@ -16,7 +16,7 @@ pub enum Coefficient<'a> {
     Record(&'a dyn Samples),
 }
 
-/// A term on the left-hand rhs beside inertia, damping and stiffness, with an unknown factor.
+/// A term on the left-hand side beside inertia, damping and stiffness, with an unknown factor.
 #[derive(Clone, Copy)]
 pub enum Term<'a> {
     /// One that has a name.
@@ -46,7 +46,7 @@ impl Motion<'_> {
     }
 
     /// Builds the rows of the samples from `first` on: one column an unknown, in the order of inertia, damping, stiffness and terms,
-    /// then the right-hand rhs. `derivatives` are the angle and its first and second derivative at these samples; those that are
+    /// then the right-hand side. `derivatives` are the angle and its first and second derivative at these samples; those that are
     /// columns as they are change places with them and are not copied.
     pub(crate) fn rows(
         &self,

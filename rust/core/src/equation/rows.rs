@@ -1,4 +1,4 @@
-//! Rows of the equation of motion of one record, whatever form they were made in.
+//! Rows of the equation of motion of one record, in strong or weak form.
 
 use std::ops::Range;
 
@@ -26,7 +26,7 @@ pub(crate) struct Rows {
     /// The kernel that the angle's noise enters the right-hand side by; empty where it does not.
     pub(crate) rhs_noise: Vec<f64>,
     pub(crate) usable: Vec<bool>,
-    /// The first rows after jumps of what is windowed, in order.
+    /// The first rows after jumps of windowed coefficients, in order.
     pub(crate) jumps: Vec<usize>,
     /// Seconds from one row to the next.
     pub(crate) period: f64,

@@ -1,4 +1,4 @@
-//! A call that needs nothing but two channels and a sample rate, and takes what is known beside them.
+//! The simple call: two channels and a sample rate, with a builder for everything else.
 
 use std::num::NonZeroUsize;
 
@@ -59,7 +59,7 @@ pub struct StrongSettings {
     pub regression_window: usize,
     /// Whether the torque is smoothed by polynomials of the orders chosen for the angle.
     pub filter_torque: bool,
-    /// Whether what is windowed may grow linearly within a window.
+    /// Whether windowed coefficients may grow linearly within a window.
     pub linear: bool,
     /// The step that the angle was rounded to: no residual is taken to be smaller than it leaves.
     pub quantisation: f64,

@@ -1,4 +1,4 @@
-//! What each form finds, told in the same words.
+//! The results of each form, converted to one common type.
 
 use std::num::NonZeroUsize;
 

@@ -1,4 +1,4 @@
-//! What is found in one record, whatever the route.
+//! The result of one record, whatever its route.
 
 use crate::identify::kinds::Kind;
 use crate::identify::weak::lag::Lag;
@@ -111,7 +111,7 @@ pub struct Identification {
     pub record_status: Status,
     /// Order of the polynomial around every wanted sample; empty in weak form.
     pub order: Vec<u8>,
-    /// Samples before which what is windowed jumps.
+    /// Samples before which windowed coefficients jump.
     pub jumps: Vec<usize>,
     /// What only the weak form says.
     pub weak: Option<WeakDetails>,

@@ -1,4 +1,4 @@
-//! How each unknown comes about, and what a form makes of what was asked for.
+//! The kind of each unknown: windowed, slowly varying or constant, and which kinds a form offers.
 
 /// How an unknown comes about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,7 +9,7 @@ pub enum Kind {
     Constant,
     /// Constant unless the record says otherwise; a stiffness is windowed.
     Automatic,
-    /// Changes more slowly than what is windowed.
+    /// Varies more slowly than the windowed coefficients.
     Varying,
 }
 

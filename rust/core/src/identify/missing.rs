@@ -1,4 +1,4 @@
-//! What becomes of the numbers around missing samples, where they are to have none.
+//! The treatment of results around missing samples, where they shall be NaN.
 
 use crate::equation::motion::Motion;
 use crate::identify::identification::{Identification, Unknown};

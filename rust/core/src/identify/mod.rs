@@ -1,4 +1,4 @@
-//! One record, from samples to numbers with errors and a status.
+//! Identification of one record: from samples to parameters with standard errors and status.
 
 pub(crate) mod builder;
 pub(crate) mod form;

@@ -1,4 +1,4 @@
-//! How records are identified.
+//! The options of identification.
 
 use crate::equation::motion::Motion;
 use crate::identify::kinds::Kind;
@@ -26,7 +26,7 @@ pub struct WeakForm {
     /// Whether windows of many lengths, before, around and after a sample are averaged and, where nothing is windowed, equations are weighted by
     /// their noise; otherwise ordinary least squares in windows of one length.
     pub averaging: bool,
-    /// Whether what is windowed may grow linearly within a window.
+    /// Whether windowed coefficients may grow linearly within a window.
     pub linear: bool,
     /// Variances of the noise of angle and torque.
     pub noise: [Option<f64>; 2],
@@ -54,7 +54,7 @@ pub struct StrongForm<'a> {
     pub regression_window: usize,
     /// Whether the torque is smoothed by polynomials of the orders chosen for the angle.
     pub filter_torque: bool,
-    /// Whether what is windowed may grow linearly within a window.
+    /// Whether windowed coefficients may grow linearly within a window.
     pub linear: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Results of weak rows, and what they say at every sample.
+//! Results of weak rows, and their interpolation to every sample.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Parameters that are the same over whole records in strong form, piece by piece.
+//! Constant parameters over whole records in strong form, piece by piece.
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
@@ -20,7 +20,7 @@ use crate::regression::limits::status_of;
 use crate::regression::newey_west::enlarge;
 use crate::status::Status;
 
-/// Identifies parameters that are the same over the whole record, one result a record; nothing where they are not determined.
+/// Identifies parameters that are the same over the whole record, one result per record, or `None` if they are not determined.
 ///
 /// `derivatives` must be a plan for the value and the first two derivatives. Equations that hold a value that is no number are left
 /// out. Of the outputs only orders and statuses are written. Standard errors hold the correlation of neighbouring rows, as residuals of

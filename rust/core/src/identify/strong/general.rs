@@ -1,7 +1,7 @@
-//! Identification in strong form with kinds of its own for every parameter: some in every window, some constant over the record.
+//! Identification in strong form with a kind of its own for every parameter: some windowed, some constant over the record.
 //!
-//! The rows are those of the paper, one a sample, from derivatives of local polynomials. Standard errors hold that neighbouring rows are
-//! correlated: those of constants by the covariance of the residuals, those of windows by how far windows scatter (see the module `scatter`).
+//! The rows are those of the paper, one a sample, from derivatives of local polynomials. Standard errors account for the correlation of neighbouring rows:
+//! those of constants by the covariance of the residuals, those of windows by the scatter of windows (see `scatter`).
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
@@ -38,7 +38,7 @@ const STAGES: usize = 6;
 pub(crate) struct StrongOptions {
     /// Rows of a window.
     pub(crate) regression_window: usize,
-    /// Whether what is windowed may grow linearly within a window.
+    /// Whether windowed coefficients may grow linearly within a window.
     pub(crate) linear: bool,
     /// How each unknown comes about: unknown coefficients in the order inertia, damping, stiffness, then terms.
     pub(crate) kinds: Vec<Kind>,
@@ -254,7 +254,7 @@ fn row_covariance(
     Ok(covariance)
 }
 
-/// By how much standard errors of what is windowed exceed those of ordinary least squares, where all is taken as constant.
+/// The factor by which standard errors of windowed coefficients exceed those of ordinary least squares, if all are assumed constant.
 fn redundancies(problem: &Problem<'_>, reach: usize) -> Option<Vec<f64>> {
     let columns = problem.windowed.iter().chain(&problem.constants).chain([&problem.rhs]);
     let columns: Vec<Vec<f64>> = columns.map(|column| column.to_vec()).collect();

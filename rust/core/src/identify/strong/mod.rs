@@ -1,4 +1,4 @@
-//! Identification in strong form: rows from derivatives, one a sample.
+//! Identification in strong form: one row per sample, from estimated derivatives.
 
 pub(crate) mod constant;
 pub(crate) mod general;

@@ -1,4 +1,4 @@
-//! One row a sample, from derivatives of local polynomials.
+//! Rows of the strong form, one per sample, from derivatives of local polynomials.
 
 use crate::equation::motion::{Coefficient, Motion, Term};
 use crate::equation::rows::{Regressor, Rows};

@@ -1,9 +1,9 @@
-//! How far windows scatter, over what their standard errors say.
+//! The scatter of windows, compared with their standard errors.
 //!
-//! Ordinary least squares take equations as independent and unknowns as constant within a window. Neither holds: derivatives at
-//! neighbouring samples come from nearly the same samples, and what changes within a window pulls its unknowns. Windows that share no
-//! equation tell what both amount to. The second difference of three of them, `x₀ − (x₋ + x₊)/2`, has the variance `v₀ + (v₋ + v₊)/4` if
-//! their variances are right, and a steady drift adds nothing to it. What every window is wrong by alike is not seen.
+//! Ordinary least squares assume independent equations and constant unknowns within a window. Neither holds: derivatives at
+//! neighbouring samples come from nearly the same samples, and unknowns that change within a window bias it. Windows that share no
+//! equation show both effects. The second difference of three of them, `x₀ − (x₋ + x₊)/2`, has the variance `v₀ + (v₋ + v₊)/4` if
+//! their variances are right, and a steady drift adds nothing to it. An error common to all windows is not seen.
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
@@ -184,7 +184,7 @@ impl Taken {
     }
 }
 
-/// The factors for what windows say that were solved around every sample of a record; nothing where it is too short.
+/// The scatter of windows around every sample of a record over their standard errors, or `None` if the record is too short.
 pub(crate) fn scatter_of(
     derivatives: &LocalPolynomials,
     window: usize,
@@ -200,7 +200,7 @@ pub(crate) fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
     columns.iter().map(Vec::as_slice).collect()
 }
 
-/// The root of the mean of squared differences of every unknown, of which none counts too much; nothing where one has none.
+/// The root mean square of the differences of every unknown, robust against single ones, or `None` if an unknown has none.
 fn factors(unknowns: usize, taken: impl IntoIterator<Item = Taken>) -> Option<Vec<f64>> {
     let mut squares = vec![Vec::new(); unknowns];
     taken.into_iter().for_each(|taken| taken.add(&mut squares));

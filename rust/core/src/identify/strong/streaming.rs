@@ -1,4 +1,4 @@
-//! Identification of one or many records: local polynomials, rows of the equation of motion, least squares, in one pass over pieces.
+//! Strong form, streaming: local polynomials, rows of the equation of motion and least squares in one pass over pieces of records.
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
@@ -48,7 +48,7 @@ pub(crate) struct Chunk {
     order: Vec<u8>,
     status: Vec<u16>,
     known: Vec<f64>,
-    /// Unknowns, then the right-hand rhs.
+    /// Unknowns, then the right-hand side.
     pub(crate) columns: Vec<Vec<f64>>,
     polynomials: crate::local_polynomials::plan::PolynomialScratch,
 }

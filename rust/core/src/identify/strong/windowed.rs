@@ -1,4 +1,4 @@
-//! Parameters in a window of equations around every sample in strong form, piece by piece: the paper's form.
+//! Windowed parameters around every sample in strong form, piece by piece: the paper's method.
 
 use std::num::NonZeroUsize;
 

@@ -1,4 +1,4 @@
-//! The choice of the test function, from the spectra of the channels and what a first fit says of the parameters.
+//! The choice of the test function, from the spectra of the channels and the parameters of a first fit.
 
 use crate::equation::motion::Coefficient;
 use crate::error::Error;
@@ -48,7 +48,7 @@ impl Session<'_, '_, '_> {
         Ok(fit.map_or([0.0; 3], |fit| self.parameters(model, &fit)))
     }
 
-    /// The rows in stretches of a long record; nothing where all of it is as good. `widest` is the half-width of the widest test function.
+    /// The rows of a subsample of a long record, or `None` if the record is short enough to use all of it. `widest` is the half-width of the widest test function.
     fn some_rows(&mut self, function: TestFunction, widest: usize) -> Result<Option<WeakRows>, Error> {
         let samples = self.record.angle.len();
         let length = (PILOT_SAMPLES / PILOT_STRETCHES).max(PILOT_WIDTHS * widest);

@@ -1,4 +1,4 @@
-//! What a record says of its unknowns: over which length windows should reach, and what is constant.
+//! Decisions from the record: the length of windows, and which unknowns are constant.
 
 use crate::equation::rows::Rows;
 use crate::error::Error;
@@ -22,7 +22,7 @@ const BETTER: f64 = 0.8;
 const JUMP_ROUNDS: usize = 4;
 
 impl Session<'_, '_, '_> {
-    /// Chooses the length of windows where it is not given, tests what is constant, and finds jumps of what is windowed.
+    /// Chooses the length of windows where it is not given, tests which coefficients are constant, and finds jumps of windowed ones.
     pub(crate) fn decide(&mut self, chosen: &mut Chosen, model: &Model) -> Result<Decided, Error> {
         let (mut jumps, mut whole, mut round) = (Vec::new(), None, 0);
         loop {

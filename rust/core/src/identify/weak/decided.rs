@@ -1,4 +1,4 @@
-//! What was decided of a record, and the fit it rests on.
+//! The decisions made for a record, and the fit that they rest on.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ pub(crate) struct Decided {
     /// Constants that turned out to change.
     pub(crate) slow: Vec<usize>,
     pub(crate) found: Option<slowly_varying::SlowCoefficients>,
-    /// Nothing where the constants are not determined.
+    /// `None` if the constants are not determined.
     pub(crate) fit: Option<Fit>,
     /// The length of windows that predicts best while nothing changes slowly. What changes is looked for from there: windows that were chosen while
     /// too little was free are so short that nothing else is found from them.
@@ -39,7 +39,7 @@ pub(crate) struct Decided {
     /// What it makes of the windowed regressors, once a fit was made with it.
     pub(crate) correlated: Option<Arc<Correlated>>,
     pub(crate) expected: Expected,
-    /// Where what is windowed jumps.
+    /// Jumps of windowed coefficients.
     pub(crate) jumps: Vec<Jump>,
     /// All rows, also those over jumps; nothing without jumps.
     pub(crate) whole: Option<Rows>,
@@ -66,7 +66,7 @@ impl Decided {
         }
     }
 
-    /// The right-hand rhs without what changes slowly.
+    /// The right-hand side without what changes slowly.
     pub(crate) fn rhs<'a>(&'a self, rows: &'a Rows) -> &'a [f64] {
         self.found.as_ref().map_or(&rows.rhs, |found| &found.rhs)
     }

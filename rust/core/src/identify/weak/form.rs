@@ -1,4 +1,4 @@
-//! One record in weak form, from its channels to what was found.
+//! The weak form of one record, from its channels to its result.
 
 use std::num::NonZeroUsize;
 

@@ -1,4 +1,4 @@
-//! What was found in one record in weak form.
+//! The result of one record in weak form.
 
 use crate::identify::results::{Constant, SampleResults};
 use crate::identify::weak::lag::Lag;
@@ -36,7 +36,7 @@ pub(crate) struct WeakIdentified {
     pub(crate) mostly_noise: bool,
     /// What may have been left out.
     pub(crate) suspects: Vec<Suspect>,
-    /// The lag that was estimated; nothing where it was given or is not determined.
+    /// The estimated lag, or `None` if it was given or is not determined.
     pub(crate) lag: Option<Lag>,
     /// What the rows say that the mask keeps out; nothing without a mask.
     pub(crate) outside_mask: Option<Outside>,

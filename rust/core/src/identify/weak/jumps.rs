@@ -1,4 +1,4 @@
-//! Jumps of what is windowed, looked for in what a fit leaves.
+//! Jumps of windowed coefficients, searched in the residuals of a fit.
 
 use crate::equation::rows::Rows;
 use crate::error::Error;
@@ -19,7 +19,7 @@ use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows};
 const JUMP_SCALES: usize = 3;
 
 impl Session<'_, '_, '_> {
-    /// Finds jumps of what is windowed beside those that are known. `whole` holds all rows where some are over jumps.
+    /// Finds jumps of windowed coefficients beside the known ones. `whole` holds all rows where some are over jumps.
     pub(crate) fn find_jumps(
         &mut self,
         weak: &WeakRows,
@@ -65,7 +65,7 @@ impl Session<'_, '_, '_> {
     }
 }
 
-/// What the windowed unknowns multiply, sample by sample; nothing where there are none or jumps of one would act through a derivative.
+/// The factors of the windowed unknowns, sample by sample, or `None` if there are none or jumps of one would act through a derivative.
 fn signals<'a>(record: &Record<'a>, model: &Model) -> Option<Vec<Box<dyn Samples + 'a>>> {
     if model.windowed.is_empty() {
         return None;

@@ -1,10 +1,10 @@
-//! By how much the torque comes late, as the record itself says.
+//! The lag of the torque, estimated from the record itself.
 //!
-//! What was recorded too late by `τ` is `T(t) = T_recorded(t + τ) ≈ T_recorded(t) + τ Ṫ_recorded(t)` on time, so the factor of the torque's
-//! rate beside everything else is what is left of the lag. The rows are made anew with what was found until nothing is left: there
+//! A torque recorded too late by `τ` is `T(t) = T_recorded(t + τ) ≈ T_recorded(t) + τ Ṫ_recorded(t)`, so the coefficient of the torque's
+//! rate is the remaining lag. The rows are built again with the lag found so far until nothing remains: there
 //! the expansion is exact, and the noise of the rate, which is uncorrelated with that of the torque, no longer matters.
 //!
-//! The lag is told from the damping by the inertia: with motion at a single frequency it is not determined.
+//! Only the inertia separates the lag from the damping: with motion at a single frequency the lag is not determined.
 
 use std::sync::Arc;
 
@@ -70,7 +70,7 @@ impl Session<'_, '_, '_> {
         Ok((chosen, decided, lag))
     }
 
-    /// The lag with which nothing is left of it; nothing where the rows do not determine it.
+    /// The lag, iterated until its correction vanishes, or `None` if the rows do not determine it.
     fn find_lag(&mut self, chosen: &Chosen, decided: &Decided) -> Result<Option<Lag>, Error> {
         let Some(fit) = &decided.fit else { return Ok(None) };
         let start = self.record.lag;
@@ -113,7 +113,7 @@ impl Session<'_, '_, '_> {
         decided: &Decided,
         fit: &Fit,
     ) -> Result<Option<(f64, f64)>, Error> {
-        // What changes slowly depends on the angle only, so what it took off the right-hand rhs is the same for every lag.
+        // What changes slowly depends on the angle only, so what it took off the right-hand side is the same for every lag.
         let (before, without) = (&chosen.weak.rows.rhs, decided.rhs(&chosen.weak.rows));
         let slow = before.iter().zip(without).map(|(rhs, without)| rhs - without);
         let rhs = weak.rows.rhs.iter().zip(slow).map(|(rhs, slow)| rhs - slow).collect();
@@ -141,7 +141,7 @@ impl Session<'_, '_, '_> {
         3 + self.record.terms.len()
     }
 
-    /// The covariance of the constants of a model where the lag was estimated beside them; nothing where it was not.
+    /// The covariance of the constants of a model together with the lag, or `None` if the lag was not estimated.
     pub(crate) fn covariance_beside_lag(
         &mut self,
         rows: &Rows,

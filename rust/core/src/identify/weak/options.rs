@@ -1,4 +1,4 @@
-//! How one record is identified in weak form.
+//! The options of the weak form for one record.
 
 use crate::identify::kinds::Kind;
 use crate::inference::missing_terms::Missing;
@@ -18,7 +18,7 @@ pub(crate) struct WeakOptions {
     /// Whether windows of many lengths, before, around and after a sample are averaged and, where nothing is windowed, equations are weighted by
     /// their noise; otherwise ordinary least squares in windows of one length.
     pub(crate) averaging: bool,
-    /// Whether what is windowed may grow linearly within a window.
+    /// Whether windowed coefficients may grow linearly within a window.
     pub(crate) linear: bool,
     /// How each unknown comes about: unknown coefficients in the order inertia, damping, stiffness, then terms.
     pub(crate) kinds: Vec<Kind>,

@@ -1,7 +1,7 @@
-//! Whether a model that was found inside a mask holds for the rows that the mask keeps out.
+//! A test of whether a model identified inside a mask holds for the rows outside it.
 //!
 //! The constants are estimated from the rows outside alone and compared with those from inside, each with its standard error (Chow 1960);
-//! where nothing belongs to windows, what is left of the rows is compared as well.
+//! if no unknown is windowed, the residuals are compared as well.
 
 use crate::error::Error;
 use crate::identify::weak::decided::Decided;
@@ -21,7 +21,7 @@ const CONSPICUOUS: f64 = 5.0;
 pub struct Outside {
     /// Constants that differ from those inside: which unknown, the value outside, and the standard error of the difference.
     pub differing: Vec<(usize, f64, f64)>,
-    /// Mean square of what is left of a row, over that inside; nothing where an unknown belongs to windows.
+    /// Mean square of the residuals over that inside the mask, or `None` if an unknown is windowed.
     pub left: Option<f64>,
     /// The rows.
     pub(crate) rows: Vec<usize>,
@@ -49,7 +49,7 @@ pub(crate) struct Inside<'a> {
 }
 
 impl Session<'_, '_, '_> {
-    /// Looks at the rows outside the mask; nothing where there is no mask, or no row on one side of it.
+    /// Tests the rows outside the mask. Returns `None` if there is no mask, or no row on one side of it.
     pub(crate) fn outside_mask(&mut self, weak: &WeakRows, inside: &Inside<'_>) -> Result<Option<Outside>, Error> {
         if self.record.mask.is_none() {
             return Ok(None);

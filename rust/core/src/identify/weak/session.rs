@@ -1,4 +1,4 @@
-//! One record under work: its channels, its noise, and what every step asks of them.
+//! The working data of one record in weak form: its channels, its noise, and what every step needs of them.
 
 use crate::equation::motion::{Coefficient, unknowns};
 use crate::error::Error;

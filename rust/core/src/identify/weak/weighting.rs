@@ -1,4 +1,4 @@
-//! Equations weighted by the inverse of the covariance of their noise, where nothing changes.
+//! Generalised least squares where all unknowns are constant: equations weighted by the inverse covariance of their noise.
 
 use crate::equation::rows::Rows;
 use crate::error::Error;

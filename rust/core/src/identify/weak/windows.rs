@@ -1,4 +1,4 @@
-//! The length of windows that predicts best, and the constants that they leave.
+//! The length of windows with the smallest cross-validation error, and the constants estimated with it.
 
 use crate::equation::rows::Rows;
 use crate::error::Error;

@@ -1,4 +1,4 @@
-//! What changes and its errors, put together at every row.
+//! Windowed and slowly varying coefficients with their standard errors, combined at every row.
 
 use crate::error::Error;
 use crate::exec::stages::Stages;

@@ -1,4 +1,4 @@
-//! How errors are made: from the noise of the channels, or where that fails from what is left.
+//! Standard errors: from the noise of the channels, or from the residuals where that noise model fails.
 
 use crate::error::Error;
 use crate::identify::weak::decided::Decided;

@@ -1,4 +1,4 @@
-//! What may have been left out of the equation, judged beside everything that was found.
+//! Tests of terms missing from the equation, beside everything that was estimated.
 
 use crate::equation::terms::BUILT_IN_TERMS;
 use crate::error::Error;

@@ -1,4 +1,4 @@
-//! What is said of a record once it is decided what changes.
+//! The report of one record after all decisions.
 
 pub(crate) mod at_rows;
 pub(crate) mod errors;

@@ -1,4 +1,4 @@
-//! What is said of a record once it is decided what changes: values at every sample, their errors, and what looks wrong.
+//! The report of one record after all decisions: values at every sample, standard errors and flags.
 
 use std::borrow::Cow;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! What changes, at every row.
+//! Windowed coefficients at every row.
 
 use crate::error::Error;
 use crate::exec::stages::Stages;
@@ -149,7 +149,7 @@ impl Session<'_, '_, '_> {
     }
 }
 
-/// How what is windowed changes with each constant, row by row: what the window nearest to a row says.
+/// The derivatives of the windowed coefficients with respect to each constant, row by row, from the window nearest to each row.
 fn sensitivities(problem: &Problem<'_>, all: &Fit, stages: &mut Stages<'_, '_>) -> Result<Vec<Vec<f64>>, Error> {
     let layout = problem.layout;
     let determined: Vec<usize> = (0..all.full.len()).filter(|&window| is_determined(&all.full, window)).collect();
