@@ -9,10 +9,14 @@ __all__ = [
     "HARDLY_TOLD_APART",
     "NOISE_MODEL_FAILS",
     "NO_CHANCE",
+    "AutomaticEstimates",
     "Identification",
+    "LocalEstimates",
     "LocalPolynomials",
     "Motions",
+    "Noise",
     "OutsideMask",
+    "RollingRegressions",
     "StrongForm",
     "Suspect",
     "Unknown",
@@ -58,7 +62,7 @@ class LocalPolynomials:
         step: int = 1,
         workers: int | None = None,
         progress: Callable[[int, int], object] | None = None,
-    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint8], npt.NDArray[np.uint16], npt.NDArray[np.float64]]: ...
+    ) -> LocalEstimates: ...
     def errors(
         self, samples: npt.NDArray[np.number], *, step: int = 1, workers: int | None = None
     ) -> npt.NDArray[np.float64]: ...
@@ -73,6 +77,52 @@ class Motions:
         coefficients: list[npt.NDArray[np.number] | float | None],
         terms: list[npt.NDArray[np.number] | str],
     ) -> Motions: ...
+
+@final
+class LocalEstimates:
+    @property
+    def derivatives(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def order(self) -> npt.NDArray[np.uint8]: ...
+    @property
+    def status(self) -> npt.NDArray[np.uint16]: ...
+    @property
+    def sigma(self) -> npt.NDArray[np.float64]: ...
+
+@final
+class AutomaticEstimates:
+    @property
+    def derivatives(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def stderr(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def order(self) -> npt.NDArray[np.uint8]: ...
+    @property
+    def status(self) -> npt.NDArray[np.uint16]: ...
+    @property
+    def chosen(self) -> list[list[tuple[int, int]]]: ...
+    @property
+    def noise(self) -> list[tuple[float, float]]: ...
+
+@final
+class RollingRegressions:
+    @property
+    def params(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def stderr(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def rss(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def condition(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def status(self) -> npt.NDArray[np.uint16]: ...
+
+@final
+class Noise:
+    @property
+    def sigma(self) -> float: ...
+    @property
+    def quantisation(self) -> float: ...
 
 @final
 class WeakForm:
@@ -183,15 +233,8 @@ def estimate_automatically(
     *,
     workers: int | None = None,
     progress: Callable[[int, int], object] | None = None,
-) -> tuple[
-    npt.NDArray[np.float64],
-    npt.NDArray[np.float64],
-    npt.NDArray[np.uint8],
-    npt.NDArray[np.uint16],
-    list[list[tuple[int, int]]],
-    list[tuple[float, float]],
-]: ...
-def noise(samples: npt.NDArray[np.number], quantisation: float | None = None) -> tuple[list[float], list[float]]: ...
+) -> AutomaticEstimates: ...
+def noise(samples: npt.NDArray[np.number], quantisation: float | None = None) -> list[Noise]: ...
 def quantisation_step(samples: npt.NDArray[np.number]) -> float: ...
 def identify(
     motions: Motions,
@@ -211,19 +254,13 @@ def identify(
 def built_in_terms() -> list[str]: ...
 def rolling_least_squares(
     regressors: npt.NDArray[np.number],
-    sides: npt.NDArray[np.number],
+    rhs: npt.NDArray[np.number],
     window: int,
     *,
     step: int = 1,
     workers: int | None = None,
     progress: Callable[[int, int], object] | None = None,
-) -> tuple[
-    npt.NDArray[np.float64],
-    npt.NDArray[np.float64],
-    npt.NDArray[np.float64],
-    npt.NDArray[np.float64],
-    npt.NDArray[np.uint16],
-]: ...
+) -> RollingRegressions: ...
 def status_flags() -> list[tuple[str, int]]: ...
 def available_instructions() -> list[str]: ...
 def instructions() -> str: ...

@@ -53,11 +53,11 @@ def test_noise_of_every_channel() -> None:
     t = np.arange(20_000) * 1e-3
     level = np.array([[1e-4], [1e-2], [1.0]])
     y = np.sin(30 * t) + level * generator.standard_normal((3, t.size))
-    sigma, step = _core.noise(y)
+    found = _core.noise(y)
     # 20 000 samples know the noise to some 1 %.
-    np.testing.assert_allclose(sigma, level[:, 0], rtol=0.02)
-    assert step == [0, 0, 0]
-    assert _core.noise(y, 0.5)[0][0] == pytest.approx(0.5 / np.sqrt(12))
+    np.testing.assert_allclose([one.sigma for one in found], level[:, 0], rtol=0.02)
+    assert [one.quantisation for one in found] == [0, 0, 0]
+    assert _core.noise(y, 0.5)[0].sigma == pytest.approx(0.5 / np.sqrt(12))
     with pytest.raises(ValueError, match="at least 25 samples"):
         _core.noise(y[:, :24])
 

@@ -108,7 +108,7 @@ def test_the_numbers_do_not_depend_on_the_number_of_workers(workers: int, window
     [
         ({"A": np.ones((100, 17))}, ValueError, "at most 16 columns; got 17"),
         ({"b": np.ones(99)}, ValueError, "as many rows as each other; got 100 and 99"),
-        ({"window": 2}, ValueError, "window must be at least 3 samples; got 2"),
+        ({"window_length": 2}, ValueError, "window_length must be at least 3 samples; got 2"),
         ({"window": 101}, ValueError, "less than or equal to the length of the record; got 101"),
         ({"A": np.ones((10, 5, 2))}, ValueError, r"shape \(n, p\)"),
         ({"b": np.ones(100) * 1j}, TypeError, "b must be real"),

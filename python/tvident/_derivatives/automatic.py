@@ -40,7 +40,7 @@ def choose(
             f"{name} must be at least max_deriv where window_length='auto'; got {highest} for derivative {max_deriv}; "
             f"use {name}={max_deriv} or more, or ask for fewer derivatives"
         )
-    derivatives, errors, orders, status, chosen, noises = _core.estimate_automatically(
+    found = _core.estimate_automatically(
         samples,
         list(range(max_deriv + 1)),
         highest,
@@ -51,8 +51,8 @@ def choose(
         progress=progress,
     )
     leading = samples.shape[:-1]
-    pairs = np.array(chosen, dtype=np.intp).reshape(max_deriv + 1, *leading, 2)
-    noise = np.array(noises).reshape(*leading, 2)
+    pairs = np.array(found.chosen, dtype=np.intp).reshape(max_deriv + 1, *leading, 2)
+    noise = np.array(found.noise).reshape(*leading, 2)
     lengths = pairs[..., 0]
 
     def plan_of(index: tuple[int, ...]) -> _core.LocalPolynomials:
@@ -61,9 +61,9 @@ def choose(
 
     shape = (*leading, len(range(0, count, step)))
     return Found(
-        derivatives=derivatives[..., ::step],
-        order=orders[..., ::step],
-        status=status[..., ::step],
+        derivatives=found.derivatives[..., ::step],
+        order=found.order[..., ::step],
+        status=found.status[..., ::step],
         sigma=np.broadcast_to(noise[..., :1], shape).copy(),
         window_length=lengths,
         settings={
@@ -73,6 +73,6 @@ def choose(
             "noise": noise[..., 0].tolist(),
             "quantisation": noise[..., 1].tolist(),
         },
-        errors=lambda: errors[..., ::step],
+        errors=lambda: found.stderr[..., ::step],
         plan_of=plan_of,
     )

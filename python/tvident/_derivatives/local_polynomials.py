@@ -199,12 +199,12 @@ def fit_local_polynomials(
             )
             return LocalPolynomialFit(samples, axis, every, found)
         core_plan = plan_of_window(length)
-        derivatives, orders, status, sigma = core_plan.estimate(samples, step=every, workers=threads, progress=report)
+        estimates = core_plan.estimate(samples, step=every, workers=threads, progress=report)
     found = Found(
-        derivatives=derivatives,
-        order=orders,
-        status=status,
-        sigma=sigma,
+        derivatives=estimates.derivatives,
+        order=estimates.order,
+        status=estimates.status,
+        sigma=estimates.sigma,
         window_length=length,
         settings={
             "window_length": length,

@@ -121,7 +121,7 @@ def savgol_filter(
         arguments.check_window("window_length", length, samples.shape[-1])
     else:
         samples = _padded(samples.astype(np.float64, copy=False), length, mode, cval)
-    derivatives, *_ = core_plan.estimate(samples, ends=ends, workers=arguments.worker_count(None))
+    derivatives = core_plan.estimate(samples, ends=ends, workers=arguments.worker_count(None)).derivatives
     filtered: npt.NDArray[Any] = np.moveaxis(derivatives[0], -1, axis)
     return filtered.astype(np.float32) if np.asarray(x).dtype == np.float32 else filtered
 

@@ -203,7 +203,7 @@ class Task:
         data = self._data
         columns: list[npt.NDArray[np.number] | str] = [term.name for term in self._terms]
         if core_plan is not None and any(term.own is not None for term in self._terms):
-            (angle, velocity, _), *_ = core_plan.estimate(data.angles, workers=data.workers)
+            angle, velocity, _ = core_plan.estimate(data.angles, workers=data.workers).derivatives
             columns = [term.own.values(data.time, angle, velocity) if term.own else term.name for term in self._terms]
         known = [self._known.get(name) for name in COEFFICIENTS]
         return _core.Motions(data.angles, data.torques, known, columns)

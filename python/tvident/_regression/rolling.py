@@ -57,7 +57,7 @@ class RollingRegression:
 def rolling_least_squares(
     A: npt.ArrayLike,
     b: npt.ArrayLike,
-    window: int,
+    window_length: int,
     *,
     step: int = 1,
     workers: int | None = None,
@@ -74,7 +74,7 @@ def rolling_least_squares(
         Regressors, at most 16; a single one may be given as shape (n,).
     b : array_like, shape (n,) or (n, q)
         Right-hand sides.
-    window : int
+    window_length : int
         Rows in a window, more than ``p``.
     step : int, optional
         Every how many rows a result is wanted.
@@ -136,10 +136,10 @@ def rolling_least_squares(
         )
     if count > MOST_REGRESSORS:
         raise ValueError(f"A must have at most {MOST_REGRESSORS} columns; got {count}; drop or combine some")
-    length = arguments.whole_number("window", window, least=1)
-    arguments.check_window("window", length, rows, least=count + 1)
+    length = arguments.whole_number("window_length", window_length, least=1)
+    arguments.check_window("window_length", length, rows, least=count + 1)
     with arguments.reporter(progress, "least squares") as report:
-        params, stderr, rss, condition, status = _core.rolling_least_squares(
+        found = _core.rolling_least_squares(
             regressors.T,
             sides.reshape(rows, -1).T,
             length,
@@ -148,5 +148,7 @@ def rolling_least_squares(
             progress=report,
         )
     if sides.ndim == 1:
-        return RollingRegression(params[:, 0].T, stderr[:, 0].T, rss[0], condition, status)
-    return RollingRegression(np.moveaxis(params, -1, 0), np.moveaxis(stderr, -1, 0), rss.T, condition, status)
+        params, stderr, rss = found.params[:, 0].T, found.stderr[:, 0].T, found.rss[0]
+    else:
+        params, stderr, rss = np.moveaxis(found.params, -1, 0), np.moveaxis(found.stderr, -1, 0), found.rss.T
+    return RollingRegression(params, stderr, rss, found.condition, found.status)

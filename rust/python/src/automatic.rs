@@ -5,7 +5,9 @@ use std::num::NonZeroUsize;
 use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use tvident::Error;
-use tvident::auto_derivatives::{AutomaticEstimates, AutomaticOptions, estimate_automatically as core_estimate};
+use tvident::auto_derivatives::{
+    AutomaticEstimates as Slices, AutomaticOptions, estimate_automatically as core_estimate,
+};
 use tvident::exec::{Watch, workers as threads};
 use tvident::noise::noise;
 use tvident::simd::Instructions;
@@ -13,16 +15,20 @@ use tvident::simd::Instructions;
 use crate::records::records;
 use crate::watch::watched;
 
-/// Derivatives and standard errors, one row each; orders and status of the last derivative and of all; then, by derivative and record, windows
-/// and orders chosen (0 where there is none), and by record noise and quantisation.
-type Outputs<'py> = (
-    Bound<'py, PyArrayDyn<f64>>,
-    Bound<'py, PyArrayDyn<f64>>,
-    Bound<'py, PyArrayDyn<u8>>,
-    Bound<'py, PyArrayDyn<u16>>,
-    Vec<Vec<(usize, usize)>>,
-    Vec<(f64, f64)>,
-);
+/// What was estimated with window and order chosen.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+pub(crate) struct AutomaticEstimates {
+    /// One row a derivative, then the shape of the samples.
+    derivatives: Py<PyArrayDyn<f64>>,
+    stderr: Py<PyArrayDyn<f64>>,
+    /// Orders of the last derivative.
+    order: Py<PyArrayDyn<u8>>,
+    status: Py<PyArrayDyn<u16>>,
+    /// By derivative and record: samples of the window and the order; zeros where none was chosen.
+    chosen: Vec<Vec<(usize, usize)>>,
+    /// By record: standard deviation of the noise, and the quantisation.
+    noise: Vec<(f64, f64)>,
+}
 
 /// Estimates derivatives along the last axis. The quantisation is looked for where it is not given.
 #[pyfunction]
@@ -36,7 +42,7 @@ pub(crate) fn estimate_automatically<'py>(
     quantisation: Option<f64>,
     workers: Option<NonZeroUsize>,
     progress: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Outputs<'py>> {
+) -> PyResult<AutomaticEstimates> {
     let py = samples.py();
     let records = records(samples)?;
     let count = samples.shape().last().copied().unwrap_or(0);
@@ -64,7 +70,7 @@ pub(crate) fn estimate_automatically<'py>(
                     let options = AutomaticOptions { derivative, highest, fixed, delta, sigma, instructions };
                     let place = (row * records.len() + index) * count;
                     let own = index * count..(index + 1) * count;
-                    let mut estimates = AutomaticEstimates {
+                    let mut estimates = Slices {
                         values: &mut values[place..place + count],
                         errors: &mut errors[place..place + count],
                         order: &mut order[own.clone()],
@@ -82,7 +88,15 @@ pub(crate) fn estimate_automatically<'py>(
             Ok::<(), Error>(())
         })?;
     }
-    Ok((values, errors, order, status, chosen, noises))
+    let (derivatives, stderr) = (values.unbind(), errors.unbind());
+    Ok(AutomaticEstimates {
+        derivatives,
+        stderr,
+        order: order.unbind(),
+        status: status.unbind(),
+        chosen,
+        noise: noises,
+    })
 }
 
 /// The watch of one of several equal parts of the work.

@@ -28,19 +28,19 @@ mod _core {
     use tvident::simd::Instructions;
 
     #[pymodule_export]
-    use crate::automatic::estimate_automatically;
+    use crate::automatic::{AutomaticEstimates, estimate_automatically};
     #[pymodule_export]
     use crate::identified::{Identification, OutsideMask, Suspect, Unknown};
     #[pymodule_export]
     use crate::identify::{StrongForm, WeakForm, identify};
     #[pymodule_export]
-    use crate::local_polynomials::LocalPolynomials;
+    use crate::local_polynomials::{LocalEstimates, LocalPolynomials};
     #[pymodule_export]
     use crate::motions::Motions;
     #[pymodule_export]
-    use crate::noise::{noise, quantisation_step};
+    use crate::noise::{Noise, noise, quantisation_step};
     #[pymodule_export]
-    use crate::rolling::rolling_least_squares;
+    use crate::rolling::{RollingRegressions, rolling_least_squares};
 
     /// Probability below which parts of a record differ by more than chance.
     #[pymodule_export]

@@ -15,9 +15,16 @@ use tvident::simd::Instructions;
 use crate::records::records;
 use crate::watch::{exception, watched};
 
-/// Derivatives, order, status and noise of every window.
-type Outputs<'py> =
-    (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<u8>>, Bound<'py, PyArrayDyn<u16>>, Bound<'py, PyArrayDyn<f64>>);
+/// What was estimated in every window.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+pub(crate) struct LocalEstimates {
+    /// One row a derivative, then the shape of the samples.
+    derivatives: Py<PyArrayDyn<f64>>,
+    order: Py<PyArrayDyn<u8>>,
+    status: Py<PyArrayDyn<u16>>,
+    /// Standard deviation of the noise.
+    sigma: Py<PyArrayDyn<f64>>,
+}
 
 /// Tables for windows of one length, made once and used for any number of records.
 #[pyclass(frozen, module = "tvident._core")]
@@ -75,14 +82,14 @@ impl LocalPolynomials {
 
     /// Estimates along the last axis; without `ends` only where a full window lies around a sample.
     #[pyo3(signature = (samples, *, ends=true, step=1, workers=None, progress=None))]
-    fn estimate<'py>(
+    fn estimate(
         &self,
-        samples: &Bound<'py, PyUntypedArray>,
+        samples: &Bound<'_, PyUntypedArray>,
         ends: bool,
         step: usize,
         workers: Option<NonZeroUsize>,
-        progress: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Outputs<'py>> {
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<LocalEstimates> {
         let plan = &self.plan;
         self.outputs(samples, ends, step, progress, |work, watch| plan.run(work, ends, threads(workers), watch))
     }
@@ -98,7 +105,7 @@ impl LocalPolynomials {
         let plan = &self.plan;
         let outputs =
             self.outputs(samples, true, step, None, |work, watch| plan.errors(work, threads(workers), watch))?;
-        Ok(outputs.0)
+        Ok(outputs.derivatives.into_bound(samples.py()))
     }
 
     /// The criterion of every order in the window around a sample of a record.
@@ -112,14 +119,14 @@ impl LocalPolynomials {
 
 impl LocalPolynomials {
     /// Makes the arrays and has them filled.
-    fn outputs<'py>(
+    fn outputs(
         &self,
-        samples: &Bound<'py, PyUntypedArray>,
+        samples: &Bound<'_, PyUntypedArray>,
         ends: bool,
         step: usize,
-        progress: Option<&Bound<'py, PyAny>>,
+        progress: Option<&Bound<'_, PyAny>>,
         fill: impl FnOnce(Vec<(&dyn Samples, Estimates<'_>)>, &mut Watch<'_>) -> Result<(), Error> + Send,
-    ) -> PyResult<Outputs<'py>> {
+    ) -> PyResult<LocalEstimates> {
         let py = samples.py();
         let options = self.plan.options();
         let records = records(samples)?;
@@ -162,6 +169,11 @@ impl LocalPolynomials {
             }
             watched(py, progress, |watch| fill(work, watch))?;
         }
-        Ok((derivatives, order, status, sigma))
+        Ok(LocalEstimates {
+            derivatives: derivatives.unbind(),
+            order: order.unbind(),
+            status: status.unbind(),
+            sigma: sigma.unbind(),
+        })
     }
 }

@@ -9,23 +9,28 @@ use tvident::simd::Instructions;
 use crate::records::records;
 use crate::watch::watched;
 
-/// Noise and quantisation step of every record along the last axis: two lists in the order of the leading axes. The step is looked for
-/// where it is not given.
+/// The noise of one record: its standard deviation, and the step that samples were rounded to.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+pub(crate) struct Noise {
+    sigma: f64,
+    quantisation: f64,
+}
+
+/// The noise of every record along the last axis, in the order of the leading axes. The quantisation is looked for where it is not given.
 #[pyfunction]
 #[pyo3(signature = (samples, quantisation=None))]
-pub(crate) fn noise(samples: &Bound<'_, PyUntypedArray>, quantisation: Option<f64>) -> PyResult<(Vec<f64>, Vec<f64>)> {
+pub(crate) fn noise(samples: &Bound<'_, PyUntypedArray>, quantisation: Option<f64>) -> PyResult<Vec<Noise>> {
     let records = records(samples)?;
     let instructions = Instructions::current();
-    let (mut sigmas, mut steps) = (Vec::new(), Vec::new());
+    let mut noises = Vec::new();
     watched(samples.py(), None, |_| {
         for record in &records {
             let found = core_noise(record, quantisation, instructions)?;
-            sigmas.push(found.sigma);
-            steps.push(found.quantisation);
+            noises.push(Noise { sigma: found.sigma, quantisation: found.quantisation });
         }
         Ok::<(), Error>(())
     })?;
-    Ok((sigmas, steps))
+    Ok(noises)
 }
 
 /// The smallest quantisation step of the records along the last axis, zero where one of them has none.

@@ -14,30 +14,33 @@ use tvident::simd::Instructions;
 use crate::records::records;
 use crate::watch::{exception, watched};
 
-/// Parameters, standard errors, residual sums of squares, condition numbers and statuses of every window.
-type Outputs<'py> = (
-    Bound<'py, PyArray3<f64>>,
-    Bound<'py, PyArray3<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<u16>>,
-);
+/// What least squares give in every window.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+pub(crate) struct RollingRegressions {
+    /// By regressor, right-hand side and window.
+    params: Py<PyArray3<f64>>,
+    stderr: Py<PyArray3<f64>>,
+    /// Residual sums of squares by right-hand side and window.
+    rss: Py<PyArray2<f64>>,
+    condition: Py<PyArray1<f64>>,
+    status: Py<PyArray1<u16>>,
+}
 
-/// Least squares in every window of rows; regressors and right-hand sides have the rows along their last axis.
+/// Least squares in every window of rows; regressors and right-hand rhs have the rows along their last axis.
 #[pyfunction]
-#[pyo3(signature = (regressors, sides, window, *, step=1, workers=None, progress=None))]
+#[pyo3(signature = (regressors, rhs, window, *, step=1, workers=None, progress=None))]
 pub(crate) fn rolling_least_squares<'py>(
     regressors: &Bound<'py, PyUntypedArray>,
-    sides: &Bound<'py, PyUntypedArray>,
+    rhs: &Bound<'py, PyUntypedArray>,
     window: usize,
     step: usize,
     workers: Option<NonZeroUsize>,
     progress: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Outputs<'py>> {
+) -> PyResult<RollingRegressions> {
     let py = regressors.py();
-    let (regressors, sides) = (records(regressors)?, records(sides)?);
-    let (p, q) = (regressors.len(), sides.len());
-    let columns: Vec<&dyn Samples> = regressors.iter().chain(&sides).map(|record| record as &dyn Samples).collect();
+    let (regressors, rhs) = (records(regressors)?, records(rhs)?);
+    let (p, q) = (regressors.len(), rhs.len());
+    let columns: Vec<&dyn Samples> = regressors.iter().chain(&rhs).map(|record| record as &dyn Samples).collect();
     let rows = columns.first().map_or(0, |column| column.len());
     let plan = RollingLeastSquares::new(window, p, q, Vec::new(), HALF_OF_THE_DIGITS, Instructions::current());
     let plan = plan.map_err(|error| exception(&error))?;
@@ -65,5 +68,11 @@ pub(crate) fn rolling_least_squares<'py>(
         let equations = Equations { columns, rows: 0..rows };
         watched(py, progress, |watch| plan.run(&equations, regressions, threads(workers), watch))?;
     }
-    Ok((parameters, errors, residuals, condition, status))
+    Ok(RollingRegressions {
+        params: parameters.unbind(),
+        stderr: errors.unbind(),
+        rss: residuals.unbind(),
+        condition: condition.unbind(),
+        status: status.unbind(),
+    })
 }
