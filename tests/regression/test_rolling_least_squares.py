@@ -109,16 +109,16 @@ def test_the_numbers_do_not_depend_on_the_number_of_workers(workers: int, window
         ({"A": np.ones((100, 17))}, ValueError, "at most 16 columns; got 17"),
         ({"b": np.ones(99)}, ValueError, "as many rows as each other; got 100 and 99"),
         ({"window_length": 2}, ValueError, "window_length must be at least 3 samples; got 2"),
-        ({"window": 101}, ValueError, "less than or equal to the length of the record; got 101"),
+        ({"window_length": 101}, ValueError, "less than or equal to the length of the record; got 101"),
         ({"A": np.ones((10, 5, 2))}, ValueError, r"shape \(n, p\)"),
         ({"b": np.ones(100) * 1j}, TypeError, "b must be real"),
         ({"step": 0}, ValueError, "step must be at least 1"),
-        ({"window": 10.5}, TypeError, "whole number; got 10.5"),
+        ({"window_length": 10.5}, TypeError, "whole number; got 10.5"),
     ],
 )
 def test_misuse_says_the_rule_the_value_and_the_cure(
     call: dict[str, Any], error: type[Exception], message: str
 ) -> None:
-    good: dict[str, Any] = {"A": np.ones((100, 2)), "b": np.ones(100), "window": 10}
+    good: dict[str, Any] = {"A": np.ones((100, 2)), "b": np.ones(100), "window_length": 10}
     with pytest.raises(error, match=message):
         tvident.rolling_least_squares(**(good | call))
