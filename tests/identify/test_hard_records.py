@@ -162,7 +162,7 @@ def test_a_lag_is_found(rig: tvident.Recording, samples: float) -> None:
     result = identify(rig.angle, late(rig.torque, samples), "auto", lag="auto")
     lag, stderr = (result.settings[name] * 1e3 for name in ("lag", "lag_stderr"))
     assert abs(lag - samples) < CLOSE * stderr < 0.25
-    assert f"the torque comes {lag:.3f} ±" in result.summary()
+    assert f"the torque is delayed by {lag:.3f} ±" in result.summary()
     damping, damping_error = result.damping, result.stderr["damping"]
     assert (np.abs(damping - rig.damping) < CLOSE * damping_error).all()
     again = tvident.identify(rig.angle, late(rig.torque, samples), sample_rate=1000, settings=result.settings)

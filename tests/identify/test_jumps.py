@@ -43,7 +43,7 @@ def test_every_jump_is_found_and_windows_end_there(angle_noise: float) -> None:
     np.testing.assert_allclose(result.jumps, true, atol=NEAR)
     error = (result.stiffness - recording.stiffness)[INTERIOR]
     assert np.sqrt(np.mean(error**2)) < ERROR * recording.stiffness.mean()
-    assert "jumps 4 times, at" in result.summary()
+    assert "jump 4 times, at" in result.summary()
     # Errors hold beside jumps too, where the place of the jump is part of them.
     beside = np.abs(recording.time[:, np.newaxis] - true).min(axis=1) < 0.1
     within = np.abs(result.stiffness - recording.stiffness) < 4 * result.stderr["stiffness"]

@@ -49,7 +49,7 @@ def sine() -> tuple[Any, Any]:
 def test_every_flag_is_in_a_group_and_the_documentation_says_in_which() -> None:
     assert sum(Status) == OF_A_SAMPLE | OF_A_RECORD
     text = " ".join((Status.__doc__ or "").split())
-    samples, records = text.split("Flags of a sample stand in")[1].split("Flags of a record stand in")
+    samples, records = text.split("Flags of a sample are in")[1].split("Flags of a record are in")
     records = records.split("Three are in both groups")[0]
     assert [str(flag.name) in samples for flag in Status] == [flag in OF_A_SAMPLE for flag in Status]
     assert [str(flag.name) in records for flag in Status] == [flag in OF_A_RECORD for flag in Status]

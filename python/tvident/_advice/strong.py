@@ -1,4 +1,4 @@
-"""What the paper's form was done with and what its statuses advise, in words."""
+"""Which settings the strong form used and what its statuses advise, in words."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _LOOKED_AT = 1 << 10
 """Samples that statuses are counted at, evenly spread: shares are known within some percent, and a long record costs no more."""
 
 _FEW = 30
-"""So few samples with an answer tell nothing of the others."""
+"""With fewer samples that have values, shares of flags mean nothing."""
 
 _OFTEN = 0.1
 """A share of the samples from which on a flag is worth a sentence: the paper's advice about orders, as a tenth."""
 
 _ALIKE = 0.9
-"""A correlation from which on what one parameter loses the other gains."""
+"""A correlation of two parameters from which on their errors compensate each other."""
 
 _LARGE = 0.02
 """A standard error over its parameter that asks for what is known."""
@@ -36,7 +36,7 @@ _LARGE = 0.02
 _HIGHEST_OF_ALL = 15
 
 _COMMON_FACTOR = 1.2
-"""Standard errors that differ less from those of independent equations need no word."""
+"""Standard errors closer than this to those of independent equations are not mentioned."""
 
 Array = npt.NDArray[np.float64]
 
@@ -130,15 +130,15 @@ class ExplainedStrong:
         if not large:
             return []
         return [
-            f"standard errors are {listed(large)} times those of independent equations: so much more do windows scatter that share none"
+            f"standard errors are {listed(large)} times those of independent equations, from the scatter between windows that share none"
         ]
 
     def _nothing(self) -> list[str]:
         if not (self.status & Status.RANK_DEFICIENT != 0).any() or self._is_missing():
-            return ["no window holds enough equations: look for missing values, shorten the windows, or record longer"]
+            return ["no window holds enough equations: look for missing values, use shorter windows, or record longer"]
         return [
             (
-                f"the record does not determine {listed(list(self.kinds))}: nothing moves, or a single frequency does not tell inertia "
+                f"the record does not determine {listed(list(self.kinds))}: nothing moves, or a single frequency does not separate inertia "
                 "from stiffness: check that angle and torque are the right channels and hold numbers, excite two or more frequencies, "
                 "leave a term out, or give what is known"
             )
@@ -154,10 +154,9 @@ class ExplainedStrong:
             return []
         return [
             (
-                f"{share:.0%} of the windows do not determine {listed(list(self.kinds))}: nothing moves there, or one "
-                "term looks like another "
-                "as long as the motion keeps its direction: make regression_window longer, take terms as constant, or leave "
-                "such parts out with mask="
+                f"{share:.0%} of the windows do not determine {listed(list(self.kinds))}: nothing moves there, or two "
+                "terms are collinear as long as the motion keeps its direction: use a longer regression_window, take terms as constant, or "
+                "exclude such parts with mask="
             )
         ]
 
@@ -174,8 +173,8 @@ class ExplainedStrong:
             number = f" (condition {condition:.3g}, the median there)" if condition > _core.HARDLY_TOLD_APART else ""
             return [
                 (
-                    f"{told} are hardly told apart in {share:.0%} of the record{number}: under a single "
-                    "frequency they look alike; excite two or more, make regression_window longer, or give one of them as known"
+                    f"{told} are nearly collinear in {share:.0%} of the record{number}: a single frequency does not separate them; "
+                    "excite two or more, use a longer regression_window, or give one of them as known"
                 )
             ]
         names = [name for name in self._alike(good) if self.kinds[name] == "windowed"]
@@ -184,7 +183,7 @@ class ExplainedStrong:
             return []
         return [
             (
-                f"what {listed(list(wide))} gain and lose they take from each other: standard errors of "
+                f"errors of {listed(list(wide))} compensate each other (nearly collinear): standard errors of "
                 f"{listed([f'{error:.1%}' for error in wide.values()])}; give inertia='constant', or its value, unless it changes"
             )
         ]
@@ -216,25 +215,25 @@ class ExplainedStrong:
         if highest >= _OFTEN:
             reached = int(self._some(self.found.order).max())
             if reached < most:
-                cure = f"{reached} is all that so few samples can judge: make window_length longer"
+                cure = f"orders above {reached} need more samples: use a longer window_length"
             elif most < _HIGHEST_OF_ALL:
-                cure = f"raise max_order= above {most}, or make window_length shorter"
+                cure = f"raise max_order= above {most}, or use a shorter window_length"
             else:
-                cure = "make window_length shorter until that is rare"
+                cure = "use a shorter window_length until that is rare"
             words.append(
                 f"in {highest:.0%} of the windows of {length} samples the highest order was best, so the angle may change more than it can "
                 f"follow: {cure}"
             )
         if lowest >= _OFTEN:
             words.append(
-                f"in {lowest:.0%} of the windows of {length} samples order 0 was best: the angle rests there, which says nothing about "
-                "the parameters (leave it out with mask=), or hardly changes: make window_length longer"
+                f"in {lowest:.0%} of the windows of {length} samples order 0 was best: the angle is at rest there, which says nothing "
+                "about the parameters (exclude it with mask=), or hardly changes: use a longer window_length"
             )
         exact = self._share(Status.EXACT)
         if exact >= _OFTEN:
             words.append(
-                f"{exact:.0%} of the windows leave nothing but rounding: the angle rests, was simulated, or was filtered and resampled: "
-                "orders mean little there"
+                f"in {exact:.0%} of the windows the residual is rounding only: the angle is at rest, was simulated, or was filtered and "
+                "resampled; orders mean little there"
             )
         return words
 

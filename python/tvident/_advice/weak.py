@@ -17,11 +17,11 @@ _SHOWN = 6
 """Jumps that are listed at most."""
 
 _TAKES_PART = 0.3
-"""A constant that has at least this share in the combination that is determined worst is named."""
+"""A constant that has at least this share in the worst determined combination is named."""
 
 _WEAK = (
-    "weak form: on simulated recordings, four patterns at five levels of noise, stiffness came out 1.4 to 55 times and inertia 3 to 78 "
-    "times closer to the truth than in strong form with the same kinds"
+    "weak form: on simulated recordings (four patterns, five noise levels) its errors were 1.4 to 55 times smaller for stiffness and 3 to "
+    "78 times smaller for inertia than those of the strong form with the same kinds"
 )
 """Why nothing else is chosen; measured as docs/automatic.md says."""
 
@@ -59,7 +59,7 @@ class Explained:
         flags = Status(self.found.record_status)
         if Status.RANK_DEFICIENT in flags:
             undetermined = (
-                f"the record does not determine {listed(list(self.names))}: nothing moves, or a single frequency does not tell "
+                f"the record does not determine {listed(list(self.names))}: nothing moves, or a single frequency does not separate "
                 "inertia from stiffness: check that angle and torque are the right channels, excite two or more frequencies, leave a "
                 "term out, or give what is known"
             )
@@ -84,28 +84,30 @@ class Explained:
         ]
 
     def _changing(self) -> list[str]:
-        """Return the names of what is no constant."""
+        """Return the names of the unknowns that are not constant."""
         return [name for name, one in zip(self.names, self.found.unknowns, strict=True) if one.kind != "constant"]
 
     def _noise(self) -> str:
         angle, torque = np.sqrt(self.found.noise or (np.nan, np.nan))
-        return f"noise, taken to be white: {angle:.2g} rad in the angle, {torque:.2g} N m in the torque"
+        return f"noise, assumed to be white: {angle:.2g} rad in the angle, {torque:.2g} N m in the torque"
 
     def _test_function(self) -> str:
         words = f"test function of {self.found.window_length} samples, exponent {self.found.exponent}"
         if not {"window_length", "exponent"} & set(self.chosen):
             return f"{words}: as given"
-        return f"{words}: with the angle's spectrum and this noise it should leave the smallest errors"
+        return f"{words}: smallest expected errors, given the angle's spectrum and this noise"
 
     def _lag(self) -> list[str]:
         if "lag" not in self.chosen:
             return []
         if self.found.lag is None:
             return [
-                "the record does not tell a lag of the torque from damping: none is taken; excite more frequencies, or give it"
+                "the record does not separate a lag of the torque from damping: lag 0 is used; excite more frequencies, or give lag="
             ]
         value, error = self.found.lag
-        return [f"the torque comes {value:.3f} ± {error:.1g} samples late: there its rate explains nothing more"]
+        return [
+            f"the torque is delayed by {value:.3f} ± {error:.1g} samples: with this lag its rate explains nothing more"
+        ]
 
     def _jumps(self) -> list[str]:
         jumps = self.found.jumps
@@ -115,7 +117,7 @@ class Explained:
             " …" if len(jumps) > _SHOWN else ""
         )
         many = f"{len(jumps)} times, at" if len(jumps) > 1 else "at"
-        return [f"what is windowed jumps {many} {shown} s: windows end there"]
+        return [f"windowed parameters jump {many} {shown} s: windows end there"]
 
     def _outside(self) -> list[str]:
         if self.found.outside_mask is None:
@@ -127,24 +129,24 @@ class Explained:
         ]
         left = outside.residual_ratio
         if left is not None and left > _core.NOISE_MODEL_FAILS:
-            parts.append(f"{left:.1f} times the mean square left")
+            parts.append(f"mean squared residual {left:.1f} times that inside")
         return [f"outside the mask the model fails: {', '.join(parts)}"]
 
     def _windows(self) -> list[str]:
         if not self.found.lengths:
             return []
         words, error = f"windows of {self.found.regression_window} samples", self.found.prediction_error
-        left = f"torque that they have not seen is predicted with {error:.2f} times the variance of the noise (1 is perfect)"
+        left = f"cross-validation error {error:.2f} times the variance of the noise (1 is the best possible)"
         why = "best of all lengths" if "regression_window" in self.chosen else "as given"
         return [
             f"{words}: {why}; {left}",
-            "longer, shorter and one-sided windows are averaged with them wherever they predict better",
+            "longer, shorter and one-sided windows are averaged with these where they predict better",
         ]
 
     def _weights(self) -> list[str]:
         weighted = (
-            "all unknowns are constant, so equations are weighted by the inverse of their noise's covariance, as maximum likelihood "
-            "does"
+            "all unknowns are constant, so equations are weighted by the inverse of the covariance of their noise "
+            "(generalised least squares)"
         )
         return [weighted] if self.found.weighted else []
 
@@ -155,14 +157,14 @@ class Explained:
         if agreeing:
             chances = ", ".join(f"{probability:.2g}" for probability in agreeing.values())
             words.append(
-                f"{listed(list(agreeing))} constant: eight parts of the record differ no more than noise makes them (p = {chances})"
+                f"{listed(list(agreeing))} constant: noise explains the differences between eight parts of the record (p = {chances})"
             )
         if self.found.pooling is not None:
             slow = [name for name in ("inertia", "damping") if name in self._changing()]
             why = "parts of the record differ by more than noise" if set(slow) <= set(self.tested) else "as given"
             seconds = self.found.pooling * self.period
             words.append(
-                f"{listed(slow)} varying: {why}; followed by quadratics in time over {seconds:.3g} s, which predict best"
+                f"{listed(slow)} varying: {why}; local quadratics in time over {seconds:.3g} s, the bandwidth that predicts best"
             )
         return words
 
@@ -170,14 +172,14 @@ class Explained:
         words = []
         if Status.NOISE_MODEL in flags:
             words.append(
-                f"torque is predicted with {self.found.prediction_error:.1f} times the variance of the noise: is a term missing, was "
-                "the torque recorded late, or is the noise not white, since a channel was filtered or drifts? Standard errors are taken "
-                "from what is left over instead, and may be too small"
+                f"the cross-validation error is {self.found.prediction_error:.1f} times the variance of the noise: is a term missing, "
+                "is the torque delayed, or is the noise not white because a channel was filtered or drifts? Standard errors are "
+                "estimated from the residuals instead, and may be too small"
             )
         if Status.COLOURED in flags:
             words.append(
-                "what is left over is correlated for longer than a test function: look for a drift, a disturbance or a sudden change, "
-                "near which errors are larger than stated"
+                "the residuals are correlated over more than a test function: look for a drift, a disturbance or a sudden change; errors "
+                "near it are larger than stated"
             )
         return words
 
@@ -189,7 +191,7 @@ class Explained:
             amount = f"{one.value:.3g} ± {one.stderr:.1g}"
             if one.name == "lag":
                 words.append(
-                    f"the torque seems to be recorded {amount} samples late: give lag={one.value * self.period:.3g} (seconds), "
+                    f"the torque seems to be delayed by {amount} samples: give lag={one.value * self.period:.3g} (seconds), "
                     "or align the channels"
                 )
             else:
@@ -197,7 +199,7 @@ class Explained:
                 terms = [name for name in self.names if name not in COEFFICIENTS] + [one.name]
                 words.append(f"{term.suspicion.format(amount=f'{amount} {term.unit}')}: give terms={terms}")
         if len(words) > 1:
-            words.append("begin with the first of these: the others may be gone then")
+            words.append("begin with the first of these: the others may then disappear")
         return words
 
     def _contradictions(self) -> list[str]:
@@ -208,7 +210,7 @@ class Explained:
             if name in COEFFICIENTS:
                 kind = "windowed" if name == "stiffness" else "auto"
                 words.append(
-                    f"{name} was given as constant, but parts of the record differ by {one.test[1]:.0%}: give {name}={kind!r}, or cut "
+                    f"{name} was given as constant, but parts of the record differ by {one.test[1]:.0%}: give {name}={kind!r}, or split "
                     "the record"
                 )
             else:
@@ -221,16 +223,16 @@ class Explained:
         if Status.ILL_CONDITIONED not in flags:
             return []
         constants = [name for name, _ in self._constants()]
-        # What varies slowly comes first among the shares.
+        # Varying parameters come first among the shares.
         shares = self.found.weakest[len(self.found.weakest) - len(constants) :]
         parts = [name for name, part in zip(constants, shares, strict=True) if abs(part) > _TAKES_PART]
         if len(parts) == 1 and "stiffness" in self._changing():
             parts.append("stiffness")
         told = listed(parts) if len(parts) > 1 else "the parameters"
-        noise = ", but by the noise of the angle" if self.found.mostly_noise else ""
+        noise = ", and what separates them is mostly noise of the angle" if self.found.mostly_noise else ""
         words = (
-            f"{told} are hardly told apart{noise} (condition {self.found.constants_condition:.0f}): under a single frequency they look "
-            "alike; excite two or more, or give one of them as known"
+            f"{told} are nearly collinear{noise} (condition {self.found.constants_condition:.0f}): a single frequency does not "
+            "separate them; excite two or more, or give one of them as known"
         )
         return [words]
 
@@ -240,12 +242,12 @@ class Explained:
         lengths = [length for length, _ in self.found.lengths]
         if lengths and self.found.regression_window <= min(lengths):
             words = (
-                f"windows of {self.found.regression_window} samples are the shortest that were tried: what is windowed changes faster than "
-                "it can be followed, or the record is too short: record ten cycles or more, and excite higher frequencies"
+                f"windows of {self.found.regression_window} samples are the shortest that were tried: windowed parameters change too fast "
+                "to be followed, or the record is too short: record ten cycles or more, and excite higher frequencies"
             )
         else:
             words = (
-                f"a test function of {self.found.window_length} samples is the narrowest or widest that was tried: record ten "
-                "cycles or more, at 20 samples a cycle or more; do not trust these numbers otherwise"
+                f"a test function of {self.found.window_length} samples is the shortest or longest that was tried: record ten "
+                "cycles or more, with 20 samples or more per cycle; do not trust these numbers otherwise"
             )
         return [words]

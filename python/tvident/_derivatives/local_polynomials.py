@@ -37,7 +37,7 @@ def fit_local_polynomials(
     r"""Differentiate noisy samples with a polynomial order chosen in every window.
 
     Around every sample :math:`t_i` a polynomial :math:`\sum_{j \le n} \alpha_j (t - t_i)^j` is fitted to the window of ``M`` samples by
-    least squares (equation (2) of the paper) for every order ``n``, and the order that minimises Akaike's criterion
+    least squares (equation (2) of the paper) for every order ``n``, and the order that minimises the corrected Akaike information criterion
 
     .. math:: AICc_n = M \ln σ_n^2 + 2K + \frac{2K(K+1)}{M-K-1}, \quad K = n + 1, \quad σ_n^2 = RSS_n / (M - 1)
 
@@ -57,15 +57,15 @@ def fit_local_polynomials(
     t : array_like, optional
         Time of every sample in seconds, shape (n,), uniform to a thousandth of the sample period.
     max_order : int, optional
-        Highest candidate order, at most 15. Orders that a short window cannot judge are left out.
+        Highest candidate order, at most 15. Orders that are too high for a short window are left out.
     order : int, optional
         Fixes the order: the classic Savitzky–Golay filter, with noise and errors.
     criterion : {"aicc", "aicc-textbook", "aic", "bic"}, optional
         What is minimised. ``"aicc"`` counts parameters as the paper does; ``"aicc-textbook"`` counts the noise variance too.
     selection : {"window", "pooled", "average"}, optional
-        ``"window"``: every window has the order that is best in it, as in the paper. ``"pooled"``: the criterion is summed over the
-        neighbouring windows, those that share a sample with the window, and the order chosen by the sum. ``"average"``: the estimates of
-        all orders are averaged with Akaike's weights :math:`w_n ∝ \exp(-AICc_n/2)`.
+        ``"window"``: every window has the order with the smallest criterion in it, as in the paper. ``"pooled"``: the criterion is summed
+        over the neighbouring windows, those that share a sample with the window, and the sum chooses the order. ``"average"``: the
+        estimates of all orders are averaged with Akaike weights :math:`w_n ∝ \exp(-AICc_n/2)`.
     max_deriv : int, optional
         Highest derivative wanted.
     axis : int, optional
@@ -73,14 +73,14 @@ def fit_local_polynomials(
     step : int, optional
         Every how many samples an estimate is wanted: the same numbers as ``[::step]`` of all of them.
     nan_policy : {"propagate", "raise"}, optional
-        Windows that hold a value that is not a finite number are NaN, and no others; or raise.
+        ``"propagate"``: windows that contain a value that is not finite are NaN, and no others. ``"raise"``: raise an error.
     quantisation : float, optional
-        Step to which `y` was rounded, in its unit: an encoder's count, a converter's last bit. By default it is looked for in the
-        samples: the step that all differences of neighbours are multiples of, the smallest one of all records. 0 means none.
+        Step to which `y` was rounded, in its unit: an encoder's count, a converter's last bit. By default it is estimated from
+        the samples: the step of which all differences of neighbours are multiples, the smallest one of all records. 0 means none.
     workers : int, optional
         Threads; by default ``TVIDENT_WORKERS`` or all processors that this process may use. The numbers do not depend on it.
     progress : bool or callable, optional
-        Show a bar, or call a function with the samples done and all of them. What it raises cancels the work.
+        Show a bar, or call a function with the samples done and all of them. An exception that it raises cancels the work.
 
     Returns
     -------
@@ -105,19 +105,19 @@ def fit_local_polynomials(
     The first and last ``N`` samples are evaluated off the centre of the first and last full window, where noise is amplified more. Each
     derivative takes there the order with the least estimated squared bias plus variance, at most ``order``; the status says EDGE.
 
-    The order that is best in one window follows the noise in it. On the simulated rig at 40 and 20 dB the second derivative with
-    windows of 101 samples is 1.9 and 3.2 times as wrong as with the one order that is best for all windows, the average 1.6 and 2.7,
-    pooled 1.0 and 1.1 times.
+    The order that is best in one window also depends on the noise in it. On the simulated rig at 40 and 20 dB, with windows of 101
+    samples, the error of the second derivative is 1.9 and 3.2 times that with the one order that is best for all windows; with
+    ``"average"`` 1.6 and 2.7 times, with ``"pooled"`` 1.0 and 1.1 times.
 
     With ``window_length="auto"`` every derivative has a window and an order of its own: those with the least estimated mean squared
-    error :math:`b^2 + σ^2 \|k\|^2` over the record, ``b`` the bias and ``k`` the weights of the samples. Around them the candidates are
-    weighed again in every neighbourhood of five half-widths, so that estimates follow a signal that changes. Near the ends
-    coefficients are shrunk by what other windows say of them. The error of θ̈ of the simulated rig is within 3 % of that of the best
-    window and order known afterwards, and 20 to 30 % below it where the signal is a chirp. Windows that hold a value that is no number
-    are left out; what no candidate's window reaches is NaN.
+    error :math:`b^2 + σ^2 \|k\|^2` over the record, ``b`` the bias and ``k`` the weights of the samples. The candidates near them
+    are weighted again in every neighbourhood of five half-widths, so that estimates follow a signal that changes. Near the ends
+    coefficients are shrunk towards what other windows predict. The error of θ̈ of the simulated rig is within 3 % of that of the best
+    window and order known afterwards, and 20 to 30 % below it if the signal is a chirp. Windows that contain a value that is not finite
+    are left out; samples that no candidate's window reaches are NaN.
 
-    The cost is some 15 ns a sample and thread at any window length on a processor with AVX-512, about twice that with AVX2; pooled or
-    averaged some 300 ns, since every window's orders need their logarithms; ``"auto"`` some 0.2 s a derivative for the first 65 000
+    The cost is about 15 ns a sample and thread for any window length on a processor with AVX-512, about twice that with AVX2; pooled or
+    averaged about 300 ns, because the orders of every window need logarithms; ``"auto"`` about 0.2 s per derivative for the first 65 000
     samples and 500 ns a sample and derivative beyond.
 
     See Also
@@ -127,7 +127,7 @@ def fit_local_polynomials(
 
     References
     ----------
-    M. Ruzek, S. Chesné, D. Rémond: identification of a time-varying mechanical system using the Akaike information criterion.
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
     K. P. Burnham, D. R. Anderson: Model Selection and Multimodel Inference, 2002.
 
     Examples

@@ -43,8 +43,8 @@ def savgol_filter(
     window_length : int
         Samples in a window, odd or even. With an even window the result belongs half a sample later, as in SciPy.
     polyorder : int or "aicc"
-        Order of the polynomial, less than `window_length`, at most 15; or ``"aicc"``: chosen in every window by Akaike's criterion
-        as in :func:`fit_local_polynomials`.
+        Order of the polynomial, less than `window_length`, at most 15; or ``"aicc"``: chosen in every window by the Akaike information
+        criterion as in :func:`fit_local_polynomials`.
     deriv : int, optional
         Derivative wanted, 0 for the smoothed samples.
     delta : float, optional

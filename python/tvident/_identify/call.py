@@ -1,4 +1,4 @@
-"""The call that users make: arguments are read and checked, and one task is made of them."""
+"""The function ``identify``: arguments are read and checked, and make one task."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ def identify(
 ) -> Identification:
     r"""Identify I(t), C(t) and K(t) in I θ̈ + C θ̇ + K θ = T from a recorded angle and torque.
 
-    In weak form, the default, the equation is multiplied by a test function φ = (1 - x²)^p that vanishes with its slope at both ends of
-    a window, and integrated by parts: I⟨φ″θ⟩ - C⟨φ′θ⟩ + K⟨φθ⟩ = ⟨φT⟩. No derivative is ever estimated, what the angle's noise does to
-    the equations is taken off, and whatever is not given is chosen from the record: ``summary()`` says what and why.
+    In weak form, the default, the equation is multiplied by a test function φ = (1 - x²)^p, which is zero with its slope at both ends of
+    a window, and integrated by parts: I⟨φ″θ⟩ - C⟨φ′θ⟩ + K⟨φθ⟩ = ⟨φT⟩. No derivative is estimated, the bias from the angle's noise is
+    corrected, and every setting that is not given is chosen from the record: ``summary()`` says what was chosen and why.
 
-    In strong form, the paper's, the angle is fitted by polynomials of every order in a window around every sample, Akaike's criterion
-    chooses one (equations (2), (8) and (9) of the paper) and gives θ̇ and θ̈; in another window of 200 such equations, the
-    regression window, the unknowns are solved for by least squares ((3) and (4)).
+    In strong form, the paper's, polynomials of every order are fitted to the angle in a window around every sample. The order with the
+    smallest Akaike information criterion (equations (2), (8) and (9) of the paper) gives θ̇ and θ̈. In a second window of 200 such
+    equations, the regression window, the unknowns are estimated by least squares ((3) and (4)).
 
     Parameters
     ----------
@@ -61,44 +61,44 @@ def identify(
     t : array_like, shape (n,)
         Time of every sample in seconds, uniform to a thousandth of the sample period.
     method : {"auto", "paper"}, WeakForm or StrongForm, optional
-        ``"auto"``: weak form, everything chosen from the record, inertia and damping constant unless it says otherwise, an offset of the
-        torque. ``"paper"``: the paper's method: strong form, polynomials in windows of 201 samples, regression windows of 200, all
-        parameters windowed, no further terms. A :class:`WeakForm` or :class:`StrongForm` holds settings of one's own; parameters and
-        terms are then as with ``"auto"`` (where nothing is tested, in strong form, inertia and damping are constant). ``"auto"`` always
-        takes the weak form: with the same kinds of parameters it was the more accurate in every case measured, 1.4 to 55 times for
-        stiffness and 2.8 to 78 times for inertia.
+        ``"auto"``: weak form, all settings chosen from the record, inertia and damping constant unless a test rejects it, an offset of
+        the torque. ``"paper"``: the paper's method: strong form, polynomials in windows of 201 samples, regression windows of 200, all
+        parameters windowed, no further terms. A :class:`WeakForm` or :class:`StrongForm` has settings of your own; the defaults of
+        parameters and terms are then those of ``"auto"`` (the strong form has no such test: inertia and damping are constant).
+        ``"auto"`` always takes the weak form: with the same kinds of parameters its errors were smaller in every case measured, 1.4 to
+        55 times for stiffness and 2.8 to 78 times for inertia.
     inertia, damping, stiffness : {"windowed", "constant", "auto", "varying"}, float or array_like, optional
-        ``"windowed"``: unknown, one value for every sample. ``"constant"``: unknown, one value for the record. ``"auto"``: constant unless
-        the record says otherwise (windowed, for stiffness). ``"varying"``: changes more slowly than what is windowed (weak form). A
-        number or an array of the angle's shape: known; 0 leaves it out.
+        ``"windowed"``: unknown and time-varying, one value per sample. ``"constant"``: unknown, one value per record. ``"auto"``: constant
+        unless a test rejects it (windowed, for stiffness). ``"varying"``: time-varying, but more slowly than windowed parameters (weak
+        form). A number or an array of the angle's shape: known; 0 leaves it out.
     terms : sequence, optional
-        What else stands on the left-hand side, with an unknown factor: ``"offset"``, ``"coulomb"`` (the sign of the velocity), ``"cubic"``
-        (the cube of the angle), ``"gravity"`` (the sine of the angle) or a :class:`Term` of one's own; or a pair of one of these and its
-        kind. Without a kind a term is windowed where all unknown parameters are, and constant otherwise.
+        Further terms of the left-hand side, each with an unknown factor: ``"offset"``, ``"coulomb"`` (the sign of the velocity),
+        ``"cubic"`` (the cube of the angle), ``"gravity"`` (the sine of the angle) or a :class:`Term` of your own; or a pair of one of
+        these and its kind. Without a kind a term is windowed if all unknown parameters are, and constant otherwise.
     lag : float or "auto", optional
-        Seconds by which the torque was recorded late; fractions of a sample count. ``"auto"``, in weak form: the lag nearest to none at
-        which the torque's rate explains nothing more, with its standard error in ``settings["lag_stderr"]``; none where the record does
-        not tell it from the damping, as with motion at a single frequency.
+        Delay of the torque in seconds; it may be a fraction of a sample. ``"auto"``, in weak form: the lag nearest to zero at
+        which the torque's rate explains nothing more, with its standard error in ``settings["lag_stderr"]``; zero if the record does
+        not separate a lag from damping, as with motion at a single frequency.
     quantisation : float, optional
-        Step to which the angle was rounded, in rad: an encoder's count. In strong form no residual is taken to be smaller than it
-        leaves, in weak form no noise. By default it is looked for in the samples, as in :func:`tvident.fit_local_polynomials`, but not
+        Step to which the angle was rounded, in rad: an encoder's count. It is a lower bound for residuals in strong form, for the noise
+        in weak form. By default it is estimated from the samples, as in :func:`tvident.fit_local_polynomials`, but not
         with ``method="paper"``, whose criterion has no such bound. 0 means none.
     mask : array_like of bool, shape (n,) or the angle's, optional
         True where a sample may be the centre of an equation.
     step : int, optional
         Every how many samples a result is wanted.
     nan_policy : {"omit", "propagate", "raise"}, optional
-        What to do about values of angle and torque that are no finite numbers. ``"omit"``: they cost their own equations only; numbers
-        around them are taken from the other equations of their window and flagged GAP. ``"propagate"``: what is windowed is NaN where
-        its window holds one. ``"raise"``: refuse them.
+        What to do with values of angle and torque that are not finite. ``"omit"``: only the equations that contain one are removed;
+        parameters around it come from the other equations of their window, with the flag GAP. ``"propagate"``: windowed parameters
+        are NaN if their window contains one. ``"raise"``: raise an error.
     settings : mapping, optional
-        Settings of an earlier result, as they are or read from JSON: what it chose is used again. What is given beside them wins, a
-        `method` other than ``"auto"`` as a whole. `mask`, `step`, what was known at every sample and functions of terms of one's own
-        are not among them.
+        Settings of an earlier result, as they are or read from JSON: its choices are used again. Other arguments override them, a
+        `method` other than ``"auto"`` as a whole. They do not contain `mask`, `step`, parameters known at every sample and functions of
+        your own terms.
     workers : int, optional
         Threads; by default ``TVIDENT_WORKERS`` or all processors that this process may use. The numbers do not depend on it.
     progress : bool or callable, optional
-        Show a bar, or call a function with the samples done and all of them. What it raises cancels the work.
+        Show a bar, or call a function with the samples done and all of them. An exception that it raises cancels the work.
 
     Returns
     -------
@@ -114,16 +114,16 @@ def identify(
 
     Notes
     -----
-    Within 0.2 s inertia and stiffness are nearly collinear unless several frequencies are excited: under a single sine they cannot be
-    told apart at all. ``condition`` says so, and ``stderr`` by how much.
+    Within 0.2 s inertia and stiffness are nearly collinear unless several frequencies are excited; with a single sine they cannot be
+    separated at all. ``condition`` shows this, and ``stderr`` its effect.
 
-    Standard errors of the strong form follow from how far windows scatter that share no equation: see :class:`Identification`. Those of
-    the weak form follow from the known covariance of its overlapping rows, times the mean squared error of predicting rows that were
-    not seen, over the noise's.
+    Standard errors of the strong form follow from the scatter between windows that share no equation: see :class:`Identification`. Those
+    of the weak form follow from the covariance of its overlapping rows, which the noise determines, times the cross-validation error
+    over the variance of the noise if that is above 1.
 
-    In strong form, where all unknowns are of one kind, the cost is some 60 ns a sample and thread, whatever the windows, and memory is
-    that of the results, but for terms of one's own, which need the derivatives of the whole record. In weak form and where kinds are
-    mixed it is some 1 to 15 µs a sample, the most where it jumps, and the equations of the whole record are kept.
+    In strong form with unknowns of one kind, the cost is about 60 ns a sample and thread for windows of any length, and memory is
+    that of the results, except with terms of your own, which need the derivatives of the whole record. In weak form and with mixed
+    kinds it is about 1 to 15 µs a sample, the most if parameters jump, and the equations of the whole record are kept.
 
     See Also
     --------
@@ -133,7 +133,7 @@ def identify(
 
     References
     ----------
-    M. Ruzek, S. Chesné, D. Rémond: identification of a time-varying mechanical system using the Akaike information criterion.
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
 
     Examples
     --------

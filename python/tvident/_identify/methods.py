@@ -19,7 +19,7 @@ _LOWEST_EXPONENT, _HIGHEST_EXPONENT = 3, 20
 class WeakForm:
     """The weak form: the equation of motion multiplied by a test function and integrated by parts, so that no derivative is estimated.
 
-    Whatever is ``"auto"`` is chosen from each record. Values are checked when the object is made.
+    A setting that is ``"auto"`` is chosen from each record. Values are checked when the object is made.
 
     Parameters
     ----------
@@ -28,13 +28,13 @@ class WeakForm:
     exponent : int or "auto"
         Exponent p of the test function (1 - x²)^p, 3 to 20.
     regression_window : int or str
-        Length of the window in which windowed parameters are estimated: samples, a duration, or ``"auto"``: the length that predicts
-        best what it has not seen.
+        Length of the window in which windowed parameters are estimated: samples, a duration, or ``"auto"``: the length
+        with the smallest cross-validation error.
     averaging : bool
-        Average windows of many lengths before, around and after each sample by how well each predicts nearby, and end them at jumps;
-        where nothing is windowed, weight the equations by the inverse of their noise's covariance. False: one window around each sample, or
-        ordinary least squares. True by default, but False where `regression_window` is given: whoever gives a length means windows of
-        that length.
+        Average windows of many lengths before, around and after each sample, weighted by their cross-validation errors nearby, and end
+        them at jumps; if no parameter is windowed, weight the equations by the inverse of the covariance of their noise. False: one
+        window around each sample, or ordinary least squares. True by default, but False if `regression_window` is given, because then
+        windows of that length are meant.
     variation : {"auto", "constant", "linear"}
         How windowed parameters may change within a window; ``"auto"`` is linear.
 
@@ -52,8 +52,8 @@ class WeakForm:
 
     References
     ----------
-    M. Shinbrot: On the analysis of linear and nonlinear systems, Transactions of the ASME 79 (1957): test functions that move derivatives
-    from the data to themselves.
+    M. Shinbrot: On the analysis of linear and nonlinear systems, Transactions of the ASME 79 (1957): integration by parts moves the
+    derivatives from the data to the test function.
 
     Examples
     --------
@@ -92,7 +92,7 @@ class WeakForm:
 class StrongForm:
     """The strong form, the paper's: derivatives of the angle by local polynomials, then least squares in a window around every sample.
 
-    By default everything is as in the paper. Values are checked when the object is made.
+    All defaults are those of the paper. Values are checked when the object is made.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ class StrongForm:
     max_order : int
         Highest candidate order, at most 15.
     criterion : {"aicc", "aicc-textbook", "aic", "bic"}
-        What chooses the order, as in :func:`tvident.fit_local_polynomials`.
+        Criterion that chooses the order, as in :func:`tvident.fit_local_polynomials`.
     selection : {"window", "pooled", "average"}
         How orders are chosen, as in :func:`tvident.fit_local_polynomials`: each window's own, one for neighbouring windows together, or
         all of them averaged.
@@ -126,7 +126,7 @@ class StrongForm:
 
     References
     ----------
-    M. Ruzek, S. Chesné, D. Rémond: identification of a time-varying mechanical system using the Akaike information criterion.
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
 
     Examples
     --------

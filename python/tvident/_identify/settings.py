@@ -1,4 +1,4 @@
-"""What is asked for: what is given wins over an earlier result's settings, those over the method's."""
+"""Settings of one call: arguments override the settings of an earlier result, which override the defaults of the method."""
 
 from __future__ import annotations
 

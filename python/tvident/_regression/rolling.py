@@ -16,7 +16,7 @@ MOST_REGRESSORS = 16
 
 @dataclass(frozen=True, eq=False)
 class RollingRegression:
-    """What :func:`rolling_least_squares` found; NaN where the status says INVALID.
+    """The result of :func:`rolling_least_squares`; NaN where the status says INVALID.
 
     Attributes
     ----------
@@ -65,8 +65,8 @@ def rolling_least_squares(
 ) -> RollingRegression:
     """Solve ``A x ≈ b`` by least squares in a window around every row.
 
-    The window around row ``i`` holds the rows ``i - w//2 … i - w//2 + w - 1``. Each window's factor is merged from factors that rows were
-    only ever added to, so a glitch leaves with its row, and no digits are lost however long the record is.
+    The window around row ``i`` holds the rows ``i - w//2 … i - w//2 + w - 1``. Rows are only appended to factors, and factors
+    merged; no row is ever subtracted, so an outlier leaves with its row, and no digits are lost however long the record is.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What an identification found."""
+"""The result of an identification."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _range(value: Any) -> str:
 
 
 def _product(factor: Array, error: Array) -> Array:
-    """Return standard errors times what they are too small by."""
+    """Return standard errors times their variance-inflation factor."""
     return np.asarray(factor * error)
 
 
@@ -55,14 +55,15 @@ class Identification:
         Parameters that are constant over the record.
     stderr : mapping of str to ndarray, shape (\*, n)
         Standard errors of all of these, ``"natural_frequency"`` and ``"damping_ratio"`` (by the delta method, with all covariances). In
-        weak form they hold the correlation of overlapping equations and what windows cannot follow. In strong form they are those of
-        ordinary least squares times one factor a record and parameter: how far windows scatter that share no equation, or for
-        constants the covariance of the residuals. They cannot hold what all windows are wrong by alike: angle noise of 3 % and more
-        pulls inertia and stiffness down, and constants taken from derivatives may be off by two or three of their standard errors.
+        weak form they contain the correlation of overlapping equations and changes that windows cannot follow. In strong form they are
+        those of ordinary least squares times one factor per record and parameter, from the scatter between windows that share no
+        equation, or for constants from the covariance of the residuals. They do not contain a bias that all windows share: angle noise
+        of 3 % and more biases inertia and stiffness downwards, and constants estimated from derivatives may have a bias of two or three
+        standard errors.
     condition : ndarray, shape (\*, n)
-        Condition number of the equations, their columns scaled to the same norm: how hard the parameters are to tell apart.
+        Condition number of the equations, their columns scaled to the same norm: large if parameters are nearly collinear.
     residual_std : ndarray, shape (\*, n)
-        Standard deviation of what is left of the torque.
+        Standard deviation of the residuals of the torque.
     order : ndarray of uint8, shape (\*, n)
         Order of the polynomial around each sample; 0 in weak form, which has none.
     status : ndarray of uint16, shape (\*, n)
@@ -70,13 +71,14 @@ class Identification:
     record_status : Status, or ndarray of uint16 in the shape of the batch
         Flags that hold for the whole record.
     jumps : tuple of float
-        Times in seconds at which what is windowed jumps, where windows of all lengths are averaged; one such tuple a record in a batch.
+        Times in seconds at which windowed parameters jump, found if windows of all lengths are averaged; one such tuple per record in a
+        batch.
     reasons : tuple of str
         What was chosen, and why.
     advice : tuple of str
         What to do about what looks wrong.
     settings : dict
-        What was used and what was chosen, as plain JSON. ``identify(…, settings=result.settings)`` repeats it.
+        Settings that were given and chosen, as plain JSON. ``identify(…, settings=result.settings)`` repeats it.
 
     See Also
     --------
@@ -133,7 +135,7 @@ class Identification:
 
     @property
     def trusted(self) -> npt.NDArray[np.bool_]:
-        r"""Where numbers may be believed, shape (\*, n): the mask for plotting and averaging.
+        r"""Where values can be trusted, shape (\*, n): the mask for plotting and averaging.
 
         True where every parameter is a finite number, where the sample's status has none of INVALID, RANK_DEFICIENT, ILL_CONDITIONED and
         NOISE_MODEL, and where that of the record has neither RANK_DEFICIENT nor ILL_CONDITIONED.
@@ -160,8 +162,8 @@ class Identification:
         Returns
         -------
         dict of str to ndarray, shape (n,)
-            Time, parameters and terms with their standard errors, what is known of the equations, the status of the sample and of the
-            record, and 1 where numbers may be believed.
+            Time, parameters and terms with their standard errors, condition number and residuals, the status of the sample and
+            of the record, and 1 where values can be trusted.
 
         Raises
         ------
@@ -201,7 +203,7 @@ class Identification:
         write_table(path, self.columns(), UNITS)
 
     def summary(self) -> str:
-        """Return a table of what was found, and what the statuses advise, in words.
+        """Return a table of the parameters, and in words what was chosen and what to do.
 
         Returns
         -------

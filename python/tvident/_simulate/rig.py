@@ -88,7 +88,7 @@ def simulate_torsional_rig(
 
     References
     ----------
-    M. Ruzek, S. Chesné, D. Rémond: identification of a time-varying mechanical system using the Akaike information criterion.
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
     S. Blanes, F. Casas, J. A. Oteo, J. Ros: The Magnus expansion and some of its applications, Physics Reports 470 (2009).
 
     Examples

@@ -1,4 +1,4 @@
-"""What a flag says of a sample or of a record, and what to do about it."""
+"""Flags of samples and of records: their meaning, and what to do."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import enum
 class Status(enum.IntFlag):
     """Flags of one sample, or of a whole record; 0 is good.
 
-    Data never raises: a window that something is wrong with gets a status, and the rest of the record goes on. Arrays hold the flags
+    Bad data never raises an error: it gets a status, and the rest of the record is computed. Arrays hold the flags
     as ``uint16``, so ``fit.status & Status.EDGE`` works on whole arrays.
 
-    There are two groups. Flags of a sample stand in ``result.status`` and say what holds at that sample only: INVALID, EDGE, GAP,
-    LOWEST_ORDER, HIGHEST_ORDER, EXACT, RANK_DEFICIENT, ILL_CONDITIONED, NOISE_MODEL. Flags of a record stand in ``result.record_status``
+    There are two groups. Flags of a sample are in ``result.status`` and say what holds at that sample only: INVALID, EDGE, GAP,
+    LOWEST_ORDER, HIGHEST_ORDER, EXACT, RANK_DEFICIENT, ILL_CONDITIONED, NOISE_MODEL. Flags of a record are in ``result.record_status``
     and say what holds for the whole record: NOISE_MODEL, COLOURED, KIND_CONTRADICTED, WINDOW_LIMIT, LAG_SUSPECTED, TERM_SUSPECTED,
     RANK_DEFICIENT, ILL_CONDITIONED. Three are in both groups: RANK_DEFICIENT and ILL_CONDITIONED are flags of the record where they
     concern its constants, and of a sample where they concern the window around it; NOISE_MODEL is a flag of a sample where it holds
@@ -33,13 +33,13 @@ class Status(enum.IntFlag):
     """
 
     INVALID = 1
-    """There is no number: it is NaN. The only flag that goes with NaN. Look for missing values, or for what the other flags say."""
+    """There is no value: it is NaN. The only flag that goes with NaN. Look for missing values, and at the other flags."""
 
     EDGE = 2
     """Near an end of the record: evaluated off the centre of its window, or with fewer equations. Errors are larger there."""
 
     GAP = 4
-    """Samples are missing or masked out here: the number is taken from what lies around. Look at its standard error."""
+    """Samples are missing or masked out here: the value comes from the samples around. Look at its standard error."""
 
     LOWEST_ORDER = 8
     """The lowest candidate order was chosen. The signal hardly changes within the window: a longer window would be less noisy."""
@@ -48,32 +48,32 @@ class Status(enum.IntFlag):
     """The highest candidate order was chosen. The signal may change more than a polynomial can follow: shorten the window."""
 
     EXACT = 32
-    """The residual is at the floor set by rounding or quantisation, so there was no noise to weigh orders against."""
+    """The residual is at the floor set by rounding or quantisation, so there is no noise to compare orders with."""
 
     RANK_DEFICIENT = 64
     """The equations do not determine the parameters: those of the window around a sample, or the constants of the record. Their values
     are NaN, and INVALID says so. Excite the system, or leave a parameter out."""
 
     ILL_CONDITIONED = 128
-    """The equations hardly tell the parameters apart: those of the window around a sample, or the constants of the record. Look at the
-    condition number, and at the standard errors before any value."""
+    """The regressors are nearly collinear, so the equations hardly distinguish the parameters: those of the window around a sample, or
+    the constants of the record. Look at the condition number, and at the standard errors before any value."""
 
     NOISE_MODEL = 256
-    """Equations are predicted much worse than the noise of the channels explains: it is coloured, the torque is late, or a term is
-    missing. Standard errors are taken from the residuals. Look at what the summary suspects."""
+    """The torque is predicted much worse than the noise of the channels explains: the noise is coloured, the torque is delayed, or a term
+    is missing. Standard errors are estimated from the residuals. Look at what the summary suspects."""
 
     COLOURED = 512
-    """What is left of the torque is correlated over more than a test function. Look for a term that is missing, or a slow disturbance."""
+    """The residuals are correlated over more than a test function. Look for a missing term, or a slow disturbance."""
 
     KIND_CONTRADICTED = 1024
     """A parameter that was taken to be constant differs between the parts of the record. Let it be ``"auto"`` or ``"varying"``."""
 
     WINDOW_LIMIT = 2048
-    """The best test function or length of windows is the first or last that was tried. The record may change faster than it can be
-    followed, or be too short: then neither values nor their errors can be trusted."""
+    """The best test function or length of windows is the first or last that was tried. The parameters may change too fast to
+    be followed, or the record is too short: then neither values nor standard errors can be trusted."""
 
     LAG_SUSPECTED = 4096
-    """The torque seems to have been recorded late. Give ``lag=`` as the summary suggests."""
+    """The torque seems to be delayed. Give ``lag=`` as the summary suggests."""
 
     TERM_SUSPECTED = 8192
     """Friction, an offset or a hardening spring seems to be missing. Add the term that the summary names."""
@@ -85,32 +85,32 @@ class Status(enum.IntFlag):
 
 
 _ADVICE = {
-    Status.INVALID: "no number: values are missing in the window, too few equations near an end, or see the other flags",
+    Status.INVALID: "no value: samples are missing in the window, too few equations near an end, or see the other flags",
     Status.EDGE: "near an end of the record: errors are larger there",
-    Status.GAP: "samples are missing or masked out here: the number is taken from what lies around",
+    Status.GAP: "samples are missing or masked out here: the value comes from the samples around",
     Status.LOWEST_ORDER: (
         "the lowest order was chosen: the signal hardly changes within the window, a longer one would be less noisy"
     ),
     Status.HIGHEST_ORDER: (
         "the highest order was chosen: the signal may change more than a polynomial can follow, shorten the window"
     ),
-    Status.EXACT: "the residual is rounding or quantisation: there was no noise to weigh orders against",
+    Status.EXACT: "the residual is rounding or quantisation: there is no noise to compare orders with",
     Status.RANK_DEFICIENT: "the equations do not determine the parameters: excite the system, or leave a parameter out",
     Status.NOISE_MODEL: (
-        "the noise of the channels does not explain what is left: coloured noise, a lag, or a term that is missing; "
-        "errors are taken from the residuals"
+        "the noise of the channels does not explain the residuals: coloured noise, a lag, or a missing term; standard errors are "
+        "estimated from the residuals"
     ),
-    Status.COLOURED: "what is left is correlated for longer than a test function: a term is missing, or a slow disturbance acts",
+    Status.COLOURED: "the residuals are correlated over more than a test function: a term is missing, or there is a slow disturbance",
     Status.KIND_CONTRADICTED: (
-        "what was taken to be constant differs between parts of the record: let it be 'auto' or 'varying'"
+        "a parameter taken as constant differs between parts of the record: use 'auto' or 'varying'"
     ),
     Status.WINDOW_LIMIT: (
-        "the best test function or window is the first or last that was tried: too fast a change, or too short a record, whose numbers "
-        "cannot be trusted"
+        "the best test function or window is the shortest or longest that was tried: the change is too fast, or the record is too short; "
+        "values cannot be trusted then"
     ),
-    Status.LAG_SUSPECTED: "the torque seems to come late: give lag= as the summary suggests",
+    Status.LAG_SUSPECTED: "the torque seems to be delayed: give lag= as the summary suggests",
     Status.TERM_SUSPECTED: "a term seems to be missing: add the one that the summary names",
-    Status.ILL_CONDITIONED: "the equations hardly tell the parameters apart: look at the standard errors first",
+    Status.ILL_CONDITIONED: "the regressors are nearly collinear: look at the standard errors first",
 }
 
 RECORD_FLAGS = (
@@ -126,7 +126,7 @@ RECORD_FLAGS = (
 """Flags that concern a whole record."""
 
 DOUBTFUL = Status.INVALID | Status.RANK_DEFICIENT | Status.ILL_CONDITIONED | Status.NOISE_MODEL
-"""Flags of a sample whose number is not to be believed."""
+"""Flags of a sample whose value is not to be trusted."""
 
 DOUBTFUL_RECORD = Status.RANK_DEFICIENT | Status.ILL_CONDITIONED
-"""Flags of a record none of whose numbers is to be believed."""
+"""Flags of a record none of whose values is to be trusted."""
