@@ -10,34 +10,34 @@ pub struct Status(u16);
 impl Status {
     /// Nothing to report.
     pub const GOOD: Self = Self(0);
-    /// There is no number here: it is NaN. The only flag that goes with NaN.
+    /// There is no value here: it is NaN. The only flag that goes with NaN.
     pub const INVALID: Self = Self(1);
     /// Near an end of the record: evaluated off the centre of its window, or with fewer equations.
     pub const EDGE: Self = Self(1 << 1);
-    /// Samples are missing or masked out here: the number is taken from what lies around.
+    /// Samples are missing or masked out here: the value comes from the samples around.
     pub const GAP: Self = Self(1 << 2);
     /// The lowest candidate order was chosen; the paper advises a longer window.
     pub const LOWEST_ORDER: Self = Self(1 << 3);
     /// The highest candidate order was chosen; the paper advises a shorter window or a higher `max_order`.
     pub const HIGHEST_ORDER: Self = Self(1 << 4);
-    /// The residual is at the floor set by rounding or quantisation: there is no noise to weigh orders against.
+    /// The residual is at the floor set by rounding or quantisation: there is no noise to compare orders with.
     pub const EXACT: Self = Self(1 << 5);
     /// The equations do not determine the parameters. Goes with [`Status::INVALID`].
     pub const RANK_DEFICIENT: Self = Self(1 << 6);
-    /// The equations hardly tell the parameters apart.
+    /// The regressors are nearly collinear: the equations hardly distinguish the parameters.
     pub const ILL_CONDITIONED: Self = Self(1 << 7);
 
-    /// Rows are predicted much worse than the noise of the channels explains: errors are taken from what is left instead.
+    /// Rows are predicted much worse than the noise of the channels explains: standard errors are estimated from the residuals.
     pub const NOISE_MODEL: Self = Self(1 << 8);
-    /// What is left is correlated over more than a test function.
+    /// The residuals are correlated over more than a test function.
     pub const COLOURED: Self = Self(1 << 9);
-    /// What was taken to be constant differs between the parts of the record.
+    /// A parameter taken as constant differs between parts of the record.
     pub const KIND_CONTRADICTED: Self = Self(1 << 10);
-    /// The best length of a window or test function is the first or last that was tried.
+    /// The best length of a window or test function is the shortest or longest that was tried.
     pub const WINDOW_LIMIT: Self = Self(1 << 11);
-    /// The torque seems to come late.
+    /// The torque seems to be delayed.
     pub const LAG_SUSPECTED: Self = Self(1 << 12);
-    /// A term that was left out seems to act: friction, an offset or a hardening spring.
+    /// A term seems to be missing: friction, an offset or a hardening spring.
     pub const TERM_SUSPECTED: Self = Self(1 << 13);
 
     /// Every flag that exists, with its name.

@@ -26,7 +26,7 @@ pub(crate) struct RollingRegressions {
     status: Py<PyArray1<u16>>,
 }
 
-/// Least squares in every window of rows; regressors and right-hand rhs have the rows along their last axis.
+/// Least squares in every window of rows; regressors and right-hand sides have the rows along their last axis.
 #[pyfunction]
 #[pyo3(signature = (regressors, rhs, window, *, step=1, workers=None, progress=None))]
 pub(crate) fn rolling_least_squares<'py>(

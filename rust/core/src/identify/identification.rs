@@ -103,7 +103,7 @@ pub struct Identification {
     pub covariances: Vec<Covariance>,
     /// Condition number of the equations.
     pub condition: Vec<f64>,
-    /// Standard deviation of what is left of the torque.
+    /// Standard deviation of the residuals of the torque.
     pub residual_std: Vec<f64>,
     /// Bits of [`Status`] for every wanted sample: what holds there.
     pub status: Vec<u16>,

@@ -50,7 +50,7 @@ pub(crate) struct Constant {
     pub(crate) test: Option<Test>,
 }
 
-/// Numbers at every so-manieth sample.
+/// Numbers at every `step`-th sample.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct SampleResults {
     /// Unknowns that change, in the order in which they are listed.
@@ -59,7 +59,7 @@ pub(crate) struct SampleResults {
     pub(crate) errors: Vec<Vec<f64>>,
     /// Covariances of pairs of unknowns.
     pub(crate) covariances: Vec<Vec<f64>>,
-    /// Standard deviation of what is left of the torque after multiplication with the test function.
+    /// Standard deviation of the residuals of the rows.
     pub(crate) deviation: Vec<f64>,
     /// Condition number of the equations.
     pub(crate) condition: Vec<f64>,

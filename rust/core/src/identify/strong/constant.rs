@@ -11,7 +11,7 @@ use crate::exec::pool;
 use crate::exec::pool::{Piece, Watch};
 use crate::identify::identification::{Covariance, Identification, Unknown};
 use crate::identify::options::StrongForm;
-use crate::identify::strong::streaming::{Chunk, Identified, PIECE, equations, finish, pairs, redundancies};
+use crate::identify::strong::streaming::{Chunk, Identified, PIECE, equations, finish, pairs, variance_inflations};
 use crate::lanes::output::Elements;
 use crate::least_squares::plan::Regressions;
 use crate::least_squares::stacked_qr::{SharedParameters, Summary};
@@ -85,7 +85,7 @@ fn solved(
     let pieces = solved.iter_mut().zip(motions).map(|content| Piece { size: 1, content }).collect();
     let work = |(solved, motion): (&mut Option<SharedParameters>, &Motion<'_>), chunk: &mut Chunk| {
         if let Some(solved) = solved {
-            enlarge(&mut solved.covariance, &redundancies(derivatives, motion, chunk)?);
+            enlarge(&mut solved.covariance, &variance_inflations(derivatives, motion, chunk)?);
         }
         Ok(())
     };

@@ -179,7 +179,7 @@ impl Windows<'_> {
         let (values, errors) = (slices(&found.values), slices(&errors));
         let track = Track { values: &values, errors: &errors };
         let factors = scatter_of(derivatives, window, samples, track)
-            .or_else(|| redundancies(problem, derivatives.options().window_length / 2))
+            .or_else(|| variance_inflations(problem, derivatives.options().window_length / 2))
             .unwrap_or_else(|| vec![1.0; windowed]);
         let between = |one: usize, other: usize, row: usize| {
             let own = |one: usize, other: usize| own(one, other, row) * factors[one] * factors[other];
@@ -255,7 +255,7 @@ fn row_covariance(
 }
 
 /// The factor by which standard errors of windowed coefficients exceed those of ordinary least squares, if all are assumed constant.
-fn redundancies(problem: &Problem<'_>, reach: usize) -> Option<Vec<f64>> {
+fn variance_inflations(problem: &Problem<'_>, reach: usize) -> Option<Vec<f64>> {
     let columns = problem.windowed.iter().chain(&problem.constants).chain([&problem.rhs]);
     let columns: Vec<Vec<f64>> = columns.map(|column| column.to_vec()).collect();
     let mut stretched = Stretched::new(columns.len(), reach);

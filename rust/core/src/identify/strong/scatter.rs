@@ -11,7 +11,7 @@ use std::ops::Range;
 use crate::equation::motion::Motion;
 use crate::error::Error;
 use crate::exec::pool::Watch;
-use crate::identify::strong::streaming::{Chunk, Identified, equations, identify_parts, redundancies};
+use crate::identify::strong::streaming::{Chunk, Identified, equations, identify_parts, variance_inflations};
 use crate::lanes::output::Elements;
 use crate::least_squares::plan::{Regressions, RollingLeastSquares};
 use crate::local_polynomials::plan::LocalPolynomials;
@@ -55,7 +55,7 @@ pub(crate) fn scatter(
     let mut all = Vec::new();
     for (motion, track) in records {
         let factors = scatter_of(derivatives, least_squares.window(), motion.angle.len(), *track);
-        all.push(or_redundancies(factors, derivatives, least_squares, motion)?);
+        all.push(or_variance_inflations(factors, derivatives, least_squares, motion)?);
     }
     Ok(all)
 }
@@ -86,12 +86,14 @@ pub(crate) fn identify_with_scatter(
     }
     identify_parts(derivatives, least_squares, parts, workers, watch)?;
     let each = motions.iter().zip(taken);
-    each.map(|(motion, taken)| or_redundancies(factors(motion.unknowns(), taken), derivatives, least_squares, motion))
-        .collect()
+    each.map(|(motion, taken)| {
+        or_variance_inflations(factors(motion.unknowns(), taken), derivatives, least_squares, motion)
+    })
+    .collect()
 }
 
 /// The factors of one record, from the correlation of its residuals where windows give none.
-fn or_redundancies(
+fn or_variance_inflations(
     factors: Option<Vec<f64>>,
     derivatives: &LocalPolynomials,
     least_squares: &RollingLeastSquares,
@@ -99,7 +101,7 @@ fn or_redundancies(
 ) -> Result<Vec<f64>, Error> {
     match factors {
         Some(factors) => Ok(factors),
-        None => redundancies(derivatives, motion, &mut Chunk::new(derivatives, least_squares.columns())),
+        None => variance_inflations(derivatives, motion, &mut Chunk::new(derivatives, least_squares.columns())),
     }
 }
 

@@ -214,7 +214,7 @@ pub(crate) fn finish(chunk: &Chunk, samples: Range<usize>, part: &mut Identified
 }
 
 /// By how much the standard errors of constants exceed those of ordinary least squares, from stretches of a long record.
-pub(crate) fn redundancies(
+pub(crate) fn variance_inflations(
     derivatives: &LocalPolynomials,
     motion: &Motion<'_>,
     chunk: &mut Chunk,
