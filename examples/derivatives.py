@@ -4,7 +4,7 @@ import numpy as np
 
 import tvident
 
-# Two seconds of a swing that gets faster, at 500 samples a second, as an encoder with noise would see it.
+# Two seconds of an oscillation with increasing frequency, 500 samples per second, with noise.
 sample_rate = 500.0
 t = np.arange(1000) / sample_rate
 phase = 2 * np.pi * (1.0 * t + 0.75 * t**2)
@@ -19,7 +19,7 @@ print(f"noise: {np.median(fit.sigma):.4f} rad (it is 0.0020)")
 orders, counts = np.unique(fit.order, return_counts=True)
 print("orders: " + ", ".join(f"{order} in {count / t.size:.0%}" for order, count in zip(orders, counts, strict=True)))
 
-# Near the ends, windows are evaluated off their centres: the status says so, and errors are larger there.
+# Near the ends, windows are evaluated off their centres and errors are larger: these samples have the flag EDGE.
 inside = fit.status & tvident.Status.EDGE == 0
 error = np.sqrt(np.mean((acceleration - true_acceleration)[inside] ** 2)) / true_acceleration.std()
 plain = np.gradient(np.gradient(angle, t), t)

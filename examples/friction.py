@@ -1,4 +1,4 @@
-"""A drive with constant inertia, viscous damping and Coulomb friction that carries nothing springy."""
+"""A drive with constant inertia, viscous damping and Coulomb friction, without a spring."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ import tvident
 
 INERTIA, DAMPING, COULOMB, OFFSET = 0.8, 2.5, 1.5, 0.2
 
-# A motion of three frequencies is prescribed; the torque follows from it, and is recorded with noise, as is the angle.
+# The motion has three frequencies; the torque follows from it. Both channels are recorded with noise.
 t = np.arange(20_000) / 1000
 angle, velocity, acceleration = np.zeros(t.size), np.zeros(t.size), np.zeros(t.size)
 for amplitude, frequency, phase in ((0.6, 0.5, 0.0), (0.3, 1.3, 1.0), (0.1, 2.9, 2.0)):

@@ -19,7 +19,7 @@ time = recordings.channel(channels, "time", path)
 angle = recordings.channel(channels, "angle", path)
 torque = recordings.channel(channels, "torque", path)
 
-# What could not be recorded is NaN: equations that hold it are left out, and no others. Here the cable was loose for 19 ms.
+# A missing sample is NaN: only the equations that contain it are left out. Here 19 ms are missing.
 angle[4001:4020] = np.nan
 
 result = tvident.identify(angle, torque, t=time)

@@ -16,11 +16,11 @@ found = tvident.identify(rig.angle, rig.torque, sample_rate=rig.sample_rate)
 print(found.summary(), end="\n\n")
 print(f"by default:                      stiffness within {error(found):.1%}")
 
-# The paper takes all three as constant within 0.2 s. Over one cycle of vibration inertia and stiffness look alike.
+# The paper takes all three as constant within 0.2 s, in which inertia and stiffness are nearly collinear.
 paper = tvident.identify(rig.angle, rig.torque, sample_rate=rig.sample_rate, method="paper")
 print(f"as in the paper:                 stiffness within {error(paper):.1%}")
 
-# A disk can be weighed: give its inertia.
+# The inertia of a disk can be computed from its mass and radius: give it as known.
 known = tvident.identify(rig.angle, rig.torque, sample_rate=rig.sample_rate, method="paper", inertia=0.0123)
 print(f"as in the paper, inertia known:  stiffness within {error(known):.1%}")
 

@@ -12,7 +12,7 @@ import tvident
 from calls import paper
 from reference.identification import derivatives, windowed
 from reference.regression import solve
-from reference.scatter import redundancy, scatter
+from reference.scatter import scatter, variance_inflation
 from tvident import Status
 
 Array = npt.NDArray[np.float64]
@@ -80,7 +80,7 @@ def test_every_window_is_the_papers(
     # A factor is taken from all windows, so the worst decides how exact it is.
     worst = float(np.nanmax(solutions.condition, initial=1.0))
     if larger is None:
-        larger = redundancy(A, side, half)
+        larger = variance_inflation(A, side, half)
         worst = max(worst, solve(*(rows[half : n - half] for rows in (A, side))).condition)
     flagged = {flag: result.status & flag != 0 for flag in (Status.INVALID, Status.RANK_DEFICIENT, Status.EDGE)}
     solved = solutions.rows > 0
@@ -139,7 +139,7 @@ def test_constant_parameters_are_one_least_squares_over_the_record(seed: int) ->
     usable = np.isfinite(A).all(axis=1) & ~hit
     expected = solve(A[usable], torque[usable])
     A[~usable] = np.nan
-    larger = redundancy(A, torque, 25)
+    larger = variance_inflation(A, torque, 25)
     for k, name in enumerate(("inertia", "damping", "stiffness", "offset")):
         value, error = result.constants[name]
         assert value == pytest.approx(expected.params[k], rel=1e-6)

@@ -32,7 +32,7 @@ def scatter(values: Array, errors: Array, window: int, half: int) -> Array | Non
     return np.array(factors)
 
 
-def redundancy(A: Array, b: Array, reach: int) -> Array:
+def variance_inflation(A: Array, b: Array, reach: int) -> Array:
     """Compare the covariance of least squares whose residuals are correlated with that of independent ones."""
     usable = np.isfinite(A).all(axis=1) & np.isfinite(b)
     solution = solve(A[usable], b[usable])
