@@ -150,3 +150,9 @@ def test_files_are_short() -> None:
     lines = {str(path.relative_to(RUST)): path.read_text(encoding="utf-8").count("\n") for path in sources}
     assert not {file: count for file, count in lines.items() if count > LONGEST_FILE}
     assert median(lines.values()) <= MEDIAN_FILE
+
+
+def test_no_two_types_have_one_name() -> None:
+    definition = re.compile(r"^(?:pub(?:\(crate\))? )?(?:struct|enum|trait) (\w+)", flags=re.MULTILINE)
+    names = [name for file in FILES for name in definition.findall(code(file))]
+    assert sorted(names) == sorted(set(names))

@@ -4,11 +4,11 @@ use std::num::NonZeroUsize;
 
 use tvident::Error;
 use tvident::equation::{Coefficient, Motion};
-use tvident::identify::{Kind, Method, Options as IdentifyOptions, StrongForm, Task, identify_all};
+use tvident::identify::{Kind, Method, Options, StrongForm, Task, identify_all};
 use tvident::lanes::Elements;
 use tvident::least_squares::HALF_OF_THE_DIGITS;
 use tvident::least_squares::{Equations, Regressions, RollingLeastSquares};
-use tvident::local_polynomials::{Criterion, Estimates, LocalPolynomials, Options, Order, Selection};
+use tvident::local_polynomials::{Criterion, Estimates, LocalPolynomials, Order, PolynomialOptions, Selection};
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
@@ -71,7 +71,7 @@ impl Samples for Repeated {
 
 fn polynomials(window_length: usize, order: Order, derivatives: &[usize], lengths: usize) -> Result<usize, Error> {
     let choice = matches!(order, Order::Chosen { .. });
-    let plan = LocalPolynomials::new(Options {
+    let plan = LocalPolynomials::new(PolynomialOptions {
         window_length,
         order,
         selection: Selection::Window,
@@ -149,7 +149,7 @@ fn least_squares(lengths: usize) -> Result<usize, Error> {
 
 fn identify(lengths: usize) -> Result<usize, Error> {
     let instructions = Instructions::current();
-    let derivatives = LocalPolynomials::new(Options {
+    let derivatives = LocalPolynomials::new(PolynomialOptions {
         window_length: 201,
         order: CHOICE,
         selection: Selection::Window,
@@ -174,7 +174,7 @@ fn identify(lengths: usize) -> Result<usize, Error> {
         linear: false,
     });
     let task = Task { motion, mask: None, method, lag: Some(0.0) };
-    let options = IdentifyOptions {
+    let options = Options {
         delta: 1e-3,
         kinds: vec![Kind::Windowed; 3],
         quantisation: None,

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use tvident::lanes::Elements;
 use tvident::least_squares::HALF_OF_THE_DIGITS;
 use tvident::least_squares::{Equations, Regressions, RollingLeastSquares};
-use tvident::local_polynomials::{Criterion, Estimates, LocalPolynomials, Options, Order, Selection};
+use tvident::local_polynomials::{Criterion, Estimates, LocalPolynomials, Order, PolynomialOptions, Selection};
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
@@ -44,7 +44,7 @@ fn slices(numbers: &mut [Vec<f64>], elements: std::ops::Range<usize>) -> Vec<&mu
     numbers.iter_mut().map(|values| &mut values[elements.clone()]).collect()
 }
 
-fn estimate(options: &Options, record: &[f64], cuts: &[usize], step: usize) -> Outputs {
+fn estimate(options: &PolynomialOptions, record: &[f64], cuts: &[usize], step: usize) -> Outputs {
     let plan = LocalPolynomials::new(options.clone()).expect("valid options");
     let mut all = Outputs::new(options.derivatives.len() + 1, record.len().div_ceil(step));
     let mut scratch = plan.scratch();
@@ -66,7 +66,7 @@ fn estimate(options: &Options, record: &[f64], cuts: &[usize], step: usize) -> O
 }
 
 /// The same by several threads.
-fn estimate_in_parallel(options: &Options, record: &[f64], workers: usize) -> Outputs {
+fn estimate_in_parallel(options: &PolynomialOptions, record: &[f64], workers: usize) -> Outputs {
     let plan = LocalPolynomials::new(options.clone()).expect("valid options");
     let mut all = Outputs::new(options.derivatives.len() + 1, record.len());
     let mut derivatives = slices(&mut all.numbers, 0..record.len());
@@ -157,14 +157,20 @@ fn lengths() -> impl Strategy<Value = usize> {
     prop_oneof![6 => 5_usize..80, 2 => 80_usize..400, 1 => 400_usize..3000]
 }
 
-fn options(length: usize, order: Order, derivatives: Vec<usize>, noise: bool, instructions: Instructions) -> Options {
+fn options(
+    length: usize,
+    order: Order,
+    derivatives: Vec<usize>,
+    noise: bool,
+    instructions: Instructions,
+) -> PolynomialOptions {
     let order = match order {
         Order::Fixed(order) => Order::Fixed(order.min(length - 1)),
         chosen @ Order::Chosen { .. } => chosen,
     };
     let noise = noise || matches!(order, Order::Chosen { .. });
     let selection = Selection::Window;
-    Options {
+    PolynomialOptions {
         window_length: length,
         order,
         selection,

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use tvident::Status;
 use tvident::lanes::Elements;
-use tvident::local_polynomials::{Basis, Criterion, Estimates, LocalPolynomials, Options, Order, Selection};
+use tvident::local_polynomials::{Basis, Criterion, Estimates, LocalPolynomials, Order, PolynomialOptions, Selection};
 use tvident::simd::Instructions;
 
 /// Everything a plan estimates, for all samples of a record.
@@ -15,8 +15,8 @@ struct Everything {
     sigma: Vec<f64>,
 }
 
-fn chosen(window_length: usize, highest: usize) -> Options {
-    Options {
+fn chosen(window_length: usize, highest: usize) -> PolynomialOptions {
+    PolynomialOptions {
         window_length,
         order: Order::Chosen { criterion: Criterion::Aicc, highest },
         selection: Selection::Window,
@@ -28,7 +28,7 @@ fn chosen(window_length: usize, highest: usize) -> Options {
     }
 }
 
-fn run_in_pieces(options: Options, record: &[f64], cuts: &[usize]) -> Everything {
+fn run_in_pieces(options: PolynomialOptions, record: &[f64], cuts: &[usize]) -> Everything {
     let count = options.derivatives.len();
     let plan = LocalPolynomials::new(options).expect("valid options");
     let n = record.len();
@@ -57,7 +57,7 @@ fn run_in_pieces(options: Options, record: &[f64], cuts: &[usize]) -> Everything
     all
 }
 
-fn run(options: Options, record: &[f64]) -> Everything {
+fn run(options: PolynomialOptions, record: &[f64]) -> Everything {
     run_in_pieces(options, record, &[])
 }
 
@@ -147,7 +147,7 @@ proptest! {
         let options = chosen(2 * half + 1, 15);
         let fastest = run(options.clone(), &record);
         for instructions in Instructions::available() {
-            let other = run(Options { instructions, ..options.clone() }, &record);
+            let other = run(PolynomialOptions { instructions, ..options.clone() }, &record);
             for i in 0..record.len() {
                 if fastest.order[i] == other.order[i] {
                     for d in 0..3 {
@@ -211,7 +211,7 @@ fn a_glitch_leaves_nothing_behind() {
 #[test]
 fn a_polynomial_is_its_own_fit_and_exact() {
     let record: Vec<f64> = (0..500).map(|i| f64::from(i) / 100.0).map(|t| 1.0 - t + 0.5 * t * t * t).collect();
-    let found = run(Options { delta: 0.01, ..chosen(51, 15) }, &record);
+    let found = run(PolynomialOptions { delta: 0.01, ..chosen(51, 15) }, &record);
     for (i, &value) in record.iter().enumerate() {
         let t = i as f64 / 100.0;
         assert_eq!(found.order[i], 3, "sample {i}");

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use tvident::Error;
 use tvident::exec::{Watch, workers as threads};
 use tvident::lanes::Elements;
-use tvident::local_polynomials::{Criterion, Estimates, LocalPolynomials as Plan, Options, Order, Selection};
+use tvident::local_polynomials::{Criterion, Estimates, LocalPolynomials as Plan, Order, PolynomialOptions, Selection};
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
@@ -69,8 +69,16 @@ impl LocalPolynomials {
         };
         let order = order.map_or(Order::Chosen { criterion, highest: max_order }, Order::Fixed);
         let instructions = Instructions::current();
-        let options =
-            Options { window_length, order, selection, derivatives, delta, noise, quantisation, instructions };
+        let options = PolynomialOptions {
+            window_length,
+            order,
+            selection,
+            derivatives,
+            delta,
+            noise,
+            quantisation,
+            instructions,
+        };
         Ok(Self { plan: Plan::new(options).map_err(|error| exception(&error))? })
     }
 

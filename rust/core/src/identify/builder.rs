@@ -11,7 +11,7 @@ use crate::identify::kinds::Kind;
 use crate::identify::options::{Method, Options, StrongForm, Task, WeakForm};
 use crate::identify::route::identify_all;
 use crate::local_polynomials::criterion::Criterion;
-use crate::local_polynomials::options::{Options as PolynomialOptions, Order, Selection};
+use crate::local_polynomials::options::{Order, PolynomialOptions, Selection};
 use crate::local_polynomials::plan::LocalPolynomials;
 use crate::simd::instructions::Instructions;
 

@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
 use crate::local_polynomials::estimates::Estimates;
-use crate::local_polynomials::options::{Options, Order};
+use crate::local_polynomials::options::{Order, PolynomialOptions};
 use crate::local_polynomials::order_shares::Wanted;
 use crate::local_polynomials::single_window::Window;
 use crate::record::samples::Samples;
@@ -50,7 +50,7 @@ pub(crate) struct Estimate {
 }
 
 impl Ends {
-    pub(crate) fn new(options: &Options) -> Self {
+    pub(crate) fn new(options: &PolynomialOptions) -> Self {
         let (order, floor) = (options.order, options.quantisation_floor());
         Self { order, derivatives: options.derivatives.clone(), delta: options.delta, floor }
     }

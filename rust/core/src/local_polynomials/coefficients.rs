@@ -7,7 +7,7 @@ use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::engine::{self, Walk, engine};
 use crate::local_polynomials::estimates::Estimates;
 use crate::local_polynomials::evaluate::Finish;
-use crate::local_polynomials::options::{Options, Order, Selection};
+use crate::local_polynomials::options::{Order, PolynomialOptions, Selection};
 use crate::record::samples::Samples;
 use crate::simd::instructions::Instructions;
 
@@ -41,7 +41,7 @@ impl Coefficients {
     /// Gives the coefficients of the degrees wanted of a basis, and the residual of its highest order.
     pub(crate) fn new(basis: &Basis, wanted: &[usize], residual: bool, instructions: Instructions) -> Self {
         let top = basis.degrees() - 1;
-        let options = Options {
+        let options = PolynomialOptions {
             window_length: basis.length(),
             order: Order::Fixed(top.min(crate::simd::vectors::TABLE - 1)),
             selection: Selection::Window,

@@ -8,7 +8,7 @@ use crate::status::Status;
 pub struct Estimates<'a> {
     /// Which samples the elements of every slice belong to.
     pub elements: Elements,
-    /// One slice a derivative, in the order in which [`crate::local_polynomials::Options::derivatives`] names them.
+    /// One slice a derivative, in the order in which [`crate::local_polynomials::PolynomialOptions::derivatives`] names them.
     pub derivatives: Vec<&'a mut [f64]>,
     /// Order chosen. Near the ends of a record each derivative may take a lower one.
     pub order: &'a mut [u8],

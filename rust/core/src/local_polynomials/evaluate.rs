@@ -3,7 +3,7 @@
 use crate::lanes::tile::Tile;
 use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
 use crate::local_polynomials::criterion::{Tables, choose};
-use crate::local_polynomials::options::{Options, Order};
+use crate::local_polynomials::options::{Order, PolynomialOptions};
 use crate::local_polynomials::sliding_projection::State;
 use crate::simd::unroll::unroll;
 use crate::simd::vectors::{Lanes, TABLE};
@@ -65,7 +65,7 @@ impl Functional {
 }
 
 impl Finish {
-    pub(crate) fn new(options: &Options, basis: &Basis) -> Self {
+    pub(crate) fn new(options: &PolynomialOptions, basis: &Basis) -> Self {
         let (length, degrees) = (basis.length(), basis.degrees());
         let functional = |&derivative: &usize| Functional::derivative(basis, derivative, options.delta);
         let mut weights = [None; TABLE];

@@ -22,5 +22,5 @@ pub use basis::Basis;
 pub use boundary::End;
 pub use criterion::Criterion;
 pub use estimates::Estimates;
-pub use options::{HIGHEST_ORDER, Options, Order, Selection};
+pub use options::{HIGHEST_ORDER, Order, PolynomialOptions, Selection};
 pub use plan::LocalPolynomials;

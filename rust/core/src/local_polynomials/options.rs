@@ -1,4 +1,4 @@
-//! Options of local polynomials: the estimates wanted in every window, and the choice of its order.
+//! PolynomialOptions of local polynomials: the estimates wanted in every window, and the choice of its order.
 
 use crate::local_polynomials::criterion::Criterion;
 use crate::simd::instructions::Instructions;
@@ -22,7 +22,7 @@ pub enum Order {
 
 /// What to estimate, and how.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct PolynomialOptions {
     /// Samples in a window, `M`.
     pub window_length: usize,
     /// How the order is determined.
@@ -41,7 +41,7 @@ pub struct Options {
     pub instructions: Instructions,
 }
 
-impl Options {
+impl PolynomialOptions {
     /// The residual sum of squares of a window with quantisation noise only: `M q²/12`.
     pub(crate) fn quantisation_floor(&self) -> f64 {
         self.window_length as f64 * self.quantisation * self.quantisation / 12.0

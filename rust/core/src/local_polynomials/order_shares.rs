@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::coefficients::{self, Coefficients, Projected};
 use crate::local_polynomials::neighbour_sums::Pool;
-use crate::local_polynomials::options::{Options, Order, Selection};
+use crate::local_polynomials::options::{Order, PolynomialOptions, Selection};
 use crate::local_polynomials::sliding_projection::ROUNDING;
 use crate::record::samples::Samples;
 
@@ -61,7 +61,7 @@ pub(crate) struct SelectionScratch {
 
 impl Selector {
     /// Prepares the tables, or returns `None` if the order is fixed.
-    pub(crate) fn new(options: &Options, basis: &Basis) -> Option<Self> {
+    pub(crate) fn new(options: &PolynomialOptions, basis: &Basis) -> Option<Self> {
         let Order::Chosen { criterion, .. } = options.order else { return None };
         let (length, degrees) = (basis.length(), basis.degrees());
         let all: Vec<usize> = (0..degrees).collect();

@@ -16,7 +16,7 @@ use crate::local_polynomials::criterion::Criterion;
 use crate::local_polynomials::engine::{Walk, engine};
 use crate::local_polynomials::estimates::Estimates;
 use crate::local_polynomials::evaluate::Finish;
-use crate::local_polynomials::options::{HIGHEST_ORDER, Options, Order, Selection};
+use crate::local_polynomials::options::{HIGHEST_ORDER, Order, PolynomialOptions, Selection};
 use crate::local_polynomials::order_shares::{SelectionScratch, Selector, Wanted};
 use crate::local_polynomials::single_window::Window;
 use crate::record::samples::Samples;
@@ -27,7 +27,7 @@ const PIECE: usize = 1 << 14;
 /// The plan for windows of one length.
 #[derive(Debug)]
 pub struct LocalPolynomials {
-    options: Options,
+    options: PolynomialOptions,
     basis: Basis,
     ends: Ends,
     engine: Box<dyn Walk>,
@@ -53,7 +53,7 @@ impl LocalPolynomials {
     /// # Errors
     /// If the window is shorter than one sample, if an order is higher than [`HIGHEST_ORDER`], or if a fixed order is not determined
     /// by the window.
-    pub fn new(options: Options) -> Result<Self, Error> {
+    pub fn new(options: PolynomialOptions) -> Result<Self, Error> {
         let window_length = options.window_length;
         if window_length == 0 {
             return Err(Error::WindowTooShort { window_length, least: 1 });
@@ -86,7 +86,7 @@ impl LocalPolynomials {
 
     /// The options that it was made with.
     #[must_use]
-    pub fn options(&self) -> &Options {
+    pub fn options(&self) -> &PolynomialOptions {
         &self.options
     }
 

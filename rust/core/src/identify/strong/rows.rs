@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::exec::stages::Stages;
 use crate::lanes::output::Elements;
 use crate::local_polynomials::estimates::Estimates;
-use crate::local_polynomials::options::{Options, Order};
+use crate::local_polynomials::options::{Order, PolynomialOptions};
 use crate::local_polynomials::plan::LocalPolynomials;
 use crate::record::delayed::Delayed;
 use crate::record::samples::{Samples, is_usable};
@@ -67,7 +67,8 @@ fn smooth_torque(
     orders.sort_unstable();
     orders.dedup();
     for order in orders {
-        let options = Options { order: Order::Fixed(order.into()), derivatives: vec![0], ..plan.options().clone() };
+        let options =
+            PolynomialOptions { order: Order::Fixed(order.into()), derivatives: vec![0], ..plan.options().clone() };
         let fixed = LocalPolynomials::new(options)?;
         stages.stage(|watch| {
             let estimates = Estimates {

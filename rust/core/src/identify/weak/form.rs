@@ -13,7 +13,7 @@ use crate::identify::weak::session::Session;
 use crate::lanes::output::Elements;
 use crate::local_polynomials::criterion::Criterion;
 use crate::local_polynomials::estimates::Estimates;
-use crate::local_polynomials::options::{Options, Order, Selection};
+use crate::local_polynomials::options::{Order, PolynomialOptions, Selection};
 use crate::local_polynomials::plan::LocalPolynomials;
 use crate::noise::channel::channel_variance;
 use crate::noise::spectrum::power;
@@ -81,7 +81,7 @@ fn velocity(
     };
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a few samples")]
     let half = (evidence.period() / 8.0).clamp(8.0, 100.0) as usize;
-    let plan = LocalPolynomials::new(Options {
+    let plan = LocalPolynomials::new(PolynomialOptions {
         window_length: (2 * half + 1).min((samples.max(1) - 1) / 2 * 2 + 1),
         order: Order::Chosen { criterion: Criterion::Aicc, highest: 15 },
         derivatives: vec![1],
