@@ -1,4 +1,4 @@
-"""Which settings the strong form used and what its statuses advise, in words."""
+"""Reasons and advice of the strong form, in words."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the weak form chose and why, and what to do next, in words."""
+"""Reasons and advice of the weak form, in words."""
 
 from __future__ import annotations
 

@@ -37,23 +37,23 @@ from tvident._files import check_folder, replaced
     "terms",
     multiple=True,
     metavar="TERM[:KIND]",
-    help=f"{', '.join(TERM_NAMES)}; may be repeated; none leaves out the offset that stands there by default.",
+    help=f"{', '.join(TERM_NAMES)}; may be repeated; none removes the default offset.",
 )
-@click.option("--lag", metavar="TIME", help="By how much the torque was recorded late: seconds, '2 ms', or auto.")
+@click.option("--lag", metavar="TIME", help="Delay of the torque: seconds, '2 ms', or auto.")
 @click.option(
-    "--quantisation", type=float, help="Step that the angle was rounded to; looked for if not given; 0: none."
+    "--quantisation", type=float, help="Step to which the angle was rounded; estimated if not given; 0: none."
 )
 @click.option("--mask", metavar="NAME", help="Channel, or file, that is not zero where a sample may be used.")
 @click.option(
-    "--settings", type=click.Path(), help="What an earlier run chose: a JSON file that --settings-output wrote."
+    "--settings", type=click.Path(), help="Settings of an earlier run: a JSON file that --settings-output wrote."
 )
-@click.option("--settings-output", type=click.Path(dir_okay=False), help="JSON file for what this run chose.")
+@click.option("--settings-output", type=click.Path(dir_okay=False), help="JSON file for the settings of this run.")
 @click.option(
     "--nan-policy",
     type=click.Choice(get_args(arguments.RowPolicy)),
     default="omit",
     show_default=True,
-    help="Missing values: omit their equations, propagate them to all windows that hold one, or raise.",
+    help="Missing values: omit their equations, propagate to all windows that contain one, or raise.",
 )
 @RUN
 def identify(

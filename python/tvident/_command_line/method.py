@@ -1,4 +1,4 @@
-"""Options of ``tvident identify`` that say by which method, and the method that they stand for."""
+"""Options of ``tvident identify`` for the method, and the method that they stand for."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ METHOD: Callable[[Decorated], Decorated] = options_of(
     click.option(
         "--method",
         type=click.Choice(METHODS),
-        help="auto (the default): all chosen from the recording; paper: as in the paper; weak: test functions, strong: derivatives, "
-        "with the following settings.",
+        help="auto (the default): all settings chosen from the recording; paper: as in the paper; weak: test functions, strong: "
+        "derivatives, with the following settings.",
     ),
     click.option(
         "--window-length",
         metavar="LENGTH",
         help="Test function, or window of the polynomials: samples, odd, or '0.2 s'.",
     ),
-    click.option("--exponent", metavar="NUMBER", help="Weak form: of the test function, 3 to 20, or auto."),
+    click.option("--exponent", metavar="NUMBER", help="Weak form: exponent of the test function, 3 to 20, or auto."),
     click.option("--regression-window", metavar="LENGTH", help="Samples solved together: a number, '0.2 s', or auto."),
     click.option(
         "--averaging/--no-averaging",
@@ -38,13 +38,17 @@ METHOD: Callable[[Decorated], Decorated] = options_of(
         help="Weak form: windows of many lengths, or one window around each sample (the default with --regression-window).",
     ),
     click.option(
-        "--variation", type=click.Choice(("auto", *get_args(Variation))), help="Of parameters within a window."
+        "--variation",
+        type=click.Choice(("auto", *get_args(Variation))),
+        help="How windowed parameters may change within a window.",
     ),
     click.option("--max-order", type=int, help="Strong form: highest candidate order."),
     CRITERION,
     click.option("--selection", type=click.Choice(get_args(Selection)), help="Strong form: how orders are chosen."),
     click.option(
-        "--filter-torque/--no-filter-torque", default=None, help="Strong form: smooth the torque as the angle is."
+        "--filter-torque/--no-filter-torque",
+        default=None,
+        help="Strong form: smooth the torque with the orders of the angle.",
     ),
 )
 """Options of the method."""

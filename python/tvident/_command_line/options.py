@@ -41,7 +41,9 @@ RUN = options_of(
     click.option("--plot", type=click.Path(dir_okay=False), help="Picture of the results: PNG, PDF or SVG."),
 )
 
-CRITERION = click.option("--criterion", type=click.Choice(get_args(Criterion)), help="What chooses the order.")
+CRITERION = click.option(
+    "--criterion", type=click.Choice(get_args(Criterion)), help="Criterion that chooses the order."
+)
 
 
 def length(text: str) -> int | str:

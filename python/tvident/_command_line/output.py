@@ -1,4 +1,4 @@
-"""Where results and pictures go."""
+"""Output of results and figures to files and to the screen."""
 
 from __future__ import annotations
 

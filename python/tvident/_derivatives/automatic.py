@@ -1,4 +1,4 @@
-"""Where windows are chosen: which suit each record, and the estimates that come of them."""
+"""Window lengths chosen from each record, and the estimates with them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Terms that are called by name: the one place in Python that knows them."""
+"""The built-in terms: the one place in Python that knows them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Inertia, damping and stiffness: known, or unknown and of a kind."""
+"""Kinds of inertia, damping and stiffness: known, constant, windowed, varying, or decided by the record."""
 
 from __future__ import annotations
 

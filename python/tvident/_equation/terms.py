@@ -1,4 +1,4 @@
-"""What else stands in the equation of motion: terms by name, and terms of one's own."""
+"""Further terms of the equation of motion: built-in terms, and user-defined ones."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tvident._equation.kinds import COEFFICIENTS, Kind
 
 @dataclass(frozen=True)
 class Term:
-    """A term of one's own on the left-hand side of the equation of motion, with an unknown factor.
+    """A user-defined term on the left-hand side of the equation of motion, with an unknown factor.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How all pictures look."""
+"""The style of all figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One call: what is to be identified from what, and how."""
+"""One call of ``identify``: data and settings, the call of the core, the result."""
 
 from __future__ import annotations
 

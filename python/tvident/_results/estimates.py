@@ -1,4 +1,4 @@
-"""What was estimated for a batch of records, by name and in the shape of the batch."""
+"""Estimates of a batch of records, by name and in the shape of the batch."""
 
 from __future__ import annotations
 

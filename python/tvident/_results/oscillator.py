@@ -1,4 +1,4 @@
-"""What follows from inertia, damping and stiffness: natural frequency and damping ratio, with their errors."""
+"""Natural frequency and damping ratio, with standard errors by the delta method."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sentences about a result."""
+"""Reasons and advice, as sentences."""
 
 from __future__ import annotations
 
