@@ -67,6 +67,11 @@ def test_everything_public_says_what_else_to_see(documented: Any) -> None:
     assert section(documented, "See Also")
 
 
+@named([one for one in PUBLIC if one not in MORE])
+def test_everything_public_but_reading_files_names_its_source(documented: Any) -> None:
+    assert section(documented, "References")
+
+
 @named(FUNCTIONS)
 def test_functions_say_what_goes_in_and_comes_out(documented: Callable[..., Any]) -> None:
     parameters = section(documented, "Parameters")

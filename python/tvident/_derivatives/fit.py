@@ -40,6 +40,11 @@ class LocalPolynomialFit:
     fit_local_polynomials : returns it.
     Status : what the flags mean.
 
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
+    K. P. Burnham, D. R. Anderson: Model Selection and Multimodel Inference, 2002: standard errors of a chosen order.
+
     Examples
     --------
     >>> import numpy as np

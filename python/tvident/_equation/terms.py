@@ -30,6 +30,11 @@ class Term:
     --------
     identify : takes it in ``terms=``, beside the built-in ones.
 
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
+    Equation (1), to which terms are added.
+
     Examples
     --------
     >>> import numpy as np

@@ -37,6 +37,11 @@ def plot_derivatives(time: npt.NDArray[np.float64], fit: LocalPolynomialFit, nam
     --------
     fit_local_polynomials : differentiates a channel.
 
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
+    Equations (2) and (8): the polynomials whose derivatives are drawn.
+
     Examples
     --------
     >>> import tvident

@@ -62,6 +62,11 @@ def plot_identification(result: Identified, truth: Recording | None = None) -> F
     --------
     Identification.plot : the same as a method.
 
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
+    Figure 6.
+
     Examples
     --------
     >>> import tvident

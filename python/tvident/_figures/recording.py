@@ -26,6 +26,11 @@ def plot_recording(recording: Recording) -> Figure:
     --------
     simulate_torsional_rig : simulates a recording.
 
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
+    The rig whose recording is drawn.
+
     Examples
     --------
     >>> import tvident

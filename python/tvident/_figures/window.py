@@ -46,6 +46,11 @@ def plot_window(
     --------
     fit_local_polynomials : chooses an order in every window.
 
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
+    Figures 4 and 5.
+
     Examples
     --------
     >>> import tvident

@@ -36,6 +36,11 @@ class RollingRegression:
     rolling_least_squares : returns it.
     Status : what the flags mean.
 
+    References
+    ----------
+    W. M. Gentleman: Least squares computations by Givens transformations without square roots, Journal of the Institute of Mathematics and
+    its Applications 12 (1973).
+
     Examples
     --------
     >>> import numpy as np

@@ -85,6 +85,12 @@ class Identification:
     identify : returns it.
     Status : what the flags mean.
 
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
+    W. K. Newey, K. D. West: A simple, positive semi-definite, heteroskedasticity and autocorrelation consistent covariance matrix,
+    Econometrica 55 (1987): standard errors from the residuals.
+
     Examples
     --------
     >>> import tvident

@@ -37,6 +37,10 @@ class Recording:
     --------
     simulate_torsional_rig : returns it.
 
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
+
     Examples
     --------
     >>> import tvident

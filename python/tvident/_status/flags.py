@@ -23,6 +23,11 @@ class Status(enum.IntFlag):
     Identification : has flags of samples and of records.
     LocalPolynomialFit, RollingRegression : have flags of samples.
 
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
+    The paper advises on LOWEST_ORDER and HIGHEST_ORDER; the tests behind the flags of a record are in docs/automatic.md.
+
     Examples
     --------
     >>> from tvident import Status
