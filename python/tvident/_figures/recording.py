@@ -29,7 +29,7 @@ def plot_recording(recording: Recording) -> Figure:
     References
     ----------
     M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
-    The rig whose recording is drawn.
+    Figure 2.
 
     Examples
     --------
