@@ -142,4 +142,35 @@ mod tests {
     fn without_freedom_nothing_is_beyond_zero() {
         assert_eq!([0.0, 1e-9].map(|value| chi_squared_beyond(value, 0)), [1.0, 0.0]);
     }
+
+    /// What is said of two constants, the first of which grows by some part over the record.
+    fn tests_of(growth: f64) -> Vec<Option<Test>> {
+        use crate::regression::simulated::{CONSTANTS, model, rows, staged, white};
+        let (count, deviation) = (1600, 0.1);
+        let mut rows = rows(count, |time| [1.0 + 0.01 * time, 0.01], deviation);
+        for row in 0..count {
+            let more = CONSTANTS[0] * growth * (row as f64 / count as f64 - 0.5);
+            rows.rhs[row] += more * rows.regressors[1].value[row];
+        }
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let variance = deviation * deviation;
+        let covariance = RowCovariance { lags: vec![variance] };
+        let fit = Fit::in_rows(&problem, 64, white(variance), Instructions::Scalar).expect("constants");
+        let expected = white(variance);
+        staged(|stages| test(&problem, &fit, expected, &covariance, 1.0, Instructions::Scalar, stages))
+    }
+
+    #[test]
+    fn a_constant_that_grows_is_no_chance_and_one_that_does_not_is() {
+        for (growth, differs) in [(0.0, false), (0.05, true), (0.3, true)] {
+            let tests: Vec<Test> = tests_of(growth).into_iter().map(|one| one.expect("eight blocks")).collect();
+            assert_eq!(tests[0].probability < NO_CHANCE, differs, "{growth}: {:?}", tests[0]);
+            assert!(tests[1].probability > 1e-3, "{:?}", tests[1]);
+            if growth == 0.3 {
+                // Steps of an eighth of a line have its deviation but for a sixty-fourth of its square.
+                let line = growth / 12.0_f64.sqrt() * (1.0_f64 - 1.0 / 64.0).sqrt() * (8.0_f64 / 7.0).sqrt();
+                assert!((tests[0].spread / line - 1.0).abs() < 0.15, "{}, {line}", tests[0].spread);
+            }
+        }
+    }
 }

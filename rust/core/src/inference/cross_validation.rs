@@ -77,3 +77,64 @@ pub(crate) fn error(
     }
     if count > 0.0 { sum / count } else { f64::INFINITY }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::simulated::{model, rows, staged, white};
+
+    const ROWS: usize = 1500;
+    const DEVIATION: f64 = 0.2;
+
+    /// How well windows of every length predict rows whose coefficient is a sine of some period in seconds.
+    fn validated(period: f64, excluded: &[usize]) -> Vec<Validated> {
+        let pace = 2.0 * std::f64::consts::PI / period;
+        let mut rows = rows(ROWS, |time| [(pace * time).sin(), pace * (pace * time).cos()], DEVIATION);
+        rows.exclude(excluded.iter().copied());
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let (scales, expected) = (Scale::all(ROWS, 3), white(DEVIATION * DEVIATION));
+        staged(|stages| validate(&problem, &scales, expected, Instructions::Scalar, stages))
+    }
+
+    #[test]
+    fn windows_that_follow_predict_with_the_noise_and_what_they_do_not_know_themselves() {
+        for one in validated(1e9, &[]) {
+            // Two unknowns from so many rows on both sides, constants from all; the mean of some thousand squares scatters by 3 %.
+            let scale = one.fit.scale.expect("a length");
+            let own = 2.0 / (2.0 * scale.one_sided() as f64);
+            assert!(one.error > 0.85 && one.error < 1.15 + 4.0 * own, "{}: {}", scale.span(), one.error);
+        }
+    }
+
+    #[test]
+    fn the_quicker_the_change_the_shorter_the_windows_that_predict_best() {
+        let spans: Vec<usize> = [1e9, 400.0, 100.0, 40.0]
+            .iter()
+            .map(|&period| best(&validated(period, &[])).expect("one").fit.span)
+            .collect();
+        assert!(spans.is_sorted_by(|long, short| long > short), "{spans:?}");
+        // Of long windows chance decides which is best where nothing changes.
+        assert!(spans[0] > 100 && spans[3] < 40, "{spans:?}");
+    }
+
+    #[test]
+    fn nothing_is_best_where_no_row_is_predicted() {
+        assert!(best(&[]).is_none());
+        let all: Vec<usize> = (0..ROWS).collect();
+        assert!(validated(1e9, &all).is_empty());
+    }
+
+    #[test]
+    fn a_row_counts_with_nine_times_the_noise_at_most() {
+        let mut rows = rows(ROWS, |_| [1.0, 0.0], 0.0);
+        rows.rhs[700] += 1e6;
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let scale = Scale::all(ROWS, 3)[4];
+        let fit = staged(|stages| Fit::with_leave_gap_out(&problem, scale, white(1.0), Instructions::Scalar, stages));
+        let fit = fit.expect("constants");
+        // No window of another row but those within its reach holds the row; its own prediction is the only one that is not zero alone.
+        let held = scale.span() + 1;
+        let found = error(&problem, scale, &fit, 600..800, 1.0);
+        assert!(found >= MOST / 200.0 && found <= MOST * held as f64 / 200.0, "{found}");
+    }
+}

@@ -70,3 +70,59 @@ pub(crate) fn is_mostly_noise(
     let [left, noise] = sums.iter().fold([0.0, 0.0], |[a, b], [c, d]| [a + c, b + d]);
     Ok(left < MOSTLY_NOISE * variance * noise)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::constants::weakest;
+    use crate::regression::simulated::{model, random, rows, staged, white};
+    use crate::simd::instructions::Instructions;
+
+    const ROWS: usize = 600;
+
+    /// Whether two constants whose regressors differ by some signal, and by noise of deviation 0.1 that each has of its own, are told apart
+    /// by noise only.
+    fn is_noise(signal: f64, variance: f64, windowed: bool) -> bool {
+        let mut rows = rows(ROWS, |_| [1.0, 0.0], 0.1);
+        let (common, own) = (random(20, ROWS), random(21, ROWS));
+        for (index, regressor) in rows.regressors.iter_mut().enumerate().skip(1) {
+            let noise = random(30 + index as u64, ROWS);
+            let different = if index == 1 { signal } else { -signal };
+            regressor.value = (0..ROWS).map(|row| common[row] + different * own[row] + 0.1 * noise[row]).collect();
+            let mut kernel = vec![0.0; 3];
+            kernel[index] = 0.1;
+            regressor.noise = [kernel, vec![0.0; 3]];
+        }
+        let mut model = model();
+        if !windowed {
+            (model.windowed, model.linear) = (Vec::new(), false);
+        }
+        let problem = model.problem(&rows, &rows.rhs, 0.0, None);
+        let fit = if windowed {
+            Fit::in_rows(&problem, 80, white(0.01), Instructions::Scalar)
+        } else {
+            staged(|stages| Fit::new(&problem, None, white(0.01), Instructions::Scalar, stages))
+        };
+        let fit = fit.expect("constants");
+        let weakest = weakest(&fit.full, &fit.pooled.weights);
+        staged(|stages| is_mostly_noise(&problem, &rows, &model, &fit, &weakest, variance, stages))
+    }
+
+    #[test]
+    fn what_only_noise_tells_apart_is_mostly_noise() {
+        for windowed in [false, true] {
+            assert!(is_noise(0.0, 1.0, windowed));
+            // As much signal as noise is where the line is drawn.
+            assert!(is_noise(0.06, 1.0, windowed));
+            assert!(!is_noise(0.15, 1.0, windowed));
+            assert!(!is_noise(1.0, 1.0, windowed));
+        }
+    }
+
+    #[test]
+    fn without_noise_nothing_is() {
+        assert!(!is_noise(0.0, 0.0, false));
+        // Noise that is said to be a tenth of what there is leaves nine tenths to be explained.
+        assert!(!is_noise(0.0, 0.1, false));
+    }
+}

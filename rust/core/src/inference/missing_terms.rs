@@ -99,3 +99,65 @@ impl JudgedTerm<'_> {
         Ok(Some((fit.pooled.values[constant - 1], variance.sqrt())))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::equation::rows::Regressor;
+    use crate::regression::simulated::{model, random, rows, staged, white};
+
+    const ROWS: usize = 800;
+    const DEVIATION: f64 = 0.3;
+
+    /// The coefficients, over their standard errors and off the truth in standard errors, of a term that is missing and of one that is not.
+    fn factors(true_value: f64) -> [(f64, f64); 2] {
+        let mut rows = rows(ROWS, |time| [1.0 + 0.01 * time, 0.01], DEVIATION);
+        for seed in [40, 41] {
+            let value = random(seed, ROWS);
+            if seed == 40 {
+                rows.rhs.iter_mut().zip(&value).for_each(|(rhs, value)| *rhs += true_value * value);
+            }
+            rows.regressors.push(Regressor { companion: vec![0.0; ROWS], value, ..Regressor::default() });
+        }
+        let (model, covariance) = (model(), RowCovariance { lags: vec![DEVIATION * DEVIATION] });
+        let correlated = staged(|stages| model.correlated(&rows, &covariance, stages));
+        let problem = model.problem(&rows, &rows.rhs, 0.0, Some(&correlated));
+        let expected = white(DEVIATION * DEVIATION);
+        let fit = Fit::in_rows(&problem, 80, expected, Instructions::Scalar).expect("constants");
+        let judged = JudgedTerm {
+            rows: &rows,
+            model: &model,
+            rhs: &rows.rhs,
+            noise: 0.0,
+            fit: &fit,
+            covariance: &covariance,
+            correlated: &correlated,
+            expected,
+            inflation: 1.0,
+            instructions: Instructions::Scalar,
+        };
+        [3, 4].map(|regressor| staged(|stages| judged.factor(regressor, stages)).expect("determined"))
+    }
+
+    #[test]
+    fn a_missing_term_is_found_with_its_coefficient_and_one_that_is_not_there_is_nothing() {
+        for true_value in [0.0, 0.05, 0.5, -2.0] {
+            let [(value, error), (nothing, other)] = factors(true_value);
+            assert!((value - true_value).abs() < 4.0 * error, "{value} ± {error}");
+            if true_value == 0.0 {
+                assert!(nothing.abs() < 4.0 * other, "{nothing} ± {other}");
+            }
+            // White regressors of variance one, two of 80 rows taken up by each window.
+            let expected = DEVIATION / (ROWS as f64 * 78.0 / 80.0).sqrt();
+            assert!((error / expected - 1.0).abs() < 0.15, "{error}, {expected}");
+        }
+    }
+
+    #[test]
+    fn a_term_is_suspected_from_five_standard_errors_on() {
+        let suspect = |value, error| Suspect { missing: Missing::Lag, value, error };
+        assert!(suspect(5.1, 1.0).is_conspicuous() && suspect(-5.1, 1.0).is_conspicuous());
+        assert!(!suspect(4.9, 1.0).is_conspicuous() && !suspect(-4.9, 1.0).is_conspicuous());
+        assert!(!suspect(f64::NAN, 1.0).is_conspicuous());
+    }
+}

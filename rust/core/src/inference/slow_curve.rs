@@ -48,3 +48,39 @@ fn interpolate(values: &[f64], place: f64, spacing: f64) -> (f64, f64) {
     let slope = if clamped == place { begin + part * (2.0 * second + 3.0 * part * third) } else { 0.0 };
     (value, slope / spacing)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curve(values: impl Fn(f64) -> f64) -> Varying {
+        let values = (0..9).map(|point| values(f64::from(point) * 4.0)).collect();
+        let variances = vec![9.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 9.0];
+        Varying { first: 0.0, spacing: 4.0, values: vec![values], variances: vec![variances], constants: Vec::new() }
+    }
+
+    #[test]
+    fn parabolas_are_interpolated_exactly_between_inner_points() {
+        let curve = curve(|row| 3.0 - 0.5 * row + 0.02 * row * row);
+        for row in 4..28 {
+            let row = f64::from(row) + 0.25;
+            let (value, slope) = curve.at(0, row);
+            assert!((value - (3.0 - 0.5 * row + 0.02 * row * row)).abs() < 1e-12);
+            assert!((slope - (-0.5 + 0.04 * row)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn beyond_the_ends_nothing_changes() {
+        let curve = curve(|row| 1.0 + row);
+        assert_eq!(curve.at(0, -7.0), (1.0, 0.0));
+        assert_eq!(curve.at(0, 40.0), (33.0, 0.0));
+    }
+
+    #[test]
+    fn a_variance_is_nowhere_below_those_of_the_points_beside_it() {
+        let curve = curve(|_| 0.0);
+        assert_eq!([0.0, 8.0, 16.0, 32.0].map(|row| curve.variance(0, row)), [9.0, 1.0, 1.0, 9.0]);
+        assert!((0..=320).all(|tenth| curve.variance(0, f64::from(tenth) / 10.0) >= 1.0));
+    }
+}

@@ -204,3 +204,82 @@ impl Slow<'_> {
         if count > 0.0 { sum / count } else { f64::INFINITY }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::equation::rows::Rows;
+    use crate::regression::simulated::{CONSTANTS, model, rows, staged, white};
+
+    const ROWS: usize = 900;
+
+    /// Rows whose first constant is a parabola in time, without its growth within a row.
+    fn bent(change: f64) -> Rows {
+        let mut rows = rows(ROWS, |time| [time.sin(), time.cos()], 0.0);
+        for row in 0..ROWS {
+            rows.rhs[row] += (parabola(row as f64, change) - CONSTANTS[0]) * rows.regressors[1].value[row];
+        }
+        rows
+    }
+
+    fn parabola(row: f64, change: f64) -> f64 {
+        let part = row / ROWS as f64;
+        CONSTANTS[0] + change * (part - 2.0 * part * part)
+    }
+
+    /// The curve that some rows within reach give, the line of every window taken as it is.
+    fn curve(rows: &Rows, reach: f64, hole: f64) -> Varying {
+        let model = model();
+        let problem = model.problem(rows, &rows.rhs, 0.0, None);
+        let scale = Scale::all(ROWS, 3)[0];
+        let fit = staged(|stages| Fit::new(&problem, Some(scale), white(1.0), Instructions::Scalar, stages));
+        let fit = fit.expect("constants");
+        let ones = vec![1.0; fit.full.len()];
+        let companions = vec![rows.regressors[1].companion.as_slice()];
+        let slow = Slow { fit: &fit, coefficients: 1, companions, current: None, weights: &ones, rows: ROWS };
+        slow.fit(reach, hole, Instructions::Scalar).expect("a curve")
+    }
+
+    /// The largest distance between two curves, the ends left out, where points reach over half of what they see.
+    fn off(curve: &Varying, expected: impl Fn(f64) -> f64) -> f64 {
+        (100..ROWS - 100).map(|row| (curve.at(0, row as f64).0 - expected(row as f64)).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_coefficient_that_rests_is_found_whatever_changes_beside_it() {
+        // The sine bends within the shortest windows by what is left of it there.
+        let windowed = |time: f64| [1.0 + 0.1 * time, 0.1];
+        let rows = rows(ROWS, windowed, 0.0);
+        for (reach, hole) in [(100.0, 0.0), (100.0, 40.0), (400.0, 0.0), (400.0, 100.0)] {
+            let found = curve(&rows, reach, hole);
+            assert!(off(&found, |_| CONSTANTS[0]) < 1e-9);
+            assert!((found.constants[0] - CONSTANTS[1]).abs() < 1e-9);
+            assert!(found.variances[0].iter().all(|variance| *variance > 0.0));
+        }
+    }
+
+    #[test]
+    fn a_parabola_is_followed_whatever_the_reach() {
+        for (reach, hole) in [(150.0, 0.0), (150.0, 50.0), (300.0, 0.0)] {
+            // What is left of the windowed sine in a window, and the parabola's own bend there, are the same for each reach.
+            let found = curve(&bent(1.0), reach, hole);
+            let still = curve(&bent(0.0), reach, hole);
+            let moved = off(&found, |row| parabola(row, 1.0) - CONSTANTS[0] + still.at(0, row).0);
+            assert!(moved < 0.02, "{reach} {hole}: {moved}");
+        }
+    }
+
+    #[test]
+    fn the_more_equations_the_smaller_the_variance() {
+        let rows = bent(0.0);
+        let middle = |reach: f64, hole: f64| curve(&rows, reach, hole).variance(0, ROWS as f64 / 2.0);
+        assert!(middle(100.0, 0.0) > 1.7 * middle(200.0, 0.0));
+        assert!(middle(200.0, 60.0) > middle(200.0, 0.0));
+    }
+
+    #[test]
+    fn gaps_take_the_nearest_number() {
+        assert_eq!(fill(&[None, Some(2.0), None, None, None, Some(5.0)]), Some(vec![2.0, 2.0, 2.0, 2.0, 5.0, 5.0]));
+        assert_eq!(fill(&[None, None]), None);
+    }
+}

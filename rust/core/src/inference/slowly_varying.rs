@@ -110,3 +110,70 @@ pub(crate) fn without(rows: &Rows, slow: &[usize], varying: &Varying) -> Vec<f64
     }
     rhs
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::simulated::{CONSTANTS, PERIOD, model, rows, staged, white};
+
+    const ROWS: usize = 1200;
+    const DEVIATION: f64 = 0.1;
+
+    /// The first constant over time, by row, and its rate per second.
+    fn slow(row: f64) -> [f64; 2] {
+        let pace = 2.0 * std::f64::consts::PI / ROWS as f64;
+        [CONSTANTS[0] + 0.5 * (pace * row).sin(), 0.5 * pace / PERIOD * (pace * row).cos()]
+    }
+
+    fn changing() -> Rows {
+        let mut rows = rows(ROWS, |time| [(0.05 * time).sin(), 0.05 * (0.05 * time).cos()], DEVIATION);
+        for row in 0..ROWS {
+            let ([value, rate], regressor) = (slow(row as f64), &rows.regressors[1]);
+            rows.rhs[row] += (value - CONSTANTS[0]) * regressor.value[row] + rate * regressor.companion[row];
+        }
+        rows
+    }
+
+    #[test]
+    fn a_slow_coefficient_is_followed_beside_a_quick_one() {
+        let (rows, scales) = (changing(), Scale::all(ROWS, 3));
+        let search = SlowSearch {
+            rows: &rows,
+            model: &model(),
+            coefficients: 1,
+            noise: 0.0,
+            expected: white(DEVIATION * DEVIATION),
+            scales: &scales,
+            instructions: Instructions::Scalar,
+        };
+        let found = staged(|stages| find(&search, scales[2], stages)).expect("a curve");
+        // Rows are predicted with little more than their noise.
+        assert!(found.error < 1.3, "{}", found.error);
+        assert!((found.varying.constants[0] - CONSTANTS[1]).abs() < 0.02);
+        let (mut squares, mut scores) = (0.0, 0.0);
+        for row in 0..ROWS {
+            let off = found.varying.at(0, row as f64).0 - slow(row as f64)[0];
+            squares += off * off;
+            scores += off * off / (DEVIATION * DEVIATION * found.varying.variance(0, row as f64));
+        }
+        // The sine's deviation is 0.35: a twentieth of it is left at most, and that is what the variances say.
+        assert!((squares / ROWS as f64).sqrt() < 0.018, "{}", (squares / ROWS as f64).sqrt());
+        let score = (scores / ROWS as f64).sqrt();
+        assert!((0.3..2.5).contains(&score), "{score}");
+    }
+
+    #[test]
+    fn what_changes_slowly_is_taken_off_with_its_growth() {
+        // A line is interpolated exactly, so nothing of it is left.
+        let mut rows = rows(ROWS, |_| [0.0, 0.0], 0.0);
+        let line = |row: f64| 1.0 + 0.01 * row;
+        for row in 0..ROWS {
+            let regressor = &rows.regressors[1];
+            rows.rhs[row] = line(row as f64) * regressor.value[row] + 0.01 / PERIOD * regressor.companion[row];
+        }
+        let points: Vec<f64> = (-2..152).map(|point| line(f64::from(point) * 8.0)).collect();
+        let variances = vec![vec![1.0; points.len()]];
+        let varying = Varying { first: -16.0, spacing: 8.0, values: vec![points], variances, constants: Vec::new() };
+        assert!(without(&rows, &[1], &varying).iter().all(|left| left.abs() < 1e-10));
+    }
+}

@@ -307,3 +307,70 @@ impl View<'_, '_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::equation::rows::Rows;
+    use crate::regression::model::Model;
+    use crate::regression::row_covariance::RowCovariance;
+    use crate::regression::simulated::{PERIOD, random, rows, staged, white};
+
+    const ROWS: usize = 1000;
+    const DEVIATION: f64 = 0.1;
+
+    /// What is averaged of one coefficient alone.
+    fn averaged(rows: &Rows, best: usize) -> Averages {
+        let model = Model { windowed: vec![0], constant: Vec::new(), linear: true };
+        let covariance = RowCovariance { lags: vec![DEVIATION * DEVIATION] };
+        let correlated = staged(|stages| model.correlated(rows, &covariance, stages));
+        let problem = model.problem(rows, &rows.rhs, 0.0, Some(&correlated));
+        let (scales, expected) = (Scale::all(ROWS, 3), white(DEVIATION * DEVIATION));
+        staged(|stages| average(&problem, None, &scales, (expected, best), Instructions::Scalar, stages))
+    }
+
+    /// Rows of one coefficient alone.
+    fn alone(coefficient: impl Fn(f64) -> [f64; 2]) -> Rows {
+        let (mut rows, noise) = (rows(ROWS, &coefficient, 0.0), random(77, ROWS));
+        for (row, noise) in noise.into_iter().enumerate() {
+            let ([value, rate], regressor) = (coefficient(row as f64 * PERIOD), &rows.regressors[0]);
+            rows.rhs[row] = value * regressor.value[row] + rate * regressor.companion[row] + DEVIATION * noise;
+        }
+        rows
+    }
+
+    #[test]
+    fn where_nothing_happens_long_windows_rule_and_errors_are_as_small() {
+        let found = averaged(&alone(|time| [2.0 + 0.01 * time, 0.01]), 500);
+        for row in 0..ROWS {
+            let off = found.values[0][row] - (2.0 + 0.01 * row as f64 * PERIOD);
+            assert!(off.abs() < 5.0 * found.errors[0][row], "{row}: {off}");
+            assert!((found.slopes[0][row] - 0.01).abs() < 0.005, "{row}: {}", found.slopes[0][row]);
+        }
+        // In the middle a mean of some hundred rows and more.
+        assert!(found.errors[0][ROWS / 2] < DEVIATION / 10.0);
+    }
+
+    #[test]
+    fn a_step_is_followed_from_both_sides() {
+        let found = averaged(&alone(|time| [if time < 250.0 { 1.0 } else { 4.0 }, 0.0]), 60);
+        for (row, value) in found.values[0].iter().enumerate() {
+            // Five rows to either side are a test function's width; a window that serves alone keeps it away.
+            if row.abs_diff(500) > 5 {
+                let expected = if row < 500 { 1.0 } else { 4.0 };
+                assert!((value - expected).abs() < 0.3, "{row}: {value}");
+            }
+        }
+    }
+
+    #[test]
+    fn missing_rows_are_bridged() {
+        let mut rows = alone(|time| [2.0 + 0.01 * time, 0.01]);
+        rows.exclude(400..430);
+        let found = averaged(&rows, 500);
+        for row in 400..430 {
+            let off = found.values[0][row] - (2.0 + 0.01 * row as f64 * PERIOD);
+            assert!(off.abs() < 5.0 * found.errors[0][row], "{row}: {off}");
+        }
+    }
+}

@@ -84,3 +84,58 @@ impl WindowAtRow<'_, '_> {
         self.candidate.predict(problem, self.place, row, self.later)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::simulated::{CONSTANTS, PERIOD, assert_near, model, rows, staged};
+    use crate::simd::instructions::Instructions;
+
+    const ROWS: usize = 400;
+    const ROW: usize = 200;
+
+    fn line(time: f64) -> [f64; 2] {
+        [3.0 + 0.2 * time, 0.2]
+    }
+
+    /// What windows before, around and after row 200 say of it and predict there, the row itself being off by something.
+    fn at_row(off: f64, jump: Option<usize>) -> [Option<[f64; 2]>; 3] {
+        let mut rows = rows(ROWS, line, 0.0);
+        rows.rhs[ROW] += off;
+        rows.jumps.extend(jump);
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let scale = *Scale::all(ROWS, 3).iter().find(|scale| scale.stands_alone()).expect("a length");
+        let all = scale.one_sided_cells(ROWS);
+        let cells = staged(|stages| scale.solve(&problem, &all, Instructions::Scalar, stages));
+        let around = Around::new(scale, &cells, &CONSTANTS);
+        [0, 1, 2].map(|which| {
+            let window = around.at_row(&problem, ROW, which)?;
+            assert!(window.variance(0) >= 0.0);
+            Some([window.value(0), window.predict(&problem, ROW)])
+        })
+    }
+
+    #[test]
+    fn a_line_is_predicted_from_every_side_by_windows_that_have_not_seen_the_row() {
+        let rows = rows(ROWS, line, 0.0);
+        let constants: f64 = (0..2).map(|one| CONSTANTS[one] * rows.regressors[1 + one].value[ROW]).sum();
+        for off in [0.0, 100.0] {
+            for (which, found) in at_row(off, None).into_iter().enumerate() {
+                let [value, predicted] = found.expect("a window");
+                assert_near(predicted, rows.rhs[ROW] - constants, 1e-9);
+                // What is believed at the row itself comes from all rows around it, this one too.
+                let untouched = (value - line(ROW as f64 * PERIOD)[0]).abs() < 1e-8;
+                assert_eq!(untouched, off == 0.0 || which != 1, "{which}: {value}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_jump_between_a_row_and_a_window_hides_the_window() {
+        let seen = |jump| at_row(0.0, Some(jump)).map(|window| window.is_some());
+        // The jump comes right before the row, right behind it, or far away.
+        assert_eq!(seen(ROW), [false, false, true]);
+        assert_eq!(seen(ROW + 1), [true, false, false]);
+        assert_eq!(seen(20), [true, true, true]);
+    }
+}

@@ -3,3 +3,5 @@
 pub(crate) mod jump;
 pub(crate) mod placement;
 pub(crate) mod search;
+#[cfg(test)]
+pub(crate) mod simulated;

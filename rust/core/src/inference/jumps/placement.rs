@@ -122,3 +122,70 @@ fn add(squares: &[Packet], lane: usize, begin: usize, candidates: &Range<usize>,
         *left += squares[length].0[lane];
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inference::jumps::simulated::{DEVIATION, HALF, STRIDE, Spring, searched, spring};
+
+    const JUMP: usize = 1500;
+
+    /// What is left where the spring is one line before a candidate and another one after it, sample by sample.
+    fn slowly(spring: &Spring, place: &JumpPlace<'_>, candidate: usize) -> f64 {
+        let [before, after] = place.lines;
+        let left = |row: usize| {
+            let sum = |k: usize| {
+                let sample = row * STRIDE + k;
+                let later = (sample as f64 - (HALF + place.row * STRIDE) as f64) / STRIDE as f64;
+                let early = before[0][0] + before[0][1] * later;
+                let late = after[0][0] + after[0][1] * (later + 1.0);
+                spring.function[k] * spring.angle[sample] * if sample < candidate { early } else { late }
+            };
+            spring.rows.rhs[row] - (0..=2 * HALF).map(sum).sum::<f64>()
+        };
+        place.over.clone().filter(|&row| spring.rows.usable[row]).map(|row| left(row).powi(2)).sum()
+    }
+
+    #[test]
+    fn every_candidate_leaves_what_its_samples_leave_one_by_one() {
+        let mut spring = spring(|sample| if sample < JUMP { 10.0 } else { 13.0 });
+        let row = (JUMP - HALF).div_ceil(STRIDE);
+        spring.rows.exclude([row - 3].into_iter());
+        let lines = [vec![[10.1, 0.01]], vec![[12.8, -0.02]]];
+        let (over, candidates) = (row - 11..row + 12, JUMP - 30..JUMP + 31);
+        let place = JumpPlace { lines: &lines, row, over: &over, candidates: &candidates };
+        let found = searched(&spring, |search| search.left(&place)).expect("usable rows");
+        for (candidate, found) in candidates.clone().zip(&found) {
+            let expected = slowly(&spring, &place, candidate);
+            assert!((found - expected).abs() < 1e-10 * (1.0 + expected), "{candidate}: {found}, not {expected}");
+        }
+    }
+
+    #[test]
+    fn the_true_lines_leave_the_noise_where_the_jump_is() {
+        let spring = spring(|sample| if sample < JUMP { 10.0 } else { 13.0 });
+        let row = (JUMP - HALF).div_ceil(STRIDE);
+        let lines = [vec![[10.0, 0.0]], vec![[13.0, 0.0]]];
+        let (over, candidates) = (row - 12..row + 12, JUMP - 20..JUMP + 20);
+        let place = JumpPlace { lines: &lines, row, over: &over, candidates: &candidates };
+        let left = searched(&spring, |search| search.left(&place)).expect("usable rows");
+        let best = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b])).expect("candidates");
+        assert!((candidates.start + best).abs_diff(JUMP) <= 1);
+        // 24 squares of even noise: their mean scatters by √(0.8 / 24).
+        assert!(left[JUMP - candidates.start] < 24.0 * DEVIATION * DEVIATION * (1.0 + 4.0 * (0.8_f64 / 24.0).sqrt()));
+    }
+
+    #[test]
+    fn a_jump_among_missing_rows_is_not_placed() {
+        let mut spring = spring(|_| 10.0);
+        spring.rows.exclude(700..720);
+        let lines = [vec![[10.0, 0.0]], vec![[10.0, 0.0]]];
+        let candidates = 1400..1440;
+        let left = |over: Range<usize>| {
+            let place = JumpPlace { lines: &lines, row: 710, over: &over, candidates: &candidates };
+            searched(&spring, |search| search.left(&place)).is_some()
+        };
+        assert!(!left(695..725));
+        assert!(left(675..725));
+    }
+}

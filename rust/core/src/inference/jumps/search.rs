@@ -273,3 +273,72 @@ pub(crate) fn rows_over(
         .collect();
     over.into_iter().flatten()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inference::jumps::simulated::{HALF, STRIDE, Spring, searched, spring};
+    use crate::regression::fit::Fit;
+    use crate::regression::residuals::residuals;
+    use crate::regression::simulated::staged;
+
+    /// The jumps that are found in a spring, some being known.
+    fn found(spring: &Spring, known: &[Jump]) -> Vec<Jump> {
+        searched(spring, |search| {
+            let scale = search.lengths.last().copied();
+            let fit = staged(|stages| Fit::new(search.problem, scale, search.expected, search.instructions, stages));
+            let (errors, _) = staged(|stages| residuals(search.problem, &fit.expect("windows"), stages));
+            staged(|stages| search.find(&errors, known, stages))
+        })
+    }
+
+    fn samples(jumps: &[Jump]) -> Vec<usize> {
+        jumps.iter().map(|jump| jump.sample).collect()
+    }
+
+    #[test]
+    fn jumps_are_found_where_they_are_and_known_ones_stay() {
+        let stiffness = |sample: usize| match sample {
+            0..1000 => 10.0,
+            1000..2000 => 13.0,
+            _ => 11.0 + 2e-4 * sample as f64,
+        };
+        let spring = spring(stiffness);
+        let jumps = found(&spring, &[]);
+        assert_eq!(jumps.len(), 2, "{:?}", samples(&jumps));
+        for (jump, true_place) in jumps.iter().zip([1000, 2000]) {
+            assert!(jump.sample.abs_diff(true_place) <= STRIDE, "{}", jump.sample);
+            // A probability that grows from nothing to one, and passes a half beside the place.
+            assert!(jump.happened.is_sorted() && jump.happened[0] < 1e-3);
+            assert!((jump.happened[jump.happened.len() - 1] - 1.0).abs() < 1e-9);
+            let half = jump.first + jump.happened.partition_point(|&happened| happened < 0.5);
+            assert!(half.abs_diff(jump.sample) <= STRIDE);
+        }
+        assert_eq!(samples(&found(&spring, &jumps)), samples(&jumps));
+    }
+
+    #[test]
+    fn none_is_found_where_none_is() {
+        assert!(found(&spring(|_| 10.0), &[]).is_empty());
+        // A slope that windows follow.
+        assert!(found(&spring(|sample| 10.0 + 1e-3 * sample as f64), &[]).is_empty());
+    }
+
+    #[test]
+    fn rows_over_a_jump_are_those_whose_test_function_reaches_it() {
+        let function = spring(|_| 1.0).function;
+        let certain = |sample: usize| Jump { sample, first: sample - 1, happened: vec![0.0, 1.0, 1.0] };
+        let over: Vec<usize> = rows_over(&[certain(500)], &function, HALF, STRIDE, 400).collect();
+        for row in 0..400 {
+            // Row r reads the samples from 2 r to 2 r + 24; the jump lies between samples 499 and 500.
+            let before: f64 = (0..function.len()).filter(|k| row * STRIDE + k < 500).map(|k| function[k]).sum();
+            let less = before.min(1.0 - before);
+            assert!(less < 1e-3 || over.contains(&row), "{row}: {less}");
+            assert!(less > UNNOTICED || !over.contains(&row), "{row}: {less}");
+        }
+        // Where the place is uncertain, all rows that may reach over it.
+        let uncertain = Jump { sample: 500, first: 480, happened: (0..40).map(|k| f64::from(k) / 39.0).collect() };
+        let wide: Vec<usize> = rows_over(&[uncertain], &function, HALF, STRIDE, 400).collect();
+        assert!(wide.len() > over.len() + 15 && over.iter().all(|row| wide.contains(row)));
+    }
+}
