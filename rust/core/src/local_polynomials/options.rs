@@ -1,4 +1,4 @@
-//! PolynomialOptions of local polynomials: the estimates wanted in every window, and the choice of its order.
+//! Options of local polynomials: the estimates wanted in every window, and the choice of its order.
 
 use crate::local_polynomials::criterion::Criterion;
 use crate::simd::instructions::Instructions;
