@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -187,6 +188,32 @@ def test_a_fork_in_the_midst_of_work_harms_neither_side() -> None:
         thread.join()
     for found in seen:
         assert_equal(found, expected)
+
+
+TASKS = Path("/proc/self/task")
+
+
+def threads_of_pools() -> int:
+    """Count the threads that the core has started and that still live."""
+    count = 0
+    for task in TASKS.iterdir():
+        try:
+            count += (task / "comm").read_text().startswith("tvident-")
+        except (FileNotFoundError, ProcessLookupError):  # it has just ended
+            continue
+    return count
+
+
+@pytest.mark.skipif(not TASKS.exists(), reason="counts threads as Linux lists them")
+def test_threads_of_outgrown_pools_end() -> None:
+    y = np.random.default_rng(0).standard_normal(400_000)
+    most = max(threads_of_pools(), 40)
+    for workers in (2, 10, 20, 40):
+        tvident.rolling_least_squares(y, np.roll(y, 3), 51, workers=workers)
+    waited_until = time.perf_counter() + 10
+    while threads_of_pools() > most and time.perf_counter() < waited_until:
+        time.sleep(0.01)
+    assert 0 < threads_of_pools() <= most
 
 
 def test_it_works_inside_other_thread_pools() -> None:

@@ -156,3 +156,17 @@ def test_no_two_types_have_one_name() -> None:
     definition = re.compile(r"^(?:pub(?:\(crate\))? )?(?:struct|enum|trait) (\w+)", flags=re.MULTILINE)
     names = [name for file in FILES for name in definition.findall(code(file))]
     assert sorted(names) == sorted(set(names))
+
+
+def test_unsafe_code_stands_where_the_design_says() -> None:
+    design = (RUST.parent / "DESIGN.md").read_text(encoding="utf-8")
+    section = design.partition("**Where `unsafe` stands.**")[2].partition("\n**")[0]
+    listed = set(re.findall(r"^\| `(.+?\.rs)`", section, flags=re.MULTILINE))
+    found = {
+        str(path.relative_to(folder))
+        for folder in (HOUSE, RUST)
+        for path in folder.rglob("*.rs")
+        if (folder is HOUSE or HOUSE not in path.parents)
+        and re.search(r"\bunsafe (?:\{|impl)", path.read_text("utf-8"))
+    }
+    assert found == listed

@@ -4,10 +4,11 @@
 //! process; a process that was forked makes its own, since threads do not survive a fork.
 
 use std::cell::{Cell, RefCell};
+use std::mem;
 use std::num::NonZeroUsize;
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicUsize, Ordering};
-use std::sync::{Condvar, Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -188,41 +189,67 @@ impl Drop for Leaving<'_> {
 /// A pool and the process that made it.
 struct Owned {
     process: u32,
-    pool: ThreadPool,
+    pool: Arc<ThreadPool>,
 }
 
-/// The newest pool. Read and replaced without a lock, so that a fork at any moment leaves a child that can go on.
-static POOL: AtomicPtr<Owned> = AtomicPtr::new(std::ptr::null_mut());
+impl Owned {
+    /// Whether the pool's threads live in a process and are as many as wanted.
+    fn serves(&self, process: u32, threads: usize) -> bool {
+        self.process == process && self.pool.current_num_threads() >= threads
+    }
+}
+
+/// The newest pool.
+static POOL: Mutex<Option<Owned>> = Mutex::new(None);
+
+/// How often the lock of the newest pool is tried. It is held for the copy of a pointer.
+const TRIES: usize = 100;
+
+/// The newest pool, or `None` where its lock cannot be had: a fork may leave it locked by a thread that the child does not have.
+fn newest() -> Option<MutexGuard<'static, Option<Owned>>> {
+    for _ in 0..TRIES {
+        match POOL.try_lock() {
+            Ok(newest) => return Some(newest),
+            Err(TryLockError::Poisoned(newest)) => return Some(newest.into_inner()),
+            Err(TryLockError::WouldBlock) => thread::yield_now(),
+        }
+    }
+    None
+}
 
 /// The pool of this process, with at least so many threads.
 ///
-/// A pool that is outgrown, or belonged to the process before a fork, is forgotten, not freed: its threads may be at work, or gone.
-fn pool(threads: usize) -> Result<&'static ThreadPool, Error> {
+/// The threads of a pool that is outgrown end with the last call that uses it.
+fn pool(threads: usize) -> Result<Arc<ThreadPool>, Error> {
     let process = std::process::id();
-    loop {
-        let current = POOL.load(Ordering::Acquire);
-        // SAFETY: what was ever stored came from a leaked box and is never freed or changed.
-        if let Some(owned) = unsafe { current.as_ref() }
-            && owned.process == process
-            && owned.pool.current_num_threads() >= threads
-        {
-            return Ok(&owned.pool);
-        }
-        let pool = ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .thread_name(|index| format!("tvident-{index}"))
-            .build()
-            .map_err(|error| Error::Threads { threads, cause: error.to_string() })?;
-        let fresh = Box::into_raw(Box::new(Owned { process, pool }));
-        if POOL.compare_exchange(current, fresh, Ordering::AcqRel, Ordering::Acquire).is_err() {
-            // SAFETY: another thread was faster, so nobody else has seen this box.
-            drop(unsafe { Box::from_raw(fresh) });
-        }
+    if let Some(newest) = newest()
+        && let Some(owned) = newest.as_ref().filter(|owned| owned.serves(process, threads))
+    {
+        return Ok(Arc::clone(&owned.pool));
     }
+    let pool = ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(|index| format!("tvident-{index}"))
+        .build()
+        .map_err(|error| Error::Threads { threads, cause: error.to_string() })?;
+    let pool = Arc::new(pool);
+    let fresh = Owned { process, pool: Arc::clone(&pool) };
+    // A call that was faster may have stored a larger pool; then this one ends with its call.
+    let outgrown = newest().and_then(|mut newest| {
+        let is_outgrown = newest.as_ref().is_none_or(|owned| !owned.serves(process, threads));
+        if is_outgrown { newest.replace(fresh) } else { None }
+    });
+    if let Some(outgrown) = outgrown.filter(|owned| owned.process != process) {
+        // Ending threads takes locks, which threads that did not survive the fork may hold.
+        mem::forget(outgrown);
+    }
+    Ok(pool)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
     use super::*;
 
     fn pieces(count: usize) -> Vec<Piece<usize>> {
@@ -262,6 +289,28 @@ mod tests {
             let result = run(pieces(1000), threads(workers), || (), work, &mut |_, _| false);
             assert_eq!(result, Err(Error::Cancelled));
             assert!(count.into_inner() < 100);
+        }
+    }
+
+    #[test]
+    fn a_pool_is_kept_and_calls_go_on_without_it() {
+        // No other test wants as many threads.
+        let kept = [pool(64), pool(64)].map(|pool| pool.expect("threads"));
+        assert!(Arc::ptr_eq(&kept[0], &kept[1]));
+        // As a fork may leave it.
+        let locked = POOL.lock().expect("no thread panics with the lock");
+        let result = run(pieces(10), threads(2), || (), |_, (): &mut ()| (), &mut |_, _| true);
+        drop(locked);
+        assert_eq!(result, Ok(()));
+    }
+
+    #[test]
+    fn a_panic_reaches_the_caller() {
+        for workers in [1, 2] {
+            let work = |content: usize, (): &mut ()| assert!(content < 5, "piece {content}");
+            let call = || run(pieces(10), threads(workers), || (), work, &mut |_, _| true);
+            let panic = catch_unwind(AssertUnwindSafe(call)).expect_err("a piece panics");
+            assert!(panic.downcast_ref::<String>().is_some_and(|message| message.starts_with("piece")));
         }
     }
 }
