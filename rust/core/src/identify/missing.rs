@@ -4,13 +4,14 @@ use crate::equation::motion::Motion;
 use crate::identify::identification::{Identification, Unknown};
 use crate::status::Status;
 
-/// Samples that are read at a time.
-const PIECE: usize = 1 << 14;
+/// Samples that are read at a time: what both channels need stays in the nearest cache.
+const PIECE: usize = 1 << 11;
 
 /// Numbers of the samples at which angle or torque holds no finite number, in order.
 pub(crate) fn holes(motion: &Motion<'_>) -> Vec<usize> {
     let samples = motion.angle.len();
-    let (mut angle, mut torque) = (vec![0.0; PIECE], vec![0.0; PIECE]);
+    let most = PIECE.min(samples);
+    let (mut angle, mut torque) = (vec![0.0; most], vec![0.0; most]);
     let mut holes = Vec::new();
     for first in (0..samples).step_by(PIECE) {
         let count = PIECE.min(samples - first);

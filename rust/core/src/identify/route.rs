@@ -38,8 +38,10 @@ pub fn identify_all(
     watch: &mut Watch<'_>,
 ) -> Result<Vec<Identification>, Error> {
     let mut found: Vec<Option<Identification>> = tasks.iter().map(|_| None).collect();
+    // Asked once, since the answer may need every sample of the record.
+    let routes: Vec<Pieces> = tasks.iter().map(|task| route(task, options)).collect();
     for pieces in [Pieces::Windowed, Pieces::Constant] {
-        for (form, places) in together(tasks, options, pieces) {
+        for (form, places) in together(tasks, &routes, pieces) {
             let motions: Vec<Motion<'_>> = places.iter().map(|&place| tasks[place].motion.clone()).collect();
             let each = if pieces == Pieces::Windowed {
                 windows(form, &motions, options.step, workers, watch)?
@@ -84,13 +86,10 @@ fn alone(
 }
 
 /// Records in strong form that are worked on together, by their settings.
-fn together<'a, 'b>(tasks: &'a [Task<'b>], options: &Options, pieces: Pieces) -> Vec<(&'a StrongForm<'b>, Vec<usize>)> {
+fn together<'a, 'b>(tasks: &'a [Task<'b>], routes: &[Pieces], pieces: Pieces) -> Vec<(&'a StrongForm<'b>, Vec<usize>)> {
     let mut groups: Vec<(&StrongForm<'b>, Vec<usize>)> = Vec::new();
-    for (place, task) in tasks.iter().enumerate() {
+    for (place, (task, _)) in tasks.iter().zip(routes).enumerate().filter(|(_, (_, route))| **route == pieces) {
         let Method::Strong(form) = &task.method else { continue };
-        if route(task, form, options) != pieces {
-            continue;
-        }
         let same = |other: &&StrongForm<'b>| {
             std::ptr::eq(other.derivatives, form.derivatives) && other.regression_window == form.regression_window
         };
@@ -102,8 +101,9 @@ fn together<'a, 'b>(tasks: &'a [Task<'b>], options: &Options, pieces: Pieces) ->
     groups
 }
 
-/// How a record in strong form is worked on.
-fn route(task: &Task<'_>, form: &StrongForm<'_>, options: &Options) -> Pieces {
+/// How a record is worked on; in weak form as a whole.
+fn route(task: &Task<'_>, options: &Options) -> Pieces {
+    let Method::Strong(form) = &task.method else { return Pieces::Whole };
     let is_plain = !form.filter_torque && task.lag == Some(0.0) && task.mask.is_none();
     let kinds = in_strong_form(&options.kinds, &regressors(&task.motion));
     let all = |kind: Kind| is_plain && kinds.iter().all(|one| *one == kind);
