@@ -352,7 +352,7 @@ mod tests {
 
     #[test]
     fn what_is_known_is_no_unknown() {
-        let angle: Vec<f64> = (0..2000).map(|k| (f64::from(k) * 0.02).sin() + (f64::from(k) * 0.047).cos()).collect();
+        let angle: Vec<f64> = (0..2000).map(|k| (f64::from(k) * 0.005).sin() + (f64::from(k) * 0.011).cos()).collect();
         let found =
             identify(&angle, &angle, 100.0).paper().inertia(0.0).damping(vec![0.0; 2000].as_slice()).run().unwrap();
         assert!(found.inertia().is_none() && found.damping().is_none());
