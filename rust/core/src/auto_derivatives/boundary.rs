@@ -21,6 +21,7 @@
 use std::ops::Range;
 
 use faer::Mat;
+use faer::linalg::solvers::Qr;
 
 use crate::auto_derivatives::candidate_weights::Reference;
 use crate::auto_derivatives::candidates::{Target, product};
@@ -243,7 +244,8 @@ fn shrinkage(projected: &Projected, variance: f64) -> Vec<Vec<f64>> {
         let size = degrees.len();
         // Singular values of the coefficients rather than eigenvalues of their moments: squares would lose what is small beside the rest.
         let coefficients = Mat::from_fn(usable.len(), size, |row, j| rows[degrees[j]][usable[row]]);
-        let Ok(decomposed) = coefficients.thin_svd() else { continue };
+        // The triangular factor has the same singular values and directions as the thousands of rows that it is made of.
+        let Ok(decomposed) = Qr::new(coefficients.as_ref()).thin_R().thin_svd() else { continue };
         let (singular, vectors) = (decomposed.S().column_vector(), decomposed.V());
         for k in 0..singular.nrows() {
             let value = singular[k] * singular[k] / usable.len() as f64 - variance;
