@@ -59,10 +59,16 @@ def centres(half: int) -> dict[str, list[int]]:
     }
 
 
+@lru_cache(maxsize=2000)
+def exact(samples: bytes, highest: int) -> Window:
+    """Fit a window in exact arithmetic, once for all tests that look at it."""
+    return Window(np.frombuffer(samples), highest)
+
+
 def window(y: Array, centre: int, half: int = HALF, highest: int = 15) -> tuple[Window, float]:
     """Give a window in exact arithmetic, and the norm of its samples."""
     samples = y[centre - half : centre + half + 1]
-    return Window(samples, highest), float(np.linalg.norm(samples - samples[half]))
+    return exact(samples.tobytes(), highest), float(np.linalg.norm(samples - samples[half]))
 
 
 @pytest.mark.parametrize("kind", ["drift", "offset"])
@@ -76,8 +82,8 @@ def test_coefficients_of_every_order_keep_their_digits(kind: str) -> None:
     table = gains(HALF, 15)
     for part, places in centres(HALF).items():
         for i in places:
-            exact, norm = window(y, i)
-            for order, expected in enumerate(exact.coefficients()):
+            fitted, norm = window(y, i)
+            for order, expected in enumerate(fitted.coefficients()):
                 here = Fraction(float(derivatives[order][i // STEP]))
                 level = Fraction(float(y[i])) if order == 0 else Fraction(0)
                 below = Fraction(float(derivatives[order - 2][i // STEP])) if order > 1 else level
@@ -96,11 +102,11 @@ def test_derivatives_of_chosen_orders_have_the_errors_of_their_coefficients(half
     allowed = COEFFICIENTS * np.abs(gains(half, 15)).cumsum(axis=1)
     for part, places in centres(half).items():
         for i in places[:: 1 if half < 1000 else 20]:
-            exact, norm = window(y, i, half)
+            fitted, norm = window(y, i, half)
             order = int(fit.order[i // STEP])
             for d in range(3):
                 found = Fraction(float(fit.derivatives[d, i // STEP]))
-                error = float(abs(found - exact.derivative(order, d)))
+                error = float(abs(found - fitted.derivative(order, d)))
                 assert error <= allowed[d, order] * norm + OUTPUT * float(abs(found)), (
                     f"{part}, sample {i}, derivative {d}"
                 )
@@ -114,8 +120,8 @@ def test_an_offset_costs_the_acceleration_nothing() -> None:
         for i in places:
             # The samples as they are, rounded at 1e-10 ...
             found = float(fit.derivatives[2, i // STEP])
-            exact, norm = window(y, i, highest=7)
-            error = abs(found - float(exact.derivative(7, 2)) * RATE**2)
+            fitted, norm = window(y, i, highest=7)
+            error = abs(found - float(fitted.derivative(7, 2)) * RATE**2)
             rounding = COEFFICIENTS * norm * np.abs(gains(HALF, 7)[2]).sum() * RATE**2
             assert error <= rounding + OUTPUT * abs(found), f"{part}, sample {i}"
             # ... and what they are rounded from.
@@ -132,10 +138,10 @@ def test_residuals_keep_their_digits_where_noise_is_a_millionth(half: int) -> No
     fit = tvident.fit_local_polynomials(y, 2 * half + 1, step=STEP)
     for part, places in centres(half).items():
         for i in places[:: 1 if half < 1000 else 20]:
-            exact, _ = window(y, i, half)
+            fitted, _ = window(y, i, half)
             order = int(fit.order[i // STEP])
             found = float(fit.sigma[i // STEP]) ** 2 * (2 * half - order)
-            expected = float(exact.rss(order))
+            expected = float(fitted.rss(order))
             assert abs(found - expected) <= RESIDUALS * expected, f"{part}, sample {i}: {found / expected - 1}"
 
 
@@ -147,10 +153,10 @@ def test_the_last_minute_is_as_accurate_as_the_first() -> None:
     for part, places in centres(HALF).items():
         rows = []
         for i in places:
-            exact, norm = window(y, i)
+            fitted, norm = window(y, i)
             rss = float(fit.sigma[i // STEP]) ** 2 * (2 * HALF - 15)
             rows.append(
-                [float(fit.derivatives[2, i // STEP]) - float(exact.derivative(15, 2)), rss - float(exact.rss(15))]
+                [float(fit.derivatives[2, i // STEP]) - float(fitted.derivative(15, 2)), rss - float(fitted.rss(15))]
             )
             rows[-1] = [error / norm for error in rows[-1]]
         errors[part] = np.sqrt(np.mean(np.square(rows), axis=0))
