@@ -51,7 +51,9 @@ def count() -> Counts:
         "checked",
         "--config",
         "benches/instructions/shipped.toml",
-        "--package",
+        # Of the whole workspace, so that dependencies have the features that the tests have compiled them with.
+        "--workspace",
+        "--bin",
         _PACKAGE,
     )
     program = str(_ROOT / "target" / "checked" / _PACKAGE)
