@@ -46,6 +46,11 @@ soak: $(BUILT)  ## the properties of both languages with many more cases, drawn 
 	PROPTEST_CASES=$(CASES) cargo test --workspace --profile checked
 	TVIDENT_HYPOTHESIS=soak $(BIN)/python -m pytest --hypothesis-show-statistics
 
+.PHONY: attack
+attack: SECONDS ?= 3600
+attack: $(BUILT)  ## random and hostile calls, files and signals, drawn anew, for an hour or SECONDS=
+	TVIDENT_ATTACK=$(SECONDS) $(BIN)/python -m pytest tests/hostile
+
 .PHONY: docs
 docs: $(BUILT) rooms  ## make anew what documents show of the program: the picture, the command line's help, the rooms
 	$(BIN)/tvident demo
