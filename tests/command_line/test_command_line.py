@@ -45,7 +45,7 @@ def test_the_demo_prints_a_table_and_writes_pictures(tmp_path: Path) -> None:
     assert "stiffness  N m/rad" in done.stdout
     written = {path.name for path in (tmp_path / "tvident-demo").iterdir()}
     pictures = {"recording.png", "window.png", "window-with-noise.png", "parameters.png", "parameters-paper.png"}
-    assert written == pictures | {"recording.csv", "result.csv"}
+    assert written == pictures | {"recording.csv", "result.csv", ".tvident-demo.json"}
     for name in pictures:
         assert (tmp_path / "tvident-demo" / name).read_bytes().startswith(b"\x89PNG")
 
@@ -361,7 +361,11 @@ def test_without_matplotlib_all_but_pictures_is_there(recording: Path, tmp_path:
     assert demo.returncode == 2
     assert "stiffness  N m/rad" in demo.stdout
     assert "pip install 'tvident[plot]'" in demo.stderr
-    assert {path.name for path in (tmp_path / "tvident-demo").iterdir()} == {"recording.csv", "result.csv"}
+    assert {path.name for path in (tmp_path / "tvident-demo").iterdir()} == {
+        "recording.csv",
+        "result.csv",
+        ".tvident-demo.json",
+    }
 
 
 def test_a_reader_that_has_had_enough_is_no_error(recording: Path) -> None:

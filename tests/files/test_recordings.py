@@ -75,6 +75,12 @@ def test_channels_are_found_by_name_with_or_without_unit_and_by_number() -> None
     assert recordings.channel(channels, "1", "x.csv") is channels["torque (N m)"]
     with pytest.raises(KeyError, match=r"x\.csv has no channel 'speed'; it has angle"):
         recordings.channel(channels, "speed", "x.csv")
+    with pytest.raises(KeyError, match="has no channel '²'"):
+        recordings.channel(channels, "²", "x.csv")
+    both = channels | {"angle (deg)": np.ones(3)}
+    with pytest.raises(KeyError, match=r"must have one channel 'angle'; it has angle \[rad\], angle \(deg\); name one"):
+        recordings.channel(both, "angle", "x.csv")
+    assert recordings.channel(both, "angle (deg)", "x.csv") is both["angle (deg)"]
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import recordings
+from tvident._files import listed, printable
 
 
 def channel_of(channels: recordings.Channels, name: str, file: str | None) -> npt.NDArray[Any]:
@@ -33,7 +34,7 @@ def source_of(channels: recordings.Channels, name: str, file: str | None) -> npt
     alone = recordings.read(name)
     if len(alone) != 1:
         raise click.UsageError(
-            f"{name} must hold one channel; it has {', '.join(alone)}; give it as FILE and name the channel"
+            f"{printable(name)} must hold one channel; it has {listed(alone)}; give it as FILE and name the channel"
         )
     return channel_of(alone, next(iter(alone)), name)
 

@@ -11,8 +11,13 @@ import numpy as np
 import tvident
 from tvident._command_line.group import main
 from tvident._command_line.output import figures_on_file, save_figure
+from tvident._command_line.own_files import check_own, note_own
 from tvident._equation import UNITS
-from tvident._files import aligned
+from tvident._files import aligned, printable
+
+TABLES = ("recording.csv", "result.csv")
+PICTURES = ("recording.png", "window.png", "window-with-noise.png", "parameters.png", "parameters-paper.png")
+"""What is written."""
 
 
 @main.command()
@@ -21,12 +26,13 @@ from tvident._files import aligned
     type=click.Path(file_okay=False, path_type=Path),
     default="tvident-demo",
     show_default=True,
-    help="Where pictures and data are written.",
+    help="Where pictures and data are written. Only files that demo wrote there itself, unchanged since, are replaced.",
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the simulated recording.")
 def demo(folder: Path, seed: int) -> None:
     """Identify a simulated recording, compare with the truth and draw the paper's figures."""
     folder.mkdir(parents=True, exist_ok=True)
+    check_own(folder, (*TABLES, *PICTURES))
     recording = tvident.simulate_torsional_rig(seed=seed)
     call: dict[str, Any] = {"sample_rate": recording.sample_rate}
     result = tvident.identify(recording.angle, recording.torque, **call)
@@ -44,22 +50,24 @@ def demo(folder: Path, seed: int) -> None:
         rows.append((name, UNITS[name], *medians, *errors))
     click.echo("\n".join([*aligned(rows), ""]))
 
-    recording.save(folder / "recording.csv")
-    result.save(folder / "result.csv")
-    click.echo(f"Written to {folder}: recording.csv, result.csv")
+    for name, save in zip(TABLES, (recording.save, result.save), strict=True):
+        save(folder / name)
+        note_own(folder, name)
+    click.echo(f"Written to {printable(folder)}: {', '.join(TABLES)}")
     noise = 0.05 * recording.angle.std() * np.random.default_rng(seed + 1).standard_normal(recording.angle.size)
     middle_sample = recording.time.size // 2
     figures = figures_on_file()
-    pictures = {
-        "recording.png": figures.plot_recording(recording),
-        "window.png": figures.plot_window(recording.angle, middle_sample, **call),
-        "window-with-noise.png": figures.plot_window(recording.angle + noise, middle_sample, **call),
-        "parameters.png": figures.plot_identification(result, recording),
-        "parameters-paper.png": figures.plot_identification(paper, recording),
-    }
-    for name, picture in pictures.items():
+    drawn = (
+        figures.plot_recording(recording),
+        figures.plot_window(recording.angle, middle_sample, **call),
+        figures.plot_window(recording.angle + noise, middle_sample, **call),
+        figures.plot_identification(result, recording),
+        figures.plot_identification(paper, recording),
+    )
+    for name, picture in zip(PICTURES, drawn, strict=True):
         save_figure(picture, folder / name)
-    click.echo(f"Drawn in {folder}: {', '.join(pictures)}")
+        note_own(folder, name)
+    click.echo(f"Drawn in {printable(folder)}: {', '.join(PICTURES)}")
 
 
 def _rms_error(result: tvident.Identification, truth: tvident.Recording, name: str) -> float:

@@ -14,7 +14,19 @@ from tvident import _arguments as arguments
 from tvident import recordings
 from tvident._command_line.channels import channel_of
 from tvident._command_line.group import main
-from tvident._command_line.options import CRITERION, RUN, TIME, check_output, check_time, given, length, wanted_progress
+from tvident._command_line.options import (
+    CRITERION,
+    PICTURE,
+    RECORDING,
+    RESULTS,
+    RUN,
+    TIME,
+    check_outputs,
+    check_time,
+    given,
+    length,
+    wanted_progress,
+)
 from tvident._command_line.output import figures_on_file, give, save_figure
 from tvident._derivatives import Selection
 from tvident._status import describe
@@ -57,7 +69,7 @@ def derivatives(
     **options: Any,
 ) -> None:
     """Differentiate a channel of FILE with a polynomial order chosen in every window."""
-    check_output(output, plot, file)
+    check_outputs({RESULTS: output, PICTURE: plot}, {RECORDING: file})
     check_time(sample_rate, delta, time_channel)
     channels = recordings.read(file)
     samples = channel_of(channels, channel, file)

@@ -14,10 +14,21 @@ from tvident import recordings
 from tvident._command_line.channels import channel_of, mask_of, scaled, source_of
 from tvident._command_line.group import main
 from tvident._command_line.method import METHOD, NAMES, method_of
-from tvident._command_line.options import RUN, TIME, check_output, check_time, given, wanted_progress
+from tvident._command_line.options import (
+    PICTURE,
+    RECORDING,
+    RESULTS,
+    RUN,
+    SETTINGS,
+    TIME,
+    check_outputs,
+    check_time,
+    given,
+    wanted_progress,
+)
 from tvident._command_line.output import give, save_figure
 from tvident._equation import COEFFICIENTS, TERM_NAMES, UNITS, Kind
-from tvident._files import check_folder, replaced
+from tvident._files import replaced
 
 
 # Every option is a parameter: so click passes them.
@@ -78,9 +89,10 @@ def identify(
 
     What is not given is chosen from the recording, and the summary says what and why.
     """
-    check_output(output, plot, file, angle, torque)
-    if settings_output is not None:
-        check_folder(Path(settings_output))
+    check_outputs(
+        {RESULTS: output, PICTURE: plot, SETTINGS: settings_output},
+        {RECORDING: file, "the angle": angle, "the torque": torque, "the mask": mask, "earlier settings": settings},
+    )
     if not check_time(options["sample_rate"], options["delta"], time_channel):
         raise click.UsageError("identify needs the sample period; got none; give --sample-rate, --delta or --time")
     of_method = {name: value for name, value in given(options).items() if name in NAMES}

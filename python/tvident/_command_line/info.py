@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from tvident import recordings
 from tvident._command_line.group import main
-from tvident._files import aligned
+from tvident._files import aligned, printable
 
 
 @main.command()
@@ -26,7 +26,14 @@ def info(file: str) -> None:
         numbers = (finite.mean(), finite.std(), finite.min(), finite.max()) if finite.size else (np.nan,) * 4
         shown = [f"{float(number):.5g}" for number in numbers]
         rows.append(
-            (name, str(values.dtype), str(values.size), *shown, str(values.size - finite.size), _remark(values))
+            (
+                printable(name, 60),
+                str(values.dtype),
+                str(values.size),
+                *shown,
+                str(values.size - finite.size),
+                _remark(values),
+            )
         )
     click.echo("\n".join(aligned(rows)))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -11,7 +11,7 @@ import click
 
 from tvident._command_line.output import figures_on_file
 from tvident._derivatives import Criterion
-from tvident._files import check_folder, check_place
+from tvident._files import check_apart, check_folder, check_place, printable
 
 Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 
@@ -40,6 +40,9 @@ RUN = options_of(
     ),
     click.option("--plot", type=click.Path(dir_okay=False), help="Picture of the results: PNG, PDF or SVG."),
 )
+
+RESULTS, PICTURE, SETTINGS, RECORDING = "results", "the picture", "the settings of this run", "the recording"
+"""What messages call files."""
 
 CRITERION = click.option(
     "--criterion", type=click.Choice(get_args(Criterion)), help="Criterion that chooses the order."
@@ -70,16 +73,20 @@ def check_time(sample_rate: float | None, delta: float | None, time_channel: str
     return bool(given)
 
 
-def check_output(output: str | None, plot: str | None, *sources: str | None) -> None:
-    """Refuse what cannot be written, or would write over a recording, before any work is done."""
+def check_outputs(outputs: Mapping[str, str | None], inputs: Mapping[str, str | None]) -> None:
+    """Refuse what cannot be written, or would write over what is read, before any work is done.
+
+    Keys are what messages call the files.
+    """
+    output, plot, settings = (outputs.get(name) for name in (RESULTS, PICTURE, SETTINGS))
     if output is not None and output != "-":
-        place = Path(output)
-        check_place(place)
-        recorded = [Path(source) for source in sources if source is not None and Path(source).is_file()]
-        if place.exists() and any(place.samefile(source) for source in recorded):
-            raise click.UsageError(f"results must not replace the recording; got {output!r}; give another file")
+        check_place(Path(output))
     if plot is not None:
         figures_on_file()
         if Path(plot).suffix.lower() not in {".png", ".pdf", ".svg"}:
-            raise click.UsageError(f"--plot must end in .png, .pdf or .svg; got {plot!r}; rename it")
+            raise click.UsageError(f"--plot must end in .png, .pdf or .svg; got '{printable(plot)}'; rename it")
         check_folder(Path(plot))
+    if settings is not None:
+        check_folder(Path(settings))
+    files = {name: path for name, path in outputs.items() if (name, path) != (RESULTS, "-")}
+    check_apart(files, inputs)

@@ -9,7 +9,7 @@ import click
 
 import tvident
 from tvident._command_line.group import main
-from tvident._files import check_place
+from tvident._files import check_place, printable
 from tvident._simulate import Excitation, Pattern
 
 
@@ -34,4 +34,4 @@ def simulate(output: str, **options: Any) -> None:
     check_place(Path(output))
     recording = tvident.simulate_torsional_rig(**options)
     recording.save(output)
-    click.echo(f"{recording.time.size} samples written to {output}", err=True)
+    click.echo(f"{recording.time.size} samples written to {printable(output)}", err=True)

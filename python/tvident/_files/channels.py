@@ -8,7 +8,13 @@ from typing import Any
 
 import numpy.typing as npt
 
+from tvident._files.names import listed, printable
+
 Channels = dict[str, npt.NDArray[Any]]
+
+
+_UNIT = re.compile(r"\s*[\[(][^\])]*[\])]\s*$")
+_NUMBER = re.compile(r"[0-9]{1,9}")
 
 
 class FileError(Exception):
@@ -35,7 +41,7 @@ def channel(channels: Mapping[str, npt.NDArray[Any]], name: str, source: str) ->
     Raises
     ------
     KeyError
-        If there is no such channel: the message lists what there is.
+        If there is no such channel, or several differ by their units alone: the message lists what there is.
 
     See Also
     --------
@@ -49,12 +55,16 @@ def channel(channels: Mapping[str, npt.NDArray[Any]], name: str, source: str) ->
     >>> recordings.channel(channels, "angle", "rig.npz")
     array([1., 1., 1.])
     """
-    without_units = {re.sub(r"\s*[\[(][^\])]*[\])]\s*$", "", key): key for key in channels}
-    for key in (name, without_units.get(name)):
-        if key is not None and key in channels:
-            return channels[key]
-    if name.isdigit() and int(name) < len(channels):
+    if name in channels:
+        return channels[name]
+    same = [key for key in channels if key.startswith(name) and _UNIT.sub("", key) == name]
+    if len(same) == 1:
+        return channels[same[0]]
+    place, asked = printable(source), printable(name)
+    if same:
+        raise KeyError(
+            f"{place} must have one channel '{asked}'; it has {listed(same)}; name one of these with its unit"
+        )
+    if _NUMBER.fullmatch(name) and int(name) < len(channels):
         return list(channels.values())[int(name)]
-    raise KeyError(
-        f"{source} has no channel {name!r}; it has {', '.join(channels)}; use one of these or a number from 0"
-    )
+    raise KeyError(f"{place} has no channel '{asked}'; it has {listed(channels)}; use one of these or a number from 0")

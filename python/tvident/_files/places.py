@@ -1,0 +1,94 @@
+"""Where results may be written: never over what was read or what is written beside them."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from collections.abc import Mapping
+from pathlib import Path
+
+from tvident._files.names import printable
+
+ENDINGS = (".csv", ".npz")
+"""Kinds of files that tables are written to."""
+
+
+def check_place(path: Path) -> None:
+    """Check that tables can be written to files of this kind, and that a file can be written there."""
+    if path.suffix not in ENDINGS:
+        raise ValueError(
+            f"results are written to files that end in {' or '.join(ENDINGS)}; got '{printable(path.name)}'; rename it"
+        )
+    check_folder(path)
+
+
+def check_folder(path: Path) -> None:
+    """Check that there is a folder for a file, no folder of its name, and that both may be written to."""
+    place = end_of_links(path)
+    if place.is_dir():
+        raise IsADirectoryError(errno.EISDIR, "this is a folder; give the name of a file", str(path))
+    if not place.parent.is_dir():
+        raise FileNotFoundError(
+            errno.ENOENT, "there is no such folder; make it first, or write elsewhere", str(place.parent)
+        )
+    if writes_through(path):
+        kind = path.stat().st_mode
+        if stat.S_ISBLK(kind) or stat.S_ISSOCK(kind):
+            raise OSError(errno.EINVAL, "this is a disk or a socket; give the name of a file", str(path))
+    elif place.exists() and not os.access(place, os.W_OK):
+        raise PermissionError(errno.EACCES, "this file may not be changed; write elsewhere", str(path))
+    elif not os.access(place.parent, os.W_OK | os.X_OK):
+        raise PermissionError(errno.EACCES, "nothing may be written in this folder; write elsewhere", str(place.parent))
+
+
+def end_of_links(path: Path) -> Path:
+    """Return the file that a path leads to when every link is followed."""
+    place = Path(os.path.realpath(path))
+    if place.is_symlink():
+        raise OSError(errno.ELOOP, "these links lead in a circle; write elsewhere", str(path))
+    return place
+
+
+def writes_through(path: Path) -> bool:
+    """Return whether a path is a pipe, a device or a stream of this process: nothing that another file could replace."""
+    try:
+        kind = path.stat().st_mode
+    except OSError:
+        return False
+    folder = os.path.realpath(path.parent)
+    return not stat.S_ISREG(kind) or folder == "/dev" or folder.startswith("/proc/")
+
+
+def check_apart(outputs: Mapping[str, str | Path | None], inputs: Mapping[str, str | Path | None]) -> None:
+    """Check that no output is a file that is read, or another output, by whatever name or link.
+
+    Parameters
+    ----------
+    outputs, inputs : mapping of str to path
+        What messages call each file, and its path; None where there is none.
+
+    Raises
+    ------
+    ValueError
+        If two of them are one file: the message names both.
+    """
+    written = {name: Path(path) for name, path in outputs.items() if path is not None}
+    read = {name: Path(path) for name, path in inputs.items() if path is not None and Path(path).exists()}
+    for index, (name, path) in enumerate(written.items()):
+        others = read | dict(list(written.items())[:index])
+        for other_name, other in others.items():
+            if _are_one(path, other):
+                rule = (
+                    f"{name} must not replace {other_name}"
+                    if other_name in read
+                    else f"{name} and {other_name} must be two files"
+                )
+                raise ValueError(f"{rule}; got '{printable(path)}' for both; give another file")
+
+
+def _are_one(path: Path, other: Path) -> bool:
+    """Return whether two paths lead to the same file, or would once it is written."""
+    if path.exists() and other.exists():
+        return path.samefile(other) and not writes_through(path)
+    return os.path.realpath(path) == os.path.realpath(other)
