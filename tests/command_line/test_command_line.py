@@ -322,7 +322,7 @@ def test_misuse_is_one_line_and_a_status(
     recording: Path, tmp_path: Path, arguments: tuple[str, ...], status: int, message: str
 ) -> None:
     (tmp_path / "broken.npz").write_bytes(b"nonsense")
-    (tmp_path / "decimal-commas.csv").write_text("a;b\n1,5;2,5\n2,5;3,5\n")
+    (tmp_path / "decimal-commas.csv").write_text("a,b\n1,5,2,5\n2,5,3,5\n")
     np.savez(tmp_path / "few.npz", angle=np.arange(300.0), torque=np.arange(300.0), few=np.arange(3.0))
     for folder in ("folder", "folder.csv"):
         (tmp_path / folder).mkdir()
@@ -345,7 +345,8 @@ def test_without_matplotlib_all_but_pictures_is_there(recording: Path, tmp_path:
     # A module of that name that cannot be imported stands for one that is not installed.
     (tmp_path / "absent").mkdir()
     (tmp_path / "absent" / "matplotlib.py").write_text("raise ImportError")
-    environment = os.environ | {"PYTHONPATH": str(tmp_path / "absent")}
+    paths = [str(tmp_path / "absent"), *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
 
     def run_without(*arguments: object) -> subprocess.CompletedProcess[str]:
         command = [TVIDENT, *map(str, arguments)]

@@ -21,14 +21,17 @@ def info(file: str) -> None:
     rows: list[tuple[str, ...]] = [
         ("channel", "type", "samples", "mean", "std", "least", "greatest", "missing", "remark")
     ]
-    for name, values in channels.items():
-        finite = values[np.isfinite(values)] if values.dtype.kind == "f" else values
-        numbers = (finite.mean(), finite.std(), finite.min(), finite.max()) if finite.size else (np.nan,) * 4
+    for name, recorded in channels.items():
+        # Half and integer types are too narrow for sums of squares.
+        values = recorded.astype(np.float64)
+        finite = values[np.isfinite(values)]
+        with np.errstate(over="ignore", invalid="ignore"):
+            numbers = (finite.mean(), finite.std(), finite.min(), finite.max()) if finite.size else (np.nan,) * 4
         shown = [f"{float(number):.5g}" for number in numbers]
         rows.append(
             (
                 printable(name, 60),
-                str(values.dtype),
+                str(recorded.dtype),
                 str(values.size),
                 *shown,
                 str(values.size - finite.size),
@@ -42,11 +45,12 @@ def _remark(values: npt.NDArray[Any]) -> str:
     """Return what a channel looks like: uniform time, a single number, a constant."""
     if values.ndim == 0:
         return "a number"
-    steps = np.diff(values.astype(np.float64))
-    if steps.size and (steps > 0).all():
-        period = (values[-1] - values[0]) / steps.size
-        grid = values[0] + period * np.arange(values.size)
-        if np.abs(values - grid).max() <= 1e-3 * period:
-            return f"uniform: {1 / period:.6g} per unit"
-        return "increasing"
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        steps = np.diff(values)
+        if steps.size and (steps > 0).all():
+            period = (values[-1] - values[0]) / steps.size
+            grid = values[0] + period * np.arange(values.size)
+            if np.abs(values - grid).max() <= 1e-3 * period:
+                return f"uniform: {1 / period:.6g} per unit"
+            return "increasing"
     return "constant" if steps.size and not steps.any() else ""

@@ -1,6 +1,6 @@
 """Reads recordings from files and writes tables to them."""
 
-from tvident._files.channels import Channels, FileError, channel
+from tvident._files.channels import Channels, FileError, FileWarning, channel
 from tvident._files.names import listed, printable
 from tvident._files.places import check_apart, check_folder, check_place
 from tvident._files.recordings import read
@@ -10,6 +10,7 @@ from tvident._files.table import aligned, write_csv, write_table
 __all__ = [
     "Channels",
     "FileError",
+    "FileWarning",
     "aligned",
     "channel",
     "check_apart",

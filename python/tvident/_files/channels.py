@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy.typing as npt
@@ -12,6 +12,9 @@ from tvident._files.names import listed, printable
 
 Channels = dict[str, npt.NDArray[Any]]
 
+Say = Callable[[str], None]
+"""Takes in what is not read, or not as it stands in the file."""
+
 
 _UNIT = re.compile(r"\s*[\[(][^\])]*[\])]\s*$")
 _NUMBER = re.compile(r"[0-9]{1,9}")
@@ -19,6 +22,22 @@ _NUMBER = re.compile(r"[0-9]{1,9}")
 
 class FileError(Exception):
     """A file that cannot be used. The message says why and what to do."""
+
+
+class FileWarning(UserWarning):
+    """Part of a file that is not read, or not as it stands there."""
+
+
+_MOST = 10_000
+"""Channels of a file. More are samples."""
+
+
+def check_count(channels: int) -> None:
+    """Refuse more channels than a recording has."""
+    if channels > _MOST:
+        raise FileError(
+            f"a file must have at most {_MOST} channels; this one has {channels}; write one line, or one row, for every sample"
+        )
 
 
 def channel(channels: Mapping[str, npt.NDArray[Any]], name: str, source: str) -> npt.NDArray[Any]:

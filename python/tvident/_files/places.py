@@ -26,12 +26,11 @@ def check_place(path: Path) -> None:
 def check_folder(path: Path) -> None:
     """Check that there is a folder for a file, no folder of its name, and that both may be written to."""
     place = end_of_links(path)
+    folder = place.parent if path.is_symlink() else path.parent
     if place.is_dir():
         raise IsADirectoryError(errno.EISDIR, "this is a folder; give the name of a file", str(path))
     if not place.parent.is_dir():
-        raise FileNotFoundError(
-            errno.ENOENT, "there is no such folder; make it first, or write elsewhere", str(place.parent)
-        )
+        raise FileNotFoundError(errno.ENOENT, "there is no such folder; make it first, or write elsewhere", str(folder))
     if writes_through(path):
         kind = path.stat().st_mode
         if stat.S_ISBLK(kind) or stat.S_ISSOCK(kind):
@@ -39,7 +38,7 @@ def check_folder(path: Path) -> None:
     elif place.exists() and not os.access(place, os.W_OK):
         raise PermissionError(errno.EACCES, "this file may not be changed; write elsewhere", str(path))
     elif not os.access(place.parent, os.W_OK | os.X_OK):
-        raise PermissionError(errno.EACCES, "nothing may be written in this folder; write elsewhere", str(place.parent))
+        raise PermissionError(errno.EACCES, "nothing may be written in this folder; write elsewhere", str(folder))
 
 
 def end_of_links(path: Path) -> Path:

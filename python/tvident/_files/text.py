@@ -2,75 +2,112 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
-from tvident._files.channels import Channels
+from tvident._files.channels import Channels, FileError, Say
+from tvident._files.dialect import CURE, Dialect, dialect_of, mixed_line
+from tvident._files.rows import Numbers, Rows, check_text
+
+_HEAD, _PIECE = 1 << 20, 1 << 22
+"""Characters in which the numbers must begin; characters that are read at once: an interrupt is heard between."""
+
+_LONGEST_LINE = 1_000_000
+
+_COMPRESSED = {
+    b"\x1f\x8b": "gzip",
+    b"PK\x03\x04": "zip",
+    b"BZh": "bzip2",
+    b"\xfd7zXZ": "xz",
+    b"\x28\xb5\x2f\xfd": "zstd",
+}
+"""How compressed files begin."""
 
 
-def read_text(path: Path) -> Channels:
+def read_text(path: Path, say: Say) -> Channels:
     """Read columns of numbers, with or without names, separated by commas, semicolons, tabs or blanks."""
-    encoding = _encoding(path)
-    with path.open(encoding=encoding) as file:
-        lines = [line for _, line in zip(range(200), file, strict=False)]
-    for separator in (",", ";", "\t", None):
-        start, width = _first_numbers(lines, separator)
-        if width > 1 or (width == 1 and separator is None):
+    with path.open("rb") as file:
+        start = file.read(8)
+    for magic, kind in _COMPRESSED.items():
+        if start.startswith(magic):
+            raise FileError(f"a text must not be compressed; this is a {kind} file; unpack it")
+    # UTF-8, or else the Western European alphabet of older programs, in which every byte is a letter.
+    encodings = ("utf-8-sig", "latin-1")
+    for encoding, mark in (("utf-32", (b"\xff\xfe\0\0", b"\0\0\xfe\xff")), ("utf-16", (b"\xff\xfe", b"\xfe\xff"))):
+        if start.startswith(mark):
+            encodings = (encoding, encoding)
             break
-    if not width:
-        return {}
-    names = _names(lines[:start], separator, width)
-    numbers = np.genfromtxt(
-        path,
-        delimiter=separator,
-        skip_header=start,
-        encoding=encoding,
-        comments="#",
-        ndmin=2,
-        invalid_raise=True,
-    )
-    return dict(zip(names, numbers.T, strict=True))
-
-
-def _encoding(path: Path) -> str:
-    """Return how a text is encoded: UTF-8, or else the Western European alphabet of older programs."""
-    with path.open(encoding="utf-8-sig") as file:
-        try:
-            for _ in file:
-                pass
-        except UnicodeDecodeError:
-            return "latin-1"
-    return "utf-8-sig"
-
-
-def _cells(line: str, separator: str | None) -> list[str]:
-    return [cell.strip().strip("\"'") for cell in line.strip().rstrip(separator or " ").split(separator)]
-
-
-def _is_number(cell: str) -> bool:
     try:
-        float(cell or "nan")
-    except ValueError:
-        return False
-    return True
+        return _read(path, encodings[0], say)
+    except UnicodeError:
+        if encodings[0] == encodings[1]:
+            raise FileError(
+                f"a text that begins as {encodings[0]} must end so; it does not; save it as UTF-8"
+            ) from None
+        return _read(path, encodings[1], say)
 
 
-def _first_numbers(lines: list[str], separator: str | None) -> tuple[int, int]:
-    """Return the first line that holds numbers only, and how many."""
-    for index, line in enumerate(lines):
-        cells = _cells(line, separator)
-        if line.strip() and not line.startswith("#") and any(cells) and all(_is_number(cell) for cell in cells):
-            return index, len(cells)
-    return 0, 0
+def _read(path: Path, encoding: str, say: Say) -> Channels:
+    with path.open(encoding=encoding) as file:
+        head = file.read(_HEAD)
+        rest = file.readline(_LONGEST_LINE) if head and not head.endswith("\n") else ""
+        if len(rest) >= _LONGEST_LINE:
+            _refuse_long_line(head.count("\n") + 1)
+        head += rest
+        check_text(head, 0)
+        lines = head.split("\n")
+        longest = max(range(len(lines)), key=lambda index: len(lines[index]))
+        if len(lines[longest]) > _LONGEST_LINE:
+            _refuse_long_line(longest + 1)
+        dialect = dialect_of(lines, say)
+        if dialect is None:
+            if head.strip():
+                raise FileError(f"holds no numbers; {mixed_line(lines)}{CURE}")
+            return {}
+        rows = Rows(dialect, say)
+        rows.skip(dialect.first)
+        parts = [rows.read("\n".join(lines[dialect.first :]))]
+        parts += [rows.read(piece) for piece in _pieces(file, head.count("\n"))]
+        rows.finish()
+    return _columns(dialect, parts)
 
 
-def _names(lines: Iterable[str], separator: str | None, width: int) -> list[str]:
-    """Return names from the last line above the numbers that has as many, or numbers from 0."""
-    names = [str(index) for index in range(width)]
-    for line in lines:
-        cells = [cell for cell in _cells(line.lstrip("# "), separator) if cell]
-        if len(cells) == width == len(set(cells)):
-            names = cells
-    return names
+def _refuse_long_line(place: int) -> None:
+    raise FileError(
+        f"a line must have at most {_LONGEST_LINE} characters; line {place} has more; write one line for every sample"
+    )
+
+
+def _pieces(file: TextIO, lines: int) -> Iterator[str]:
+    """Give the rest of a text in pieces of whole lines."""
+    carried = ""
+    while piece := file.read(_PIECE):
+        whole, newline, last = (carried + piece).rpartition("\n")
+        if len(last) > _LONGEST_LINE:
+            _refuse_long_line(lines + whole.count("\n") + 2)
+        carried = last
+        if newline:
+            lines += whole.count("\n") + 1
+            yield whole + newline
+    if carried:
+        yield carried
+
+
+def _columns(dialect: Dialect, parts: list[Numbers]) -> Channels:
+    """Return rows as columns, each in one piece of memory."""
+    rows = sum(part.shape[0] for part in parts)
+    width = len(dialect.names)
+    columns = np.empty((width, rows))
+    start = 0
+    while parts:
+        part = parts.pop(0)
+        columns[:, start : start + len(part)] = part.T
+        start += len(part)
+    if not dialect.named:
+        # A separator at the end of every line makes no column.
+        while width > 1 and np.isnan(columns[width - 1]).all():
+            width -= 1
+    return dict(zip(dialect.names[:width], columns, strict=False))

@@ -1,0 +1,69 @@
+"""Cells of a line of text, and the numbers that they hold."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+
+Separator = str | None
+"""What stands between cells; None: blanks."""
+
+_POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
+_INFINITE = re.compile(r"([+-]?)(inf|infinity|1\.#inf)", re.IGNORECASE)
+_MISSING = re.compile(r"([+-]?nan|n/?a|#n/a|null|none|[+-]?1\.#(qnan|snan|ind))?", re.IGNORECASE)
+_NOT_A_COMMENT = re.compile(r"#(?=(n/a|div/0|ref!|value!|num!|name\?|null!|qnan|snan|ind|inf)\b)", re.IGNORECASE)
+_IN_QUOTES = re.compile(r'"[^"]*"|[^\s"]+')
+
+
+def split(line: str, separator: Separator) -> list[str]:
+    """Return the cells of a line without blanks and quotes around them; a separator in double quotes is part of its cell."""
+    if '"' not in line:
+        cells = line.strip().split() if separator is None else line.strip("\r\n ").split(separator)
+    elif separator is None:
+        cells = _IN_QUOTES.findall(line)
+    else:
+        try:
+            cells = next(csv.reader([line.strip()], delimiter=separator, skipinitialspace=True), [])
+        except csv.Error:  # a cell of more than 131 072 characters
+            cells = line.split(separator)
+    return [cell.strip().strip("\"'").strip() for cell in cells]
+
+
+def without_comment(line: str) -> str:
+    """Return a line up to its ``#``, unless this is how spreadsheets and older programs write that there is no number."""
+    start = line.find("#")
+    while start >= 0:
+        if not _NOT_A_COMMENT.match(line, start):
+            return line[:start]
+        start = line.find("#", start + 1)
+    return line
+
+
+def hides_numbers(text: str) -> bool:
+    """Return whether a ``#`` in a text is part of a cell rather than the beginning of a comment."""
+    return "#" in text and _NOT_A_COMMENT.search(text) is not None
+
+
+def number(cell: str, *, comma: bool) -> float | None:
+    """Return the number in a cell, NaN where it says that there is none, None where it says anything else.
+
+    ``comma`` allows a comma as the decimal sign. A number too large for 64 bits is none.
+    """
+    if _POINT.fullmatch(cell):
+        value = float(cell)
+        return value if math.isfinite(value) else None
+    if comma and _COMMA.fullmatch(cell):
+        value = float(cell.replace(",", "."))
+        return value if math.isfinite(value) else None
+    if _MISSING.fullmatch(cell):
+        return math.nan
+    infinite = _INFINITE.fullmatch(cell)
+    return float(f"{infinite[1]}inf") if infinite else None
+
+
+def is_present(cell: str, *, comma: bool) -> bool:
+    """Return whether a cell holds a number, rather than nothing or words."""
+    value = number(cell, comma=comma)
+    return value is not None and not math.isnan(value)

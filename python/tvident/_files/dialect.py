@@ -1,0 +1,234 @@
+"""How a text of columns is written: what separates its cells, where its numbers begin, what its columns are called."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tvident._files.cells import Separator, is_present, number, split
+from tvident._files.channels import FileError, Say, check_count
+from tvident._files.names import listed, printable
+
+_COMPARED = 20
+"""Rows that are looked at to tell one separator from another."""
+
+_SEARCHED = 100
+"""Lines that are looked at to say why none holds numbers."""
+
+_BEGINS_AS_NUMBER = re.compile(r"[+-]?[.,]?[0-9]")
+
+_UNITS = re.compile(
+    r"-|1|%|[\[(].*[\])]|"
+    r"([numkMGµμ]?(s|sec|m|g|N|V|A|Hz|rad|Pa|J|W|bar|N[ ·*.]?m)|deg|degrees|°|°C|K|min|h|rpm|counts|in|ft|lb|cm)"
+    r"([/·*. ]?(s|rad|deg|m|kg|min)([\^²³]?-?\d?))?([\^²³]\d?)?"
+)
+_FRACTION = re.compile(r"0\d+")
+
+_HINT = re.compile(r'"?sep=.?"?', re.IGNORECASE)
+"""What a spreadsheet takes for the separator of what follows."""
+
+CURE = "export the channels as columns of numbers with a point as the decimal sign"
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How a text of columns is written."""
+
+    separator: Separator
+    first: int
+    """Index of the first line of numbers."""
+    names: list[str]
+    """Of the columns, which are as many."""
+    cells: int
+    """In the first line of numbers: more than names where separators end its lines."""
+    named: bool
+    """Whether the names are from the file."""
+
+    @property
+    def comma(self) -> bool:
+        """Whether a comma may be a decimal sign, since other signs separate cells."""
+        return self.separator != "," and self.cells > 1
+
+
+@dataclass(frozen=True)
+class _Start:
+    separator: Separator
+    first: int
+    cells: list[str]
+    agree: int
+
+
+def dialect_of(lines: Sequence[str], say: Say) -> Dialect | None:
+    """Return how the first lines of a text are written, or None where there is no line of numbers."""
+    starts = [start for separator in (",", ";", "\t", None) if (start := _start(lines, separator)) is not None]
+    if not starts:
+        return None
+    # Single numbers are lines of numbers only where nothing separates any; of equals the first.
+    several = [one for one in starts if len(one.cells) > 1]
+    start = max(several or starts, key=lambda one: one.agree)
+    above = [_Line(index, lines[index], start.separator) for index in range(start.first)]
+    return _Names(start, [line for line in above if line.says_something], say).dialect()
+
+
+def mixed_line(lines: Sequence[str]) -> str:
+    """Return what keeps the first line that looks like a line of numbers from being one."""
+    for index, line in enumerate(lines[:_SEARCHED]):
+        for separator in (",", ";", "\t", None):
+            cells = split(line, separator)
+            words = [cell for cell in cells if number(cell, comma=separator != ",") is None]
+            if words and all(_BEGINS_AS_NUMBER.match(cell) for cell in cells if cell):
+                return f"'{printable(words[0], 40)}' in line {index + 1} is no number; "
+    return ""
+
+
+def _start(lines: Sequence[str], separator: Separator) -> _Start | None:
+    """Return the first line of numbers for one separator, and how many of the following ones agree with it."""
+    for index, line in enumerate(lines):
+        cells = _numbers(line, separator)
+        if cells and not _counts(cells):
+            following = [one for one in lines[index : index + 2 * _COMPARED] if one.strip() and not one.startswith("#")]
+            agree = sum(len(_numbers(one, separator)) == len(cells) for one in following[:_COMPARED])
+            return _Start(separator, _back(lines, index, separator), cells, agree)
+    return None
+
+
+def _counts(cells: list[str]) -> bool:
+    """Return whether cells are the numbers of columns, as written above them where nothing has a name."""
+    return len(cells) > 1 and cells == ["", *map(str, range(len(cells) - 1))]
+
+
+def _numbers(line: str, separator: Separator) -> list[str]:
+    """Return the cells of a line of numbers, and none where it is not one or nothing is separated."""
+    if not line.strip() or line.startswith("#") or (separator is not None and separator not in line):
+        return []
+    cells = split(line.partition("#")[0], separator)
+    # A single number with a comma may be two.
+    comma = separator != "," and len(cells) > 1
+    if any(number(cell, comma=comma) is None for cell in cells):
+        return []
+    return cells if any(is_present(cell, comma=comma) for cell in cells) else []
+
+
+def _back(lines: Sequence[str], index: int, separator: Separator) -> int:
+    """Return the first of the lines directly above the numbers in which all values are missing."""
+    while index > 0 and separator is not None and separator in lines[index - 1]:
+        cells = split(lines[index - 1], separator)
+        if any(number(cell, comma=True) is None or is_present(cell, comma=True) for cell in cells):
+            break
+        index -= 1
+    return index
+
+
+class _Line:
+    """A line above the numbers."""
+
+    def __init__(self, index: int, text: str, separator: Separator) -> None:
+        self.place = index + 1
+        self.is_comment = text.lstrip().startswith("#")
+        bare = text.lstrip("# ") if self.is_comment else text
+        self.says_something = any(one.isalnum() for one in bare) and not _HINT.fullmatch(bare.strip())
+        self.cells = split(bare, separator)
+        while self.cells and not self.cells[-1]:
+            self.cells.pop()
+
+    def names(self, most: int, least: int) -> list[str]:
+        """Return its cells if they are as many as columns: with, or without empty ones."""
+        every = self.cells
+        present = [cell for cell in every if cell]
+        if least <= len(every) <= most:
+            return every
+        return present if least <= len(present) <= most else []
+
+
+class _Names:
+    """Finds the names of columns in the lines above the numbers."""
+
+    def __init__(self, start: _Start, above: Sequence[_Line], say: Say) -> None:
+        self.start = start
+        self.above = above
+        self.say = say
+        self.most = len(start.cells)
+        self.least = max(index for index, cell in enumerate(start.cells) if cell) + 1
+
+    def dialect(self) -> Dialect:
+        check_count(self.least)
+        start = self.start
+        names = self._found()
+        if names is None:
+            self._check_no_fractions()
+            return Dialect(start.separator, start.first, [str(i) for i in range(self.most)], self.most, named=False)
+        return Dialect(start.separator, start.first, self._different(names), self.most, named=True)
+
+    def _found(self) -> list[str] | None:
+        """Return the names that stand nearest above the numbers, with units where these have a line of their own."""
+        said = False
+        for index in reversed(range(len(self.above))):
+            line = self.above[index]
+            names = line.names(self.most, self.least)
+            if names:
+                return self._with_units(self.above[index - 1] if index else None, line, names)
+            if not line.is_comment and not said:
+                self._check_not_decimal_commas(line)
+                said = True
+        return None
+
+    def _check_not_decimal_commas(self, nearest: _Line) -> None:
+        """Refuse names that are more or fewer than cells where a comma may be what makes them so."""
+        words = len(nearest.cells)
+        if self.start.separator == ",":
+            raise FileError(
+                f"the line above the numbers must name every column; line {nearest.place} has {words}, and there are "
+                f"{self.most}; {CURE} and one name for each, and begin lines that are not read with #"
+            )
+        self.say(
+            f"line {nearest.place} is not read as names: it has {words} cells, and the lines of numbers {self.most}"
+        )
+
+    def _check_no_fractions(self) -> None:
+        """Refuse numbers without names that are as likely one number with a decimal comma."""
+        suspect = next((cell for cell in self.start.cells[1::2] if _FRACTION.fullmatch(cell)), None)
+        if self.start.separator == "," and self.most % 2 == 0 and suspect is not None:
+            raise FileError(
+                f"without names of columns no number may begin with 0 as '{printable(suspect, 40)}' in line "
+                f"{self.start.first + 1}, which may follow a decimal comma; {CURE}, and a first line that names them"
+            )
+
+    def _with_units(self, above: _Line | None, line: _Line, names: list[str]) -> list[str]:
+        """Return names from the lines nearest to the numbers: the lower one may hold units, and no numbers."""
+        upper = [] if above is None else above.names(self.most, self.least)
+        comma = self.start.separator != ","
+        if len(upper) == len(names) and all(_UNITS.fullmatch(cell) for cell in names if cell):
+            bare = [cell.strip("[]()") for cell in names]
+            return [f"{name} [{unit}]" if unit else name for name, unit in zip(upper, bare, strict=True)]
+        if any(is_present(cell, comma=comma) for cell in names):
+            if len(upper) == len(names):
+                words = [one for one in names if number(one, comma=comma) is None]
+                raise FileError(not_a_number(line.place, None, (words or names)[0]))
+            self.say(f"line {line.place} is read as names of columns: {listed(names)}")
+        return names
+
+    def _different(self, names: Sequence[str]) -> list[str]:
+        """Return names that differ: without one the number of the column, of equal ones the later with a number."""
+        given, found, again = set(names), dict[str, None](), []
+        for index, name in enumerate(names):
+            bare = name or (f"column_{index}" if str(index) in given else str(index))
+            unique, count = bare, 1
+            while unique in found or (count > 1 and unique in given):
+                count += 1
+                unique = f"{bare}_{count}"
+            if count > 1:
+                again.append(f"column {index} is called {printable(unique, 40)}")
+            found[unique] = None
+        if again:
+            self.say(f"several columns have one name: {listed(again)}")
+        return list(found)
+
+
+def not_a_number(place: int, name: str | None, cell: str) -> str:
+    """Return the message about a cell that holds no number."""
+    column = "" if name is None else f" in column '{printable(name, 40)}'"
+    return (
+        f"line {place} must hold numbers; it has '{printable(cell, 40)}'{column}; write 1234.5 without separators of "
+        f"thousands, leave the cell empty where a value is missing, and begin comments with #"
+    )

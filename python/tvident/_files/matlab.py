@@ -1,0 +1,97 @@
+"""Arrays in files of MATLAB."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from tvident._files.arrays import fill, numeric
+from tvident._files.channels import Channels, FileError, Say
+from tvident._files.names import listed, printable
+
+_READER = Path(__file__).with_name("matlab_variables.py")
+
+_BYTES, _BYTES_FOR_EACH = 2 << 30, 64
+"""Memory of the reader: what its libraries take, and compressed content."""
+
+_SECONDS, _BYTES_A_SECOND = 20, 2_000_000
+"""Time of the reader: the start of Python on a busy machine, and slow disks."""
+
+_LONGEST_LINE = 1 << 20
+
+CURE = "save it again with -v7"
+
+
+def read_matlab(path: Path, say: Say) -> Channels:
+    """Read a file of any version from 4 to 7.3.
+
+    A damaged file can crash SciPy's reader or keep it busy for ever, so it works in a process of its own, with a limit of time and memory.
+    """
+    if find_spec("pymatreader") is None:
+        raise FileError("MATLAB files need pymatreader; install it with: pip install 'tvident[io]'")
+    with path.open("rb"):
+        pass  # what may not be read says so in the same words as any other file
+    size = path.stat().st_size
+    seconds = _SECONDS + size // _BYTES_A_SECOND
+    limits = (str(_BYTES + _BYTES_FOR_EACH * size), str(seconds))
+    # -P: the folder of the reader is no place to import from; the rest is found where this process finds it.
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
+        "OPENBLAS_NUM_THREADS": "1",
+        "PYTHONWARNINGS": "ignore",
+    }
+    process = subprocess.Popen(  # noqa: S603 - Python itself
+        [sys.executable, "-P", str(_READER), str(path.absolute()), *limits],
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )
+    late = threading.Timer(seconds, process.kill)
+    late.daemon = True
+    late.start()
+    last: dict[str, Any] = {}
+    try:
+        assert process.stdout is not None  # noqa: S101 - a pipe was asked for
+        channels = numeric(_arrays(process.stdout, last), say)
+        process.wait()
+    finally:
+        is_late = not late.is_alive()
+        late.cancel()
+        process.kill()
+        process.wait()
+        if process.stdout is not None:
+            process.stdout.close()
+    if not last:
+        ended = f"took more than {seconds} s" if is_late else f"ended with status {process.returncode}"
+        raise FileError(f"a MATLAB file must be whole; its reader {ended}; copy it again, or {CURE}")
+    if last["error"]:
+        raise FileError(f"a MATLAB file must be whole; its reader says: {printable(last['error'], 300)}; {CURE}")
+    if last["skipped"]:
+        say(f"not read: {listed(last['skipped'])}")
+    return channels
+
+
+def _arrays(pipe: IO[bytes], last: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Give the arrays that the reader sends, and keep its last words."""
+    while line := pipe.readline(_LONGEST_LINE):
+        try:
+            head = json.loads(line)
+        except ValueError:
+            return  # it ended within a line
+        if "error" in head:
+            last.update(head)
+            return
+        array = np.empty(head["shape"], head["type"])
+        if not fill(array, pipe):
+            return
+        yield head["name"], array
