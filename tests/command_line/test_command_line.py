@@ -341,34 +341,6 @@ def test_a_channel_is_found_beside_a_file_of_its_name(recording: Path, tmp_path:
     assert done.returncode == 0, done.stderr
 
 
-def test_without_matplotlib_all_but_pictures_is_there(recording: Path, tmp_path: Path) -> None:
-    # A module of that name that cannot be imported stands for one that is not installed.
-    (tmp_path / "absent").mkdir()
-    (tmp_path / "absent" / "matplotlib.py").write_text("raise ImportError")
-    paths = [str(tmp_path / "absent"), *filter(None, [os.environ.get("PYTHONPATH")])]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
-
-    def run_without(*arguments: object) -> subprocess.CompletedProcess[str]:
-        command = [TVIDENT, *map(str, arguments)]
-        return subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-
-    done = run_without("identify", recording, *GOOD, "-o", "result.csv")
-    assert done.returncode == 0, done.stderr
-    refused = run_without("identify", recording, *GOOD, "-o", "other.csv", "--plot", "picture.png")
-    assert refused.returncode == 2
-    assert "pip install 'tvident[plot]'" in refused.stderr
-    assert not (tmp_path / "other.csv").exists()
-    demo = run_without("demo")
-    assert demo.returncode == 2
-    assert "stiffness  N m/rad" in demo.stdout
-    assert "pip install 'tvident[plot]'" in demo.stderr
-    assert {path.name for path in (tmp_path / "tvident-demo").iterdir()} == {
-        "recording.csv",
-        "result.csv",
-        ".tvident-demo.json",
-    }
-
-
 def test_a_reader_that_has_had_enough_is_no_error(recording: Path) -> None:
     command = [TVIDENT, "identify", str(recording), *GOOD, "-o", "-"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:

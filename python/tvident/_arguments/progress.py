@@ -16,7 +16,13 @@ def reporter(progress: Progress, description: str) -> Iterator[Callable[[int, in
     if progress is None or progress is False:
         yield None
     elif progress is True:
-        from tqdm.auto import tqdm  # noqa: PLC0415 - imported where it is used
+        try:
+            from tqdm.auto import tqdm  # noqa: PLC0415 - optional
+        except ImportError:
+            raise ImportError(
+                "progress=True needs tqdm, which is not installed; install it with: pip install 'tvident[cli]', "
+                "or pass a function of (done, total)"
+            ) from None
 
         with tqdm(desc=description, unit="sample", unit_scale=True) as bar:
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -60,8 +61,8 @@ def given(options: dict[str, Any]) -> dict[str, Any]:
 
 
 def wanted_progress(wanted: bool | None) -> bool:  # noqa: FBT001 - an option's value
-    """Return whether to show progress: on a terminal, unless told otherwise."""
-    return sys.stderr.isatty() if wanted is None else wanted
+    """Return whether to show progress: on a terminal and if there are bars, unless told otherwise."""
+    return sys.stderr.isatty() and find_spec("tqdm") is not None if wanted is None else wanted
 
 
 def check_time(sample_rate: float | None, delta: float | None, time_channel: str | None) -> bool:
