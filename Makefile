@@ -20,7 +20,7 @@ demo: $(BUILT)  ## identify a simulated recording, print what was found against 
 	$(BIN)/tvident demo
 
 .PHONY: test
-test: test-rust test-python lint  ## every test and every lint
+test: test-rust lint test-python  ## every test and every lint; the last line says which tests had no recordings
 
 .PHONY: test-rust
 test-rust:  ## tests of the core

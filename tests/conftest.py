@@ -4,6 +4,7 @@ import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
@@ -12,6 +13,10 @@ from hypothesis import settings
 settings.register_profile("check", deadline=None, derandomize=True, print_blob=True)
 settings.register_profile("soak", deadline=None, max_examples=2000, print_blob=True)
 settings.load_profile(os.environ.get("TVIDENT_HYPOTHESIS", "check"))
+
+
+NO_RECORDINGS, A_MISSING_RECORDING = "no recordings at", "the recording "
+"""How tests that need one say why they are skipped."""
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -27,5 +32,20 @@ def folder_of_recordings() -> Path:
     """Give the folder of real recordings, which are not part of the project."""
     folder = Path(os.environ.get("TVIDENT_DATA", Path(__file__).parents[2] / "shared" / "data"))
     if not folder.is_dir():
-        pytest.skip(f"no recordings at {folder}; set TVIDENT_DATA to where they are")
+        pytest.skip(f"{NO_RECORDINGS} {folder}; set TVIDENT_DATA to where they are")
     return folder
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Say in the last line how many tests had no recordings: a green run does not mean that they passed."""
+    reporter: Any = config.pluginmanager.get_plugin("terminalreporter")
+    if reporter is None:
+        return
+    reasons = [str(one.longrepr) for one in reporter.stats.get("skipped", [])]
+    skipped = [reason for reason in reasons if any(words in reason for words in (NO_RECORDINGS, A_MISSING_RECORDING))]
+    if skipped:
+        reporter.write_line(
+            f"NOT RUN: {len(skipped)} tests on real recordings, which are not part of the project; to run them, set "
+            f"TVIDENT_DATA to the folder that holds them (CONTRIBUTING.md says which)",
+            yellow=True,
+        )

@@ -13,6 +13,9 @@ from tvident._files.names import listed, printable
 _COMPARED = 20
 """Rows that are looked at to tell one separator from another."""
 
+_SEPARATORS: tuple[Separator, ...] = (",", ";", "\t", None)
+"""The earlier one where numbers are the same for several."""
+
 _SEARCHED = 100
 """Lines that are looked at to say why none holds numbers."""
 
@@ -61,7 +64,7 @@ class _Start:
 
 def dialect_of(lines: Sequence[str], say: Say) -> Dialect | None:
     """Return how the first lines of a text are written, or None where there is no line of numbers."""
-    starts = [start for separator in (",", ";", "\t", None) if (start := _start(lines, separator)) is not None]
+    starts = _starts(lines)
     if not starts:
         return None
     # Single numbers are lines of numbers only where nothing separates any; of equals the first.
@@ -74,7 +77,7 @@ def dialect_of(lines: Sequence[str], say: Say) -> Dialect | None:
 def mixed_line(lines: Sequence[str]) -> str:
     """Return what keeps the first line that looks like a line of numbers from being one."""
     for index, line in enumerate(lines[:_SEARCHED]):
-        for separator in (",", ";", "\t", None):
+        for separator in _SEPARATORS:
             cells = split(line, separator)
             words = [cell for cell in cells if number(cell, comma=separator != ",") is None]
             if words and all(_BEGINS_AS_NUMBER.match(cell) for cell in cells if cell):
@@ -82,15 +85,25 @@ def mixed_line(lines: Sequence[str]) -> str:
     return ""
 
 
-def _start(lines: Sequence[str], separator: Separator) -> _Start | None:
-    """Return the first line of numbers for one separator, and how many of the following ones agree with it."""
+def _starts(lines: Sequence[str]) -> list[_Start]:
+    """Return the first line of numbers for every separator, unless it is far below that for another."""
+    found: dict[Separator, _Start] = {}
+    last = len(lines)
     for index, line in enumerate(lines):
-        cells = _numbers(line, separator)
-        if cells and not _counts(cells):
-            following = [one for one in lines[index : index + 2 * _COMPARED] if one.strip() and not one.startswith("#")]
-            agree = sum(len(_numbers(one, separator)) == len(cells) for one in following[:_COMPARED])
-            return _Start(separator, _back(lines, index, separator), cells, agree)
-    return None
+        if index > last:
+            break
+        for separator in _SEPARATORS:
+            cells = [] if separator in found else _numbers(line, separator)
+            if cells and not _counts(cells):
+                found[separator] = _start(lines, index, cells, separator)
+                last = min(last, index + _COMPARED)
+    return [found[separator] for separator in _SEPARATORS if separator in found]
+
+
+def _start(lines: Sequence[str], index: int, cells: list[str], separator: Separator) -> _Start:
+    following = [one for one in lines[index : index + 2 * _COMPARED] if one.strip() and not one.startswith("#")]
+    agree = sum(len(_numbers(one, separator)) == len(cells) for one in following[:_COMPARED])
+    return _Start(separator, _back(lines, index, separator), cells, agree)
 
 
 def _counts(cells: list[str]) -> bool:
