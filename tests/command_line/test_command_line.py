@@ -313,7 +313,7 @@ GOOD = ("--angle", "angle", "--torque", "torque", "--sample-rate", "1000")
         (("derivatives", "FILE", "--channel", "angle", "--time", "angle"), 2, "t must increase"),
         (("simulate", "rig.txt"), 2, "files that end in .csv or .npz"),
         (("simulate", "rig.csv", "--duration", "-3"), 2, "duration must be positive"),
-        (("simulate", "rig.csv", "--duration", "1e12"), 1, "more memory than there is"),
+        (("simulate", "rig.csv", "--duration", "1e12"), 2, "duration times sample_rate must be at most 1e+08 samples"),
         (("simulate", "no/such/folder/rig.csv"), 1, "no/such/folder: there is no such folder"),
         (("demo", "--folder", "broken.npz/demo"), 1, "broken.npz/demo: Not a directory"),
     ],
@@ -339,6 +339,16 @@ def test_a_channel_is_found_beside_a_file_of_its_name(recording: Path, tmp_path:
     (tmp_path / "angle").write_text("not a recording")
     done = run("identify", recording, *GOOD, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+
+
+def test_memory_that_runs_out_is_one_line(tmp_path: Path) -> None:
+    # Two arrays of 800 MB in an address space of 1.5 GB.
+    command = f"ulimit -v 1500000; exec '{TVIDENT}' simulate rig.csv --duration 99999"
+    done = subprocess.run(["/bin/sh", "-c", command], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "more memory than there is" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_reader_that_has_had_enough_is_no_error(recording: Path) -> None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 import tvident
@@ -68,8 +69,67 @@ def test_the_truth_obeys_the_equation_of_motion() -> None:
         ({"excitation": "hammer"}, "excitation must be 'multisine'"),
         ({"encoder_counts": 0}, "encoder_counts must be at least 1"),
         ({"inertia": 0.0}, "inertia must be positive"),
+        ({"duration": 1e18}, "duration times sample_rate must be at most 1e[+]08 samples; got 1e[+]21; shorten"),
+        ({"duration": 1e300, "sample_rate": 1e29}, "at most 1e[+]08 samples; got inf; shorten"),
+        ({"duration": 200, "sample_rate": 0.01}, "at most 100 rad in a sample period; got 7.54e[+]03 rad at 12 Hz"),
+        (
+            {"duration": 1e4, "torsional_rigidity": 1e4},
+            "at most 1e[+]09 steps of integration; got .* shorten the recording",
+        ),
+        ({"duration": 0.1, "inertia": 1e-300}, "at most 100 rad in a sample period; got 8.25e[+]294 rad"),
+        ({"duration": 0.1, "torsional_rigidity": 1e300}, "at most 100 rad in a sample period"),
+        ({"duration": 0.1, "damping": 1e308}, "at most 100 rad in a sample period; got inf"),
+        ({"sample_rate": 1e300}, "sample_rate must be between 1e-30 and 1e[+]30 Hz"),
+        ({"damping": -0.1}, "damping must be at least 0; got -0.1; pass 0 or more"),
+        ({"damping": np.nan}, "damping must be finite; got nan"),
+        ({"torque_snr_db": np.nan}, "torque_snr_db must be finite; got nan"),
+        ({"torque_snr_db": -(10**400)}, "torque_snr_db must be finite; got -1000"),
+        ({"torque_snr_db": -1e4}, "torque_snr_db must be at least -200; got -10000.0"),
+        ({"angle_noise": -1e-3}, "angle_noise must be at least 0; got -0.001"),
+        ({"angle_noise": np.inf}, "angle_noise must be finite; got inf"),
+        ({"angle_noise": 1e300}, "angle_noise must be at most 1e[+]10; got 1e[+]300"),
+        ({"pattern": lambda t: t * np.nan}, "what pattern returns must be finite and positive; got nan at 0 s; repair"),
+        ({"pattern": lambda t: 0.1 - t}, "what pattern returns must be finite and positive; got .* at 0.1"),
+        ({"pattern": lambda t: np.where(t < 19, 1.0, np.inf)}, "finite and positive; got inf at 19"),
+        ({"pattern": lambda t: np.ma.masked_less(1 + t, 2.0)}, "finite and positive; got nan at 0 s"),
+        (
+            {"pattern": lambda _: np.zeros(3)},
+            r"one value for every time; got shape \(3,\) for times of shape \(",
+        ),
+        ({"inertia": lambda t: -t}, "what inertia returns must be finite and positive; got -0 at 0 s"),
+        ({"damping": lambda t: -t}, "what damping returns must be finite and not negative; got "),
     ],
 )
 def test_misuse_says_the_rule_the_value_and_the_cure(call: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         tvident.simulate_torsional_rig(**call)
+
+
+@pytest.mark.parametrize("wrong", [lambda t: t + 1j, lambda _: None, lambda _: "far"])
+def test_functions_return_real_numbers(wrong: Any) -> None:
+    with pytest.raises(TypeError, match="what pattern returns must"):
+        tvident.simulate_torsional_rig(pattern=wrong)
+
+
+def test_a_function_that_writes_to_its_times_changes_nothing() -> None:
+    def writing(t: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        t *= 0.0
+        return t + 0.45
+
+    rig = tvident.simulate_torsional_rig(1.0, pattern=writing)
+    same = tvident.simulate_torsional_rig(1.0, pattern="constant")
+    np.testing.assert_array_equal(rig.time, np.arange(1000) / 1000)
+    np.testing.assert_array_equal(rig.angle, same.angle)
+
+
+def test_heavy_damping_is_followed() -> None:
+    # The velocity decays within an eighth of a sample, so it is the torque over the damping: inertia and stiffness change that by
+    # the ratio of 813 000 rad/s to the 75 rad/s of the torque, and to the 27 rad/s at which the stiffness brings the rig back.
+    r = tvident.simulate_torsional_rig(0.005, sample_rate=10_000, damping=1000.0)
+    np.testing.assert_allclose(r.true_velocity[1:], r.true_torque[1:] / 1000, rtol=1e-3)
+
+
+def test_few_samples_of_a_fast_clock_are_simulated() -> None:
+    r = tvident.simulate_torsional_rig(1e-6, sample_rate=1e9)
+    assert r.angle.shape == (1000,)
+    assert np.isfinite(r.torque).all()

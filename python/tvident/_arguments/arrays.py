@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._arguments.numbers import one_of, whole_number
+from tvident._arguments.shown import shown
 
 NanPolicy: TypeAlias = Literal["propagate", "raise"]
 
@@ -16,25 +17,64 @@ RowPolicy: TypeAlias = Literal["omit", "propagate", "raise"]
 
 _READ_AS_THEY_ARE = frozenset(np.dtype(code) for code in ("f8", "f4", "i8", "i4", "i2", "i1", "u8", "u4", "u2", "u1"))
 
+_OTHER_KINDS = {
+    "S": "text; read it with np.asarray(text, dtype=float)",
+    "U": "text; read it with np.asarray(text, dtype=float)",
+    "M": "dates; take seconds from the first sample on: (dates - dates[0]) / np.timedelta64(1, 's')",
+    "m": "durations; divide them by np.timedelta64(1, 's')",
+    "V": "records with fields; take one field by its name",
+}
+"""What arrays hold that are no numbers, and the cure."""
+
 
 def real_array(name: str, values: npt.ArrayLike) -> npt.NDArray[np.number]:
-    """Return values as an array of real numbers that the core reads without a copy of its own."""
-    array = np.asarray(values)
-    if array.dtype.kind == "c":
+    """Return values as an array of real numbers that the core reads without a copy of its own; masked ones are NaN."""
+    array = any_array(name, values)
+    if array.ndim == 0:
+        raise ValueError(
+            f"{name} must be an array of samples; got the single value {shown(array.item())}; pass a sequence"
+        )
+    if array.size == 0:
+        raise ValueError(f"{name} must not be empty; got an array of shape {array.shape}; check how it was read or cut")
+    return array
+
+
+def any_array(name: str, values: npt.ArrayLike) -> npt.NDArray[np.number]:
+    """Return values as an array of real numbers of any shape; masked ones are NaN."""
+    array = _as_array(name, values)
+    kind = array.dtype.kind
+    if kind == "c":
         raise TypeError(
             f"{name} must be real; got complex numbers ({array.dtype}); pass the real part or the magnitude"
         )
-    if array.dtype.kind not in "biuf":
-        raise TypeError(
-            f"{name} must hold numbers; got {array.dtype}; convert them with np.asarray({name}, dtype=float)"
-        )
-    if array.ndim == 0:
-        raise ValueError(f"{name} must be an array of samples; got the single number {array}; pass a sequence")
-    if array.size == 0:
-        raise ValueError(f"{name} must not be empty; got an array of shape {array.shape}; check how it was read or cut")
+    if kind not in "biuf":
+        got = _OTHER_KINDS.get(kind, f"{array.dtype}; convert them with np.asarray({name}, dtype=float)")
+        raise TypeError(f"{name} must hold numbers; got {got}")
+    array = np.asarray(_filled(array))
     if array.dtype not in _READ_AS_THEY_ARE:
-        array = array.astype(np.float64)
+        with np.errstate(all="ignore"):
+            # A long double may be too large for a double: it is infinite then, and so no sample.
+            array = array.astype(np.float64)
     return array
+
+
+def _as_array(name: str, values: npt.ArrayLike) -> npt.NDArray[Any]:
+    """Return values as an array, a masked one if they are masked."""
+    if isinstance(values, list | tuple):
+        values = [_filled(value) if isinstance(value, np.ma.MaskedArray) else value for value in values]
+    try:
+        return values if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
+    except (ValueError, OverflowError):
+        raise ValueError(
+            f"{name} must be a regular array of numbers; got {shown(values)}; give all rows the same length"
+        ) from None
+
+
+def _filled(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return an array with NaN where it is masked: such samples are missing, and anything may lie below the mask."""
+    if array.dtype.kind not in "biuf" or not np.ma.is_masked(array):
+        return array
+    return np.asarray(np.ma.filled(array.astype(np.result_type(array.dtype, np.float16)), np.nan))
 
 
 def along_axis(name: str, array: npt.NDArray[Any], axis: int) -> npt.NDArray[Any]:
@@ -58,14 +98,15 @@ def check_nan(name: str, array: npt.NDArray[Any], policy: str, policies: Any = N
 
 
 def mask(name: str, values: npt.ArrayLike | None, shape: tuple[int, ...]) -> npt.NDArray[np.bool_] | None:
-    """Return a mask of the given shape, or nothing."""
+    """Return a mask of the given shape, or nothing; what is masked in the mask itself is False."""
     if values is None:
         return None
-    array = np.asarray(values)
-    if array.dtype != np.bool_:
+    array = _as_array(name, values)
+    if array.dtype != np.bool_ and array.size:
         raise TypeError(f"{name} must hold True and False; got {array.dtype}; write {name} = {name} != 0")
+    plain = np.ma.filled(array, False)  # noqa: FBT003 - what is masked is left out
     try:
-        return np.broadcast_to(array, shape)
+        return np.broadcast_to(np.asarray(plain), shape)
     except ValueError:
         raise ValueError(
             f"{name} must have one value for every sample; got shape {array.shape} for an angle of shape {shape}; check its length"

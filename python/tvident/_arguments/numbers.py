@@ -5,47 +5,89 @@ from __future__ import annotations
 import math
 from numbers import Integral, Real
 
-# No whole number this large fits into the core's.
+import numpy as np
+
+from tvident._arguments.shown import shown
+
 _BEYOND_COUNTING = 1 << 63
+"""No whole number this large fits into the core's."""
+
+LARGEST = 1e140
+"""The core takes no value above this for a sample: squares of such values have no double."""
 
 
-def whole_number(name: str, value: object, *, least: int | None = None) -> int:
-    """Return a whole number, of at least a given size."""
+def whole_number(name: str, value: object, *, least: int | None = None, most: int | None = None) -> int:
+    """Return a whole number, within limits if there are any."""
     if not isinstance(value, Integral) or isinstance(value, bool):
-        whole = isinstance(value, Real) and math.isfinite(value) and float(value).is_integer()
-        cure = f"pass {int(float(value))}" if whole else "pass an integer"  # type: ignore[arg-type]
-        raise TypeError(f"{name} must be a whole number; got {value!r}; {cure}")
-    if least is not None and value < least:
-        raise ValueError(f"{name} must be at least {least}; got {value}; pass {least} or more")
+        number = _float(value)
+        whole = number is not None and number.is_integer()
+        cure = f"pass {shown(int(number))}" if whole and number is not None else "pass an integer"
+        raise TypeError(f"{name} must be a whole number; got {shown(value)}; {cure}")
     number = int(value)
-    if number >= _BEYOND_COUNTING:
-        raise ValueError(f"{name} must be less than 2^63; got {number}; pass a smaller number")
+    if least is not None and number < least:
+        raise ValueError(f"{name} must be at least {least}; got {shown(number)}; pass {least} or more")
+    if most is not None and number > most:
+        raise ValueError(f"{name} must be at most {most}; got {shown(number)}; pass {most} or less")
+    if abs(number) >= _BEYOND_COUNTING:
+        raise ValueError(f"{name} must be less than 2^63; got {shown(number)}; pass a smaller number")
     return number
 
 
-def positive_number(name: str, value: object) -> float:
-    """Return a finite number above zero."""
-    if not isinstance(value, Real) or isinstance(value, bool):
-        raise TypeError(f"{name} must be a number; got {value!r}; pass a float")
-    number = float(value)
+def positive_number(name: str, value: object, *, most: float | None = None) -> float:
+    """Return a finite number above zero, of at most a given size."""
+    number = real_number(name, value)
     if not (math.isfinite(number) and number > 0):
-        raise ValueError(f"{name} must be positive and finite; got {number}; pass a number above zero")
+        raise ValueError(f"{name} must be positive and finite; got {shown(value)}; pass a number above zero")
+    if most is not None and number > most:
+        raise ValueError(f"{name} must be at most {most:g}; got {number:g}; pass {most:g} or less")
     return number
 
 
-def finite_number(name: str, value: object) -> float:
-    """Return a finite number."""
-    if not isinstance(value, Real) or isinstance(value, bool):
-        raise TypeError(f"{name} must be a number; got {value!r}; pass a float")
-    number = float(value)
+def finite_number(name: str, value: object, *, least: float | None = None, most: float | None = None) -> float:
+    """Return a finite number, within limits if there are any."""
+    number = real_number(name, value)
     if not math.isfinite(number):
-        raise ValueError(f"{name} must be finite; got {number}; pass a number")
+        raise ValueError(f"{name} must be finite; got {shown(value)}; pass a number")
+    if least is not None and number < least:
+        raise ValueError(f"{name} must be at least {least:g}; got {shown(value)}; pass {least:g} or more")
+    if most is not None and number > most:
+        raise ValueError(f"{name} must be at most {most:g}; got {shown(value)}; pass {most:g} or less")
     return number
+
+
+def real_number(name: str, value: object) -> float:
+    """Return a real number; infinite where it is too large for a double."""
+    number = _float(value)
+    if number is None:
+        raise TypeError(f"{name} must be a number; got {shown(value)}; pass a float")
+    return number
+
+
+def _float(value: object) -> float | None:
+    """Return a real number as a double, or None for what is none."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return None
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value == abs(value) else -math.inf
 
 
 def one_of(name: str, value: object, choices: tuple[str, ...]) -> str:
     """Return one of several words."""
-    if value not in choices:
+    if not isinstance(value, str) or value not in choices:
         *most, last = (repr(choice) for choice in choices)
-        raise ValueError(f"{name} must be {', '.join(most)} or {last}; got {value!r}; use one of these")
+        raise ValueError(f"{name} must be {', '.join(most)} or {last}; got {shown(value)}; use one of these")
     return str(value)
+
+
+def flag(name: str, value: object) -> bool:
+    """Return True or False, Python's or NumPy's."""
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError(f"{name} must be True or False; got {shown(value)}; pass one of them")
+    return bool(value)
+
+
+def is_word(value: object, word: str) -> bool:
+    """Return whether a value is this word; arrays, which compare element by element, are no word."""
+    return isinstance(value, str) and value == word

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeAlias
 
+from tvident._arguments.shown import shown
+
 Progress: TypeAlias = bool | Callable[[int, int], object] | None
 """``True`` shows a bar; a callable is given the work done and all of it."""
 
@@ -35,5 +37,5 @@ def reporter(progress: Progress, description: str) -> Iterator[Callable[[int, in
         yield progress
     else:
         raise TypeError(
-            f"progress must be True, False or a function of (done, total); got {progress!r}; pass one of these"
+            f"progress must be True, False or a function of (done, total); got {shown(progress)}; pass one of these"
         )

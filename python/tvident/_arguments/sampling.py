@@ -10,9 +10,19 @@ import numpy.typing as npt
 
 from tvident._arguments.arrays import real_array
 from tvident._arguments.numbers import positive_number, whole_number
+from tvident._arguments.shown import shown
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0}
 
+
+_SHORTEST, _LONGEST = 1e-30, 1e30
+"""Sample periods in seconds: nothing is recorded faster or more slowly, and beyond them numbers leave the range of doubles."""
+
+_MOST_DIGITS = 100
+"""By how many powers of ten a derivative may be larger or smaller than the samples: doubles have 308, and squares are taken."""
+
+_COUNTABLE = float(1 << 53)
+"""Doubles count samples up to here."""
 
 # How far a time stamp may lie from a uniform grid, as a fraction of the sample period: what printing with a few digits does.
 _JITTER = 1e-3
@@ -26,10 +36,34 @@ def sample_period(
     if len(given) > 1:
         raise TypeError(f"give only one of delta, sample_rate and t; got {' and '.join(given)}; drop all but one")
     if sample_rate is not None:
-        return 1.0 / positive_number("sample_rate", sample_rate)
+        rate = positive_number("sample_rate", sample_rate)
+        if not 1 / _LONGEST <= rate <= 1 / _SHORTEST:
+            raise ValueError(
+                f"sample_rate must be between {1 / _LONGEST:g} and {1 / _SHORTEST:g} Hz; got {rate:g}; give samples per second"
+            )
+        return 1.0 / rate
     if t is not None:
-        return _period_of_times(t, samples)
-    return 1.0 if delta is None else positive_number("delta", delta)
+        return _possible("the step of t", _period_of_times(t, samples))
+    return 1.0 if delta is None else _possible("delta", positive_number("delta", delta))
+
+
+def _possible(name: str, period: float) -> float:
+    """Return a sample period that a record may have."""
+    if not _SHORTEST <= period <= _LONGEST:
+        raise ValueError(
+            f"{name} must be between {_SHORTEST:g} and {_LONGEST:g} s; got {period:g}; give the sample period in seconds"
+        )
+    return period
+
+
+def check_power(name: str, derivative: int, period: float) -> None:
+    """Check that samples divided by this power of the sample period stay within the range of doubles."""
+    if derivative * abs(math.log10(period)) > _MOST_DIGITS:
+        most = math.floor(_MOST_DIGITS / abs(math.log10(period)))
+        raise ValueError(
+            f"{name} must be at most {most} with a sample period of {period:g} s, or the estimates leave the range of doubles; "
+            f"got {derivative}; ask for a lower derivative or take another unit of time"
+        )
 
 
 def _period_of_times(t: npt.ArrayLike, samples: int) -> float:
@@ -43,8 +77,10 @@ def _period_of_times(t: npt.ArrayLike, samples: int) -> float:
         return 1.0
     rounding = 4 * float(np.spacing(np.ones(1, times.dtype if times.dtype.kind == "f" else np.float64))[0])
     seconds = times.astype(np.float64, copy=False)
-    if not np.isfinite(seconds).all():
-        place = int(np.flatnonzero(~np.isfinite(seconds))[0])
+    # Differences of times that are larger by far leave the range of doubles.
+    bad = ~(np.abs(seconds) < _COUNTABLE * _LONGEST)
+    if bad.any():
+        place = int(np.flatnonzero(bad)[0])
         raise ValueError(f"t must hold finite times; t[{place}] is {seconds[place]}; repair it")
     period = float(seconds[-1] - seconds[0]) / (samples - 1)
     if not period > 0:
@@ -71,7 +107,7 @@ def seconds(name: str, value: str) -> float:
         duration = math.nan
     if not (math.isfinite(duration) and duration > 0):
         units = ", ".join(_SECONDS)
-        raise ValueError(f"{name} must be samples or a duration such as '0.2 s'; got {value!r}; units are {units}")
+        raise ValueError(f"{name} must be samples or a duration such as '0.2 s'; got {shown(value)}; units are {units}")
     return duration
 
 
@@ -79,6 +115,11 @@ def window_length(name: str, value: int | str, period: float, *, odd: bool) -> i
     """Return a length in samples from a number of samples or a duration such as ``"0.2 s"``."""
     if isinstance(value, str):
         samples = seconds(name, value) / period
+        if not samples < _COUNTABLE:
+            raise ValueError(
+                f"{name} must be less than or equal to the length of the record; got {shown(value)}, which is {samples:g} samples; "
+                "shorten it"
+            )
         return max(1, 2 * round((samples - 1) / 2) + 1) if odd else max(1, round(samples))
     length = whole_number(name, value, least=1)
     if odd and length % 2 == 0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 
 from tvident._arguments.numbers import whole_number
+from tvident._arguments.shown import shown
 
 
 def worker_count(workers: int | None) -> int | None:
@@ -14,6 +15,9 @@ def worker_count(workers: int | None) -> int | None:
     setting = os.environ.get("TVIDENT_WORKERS", "").strip()
     if not setting:
         return None
-    if not (setting.isascii() and setting.isdigit() and int(setting) > 0):
-        raise ValueError(f"TVIDENT_WORKERS must be a whole number above zero; got {setting!r}; set it to 1 or more")
+    # No word of more than nine digits counts processors, and Python reads none of more than 4300.
+    if not (setting.isascii() and setting.isdigit() and len(setting) < 10 and int(setting) > 0):  # noqa: PLR2004
+        raise ValueError(
+            f"TVIDENT_WORKERS must be a whole number above zero; got {shown(setting)}; set it to 1 or more"
+        )
     return int(setting)

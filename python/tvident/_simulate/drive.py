@@ -19,6 +19,9 @@ _SPACING = 0.25
 _AMPLITUDE = 0.05
 """Torque of each of the multisine's frequencies, N·m."""
 
+_MOST_TABLES = 64
+"""Offsets for which the torque is tabulated; a system so fast that it needs more steps a sample has little use of them."""
+
 BLOCK = 20_000
 """Samples integrated at a time."""
 
@@ -26,7 +29,7 @@ BLOCK = 20_000
 class Drive:
     """The driving torque at any time."""
 
-    def __init__(self, excitation: str, sample_rate: float, generator: np.random.Generator) -> None:
+    def __init__(self, excitation: str, sample_rate: float, samples: int, generator: np.random.Generator) -> None:
         self._sample_rate = sample_rate
         self._period = 0
         self._frequencies, self._phases, self._amplitudes = np.zeros(0), np.zeros(0), np.zeros(0)
@@ -36,7 +39,8 @@ class Drive:
             self._phases = generator.uniform(0, 2 * np.pi, count)
             self._amplitudes = np.full(count, _AMPLITUDE)
             period = sample_rate / _SPACING
-            self._period = round(period) if float(period).is_integer() else 0
+            # A table of a period that is longer than the recording costs more than it saves.
+            self._period = round(period) if period <= samples and period.is_integer() else 0
         elif excitation == "random":
             lines = 200
             self._frequencies = generator.uniform(_LOWEST, HIGHEST, lines)
@@ -49,7 +53,7 @@ class Drive:
 
     def __call__(self, first: int, count: int, offset: float) -> Array:
         """Return the torque at ``offset`` of a sample period after each of some samples."""
-        if not self._period:
+        if not self._period or (offset not in self._tables and len(self._tables) == _MOST_TABLES):
             return self._at((np.arange(first, first + count, dtype=np.float64) + offset) / self._sample_rate)
         if offset not in self._tables:
             self._tables[offset] = self._at((np.arange(self._period, dtype=np.float64) + offset) / self._sample_rate)

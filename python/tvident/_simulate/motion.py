@@ -16,14 +16,23 @@ Array: TypeAlias = npt.NDArray[np.float64]
 _ANGLE_A_STEP = 0.01
 """Phase that the highest frequency may advance in one step of integration: keeps the angle good to 1e-10."""
 
+_MOST_AT_ONCE = 10_000
+"""More belong to a system far too fast for its samples; each takes about 100 µs however few samples there are."""
+
+_MOST_STEPS = 1_000_000_000
+"""Steps of integration in all: about ten minutes."""
+
 
 def integrate(
     samples: int, sample_rate: float, coefficients: Callable[[Array], tuple[Array, Array, Array]], drive: Drive
 ) -> tuple[Array, Array]:
     """Return angle and velocity at every sample, from rest."""
     probe = np.arange(0, samples, max(1, samples // 1000), dtype=np.float64) / sample_rate
-    fastest = max(2 * np.pi * HIGHEST, math.sqrt(float(np.max(coefficients(probe)[0]))))
-    steps = max(1, math.ceil(fastest / sample_rate / _ANGLE_A_STEP))
+    with np.errstate(over="ignore"):
+        # What is too fast for a double is too fast to be followed.
+        stiffness, damping, _ = coefficients(probe)
+        fastest = max(2 * np.pi * HIGHEST, math.sqrt(float(np.max(stiffness))), float(np.max(damping)))
+    steps = _steps(samples, fastest, sample_rate)
     h = 1 / (sample_rate * steps)
     angle, velocity = np.empty(samples), np.empty(samples)
     x, v = 0.0, 0.0
@@ -52,6 +61,24 @@ def integrate(
             x, v = a * x + b * v + e, c * x + d * v + f
         angle[first : first + count], velocity[first : first + count] = angles, velocities
     return angle, velocity
+
+
+def _steps(samples: int, fastest: float, sample_rate: float) -> int:
+    """Return the steps of integration from one sample to the next, if the whole simulation ends in a few minutes."""
+    steps = fastest / sample_rate / _ANGLE_A_STEP
+    if steps > _MOST_AT_ONCE:
+        most, got = _MOST_AT_ONCE * _ANGLE_A_STEP, steps * _ANGLE_A_STEP
+        raise ValueError(
+            f"the fastest motion must turn by at most {most:g} rad in a sample period; got {got:.3g} rad at {fastest / (2 * np.pi):.3g} Hz "
+            f"and {sample_rate:g} samples a second; raise sample_rate, or change inertia, damping or torsional_rigidity"
+        )
+    steps = max(1, math.ceil(steps))
+    if samples * steps > _MOST_STEPS:
+        raise ValueError(
+            f"a simulation must need at most {_MOST_STEPS:g} steps of integration; got {samples * steps:g} for a motion of "
+            f"{fastest / (2 * np.pi):.3g} Hz; shorten the recording"
+        )
+    return steps
 
 
 def _magnus(h: float, one: tuple[Array, Array, Array], other: tuple[Array, Array, Array]) -> Any:

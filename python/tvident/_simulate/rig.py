@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._simulate.drive import Drive
+from tvident._simulate.functions import Function, function_of_time
 from tvident._simulate.motion import integrate
 from tvident._simulate.recording import Recording
 
@@ -18,7 +18,11 @@ Pattern: TypeAlias = Literal["slider", "ramp", "square", "constant"]
 
 Excitation: TypeAlias = Literal["multisine", "chirp", "random"]
 
-Function: TypeAlias = Callable[[Array], npt.ArrayLike]
+_LEAST_SNR, _MOST_NOISE = -200.0, 1e10
+"""In decibels for the torque, as a ratio for the angle: noise of ten thousand million times the signal."""
+
+_MOST_SAMPLES = 100_000_000
+"""More than a day at 1 kHz."""
 
 
 # All have a default, as users call it.
@@ -52,9 +56,9 @@ def simulate_torsional_rig(
     excitation : {"multisine", "chirp", "random"}, optional
         Torque between 0.5 and 12 Hz: 47 sines of random phase, a sweep every 10 s, or 200 sines of random frequency.
     torque_snr_db : float, optional
-        Power of the torque over that of its noise, dB.
+        Power of the torque over that of its noise, dB; -200 or more.
     angle_noise : float, optional
-        Noise of the angle over its standard deviation.
+        Noise of the angle over its standard deviation, 0 or more.
     encoder_counts : int, optional
         Counts a turn: the angle is rounded to whole counts instead of getting noise.
     inertia : float or callable, optional
@@ -72,7 +76,8 @@ def simulate_torsional_rig(
     Raises
     ------
     ValueError
-        If a number is not positive, or a name is unknown.
+        If a number is not positive, a name is unknown, a function returns values that are not finite and positive (zero damping is
+        allowed) or of another shape than the times, or the simulation would take longer than about ten minutes.
     TypeError
         If a number is none, or a count or the seed is not whole.
 
@@ -100,37 +105,36 @@ def simulate_torsional_rig(
     >>> float(recording.stiffness[1000])  # 6 N m² / 0.5 m
     12.0
     """
-    for name, number in (
-        ("duration", duration),
-        ("sample_rate", sample_rate),
-        ("torsional_rigidity", torsional_rigidity),
-    ):
-        arguments.positive_number(name, number)
-    samples = round(duration * sample_rate)
-    if samples < 1:
-        raise ValueError(f"duration must hold at least one sample; got {duration} s at {sample_rate} Hz; lengthen it")
+    duration = arguments.positive_number("duration", duration)
+    arguments.sample_period(1, sample_rate=sample_rate)
+    sample_rate = float(sample_rate)
+    torsional_rigidity = arguments.positive_number("torsional_rigidity", torsional_rigidity)
+    torque_noise = 10 ** (-arguments.finite_number("torque_snr_db", torque_snr_db, least=_LEAST_SNR) / 20)
+    angle_noise = arguments.finite_number("angle_noise", angle_noise, least=0, most=_MOST_NOISE)
+    count = None if encoder_counts is None else arguments.whole_number("encoder_counts", encoder_counts, least=1)
+    samples = _samples(duration, sample_rate)
     generator = np.random.default_rng(arguments.whole_number("seed", seed, least=0))
-    drive = Drive(arguments.one_of("excitation", excitation, get_args(Excitation)), sample_rate, generator)
-    length = pattern if callable(pattern) else _pattern(pattern, duration)
-    inertia_of, damping_of = _function("inertia", inertia), _function("damping", damping)
+    drive = Drive(arguments.one_of("excitation", excitation, get_args(Excitation)), sample_rate, samples, generator)
+    length_of = function_of_time("pattern", pattern if callable(pattern) else _pattern(pattern, duration))
+    inertia_of = function_of_time("inertia", inertia)
+    damping_of = function_of_time("damping", damping, zero=True)
 
     def coefficients(t: Array) -> tuple[Array, Array, Array]:
         i = inertia_of(t)
-        stiffness = torsional_rigidity / np.broadcast_to(np.asarray(length(t), dtype=np.float64), t.shape)
-        return stiffness / i, damping_of(t) / i, 1 / i
+        return torsional_rigidity / length_of(t) / i, damping_of(t) / i, 1 / i
 
     time = np.arange(samples) / sample_rate
     angle, velocity = integrate(samples, sample_rate, coefficients, drive)
-    position = np.array(np.broadcast_to(np.asarray(length(time), dtype=np.float64), time.shape))
+    position = length_of(time)
     torque = drive.at_samples(samples)
     truth = {"inertia": inertia_of(time), "damping": damping_of(time), "stiffness": torsional_rigidity / position}
     acceleration = (torque - truth["damping"] * velocity - truth["stiffness"] * angle) / truth["inertia"]
-    recorded_torque = torque + generator.standard_normal(samples) * torque.std() * 10 ** (-torque_snr_db / 20)
-    if encoder_counts is None:
+    recorded_torque = torque + generator.standard_normal(samples) * torque.std() * torque_noise
+    if count is None:
         recorded_angle = angle + generator.standard_normal(samples) * angle_noise * angle.std()
     else:
-        count = 2 * np.pi / arguments.whole_number("encoder_counts", encoder_counts, least=1)
-        recorded_angle = np.round(angle / count) * count
+        step = 2 * np.pi / count
+        recorded_angle = np.round(angle / step) * step
     return Recording(
         time=time,
         angle=recorded_angle,
@@ -141,18 +145,20 @@ def simulate_torsional_rig(
         true_velocity=velocity,
         true_acceleration=acceleration,
         true_torque=torque,
-        sample_rate=float(sample_rate),
+        sample_rate=sample_rate,
     )
 
 
-def _function(name: str, value: float | Function) -> Callable[[Array], Array]:
-    """Return a function of time from a number or a function."""
-    if callable(value):
-        return lambda t: np.array(np.broadcast_to(np.asarray(value(t), dtype=np.float64), t.shape))
-    number = float(value)
-    if name == "inertia":
-        arguments.positive_number(name, number)
-    return lambda t: np.full(t.shape, number)
+def _samples(duration: float, sample_rate: float) -> int:
+    """Return how many samples there are, if any and not too many."""
+    samples = duration * sample_rate
+    if samples > _MOST_SAMPLES:
+        raise ValueError(
+            f"duration times sample_rate must be at most {_MOST_SAMPLES:g} samples; got {samples:g}; shorten the recording"
+        )
+    if round(samples) < 1:
+        raise ValueError(f"duration must hold at least one sample; got {duration} s at {sample_rate} Hz; lengthen it")
+    return round(samples)
 
 
 def _pattern(name: str, duration: float) -> Function:
