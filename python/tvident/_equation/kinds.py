@@ -24,21 +24,21 @@ def parameter(name: str, value: object, shape: tuple[int, ...]) -> Kind | float 
         kinds = get_args(Kind)
         if value not in kinds:
             raise ValueError(
-                f"{name} must be 'windowed', 'constant', 'auto', 'varying', a number or an array; got {value!r}; use one of these"
+                f"{name} must be 'windowed', 'constant', 'auto', 'varying', a number or an array; got {arguments.shown(value)}; "
+                "use one of these"
             )
         kind: Kind = next(kind for kind in kinds if kind == value)
         return kind
-    array = np.asarray(value)
-    if array.ndim == 0 and array.dtype.kind in "iuf":
-        number = float(array)
+    known = arguments.any_array(name, value)  # type: ignore[arg-type] # which is what it checks
+    if known.ndim == 0:
+        number = float(known)
         if not np.isfinite(number):
             raise ValueError(f"{name} must be finite; got {number}; give a number, or 'windowed' where it is unknown")
         return number
-    known = arguments.real_array(name, array)
     if not np.isfinite(known).all():
         raise ValueError(
             f"a known {name} must be finite at every sample; got {np.count_nonzero(~np.isfinite(known))} values that are not; "
-            "interpolate them, or leave these samples out with mask="
+            "interpolate them, and leave these samples out with mask= if that would be wrong"
         )
     try:
         return np.broadcast_to(known, shape)

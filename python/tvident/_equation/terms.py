@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._equation.built_in import TERM_NAMES
-from tvident._equation.kinds import COEFFICIENTS, Kind
+from tvident._equation.kinds import Kind
+from tvident._equation.names import name_of_term
 
 
 @dataclass(frozen=True)
@@ -21,10 +22,19 @@ class Term:
     Parameters
     ----------
     name : str
-        What the factor is called in results.
+        What the factor is called in results: a letter, then letters, digits, spaces, ``_``, ``-`` and ``.``; no name that results have
+        already, such as ``"time"``.
     function : callable
         Function of ``(t, angle, velocity)``: times in s of shape (n,), smoothed angle in rad and velocity in rad/s of the angle's shape.
-        Returns an array of that shape. The unit of the factor is N m over that of the function.
+        They are copies, which the function may change. Returns an array of that shape. The unit of the factor is N m over that of the
+        function.
+
+    Raises
+    ------
+    ValueError
+        If the name is taken or holds other signs.
+    TypeError
+        If the name is no word, or the function cannot be called.
 
     See Also
     --------
@@ -49,6 +59,14 @@ class Term:
     name: str
     function: Callable[[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]], npt.ArrayLike]
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", str(name_of_term(self.name)))
+        if not callable(self.function):
+            raise TypeError(
+                f"the function of term {self.name!r} must be callable; got {arguments.shown(self.function)}; "
+                "pass a function of (t, angle, velocity)"
+            )
+
     def values(
         self, t: npt.NDArray[Any], angle: npt.NDArray[Any], velocity: npt.NDArray[Any]
     ) -> npt.NDArray[np.number]:
@@ -61,13 +79,15 @@ class Term:
         TypeError
             If it returns no real numbers.
         """
-        values = np.asarray(self.function(t, angle, velocity))
+        # The result's time and the angle of the next term are not for this function to change.
+        returned = self.function(t.copy(), angle.copy(), velocity.copy())
+        values = arguments.any_array(f"what the function of term {self.name!r} returns", returned)
         if values.shape != angle.shape:
             raise ValueError(
                 f"the function of term {self.name!r} must return an array of shape {angle.shape}; got {values.shape}; "
                 "return one value for every sample"
             )
-        return arguments.real_array(f"term {self.name!r}", values)
+        return values
 
 
 GivenTerm: TypeAlias = str | Term | tuple[str | Term, Kind]
@@ -86,7 +106,10 @@ class Unknown:
 def all_terms(terms: Sequence[Any], default: Kind) -> list[Unknown]:
     """Return every further term with its name and kind."""
     if isinstance(terms, str | Term):
-        raise TypeError(f"terms must be a sequence of terms; got {terms!r}; write ({terms!r},)")
+        shown = arguments.shown(terms)
+        raise TypeError(f"terms must be a sequence of terms; got {shown}; write ({shown},)")
+    if not isinstance(terms, Sequence):
+        raise TypeError(f"terms must be a sequence of terms; got {arguments.shown(terms)}; write ('offset',), say")
     found: list[Unknown] = []
     for given in terms:
         pair = isinstance(given, tuple | list) and len(given) == 2  # noqa: PLR2004 - a term and its kind
@@ -94,7 +117,7 @@ def all_terms(terms: Sequence[Any], default: Kind) -> list[Unknown]:
         arguments.one_of("the kind of a term", kind, ("windowed", "constant"))
         own = term if isinstance(term, Term) else None
         name = arguments.one_of("a term", term, TERM_NAMES) if own is None else own.name
-        if any(name == other.name for other in found) or name in COEFFICIENTS:
+        if any(name.casefold() == other.name.casefold() for other in found):
             raise ValueError(f"every term must have a name of its own; {name!r} comes twice; drop or rename one")
         found.append(Unknown(name, kind, own))
     return found
