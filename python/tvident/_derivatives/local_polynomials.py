@@ -46,7 +46,7 @@ def fit_local_polynomials(
     Parameters
     ----------
     y : array_like
-        Samples: real numbers of any type, any shape.
+        Samples: real numbers of any type, any shape. Masked ones are missing, as NaN is.
     window_length : int or str
         Samples in a window, ``M = 2N + 1``: odd, at least 5; or a duration such as ``"0.2 s"``, of which the nearest odd number of
         samples is taken; or ``"auto"``: window and order are chosen together, for every derivative on its own (see Notes).
@@ -67,7 +67,7 @@ def fit_local_polynomials(
         over the neighbouring windows, those that share a sample with the window, and the sum chooses the order. ``"average"``: the
         estimates of all orders are averaged with Akaike weights :math:`w_n ∝ \exp(-AICc_n/2)`.
     max_deriv : int, optional
-        Highest derivative wanted.
+        Highest derivative wanted, at most 15.
     axis : int, optional
         Axis of time.
     step : int, optional
@@ -156,9 +156,11 @@ def fit_local_polynomials(
     arguments.one_of("criterion", criterion, get_args(Criterion))
     arguments.one_of("selection", selection, get_args(Selection))
     arguments.check_nan("y", array, nan_policy)
-    max_order = arguments.whole_number("max_order", max_order, least=0)
-    order = None if order is None else arguments.whole_number("order", order, least=0)
-    max_deriv = arguments.whole_number("max_deriv", max_deriv, least=0)
+    max_order = arguments.whole_number("max_order", max_order, least=0, most=HIGHEST_ORDER)
+    order = None if order is None else arguments.whole_number("order", order, least=0, most=HIGHEST_ORDER)
+    # Derivatives above the highest order are zero.
+    max_deriv = arguments.whole_number("max_deriv", max_deriv, least=0, most=HIGHEST_ORDER)
+    arguments.check_power("max_deriv", max_deriv, period)
     every = arguments.whole_number("step", step, least=1)
     threads = arguments.worker_count(workers)
     automatic = isinstance(window_length, str) and window_length.strip() == "auto"
@@ -225,6 +227,6 @@ def _check_left_to_the_rule(criterion: str, selection: str) -> None:
     for name, value, default in (("criterion", criterion, "aicc"), ("selection", selection, "window")):
         if value != default:
             raise ValueError(
-                f"{name} chooses the order in a window that is given; got {value!r} with window_length='auto', which "
+                f"{name} chooses the order in a window that is given; got {arguments.shown(value)} with window_length='auto', which "
                 f"chooses the order too; leave {name} out or give a window"
             )

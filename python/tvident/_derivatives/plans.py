@@ -72,4 +72,6 @@ def quantisation_step(samples: npt.NDArray[Any], given: float | None) -> float:
     """Return the step to which samples were rounded: what was given, or what is found in them; 0 for none."""
     if given is None:
         return _core.quantisation_step(samples)
-    return 0.0 if given == 0 else arguments.positive_number("quantisation", given)
+    if arguments.real_number("quantisation", given) == 0:
+        return 0.0
+    return arguments.positive_number("quantisation", given, most=arguments.LARGEST)

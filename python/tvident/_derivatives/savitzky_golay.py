@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
@@ -13,11 +14,25 @@ from tvident._derivatives.plans import HIGHEST_ORDER, plan
 Mode: TypeAlias = Literal["interp", "mirror", "constant", "nearest", "wrap"]
 
 
-# What NumPy calls SciPy's modes.
-# Samples copied at a time: about a millisecond.
 _PART = 1 << 18
+"""Samples copied at a time: about a millisecond."""
 
-_PADDING: dict[str, Literal["reflect", "edge", "wrap"]] = {"mirror": "reflect", "nearest": "edge", "wrap": "wrap"}
+_LONGEST_PADDED = 100_001
+"""Samples of a window that may always reach beyond the record, however short it is."""
+
+
+def _mirrored(places: npt.NDArray[np.intp], count: int) -> npt.NDArray[np.intp]:
+    """Return the samples that lie at places beyond the record where it is mirrored at its first and last sample."""
+    folded = places % max(1, 2 * count - 2)
+    return np.minimum(folded, 2 * count - 2 - folded)
+
+
+_INSIDE: dict[str, Callable[[npt.NDArray[np.intp], int], npt.NDArray[np.intp]]] = {
+    "mirror": _mirrored,
+    "nearest": lambda places, count: np.clip(places, 0, count - 1),
+    "wrap": lambda places, count: places % count,
+}
+"""Which samples of the record are taken for places beyond it."""
 
 
 # SciPy's parameters.
@@ -39,14 +54,15 @@ def savgol_filter(
     Parameters
     ----------
     x : array_like
-        Samples, of any shape and unit. Float32 stays float32, any other real type becomes float64.
+        Samples, of any shape and unit. Float32 stays float32, any other real type becomes float64. Masked ones
+        are NaN.
     window_length : int
         Samples in a window, odd or even. With an even window the result belongs half a sample later, as in SciPy.
     polyorder : int or "aicc"
         Order of the polynomial, less than `window_length`, at most 15; or ``"aicc"``: chosen in every window by the Akaike information
         criterion as in :func:`fit_local_polynomials`.
     deriv : int, optional
-        Derivative wanted, 0 for the smoothed samples.
+        Derivative wanted, 0 for the smoothed samples. Above the order it is zero.
     delta : float, optional
         Sample period in seconds.
     axis : int, optional
@@ -65,8 +81,8 @@ def savgol_filter(
     Raises
     ------
     ValueError
-        If the window is longer than the record with mode ``"interp"``, `polyorder` is not less than `window_length` or above 15, or
-        a mode is unknown.
+        If the window is longer than the record with mode ``"interp"``, or longer than twice the record and than 100 001 samples with
+        another, `polyorder` is not less than `window_length` or above 15, or a mode is unknown.
     TypeError
         If `x` is complex or holds no numbers.
 
@@ -96,9 +112,11 @@ def savgol_filter(
     array = arguments.real_array("x", x)
     samples = arguments.along_axis("x", array, axis)
     length = arguments.whole_number("window_length", window_length, least=1)
-    chosen = polyorder == "aicc"
+    chosen = arguments.is_word(polyorder, "aicc")
     if isinstance(polyorder, str) and not chosen:
-        raise ValueError(f"polyorder must be a whole number or 'aicc'; got {polyorder!r}; use one of these")
+        raise ValueError(
+            f"polyorder must be a whole number or 'aicc'; got {arguments.shown(polyorder)}; use one of these"
+        )
     order = None if chosen else arguments.whole_number("polyorder", polyorder, least=0)
     if order is not None and order >= length:
         raise ValueError(
@@ -109,42 +127,48 @@ def savgol_filter(
             f"polyorder must be at most {HIGHEST_ORDER}; got {order}; polynomials of a higher order do more harm than good: "
             "shorten the window"
         )
-    core_plan = plan(
-        length,
-        order=order,
-        derivatives=(arguments.whole_number("deriv", deriv, least=0),),
-        delta=arguments.positive_number("delta", delta),
-        noise=False,
-    )
     ends = mode == "interp"
     if ends:
         arguments.check_window("window_length", length, samples.shape[-1])
     else:
-        samples = _padded(samples.astype(np.float64, copy=False), length, mode, cval)
+        _check_padded_window(length, samples.shape[-1])
+    derivative, period = _derivative(deriv, delta, HIGHEST_ORDER if order is None else order)
+    beyond = arguments.real_number("cval", cval)
+    core_plan = plan(length, order=order, derivatives=(derivative,), delta=period, noise=False)
+    if not ends:
+        samples = _padded(samples.astype(np.float64, copy=False), length, mode, beyond)
     derivatives = core_plan.estimate(samples, ends=ends, workers=arguments.worker_count(None)).derivatives
     filtered: npt.NDArray[Any] = np.moveaxis(derivatives[0], -1, axis)
-    return filtered.astype(np.float32) if np.asarray(x).dtype == np.float32 else filtered
+    return filtered.astype(np.float32) if array.dtype == np.float32 else filtered
+
+
+def _derivative(deriv: int, delta: float, order: int) -> tuple[int, float]:
+    """Return which derivative tables are made for, and for which sample period."""
+    wanted, period = arguments.whole_number("deriv", deriv, least=0), arguments.positive_number("delta", delta)
+    if wanted > order:
+        # All of them are zero, in any unit of time.
+        return order + 1, 1.0
+    arguments.check_power("deriv", wanted, period)
+    return wanted, period
+
+
+def _check_padded_window(length: int, samples: int) -> None:
+    """Check that a window which may reach beyond the record is not longer by far."""
+    most = max(_LONGEST_PADDED, 2 * samples + 1)
+    if length > most:
+        raise ValueError(
+            f"window_length must be at most {most} for a record of {samples} samples; got {length}; shorten it: from twice the record on "
+            "all windows hold the same samples"
+        )
 
 
 def _padded(samples: npt.NDArray[np.float64], length: int, mode: str, cval: float) -> npt.NDArray[np.float64]:
     """Return the samples with half a window more at either end, copied in parts so that Ctrl-C is heard in between."""
     before, after, count = (length - 1) // 2, length // 2, samples.shape[-1]
-    widths = [(0, 0)] * (samples.ndim - 1) + [(before, after)]
-    # What lies beyond an end follows from the samples near the two ends.
-    near = samples
-    if count > 4 * length:
-        near = np.concatenate([samples[..., : 2 * length], samples[..., -2 * length :]], axis=-1)
-    near = (
-        np.pad(near, widths, "constant", constant_values=cval)
-        if mode == "constant"
-        else np.pad(near, widths, _PADDING[mode])
-    )
-    if count <= 4 * length:
-        return near
     padded = np.empty((*samples.shape[:-1], before + count + after))
-    padded[..., :before] = near[..., :before]
-    padded[..., before + count :] = near[..., near.shape[-1] - after :]
     for first in range(0, count, _PART):
         part = samples[..., first : first + _PART]
         padded[..., before + first : before + first + part.shape[-1]] = part
+    for beyond in (np.arange(-before, 0), np.arange(count, count + after)):
+        padded[..., beyond + before] = cval if mode == "constant" else samples[..., _INSIDE[mode](beyond, count)]
     return padded

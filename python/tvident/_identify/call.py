@@ -51,7 +51,7 @@ def identify(
     Parameters
     ----------
     angle : array_like, shape (\*, n)
-        Angle in rad. Time is the last axis; any others are a batch of records.
+        Angle in rad. Time is the last axis; any others are a batch of records. Masked samples are missing, as NaN is.
     torque : array_like, same shape
         Torque in N m.
     sample_rate : float

@@ -75,16 +75,16 @@ class WeakForm:
 
     def __post_init__(self) -> None:
         checked = {"window_length": self.window_length, "regression_window": self.regression_window}
-        if self.window_length != "auto":
+        if not arguments.is_word(self.window_length, "auto"):
             checked["window_length"] = arguments.length_given(
                 "window_length", self.window_length, odd=True, least=SHORTEST_TEST_FUNCTION
             )
-        if self.regression_window != "auto":
+        if not arguments.is_word(self.regression_window, "auto"):
             checked["regression_window"] = arguments.length_given("regression_window", self.regression_window)
         _set(self, **checked, exponent=_exponent(self.exponent))
         if self.averaging is None:
-            _set(self, averaging=self.regression_window == "auto")
-        _check_flag("averaging", self.averaging)
+            _set(self, averaging=arguments.is_word(self.regression_window, "auto"))
+        _set(self, averaging=arguments.flag("averaging", self.averaging))
         arguments.one_of("variation", self.variation, ("auto", *get_args(Variation)))
 
 
@@ -148,7 +148,7 @@ class StrongForm:
 
     def __post_init__(self) -> None:
         for name in ("window_length", "regression_window"):
-            if getattr(self, name) == "auto":
+            if arguments.is_word(getattr(self, name), "auto"):
                 raise ValueError(
                     f"{name} must be a number of samples or a duration in strong form, where nothing chooses it; got 'auto'; "
                     f"give a length ({getattr(type(self), name)} in the paper), or use WeakForm"
@@ -163,7 +163,7 @@ class StrongForm:
         _set(self, window_length=length, max_order=order, regression_window=rows)
         arguments.one_of("criterion", self.criterion, get_args(Criterion))
         arguments.one_of("selection", self.selection, get_args(Selection))
-        _check_flag("filter_torque", self.filter_torque)
+        _set(self, filter_torque=arguments.flag("filter_torque", self.filter_torque))
         arguments.one_of("variation", self.variation, get_args(Variation))
 
 
@@ -179,7 +179,7 @@ def _set(form: Form, **values: object) -> None:
 
 def _exponent(value: object) -> int | str:
     """Return the exponent of a test function, or "auto"."""
-    if value == "auto":
+    if arguments.is_word(value, "auto"):
         return "auto"
     exponent = arguments.whole_number("exponent", value)
     if not _LOWEST_EXPONENT <= exponent <= _HIGHEST_EXPONENT:
@@ -188,8 +188,3 @@ def _exponent(value: object) -> int | str:
             f"use {min(max(exponent, _LOWEST_EXPONENT), _HIGHEST_EXPONENT)}"
         )
     return exponent
-
-
-def _check_flag(name: str, value: object) -> None:
-    if not isinstance(value, bool):
-        raise TypeError(f"{name} must be True or False; got {value!r}; pass one of them")

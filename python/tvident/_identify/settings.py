@@ -97,17 +97,17 @@ def resolve(method: Method, given: Mapping[str, Any], earlier: Mapping[str, Any]
         before = _of_result(earlier, given)
         if "terms" in given:
             given["terms"] = _with_earlier_kinds(given["terms"], earlier)
-        if method == "auto":
+        if arguments.is_word(method, "auto"):
             name, form, by_record = _form_of_result(earlier)
     asked = _OF_METHOD["paper" if name == "paper" else "auto"] | before | given
     lag = asked["lag"]
     if isinstance(lag, tuple | list) and isinstance(form, WeakForm):
         by_record["lag"] = [arguments.finite_number("lag", one) for one in lag]
-    elif lag == "auto" and isinstance(form, StrongForm):
+    elif arguments.is_word(lag, "auto") and isinstance(form, StrongForm):
         raise ValueError(
             "lag='auto' needs the weak form; got the strong form; use WeakForm, or give the lag that it finds, settings['lag']"
         )
-    elif lag != "auto":
+    elif not arguments.is_word(lag, "auto"):
         lag = arguments.finite_number("lag", lag)
     same_lag = earlier is not None and "lag" not in given and earlier.get("sample_rate") == sample_rate
     return Request(
@@ -131,11 +131,13 @@ def _method(method: Method) -> tuple[str, Form]:
         return "strong", method
     if isinstance(method, type) and method in {WeakForm, StrongForm}:
         raise TypeError(f"method must be an object; got the class {method.__name__}; write {method.__name__}()")
-    if method == "auto":
+    if arguments.is_word(method, "auto"):
         return "auto", WeakForm()
-    if method == "paper":
+    if arguments.is_word(method, "paper"):
         return "paper", StrongForm()
-    raise ValueError(f"method must be 'auto', 'paper', a WeakForm or a StrongForm; got {method!r}; use one of these")
+    raise ValueError(
+        f"method must be 'auto', 'paper', a WeakForm or a StrongForm; got {arguments.shown(method)}; use one of these"
+    )
 
 
 def _form_of_result(earlier: Mapping[str, Any]) -> tuple[str, Form, dict[str, Sequence[Any]]]:
@@ -158,7 +160,9 @@ def _of_result(earlier: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str
         terms = [(str(name), str(kind)) for name, kind in earlier["terms"]]
         asked = {name: earlier[name] for name in ("lag", "quantisation")}
     except (KeyError, TypeError, ValueError):
-        raise TypeError(f"settings must be those of an earlier result; got {earlier!r}; pass result.settings") from None
+        raise TypeError(
+            f"settings must be those of an earlier result; got {arguments.shown(earlier)}; pass result.settings"
+        ) from None
     for name in COEFFICIENTS:
         asked[name] = known[name] if kinds[name] == "known" else kinds[name]
         if asked[name] is None and name not in given:

@@ -76,7 +76,7 @@ def rolling_least_squares(
     Parameters
     ----------
     A : array_like, shape (n, p)
-        Regressors, at most 16; a single one may be given as shape (n,).
+        Regressors, at most 16; a single one may be given as shape (n,). Masked values are missing, as NaN is.
     b : array_like, shape (n,) or (n, q)
         Right-hand sides.
     window_length : int
