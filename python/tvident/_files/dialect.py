@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tvident._files.cells import Separator, is_present, number, split
+from tvident._files.cells import Separator, is_present, number, split, without_comment
 from tvident._files.channels import FileError, Say, check_count
 from tvident._files.names import listed, printable
 
@@ -26,6 +26,9 @@ _UNITS = re.compile(
     r"([numkMGµμ]?(s|sec|m|g|N|V|A|Hz|rad|Pa|J|W|bar|N[ ·*.]?m)|deg|degrees|°|°C|K|min|h|rpm|counts|in|ft|lb|cm)"
     r"([/·*. ]?(s|rad|deg|m|kg|min)([\^²³]?-?\d?))?([\^²³]\d?)?"
 )
+_NAME = re.compile(r"[0-9]+")
+"""A number that may be a name. Others are of a line of numbers in which something is wrong."""
+
 _FRACTION = re.compile(r"0\d+")
 
 _HINT = re.compile(r'"?sep=.?"?', re.IGNORECASE)
@@ -101,7 +104,7 @@ def _starts(lines: Sequence[str]) -> list[_Start]:
 
 
 def _start(lines: Sequence[str], index: int, cells: list[str], separator: Separator) -> _Start:
-    following = [one for one in lines[index : index + 2 * _COMPARED] if one.strip() and not one.startswith("#")]
+    following = [one for one in lines[index : index + 2 * _COMPARED] if without_comment(one).strip()]
     agree = sum(len(_numbers(one, separator)) == len(cells) for one in following[:_COMPARED])
     return _Start(separator, _back(lines, index, separator), cells, agree)
 
@@ -113,9 +116,10 @@ def _counts(cells: list[str]) -> bool:
 
 def _numbers(line: str, separator: Separator) -> list[str]:
     """Return the cells of a line of numbers, and none where it is not one or nothing is separated."""
-    if not line.strip() or line.startswith("#") or (separator is not None and separator not in line):
+    line = without_comment(line)
+    if not line.strip() or (separator is not None and separator not in line):
         return []
-    cells = split(line.partition("#")[0], separator)
+    cells = split(line, separator)
     # A single number with a comma may be two.
     comma = separator != "," and len(cells) > 1
     if any(number(cell, comma=comma) is None for cell in cells):
@@ -138,7 +142,7 @@ class _Line:
 
     def __init__(self, index: int, text: str, separator: Separator) -> None:
         self.place = index + 1
-        self.is_comment = text.lstrip().startswith("#")
+        self.is_comment = not without_comment(text).strip()
         bare = text.lstrip("# ") if self.is_comment else text
         self.says_something = any(one.isalnum() for one in bare) and not _HINT.fullmatch(bare.strip())
         self.cells = split(bare, separator)
@@ -182,13 +186,17 @@ class _Names:
             if names:
                 return self._with_units(self.above[index - 1] if index else None, line, names)
             if not line.is_comment and not said:
-                self._check_not_decimal_commas(line)
+                self._check_no_numbers(line)
                 said = True
         return None
 
-    def _check_not_decimal_commas(self, nearest: _Line) -> None:
-        """Refuse names that are more or fewer than cells where a comma may be what makes them so."""
-        words = len(nearest.cells)
+    def _check_no_numbers(self, nearest: _Line) -> None:
+        """Refuse a line that is no names: too few numbers, or too few names where a comma may be what makes numbers more."""
+        words, comma = len(nearest.cells), self.start.separator != ","
+        if all(number(cell, comma=comma) is not None for cell in nearest.cells):
+            raise FileError(
+                f"every line must have {self.most} cells; line {nearest.place} has {words}; repair it, or begin it with #"
+            )
         if self.start.separator == ",":
             raise FileError(
                 f"the line above the numbers must name every column; line {nearest.place} has {words}, and there are "
@@ -215,7 +223,9 @@ class _Names:
             bare = [cell.strip("[]()") for cell in names]
             return [f"{name} [{unit}]" if unit else name for name, unit in zip(upper, bare, strict=True)]
         if any(is_present(cell, comma=comma) for cell in names):
-            if len(upper) == len(names):
+            if len(upper) == len(names) or not all(
+                _NAME.fullmatch(one) for one in names if is_present(one, comma=comma)
+            ):
                 words = [one for one in names if number(one, comma=comma) is None]
                 raise FileError(not_a_number(line.place, None, (words or names)[0]))
             self.say(f"line {line.place} is read as names of columns: {listed(names)}")

@@ -165,10 +165,9 @@ class Rows:
     def _is_end(self, cells: list[str]) -> bool:
         """Return whether a line may stand below the numbers: words first, and not a row in which one number is wrong."""
         comma = self._dialect.comma
-        if number(cells[0], comma=comma) is not None and len(cells) > 1:
+        if not cells or number(cells[0], comma=comma) is not None:
             return False
-        has_number = any(is_present(cell, comma=comma) for cell in cells)
-        return number(cells[0], comma=comma) is None and (len(cells) != self._width or not has_number)
+        return len(cells) != self._width or not any(is_present(cell, comma=comma) for cell in cells)
 
     def _check_width(self, place: int, line: str, cells: list[str]) -> None:
         if len(cells) == self._width:
