@@ -306,6 +306,52 @@ def test_no_name_speaks_to_the_terminal(
     assert "Traceback" not in said
 
 
+def test_names_of_channels_are_no_names_of_files_and_no_formulas(folder: Path) -> None:
+    channels = recordings.read(folder / "rig.csv")
+    names = ("a$b_{$" + "x" * 300, "t" * 300)
+    write_table(folder / "x.npz", dict(zip(names, list(channels.values())[1:3], strict=True)), {})
+    period = ("--sample-rate", 1000, "--no-progress")
+    done = run(folder, "derivatives", "x.npz", "--channel", names[0], *period, "--plot", "x.png")
+    assert done.returncode == 0, done.stderr
+    done = run(folder, "identify", "x.npz", "--angle", names[0], "--torque", names[1], *period, "-o", "y.csv")
+    assert done.returncode == 0, done.stderr
+    done = run(folder, "identify", "x.npz", "--angle", names[0], "--torque", "z" * 300, *period)
+    assert done.returncode == 2
+    assert "has no channel" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("{}", "settings must be those of an earlier result"),
+        ("[" * 100_000, "holds no settings (maximum recursion"),
+        ("\0", "holds no settings"),
+        (
+            '{"kinds": {}, "known": {}, "terms": [], "lag": 0, "quantisation": 0, "form": []}',
+            "those of an earlier result",
+        ),
+        (
+            '{"kinds": {}, "known": {}, "terms": [], "lag": 0, "quantisation": 0, "form": "x"}',
+            "those of an earlier result",
+        ),
+        (
+            '{"kinds": {}, "known": {}, "terms": [], "lag": 0, "quantisation": 0, "form": "weak"}',
+            "of an earlier result",
+        ),
+        (None, "settings must be a file"),
+    ],
+)
+def test_settings_that_are_none(folder: Path, content: str | None, message: str) -> None:
+    if content is None:
+        os.mkfifo(folder / "s.json")
+    else:
+        (folder / "s.json").write_text(content)
+    done = run(folder, *IDENTIFY, "--settings", "s.json")
+    assert done.returncode in {1, 2}
+    assert message in " ".join(done.stderr.split())
+    assert "Traceback" not in done.stderr
+
+
 def test_any_encoding_of_the_terminal_will_do(folder: Path) -> None:
     done = run(folder, *IDENTIFY, env=os.environ | {"PYTHONIOENCODING": "iso8859-5"})
     assert done.returncode == 0, done.stderr

@@ -4,11 +4,11 @@ from hostile import attack
 
 
 def test_text_is_read_as_it_stands_there_or_refused() -> None:
-    attack.run("hostile.texts", cases=150, share=0.1)
+    attack.run("hostile.text_files", cases=150, share=0.1)
 
 
 def test_damaged_arrays_are_read_or_refused() -> None:
-    attack.run("hostile.arrays", cases=16, share=0.1)
+    attack.run("hostile.array_files", cases=16, share=0.1)
 
 
 def test_outputs_cost_nothing_that_was_there() -> None:

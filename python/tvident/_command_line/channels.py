@@ -27,7 +27,7 @@ def source_of(channels: recordings.Channels, name: str, file: str | None) -> npt
         try:
             return channel_of(channels, name, file)
         except KeyError:
-            if not Path(name).is_file():
+            if not _is_file(name):
                 raise
     elif Path(name).suffix == "":
         raise click.UsageError(f"channel {name!r} needs a FILE to be in; name the file first")
@@ -37,6 +37,13 @@ def source_of(channels: recordings.Channels, name: str, file: str | None) -> npt
             f"{printable(name)} must hold one channel; it has {listed(alone)}; give it as FILE and name the channel"
         )
     return channel_of(alone, next(iter(alone)), name)
+
+
+def _is_file(name: str) -> bool:
+    try:
+        return Path(name).is_file()
+    except OSError:  # the name of a channel may be too long for a file
+        return False
 
 
 def scaled(

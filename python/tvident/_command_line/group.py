@@ -34,7 +34,7 @@ def _in_plain_words() -> Iterator[None]:
         raise click.ClickException(_line(error)) from None
     except KeyError as error:
         raise click.UsageError(_line(error.args[0])) from None
-    except (ValueError, TypeError, ImportError) as error:
+    except (ValueError, TypeError, ArithmeticError, ImportError) as error:
         raise click.UsageError(_line(error)) from None
     except MemoryError:
         raise click.ClickException(

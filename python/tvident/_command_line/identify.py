@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import stat
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -28,7 +29,10 @@ from tvident._command_line.options import (
 )
 from tvident._command_line.output import give, save_figure
 from tvident._equation import COEFFICIENTS, TERM_NAMES, UNITS, Kind
-from tvident._files import replaced
+from tvident._files import printable, replaced
+
+_MOST_BYTES = 100_000_000
+"""Of settings, which are some lines for every record of a batch."""
 
 
 # Every option is a parameter: so click passes them.
@@ -162,12 +166,14 @@ def _lag(text: str) -> float | Literal["auto"]:
 
 def _read_settings(path: str) -> dict[str, Any]:
     """Return what an earlier run chose."""
+    place, cure = printable(path), "give a file that --settings-output wrote"
+    kind = Path(path).stat()
+    if not stat.S_ISREG(kind.st_mode) or kind.st_size > _MOST_BYTES:
+        raise recordings.FileError(f"{place}: settings must be a file of at most {_MOST_BYTES} bytes; {cure}")
     try:
         content = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (ValueError, UnicodeDecodeError) as error:
-        raise recordings.FileError(
-            f"{path}: holds no settings ({error}); give a file that --settings-output wrote"
-        ) from None
+    except (ValueError, RecursionError) as error:
+        raise recordings.FileError(f"{place}: holds no settings ({error}); {cure}") from None
     if not isinstance(content, dict):
-        raise recordings.FileError(f"{path}: holds no settings; give a file that --settings-output wrote")
+        raise recordings.FileError(f"{place}: holds no settings; {cure}")
     return content

@@ -53,6 +53,7 @@ def plot_derivatives(time: npt.NDArray[np.float64], fit: LocalPolynomialFit, nam
     if fit.order.ndim != 1:
         raise ValueError(f"only a single record can be drawn; this one has shape {fit.order.shape}; take one record")
     count = fit.derivatives.shape[0]
+    name = name.replace("$", r"\$")  # no formula
     with style():
         figure = plt.figure(figsize=(8, 1.4 + 1.6 * count), layout="constrained")
         axes = figure.subplots(count + 1, 1, sharex=True)

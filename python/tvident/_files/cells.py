@@ -25,7 +25,7 @@ def split(line: str, separator: Separator) -> list[str]:
         cells = _IN_QUOTES.findall(line)
     else:
         try:
-            cells = next(csv.reader([line.strip()], delimiter=separator, skipinitialspace=True), [])
+            cells = next(csv.reader([line.strip("\r\n ")], delimiter=separator, skipinitialspace=True), [])
         except csv.Error:  # a cell of more than 131 072 characters
             cells = line.split(separator)
     return [cell.strip().strip("\"'").strip() for cell in cells]

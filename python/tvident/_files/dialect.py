@@ -17,7 +17,7 @@ _SEPARATORS: tuple[Separator, ...] = (",", ";", "\t", None)
 """The earlier one where numbers are the same for several."""
 
 _SEARCHED = 100
-"""Lines that are looked at to say why none holds numbers."""
+"""Lines that are looked at for what makes them odd."""
 
 _BEGINS_AS_NUMBER = re.compile(r"[+-]?[.,]?[0-9]")
 
@@ -74,7 +74,7 @@ def dialect_of(lines: Sequence[str], say: Say) -> Dialect | None:
     several = [one for one in starts if len(one.cells) > 1]
     start = max(several or starts, key=lambda one: one.agree)
     above = [_Line(index, lines[index], start.separator) for index in range(start.first)]
-    return _Names(start, [line for line in above if line.says_something], say).dialect()
+    return _Names(start, [line for line in above if line.says_something], say).dialect(lines)
 
 
 def mixed_line(lines: Sequence[str]) -> str:
@@ -168,12 +168,12 @@ class _Names:
         self.most = len(start.cells)
         self.least = max(index for index, cell in enumerate(start.cells) if cell) + 1
 
-    def dialect(self) -> Dialect:
+    def dialect(self, lines: Sequence[str]) -> Dialect:
         check_count(self.least)
         start = self.start
         names = self._found()
         if names is None:
-            self._check_no_fractions()
+            self._check_no_fractions(lines)
             return Dialect(start.separator, start.first, [str(i) for i in range(self.most)], self.most, named=False)
         return Dialect(start.separator, start.first, self._different(names), self.most, named=True)
 
@@ -206,14 +206,17 @@ class _Names:
             f"line {nearest.place} is not read as names: it has {words} cells, and the lines of numbers {self.most}"
         )
 
-    def _check_no_fractions(self) -> None:
+    def _check_no_fractions(self, lines: Sequence[str]) -> None:
         """Refuse numbers without names that are as likely one number with a decimal comma."""
-        suspect = next((cell for cell in self.start.cells[1::2] if _FRACTION.fullmatch(cell)), None)
-        if self.start.separator == "," and self.most % 2 == 0 and suspect is not None:
-            raise FileError(
-                f"without names of columns no number may begin with 0 as '{printable(suspect, 40)}' in line "
-                f"{self.start.first + 1}, which may follow a decimal comma; {CURE}, and a first line that names them"
-            )
+        if self.start.separator != "," or self.most % 2:
+            return
+        for place, line in enumerate(lines[self.start.first : self.start.first + _SEARCHED], self.start.first + 1):
+            suspect = next((cell for cell in split(line, ",")[1::2] if _FRACTION.fullmatch(cell)), None)
+            if suspect is not None:
+                raise FileError(
+                    f"without names of columns no number may begin with 0 as '{printable(suspect, 40)}' in line {place}, "
+                    f"which may follow a decimal comma; {CURE}, and a first line that names them"
+                )
 
     def _with_units(self, above: _Line | None, line: _Line, names: list[str]) -> list[str]:
         """Return names from the lines nearest to the numbers: the lower one may hold units, and no numbers."""

@@ -73,7 +73,7 @@ def check_apart(outputs: Mapping[str, str | Path | None], inputs: Mapping[str, s
         If two of them are one file: the message names both.
     """
     written = {name: Path(path) for name, path in outputs.items() if path is not None}
-    read = {name: Path(path) for name, path in inputs.items() if path is not None and Path(path).exists()}
+    read = {name: Path(path) for name, path in inputs.items() if path is not None and _exists(Path(path))}
     for index, (name, path) in enumerate(written.items()):
         others = read | dict(list(written.items())[:index])
         for other_name, other in others.items():
@@ -86,8 +86,15 @@ def check_apart(outputs: Mapping[str, str | Path | None], inputs: Mapping[str, s
                 raise ValueError(f"{rule}; got '{printable(path)}' for both; give another file")
 
 
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except OSError:  # the name of a channel may be too long for a file
+        return False
+
+
 def _are_one(path: Path, other: Path) -> bool:
     """Return whether two paths lead to the same file, or would once it is written."""
-    if path.exists() and other.exists():
+    if _exists(path) and _exists(other):
         return path.samefile(other) and not writes_through(path)
     return os.path.realpath(path) == os.path.realpath(other)

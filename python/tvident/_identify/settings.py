@@ -32,6 +32,9 @@ _OF_METHOD: dict[str, dict[str, Any]] = {
 """What is used beside the form where nothing is given; forms of the user's own take the same as "auto"."""
 
 
+_FORMS: dict[str, type[Form]] = {"weak": WeakForm, "strong": StrongForm}
+
+
 @dataclass(frozen=True)
 class Request:
     """What is asked for, settled: every word is known, every number checked.
@@ -142,7 +145,7 @@ def _method(method: Method) -> tuple[str, Form]:
 
 def _form_of_result(earlier: Mapping[str, Any]) -> tuple[str, Form, dict[str, Sequence[Any]]]:
     """Return the method of an earlier result, and what it chose for every record of a batch."""
-    kind: Any = {"weak": WeakForm, "strong": StrongForm}[earlier["form"]]
+    kind: Any = _FORMS[earlier["form"]]
     values = {one.name: earlier[one.name] for one in fields(kind)}
     if values.get("averaging") and "regression_window" in earlier["chosen"]:
         # Where windows of all lengths are averaged, which of them predicts best is a matter of the record, as their weights are.
@@ -159,10 +162,13 @@ def _of_result(earlier: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str
         kinds, known = dict(earlier["kinds"]), dict(earlier["known"])
         terms = [(str(name), str(kind)) for name, kind in earlier["terms"]]
         asked = {name: earlier[name] for name in ("lag", "quantisation")}
+        is_whole = _is_whole(earlier, kinds, known)
     except (KeyError, TypeError, ValueError):
+        is_whole = False
+    if not is_whole:
         raise TypeError(
             f"settings must be those of an earlier result; got {arguments.shown(earlier)}; pass result.settings"
-        ) from None
+        )
     for name in COEFFICIENTS:
         asked[name] = known[name] if kinds[name] == "known" else kinds[name]
         if asked[name] is None and name not in given:
@@ -176,6 +182,18 @@ def _of_result(earlier: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str
             f"with all of {', '.join(name for name, _ in terms)}"
         )
     return asked | {"terms": terms}
+
+
+def _is_whole(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Mapping[str, Any]) -> bool:
+    """Return whether settings have what a result's have: files of settings may be edited, or others."""
+    form: Any = _FORMS[earlier["form"]]
+    lists = [earlier["chosen"], earlier.get("own_terms", [])]
+    return (
+        all(isinstance(one, list | tuple) for one in lists)
+        and all(isinstance(name, str) for one in lists for name in one)
+        and all(isinstance(kinds[name], str) and (kinds[name] != "known" or name in known) for name in COEFFICIENTS)
+        and all(one.name in earlier for one in fields(form))
+    )
 
 
 def _with_earlier_kinds(terms: Sequence[Any], earlier: Mapping[str, Any]) -> Sequence[Any]:

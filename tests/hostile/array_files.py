@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 from scipy.io import savemat
 
-from hostile.texts import LONGEST
+from hostile.text_files import LONGEST
 from tvident import recordings
 
 MOST_SECONDS = {".npy": 2.0, ".npz": 2.0, ".mat": 30.0}
