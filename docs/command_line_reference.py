@@ -12,7 +12,8 @@ WIDTH = 110
 INTRODUCTION = """\
 Every argument of the Python functions has an option of the same name. Results go to files or to standard output, messages and
 progress to standard error, so `-o -` can be piped. The exit status is 0, 2 for misuse, 1 for a file that cannot be used. Ctrl-C
-stops at once; files appear whole or not at all. This page is written by `make docs` from what the commands say themselves."""
+stops at once; files appear whole or not at all, keep the mode of those that they replace, and never replace what is read. The
+command comes with `pip install 'tvident[cli]'`. This page is written by `make docs` from what the commands say themselves."""
 
 
 def reference() -> str:
