@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
@@ -160,7 +161,8 @@ class Explained:
                 f"{listed(list(agreeing))} constant: noise explains the differences between eight parts of the record (p = {chances})"
             )
         if self.found.pooling is not None:
-            slow = [name for name in ("inertia", "damping") if name in self._changing()]
+            varying = [name for name, one in zip(self.names, self.found.unknowns, strict=True) if one.kind == "varying"]
+            slow = varying or [name for name in ("inertia", "damping") if name in self._changing()]
             why = "parts of the record differ by more than noise" if set(slow) <= set(self.tested) else "as given"
             seconds = self.found.pooling * self.period
             words.append(
@@ -185,7 +187,7 @@ class Explained:
 
     def _suspects(self) -> list[str]:
         found = [suspect for suspect in self.found.suspects if suspect.conspicuous]
-        found.sort(key=lambda suspect: -abs(suspect.value) / suspect.stderr)
+        found.sort(key=lambda suspect: -abs(suspect.value) / suspect.stderr if suspect.stderr > 0 else -math.inf)
         words = []
         for one in found:
             amount = f"{one.value:.3g} ± {one.stderr:.1g}"

@@ -12,8 +12,8 @@ from tvident._arguments.shown import shown
 _BEYOND_COUNTING = 1 << 63
 """No whole number this large fits into the core's."""
 
-LARGEST = 1e140
-"""The core takes no value above this for a sample: squares of such values have no double."""
+LARGEST = 1e70
+"""Fourth powers of larger values, which variances of products are made of, leave the range of doubles."""
 
 
 def whole_number(name: str, value: object, *, least: int | None = None, most: int | None = None) -> int:

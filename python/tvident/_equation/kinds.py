@@ -34,12 +34,15 @@ def parameter(name: str, value: object, shape: tuple[int, ...]) -> Kind | float 
         number = float(known)
         if not np.isfinite(number):
             raise ValueError(f"{name} must be finite; got {number}; give a number, or 'windowed' where it is unknown")
+        _check_size(name, abs(number))
         return number
+    known = arguments.real_array(name, known)
     if not np.isfinite(known).all():
         raise ValueError(
             f"a known {name} must be finite at every sample; got {np.count_nonzero(~np.isfinite(known))} values that are not; "
             "interpolate them, and leave these samples out with mask= if that would be wrong"
         )
+    _check_size(name, float(np.abs(known).max()))
     try:
         return np.broadcast_to(known, shape)
     except ValueError:
@@ -47,3 +50,10 @@ def parameter(name: str, value: object, shape: tuple[int, ...]) -> Kind | float 
             f"a known {name} must have one value for every sample; got shape {known.shape} for an angle of shape {shape}; "
             "resample it"
         ) from None
+
+
+def _check_size(name: str, largest: float) -> None:
+    if largest > arguments.LARGEST:
+        raise ValueError(
+            f"a known {name} must be at most {arguments.LARGEST:g}; got {largest:g}; take units that make the numbers smaller"
+        )

@@ -81,7 +81,7 @@ class WeakForm:
             )
         if not arguments.is_word(self.regression_window, "auto"):
             checked["regression_window"] = arguments.length_given("regression_window", self.regression_window)
-        _set(self, **checked, exponent=_exponent(self.exponent))
+        _set(self, **checked, exponent=exponent_of(self.exponent))
         if self.averaging is None:
             _set(self, averaging=arguments.is_word(self.regression_window, "auto"))
         _set(self, averaging=arguments.flag("averaging", self.averaging))
@@ -177,7 +177,7 @@ def _set(form: Form, **values: object) -> None:
         object.__setattr__(form, name, value)
 
 
-def _exponent(value: object) -> int | str:
+def exponent_of(value: object) -> int | str:
     """Return the exponent of a test function, or "auto"."""
     if arguments.is_word(value, "auto"):
         return "auto"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -193,6 +194,8 @@ def _is_whole(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Mappi
         and all(isinstance(name, str) for one in lists for name in one)
         and all(isinstance(kinds[name], str) and (kinds[name] != "known" or name in known) for name in COEFFICIENTS)
         and all(one.name in earlier for one in fields(form))
+        and isinstance(earlier["method"], str)
+        and all(isinstance(one, int | float) and math.isfinite(one) for one in earlier.get("lag_samples") or ())
     )
 
 

@@ -15,7 +15,7 @@ from tvident._advice import Explained, ExplainedStrong
 from tvident._derivatives import SHORTEST_WINDOW, plan, quantisation_step
 from tvident._equation import COEFFICIENTS, Kind, Unknown, all_terms, parameter
 from tvident._identify.batch import estimates
-from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm
+from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm, exponent_of
 from tvident._identify.settings import Request, plain
 from tvident._results import Estimates, Identification, Words
 
@@ -148,7 +148,7 @@ class Task:
             for value in self._each("window_length")
         ]
         rows_of = [None if value == "auto" else self._rows(value) for value in self._each("regression_window")]
-        exponents = [None if value == "auto" else int(value) for value in self._each("exponent")]
+        exponents = [None if value == "auto" else int(exponent_of(value)) for value in self._each("exponent")]
         linear = form.variation != "constant"
         weak = _core.WeakForm(lengths, exponents, rows_of, averaging=bool(form.averaging), linear=linear)
         return weak, self._plan(min(_WINDOW_OF_TERMS, (samples - 1) // 2 * 2 + 1), StrongForm()) if own else None
@@ -217,7 +217,12 @@ class Task:
 
         used = {one.name: getattr(request.form, one.name) for one in fields(request.form)}
         names = ("window_length", "exponent", "regression_window")
-        used |= {name: by_record([getattr(one, name) for one in found]) for name in names if name in used}
+        # Where nothing could be determined nothing was chosen: what was asked for stands.
+        used |= {
+            name: by_record([getattr(one, name) or asked for one, asked in zip(found, self._each(name), strict=True)])
+            for name in names
+            if name in used
+        }
         chosen: list[str] = []
         lag: dict[str, Any] = {"lag": by_record(self._each("lag"))}
         if isinstance(request.form, StrongForm):

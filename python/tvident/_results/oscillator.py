@@ -33,21 +33,21 @@ class Oscillator:
 
     @cached_property
     def natural_frequency(self) -> Array:
-        with np.errstate(invalid="ignore", divide="ignore"):
+        with np.errstate(all="ignore"):
             return np.asarray(np.sqrt(self._stiffness / self._inertia) / (2 * np.pi))
 
     @cached_property
     def damping_ratio(self) -> Array:
-        with np.errstate(invalid="ignore", divide="ignore"):
+        with np.errstate(all="ignore"):
             return np.asarray(self._damping / (2 * np.sqrt(self._stiffness * self._inertia)))
 
     def natural_frequency_error(self) -> Array:
-        with np.errstate(invalid="ignore", divide="ignore"):
+        with np.errstate(all="ignore"):
             f = self.natural_frequency
             return self._propagate({"inertia": -f / (2 * self._inertia), "stiffness": f / (2 * self._stiffness)})
 
     def damping_ratio_error(self) -> Array:
-        with np.errstate(invalid="ignore", divide="ignore"):
+        with np.errstate(all="ignore"):
             ratio = self.damping_ratio
             gradient = {
                 "inertia": -ratio / (2 * self._inertia),

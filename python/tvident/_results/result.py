@@ -28,10 +28,13 @@ _MOST_SENTENCES = 20
 
 
 def _range(value: Any) -> str:
-    """Return one number, or those of several records."""
+    """Return one number, or those of several records; words stand where nothing was chosen."""
     if not isinstance(value, list):
         return str(value)
-    least, most = min(value, default=0), max(value, default=0)
+    numbers = [one for one in value if not isinstance(one, str)]
+    if not numbers:
+        return str(value[0]) if value else "0"
+    least, most = min(numbers), max(numbers)
     return str(least) if least == most else f"{least} to {most}"
 
 

@@ -25,7 +25,8 @@ _MOST_SAMPLES = 100_000_000
 """More than a day at 1 kHz."""
 
 
-# All have a default, as users call it.
+# All have a default, as users call it. What leaves the range of doubles is refused or next to zero.
+@np.errstate(all="ignore")
 def simulate_torsional_rig(
     duration: float = 20.0,
     sample_rate: float = 1000.0,
@@ -106,8 +107,8 @@ def simulate_torsional_rig(
     12.0
     """
     duration = arguments.positive_number("duration", duration)
+    sample_rate = arguments.positive_number("sample_rate", sample_rate)
     arguments.sample_period(1, sample_rate=sample_rate)
-    sample_rate = float(sample_rate)
     torsional_rigidity = arguments.positive_number("torsional_rigidity", torsional_rigidity)
     torque_noise = 10 ** (-arguments.finite_number("torque_snr_db", torque_snr_db, least=_LEAST_SNR) / 20)
     angle_noise = arguments.finite_number("angle_noise", angle_noise, least=0, most=_MOST_NOISE)
