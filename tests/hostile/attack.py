@@ -9,6 +9,7 @@ from __future__ import annotations
 import faulthandler
 import importlib
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -108,7 +109,8 @@ def main(module: str, first: str, how_many: str = "1 cases", place: str = os.dev
                 raise
             except BaseException as error:  # noqa: BLE001 - whatever it is, it is a finding
                 frame = traceback.extract_tb(error.__traceback__)[-1]
-                kind = f"{type(error).__name__} {frame.filename}:{frame.lineno}"
+                words = re.sub(r"\d+", "#", str(error))[:80]
+                kind = f"{type(error).__name__} {Path(frame.filename).name}:{frame.lineno} {words}"
                 kinds[kind] = kinds.get(kind, 0) + 1
                 if kinds[kind] == 1:
                     found = (
