@@ -342,8 +342,8 @@ def test_a_channel_is_found_beside_a_file_of_its_name(recording: Path, tmp_path:
 
 
 def test_memory_that_runs_out_is_one_line(tmp_path: Path) -> None:
-    # Two arrays of 800 MB in an address space of 1.5 GB.
-    command = f"ulimit -v 1500000; exec '{TVIDENT}' simulate rig.csv --duration 99999"
+    # An array of 800 MB in an address space of 1 GB.
+    command = f"ulimit -v 1000000; exec '{TVIDENT}' simulate rig.csv --duration 99999"
     done = subprocess.run(["/bin/sh", "-c", command], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "more memory than there is" in done.stderr
