@@ -16,7 +16,7 @@ from scipy.io import savemat
 from hostile.text_files import LONGEST
 from tvident import recordings
 
-MOST_SECONDS = {".npy": 2.0, ".npz": 2.0, ".mat": 30.0}
+MOST_SECONDS = {".npy": 2.0, ".npz": 2.0, ".mat": 40.0}
 """A MATLAB file is read in a process of its own, which has to start on a busy machine."""
 
 

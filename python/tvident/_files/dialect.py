@@ -208,11 +208,14 @@ class _Names:
 
     def _check_no_fractions(self, lines: Sequence[str]) -> None:
         """Refuse numbers without names that are as likely one number with a decimal comma."""
-        if self.start.separator != "," or self.most % 2:
+        if self.start.separator != ",":
             return
+        rows = [split(line, ",") for line in lines[self.start.first : self.start.first + _SEARCHED] if line.strip()]
+        if all(cell.isdecimal() for row in rows for cell in row):
+            self.say("every comma separates two numbers; where it is the decimal sign, write points")
         for place, line in enumerate(lines[self.start.first : self.start.first + _SEARCHED], self.start.first + 1):
             suspect = next((cell for cell in split(line, ",")[1::2] if _FRACTION.fullmatch(cell)), None)
-            if suspect is not None:
+            if suspect is not None and self.most % 2 == 0:
                 raise FileError(
                     f"without names of columns no number may begin with 0 as '{printable(suspect, 40)}' in line {place}, "
                     f"which may follow a decimal comma; {CURE}, and a first line that names them"
@@ -232,6 +235,10 @@ class _Names:
                 words = [one for one in names if number(one, comma=comma) is None]
                 raise FileError(not_a_number(line.place, None, (words or names)[0]))
             self.say(f"line {line.place} is read as names of columns: {listed(names)}")
+        elif above is not None and len(upper) == len(names) and above.place == line.place - 1:
+            self.say(
+                f"line {above.place} is not read as names: they are in line {line.place}, and it holds no known units"
+            )
         return names
 
     def _different(self, names: Sequence[str]) -> list[str]:

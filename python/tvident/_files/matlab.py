@@ -23,7 +23,7 @@ _READER = Path(__file__).with_name("matlab_variables.py")
 _BYTES, _BYTES_FOR_EACH = 2 << 30, 64
 """Memory of the reader: what its libraries take, and compressed content."""
 
-_SECONDS, _BYTES_A_SECOND = 20, 2_000_000
+_SECONDS, _BYTES_A_SECOND = 30, 2_000_000
 """Time of the reader: the start of Python on a busy machine, and slow disks."""
 
 _LONGEST_LINE = 1 << 20

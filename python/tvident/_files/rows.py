@@ -19,6 +19,9 @@ Numbers = npt.NDArray[np.float64]
 _CLEARLY_DECIMAL = re.compile(r"(?<!\d)0,\d|\d{4},\d|,\d{1,2}(?!\d)|,\d{4}")
 """Thousands are separated in groups of three behind one to three digits that do not begin with 0."""
 
+_CLEARLY_POINTS = re.compile(r"(?<!\d)0?\.\d|\d{4}\.|\.\d{0,2}(?!\d)|\.\d{4}")
+"""The same for points, which separate thousands where semicolons separate cells and no number has a comma."""
+
 _MOST_WORDS = 20
 """Lines of words that may stand below the numbers."""
 
@@ -42,6 +45,9 @@ class Rows:
         self._points = self._commas = 0
         """First line that has a number with this decimal sign."""
         self._is_decimal = False
+        self._may_be_thousands = False
+        """A point was found, and all of them may separate thousands."""
+        self._are_points = dialect.separator != ";"
 
     def skip(self, lines: int) -> None:
         self._line += lines
@@ -56,6 +62,9 @@ class Rows:
         lines = text.count("\n")
         if found is None:
             found = self._line_by_line(text.split("\n")[: lines + 1])
+        if not self._are_points and "." in text:
+            self._are_points = _CLEARLY_POINTS.search(text) is not None
+            self._may_be_thousands = True
         self._line += lines
         return found
 
@@ -64,6 +73,10 @@ class Rows:
         if self._commas and not self._is_decimal:
             raise FileError(
                 f"a comma in line {self._commas} may be a decimal sign or separate thousands, as all others in this file; {CURE}"
+            )
+        if self._may_be_thousands and not self._are_points:
+            self._say(
+                "every point has three digits behind it; it is read as the decimal sign, not as a separator of thousands"
             )
         if self._words is not None:
             first, words = self._words
