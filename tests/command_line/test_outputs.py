@@ -199,6 +199,24 @@ def test_devices_and_streams_of_the_process_are_written_to(folder: Path) -> None
     assert "/dev/full: No space left on device" in full.stderr
 
 
+@pytest.mark.parametrize(
+    ("redirected", "status", "said"),
+    [
+        (">&-", 0, ""),
+        ("-o - >&-", 2, "-o - needs standard output; it is closed"),
+        ("-o - >/dev/full", 1, "the output: No space left on device"),
+        (">/dev/full", 1, "the output: No space left on device"),
+        ("2>&-", 0, ""),
+    ],
+)
+def test_streams_that_are_closed_or_full(folder: Path, redirected: str, status: int, said: str) -> None:
+    command = ["bash", "-c", f'"$@" {redirected}', "bash", TVIDENT, *IDENTIFY]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == status, done.stderr
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+
+
 @pytest.mark.parametrize("name", ["old.csv", "old.npz", "old.png", "old.json"])
 def test_a_full_disk_leaves_the_old_file(folder: Path, name: str) -> None:
     def fill() -> None:

@@ -66,6 +66,7 @@ class _Command(click.Group):
             if isinstance(stream, TextIOWrapper):
                 stream.reconfigure(errors="backslashreplace")
         with _in_plain_words(), warnings.catch_warnings():
+            warnings.simplefilter("always", recordings.FileWarning)  # an error elsewhere is a word here
             warnings.showwarning = _show_warning
             return super().invoke(ctx)
 

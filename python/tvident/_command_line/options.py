@@ -80,6 +80,8 @@ def check_outputs(outputs: Mapping[str, str | None], inputs: Mapping[str, str | 
     Keys are what messages call the files.
     """
     output, plot, settings = (outputs.get(name) for name in (RESULTS, PICTURE, SETTINGS))
+    if output == "-" and sys.stdout is None:
+        raise click.UsageError("-o - needs standard output; it is closed; open it, or give a file")
     if output is not None and output != "-":
         check_place(Path(output))
     if plot is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 import sys
 import threading
 from collections.abc import Iterator
@@ -36,6 +35,8 @@ def read_matlab(path: Path, say: Say) -> Channels:
 
     A damaged file can crash SciPy's reader or keep it busy for ever, so it works in a process of its own, with a limit of time and memory.
     """
+    import subprocess  # noqa: PLC0415 - few need it, and it takes long to import
+
     if find_spec("pymatreader") is None:
         raise FileError("MATLAB files need pymatreader; install it with: pip install 'tvident[io]'")
     with path.open("rb"):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import secrets
 import shutil
 import signal
 import stat
@@ -41,7 +40,7 @@ def _beside(place: Path) -> Iterator[IO[bytes]]:
     """Give a file of another name in the same folder, which is renamed when it is whole."""
     # Names may be 255 bytes long.
     beginning = os.fsdecode(os.fsencode(place.name)[:100])
-    beside = place.with_name(f".{beginning}.{secrets.token_hex(8)}")
+    beside = place.with_name(f".{beginning}.{os.urandom(8).hex()}")
     old = place.stat() if place.exists() else None
     # Nobody else may read what replaces a private file, not even for a moment.
     mode = 0o666 if old is None else 0o600
