@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import os
+import pty
 import resource
 import signal
 import stat
@@ -183,20 +184,27 @@ def test_a_pipe_is_written_to_and_stays_a_pipe(folder: Path) -> None:
     assert stat.S_ISFIFO((folder / "pipe.csv").stat().st_mode)
 
 
+# No device that others need is named here: a test that fails would cost the machine its /dev/null.
 def test_devices_and_streams_of_the_process_are_written_to(folder: Path) -> None:
-    assert run(folder, *IDENTIFY, "--settings-output", "/dev/null").returncode == 0
-    assert stat.S_ISCHR(Path("/dev/null").stat().st_mode)
-    shown = run(folder, *IDENTIFY, "--settings-output", "/dev/stdout")
+    parent, child = pty.openpty()
+    device = os.ttyname(child)
+    assert run(folder, *IDENTIFY, "--settings-output", device).returncode == 0
+    assert stat.S_ISCHR(Path(device).stat().st_mode)
+    assert os.read(parent, 100).startswith(b"{")
+    os.close(parent)
+    os.close(child)
+    shown = run(folder, *IDENTIFY, "--settings-output", "/proc/self/fd/1")
     assert shown.returncode == 0
     assert shown.stdout.startswith("{\n")
     assert "stiffness" in shown.stdout.partition("\n}\n")[2]
+    command = [TVIDENT, *IDENTIFY, "--settings-output", "/proc/self/fd/1"]
     with (folder / "all.txt").open("wb") as file:
-        command = [TVIDENT, *IDENTIFY, "--settings-output", "/dev/stdout"]
         subprocess.run(command, cwd=folder, stdout=file, check=True)
     assert (folder / "all.txt").read_text() == shown.stdout
-    full = run(folder, *IDENTIFY, "--settings-output", "/dev/full")
+    with Path("/dev/full").open("wb") as file:
+        full = subprocess.run(command, cwd=folder, stdout=file, stderr=subprocess.PIPE, text=True, check=False)
     assert full.returncode == 1
-    assert "/dev/full: No space left on device" in full.stderr
+    assert "/proc/self/fd/1: No space left on device" in full.stderr
 
 
 @pytest.mark.parametrize(

@@ -110,8 +110,10 @@ def _descriptor(path: Path) -> int:
         with suppress(OSError):  # it may be closed
             if os.path.samestat(kind, os.fstat(stream)):
                 return os.dup(stream)
+    # Without O_NONBLOCK a pipe that has no reader would be waited for.
+    flags = os.O_WRONLY | os.O_NONBLOCK | (os.O_TRUNC if stat.S_ISREG(kind.st_mode) else 0)
     try:
-        descriptor = os.open(path, os.O_WRONLY | os.O_NONBLOCK)  # or a pipe without a reader would be waited for
+        descriptor = os.open(path, flags)
     except OSError as error:
         if error.errno != errno.ENXIO:
             raise
