@@ -42,6 +42,8 @@ def _beside(place: Path) -> Iterator[IO[bytes]]:
     beginning = os.fsdecode(os.fsencode(place.name)[:100])
     beside = place.with_name(f".{beginning}.{os.urandom(8).hex()}")
     old = place.stat() if place.exists() else None
+    if old is not None and not stat.S_ISREG(old.st_mode):
+        raise OSError(errno.EINVAL, "only a file can be replaced; give the name of a file", str(place))
     # Nobody else may read what replaces a private file, not even for a moment.
     mode = 0o666 if old is None else 0o600
     with _gone_when_terminated(beside):
