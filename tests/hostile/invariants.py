@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -24,8 +24,11 @@ def same(one: Any, other: Any) -> bool:
     return bool(one == other) or (one != one and other != other)  # noqa: PLR0124 - NaN is NaN
 
 
-def check(values: Mapping[str, Array], errors: Mapping[str, Array], status: Array) -> None:
-    """Check numbers of one shape: missing where the status says so and nowhere else, errors that are errors."""
+def check(values: Mapping[str, Array], errors: Mapping[str, Array], status: Array, apart: Collection[str] = ()) -> None:
+    """Check numbers of one shape: missing where the status says so and nowhere else, errors that are errors.
+
+    Numbers that stand `apart`, as constants of a record do, may be there where others are missing.
+    """
     invalid = status & Status.INVALID != 0
     missing = np.zeros(status.shape, dtype=np.bool_)
     for name, given in values.items():
@@ -33,6 +36,9 @@ def check(values: Mapping[str, Array], errors: Mapping[str, Array], status: Arra
         missing |= np.isnan(value)
         assert not (np.isnan(value) & ~invalid).any(), f"{name} is NaN where the status is not INVALID"
         assert not np.isinf(value).any(), f"{name} is infinite"
+        assert name in apart or not (np.isfinite(value) & invalid).any(), (
+            f"{name} is a number where the status is INVALID"
+        )
         if name in errors:
             error = np.broadcast_to(errors[name], status.shape)
             assert not np.isinf(error).any(), f"the error of {name} is infinite"

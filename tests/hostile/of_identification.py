@@ -46,7 +46,10 @@ def identified(generator: np.random.Generator) -> None:
 
     result, first = found(angle, torque)
     unknown = {name: values for name, values in first["values"].items() if result.settings["kinds"][name] != "known"}
-    invariants.check(unknown, first["errors"], result.status)
+    # In weak form inertia and damping that vary are one curve over the record.
+    curves = {"inertia", "damping"} if result.settings["form"] == "weak" else set()
+    apart = curves | {name for name in unknown if result.settings["kinds"][name] != "windowed"}
+    invariants.check(unknown, first["errors"], result.status, apart)
     assert invariants.same(first, found(angle, torque, workers=3)[1]), "other workers give other numbers"
     copies = arrays.plain(angle), arrays.plain(torque)
     if copies[0] is not None and copies[1] is not None and options.get("quantisation") is not None:

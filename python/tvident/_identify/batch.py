@@ -105,6 +105,12 @@ def _believed(
         missing = ~(np.isfinite(value) & np.isfinite(error))
         values[place], errors[place] = np.where(missing, np.nan, value), np.where(missing, np.nan, error)
         status = np.where(missing, status | np.uint16(Status.INVALID), status)
+    if status is not one.status:
+        # What is windowed was solved together with what is missing now.
+        invalid = status & Status.INVALID != 0
+        windowed = [place for place, unknown in enumerate(one.unknowns) if unknown.kind == "windowed"]
+        for place in windowed:
+            values[place], errors[place] = (np.where(invalid, np.nan, of[place]) for of in (values, errors))
     return values, errors, status
 
 
