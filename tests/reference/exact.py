@@ -64,12 +64,16 @@ class Window:
     """Every order's fit of one window with a sample at its centre."""
 
     def __init__(self, samples: npt.ArrayLike, highest: int) -> None:
-        exact = [Fraction(float(value)) for value in np.asarray(samples)]
-        half = len(exact) // 2
-        self._level = exact[half]
-        self._unit = lcm(*(value.denominator for value in exact))
+        ratios: list[tuple[int, int]] = [
+            value.as_integer_ratio() for value in np.asarray(samples, dtype=np.float64).tolist()
+        ]
+        half = len(ratios) // 2
+        # Denominators of doubles are powers of two, so the largest is a multiple of all.
+        self._unit = max(denominator for _, denominator in ratios)
+        exact = [numerator * (self._unit // denominator) for numerator, denominator in ratios]
+        self._level = Fraction(exact[half], self._unit)
         self._grid = grid(half, highest)
-        rest = [int((value - self._level) * self._unit) for value in exact]
+        rest = [value - exact[half] for value in exact]
         self._energy = sum(value * value for value in rest)
         self._products = [
             sum(p * value for p, value in zip(polynomial, rest, strict=True)) for polynomial in self._grid.values

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -62,15 +63,22 @@ class Rows:
     def noise(self, centre: float, rows: npt.NDArray[np.intp]) -> Array:
         """Give what the angle's noise adds to the products of these columns over some rows."""
         time = (rows[self.usable[rows]] - centre) * self.period
+        still, mixed, growing = self.grams
+        # A column's kernel at time t is a + t b: the products of two of them, summed over the rows.
+        products = time.size * still + time.sum() * (mixed + mixed.T) + float(time @ time) * growing
+        return np.asarray(self.variance * products)
+
+    @cached_property
+    def grams(self) -> tuple[Array, Array, Array]:
+        """Give the products of the kernels a that stay the same in a window, of a and b, and of those b that grow with time."""
         still = [one.kernel for one in self.windowed]
         growing = [np.zeros_like(self.side.kernel)] * len(still)
         if self.linear:
             still, growing = still + [one.companion_kernel for one in self.windowed], growing + still
         still += [one.kernel for one in (*self.constant, self.side)]
         growing += [np.zeros_like(self.side.kernel)] * (len(still) - len(growing))
-        # Kernel by kernel those of all rows, one after another.
-        every = np.array([(one + np.outer(time, more)).ravel() for one, more in zip(still, growing, strict=True)])
-        return np.asarray(self.variance * every @ every.T)
+        a, b = np.array(still), np.array(growing)
+        return a @ a.T, a @ b.T, b @ b.T
 
 
 @dataclass
@@ -88,18 +96,18 @@ class Window:
     product: Array
     """The window's own columns times all that the covariance of the rows makes of them."""
 
-    @property
+    @cached_property
     def own(self) -> Array:
         """The window's own unknowns where all constants are zero."""
         return np.asarray(np.linalg.solve(self.normal[: self.local, : self.local], self.side[: self.local]))
 
-    @property
+    @cached_property
     def dependence(self) -> Array:
         """By what they fall with each constant."""
         own = self.normal[: self.local]
         return np.asarray(np.linalg.solve(own[:, : self.local], own[:, self.local :]))
 
-    @property
+    @cached_property
     def left(self) -> tuple[Array, Array]:
         """What is left for the constants: normal matrix and right-hand side."""
         across = self.normal[self.local :, : self.local]
@@ -107,7 +115,7 @@ class Window:
             self.local :
         ] - across @ self.own
 
-    @property
+    @cached_property
     def condition(self) -> float:
         """The condition number of all normal equations, columns scaled."""
         return float(np.linalg.cond(self.normal / np.sqrt(np.outer(self.norms, self.norms))))
@@ -120,7 +128,7 @@ class Window:
         off = constants - np.linalg.solve(normal, side)
         return self.rest + float(off @ normal @ off)
 
-    @property
+    @cached_property
     def freedom(self) -> float:
         """The part of the noise that the window's own unknowns take up."""
         return float(np.trace(np.linalg.solve(self.normal[: self.local, : self.local], self.product)))
@@ -137,7 +145,7 @@ class Window:
 
 
 def window(rows: Rows, held: npt.NDArray[np.intp], centre: float, gamma: Array) -> Window:
-    """Take the noise off one window's normal equations."""
+    """Take the noise off the normal equations of one window, of rows that follow each other."""
     columns = rows.columns(centre)
     part = columns[held]
     total = part.T @ part
@@ -146,7 +154,7 @@ def window(rows: Rows, held: npt.NDArray[np.intp], centre: float, gamma: Array) 
     relative = float(np.linalg.norm(inverse @ noise[:-1, :-1] @ inverse.T))
     corrected = total - min(1.0, MOST_NOISE / relative if relative else 1.0) * noise
     normal, side = corrected[:-1, :-1], corrected[:-1, -1]
-    product = part[:, : rows.local].T @ gamma[held] @ columns[:, : rows.local]
+    product = part[:, : rows.local].T @ gamma[held[0] : held[-1] + 1] @ columns[:, : rows.local]
     return Window(
         normal=normal,
         side=side,
