@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -82,3 +83,33 @@ def test_what_holds_for_the_whole_record_is_written_below() -> None:
     axes = late.plot().axes
     assert "LAG_SUSPECTED" in axes[-1].get_xlabel()
     assert not axes[0].patches
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        ({"window_length": 32}, ValueError, "window_length must be odd"),
+        ({"window_length": 3}, ValueError, "window_length must be at least 5 samples; got 3"),
+        ({"window_length": 1001}, ValueError, "less than or equal to the length of the record; got 1001"),
+        ({"window_length": 10**400}, ValueError, "window_length must be less than 2.63"),
+        ({"window_length": "x"}, ValueError, "window_length must be samples or a duration"),
+        ({"i": 1.5}, TypeError, "i must be a whole number; got 1.5"),
+        ({"i": None}, TypeError, "i must be a whole number; got None"),
+        ({"y": [[1.0, 2.0], [3.0, 4.0]]}, ValueError, "y must be a single record"),
+        ({"y": ["a", "b"]}, TypeError, "y must hold numbers; got text"),
+        ({"sample_rate": 0}, ValueError, "sample_rate must be positive"),
+    ],
+)
+def test_a_window_that_cannot_be_drawn_is_refused(call: dict[str, Any], error: type[Exception], message: str) -> None:
+    given: dict[str, Any] = {"y": np.sin(np.arange(300) / 20), "i": 100, "window_length": 31} | call
+    with pytest.raises(error, match=message):
+        figures.plot_window(**given)
+
+
+def test_what_is_masked_is_not_in_the_window() -> None:
+    y: Any = np.ma.masked_array(np.sin(np.arange(300) / 20), mask=np.arange(300) == 100)
+    spoilt: Any = np.ma.masked_array(np.where(np.arange(300) == 100, 99.0, y.data), mask=y.mask)
+    tops = [figures.plot_window(samples, 150, 31).axes[0].get_ylim() for samples in (y, spoilt)]
+    assert tops[0] == tops[1]
+    beside = figures.plot_window(spoilt, 100, 31).axes[0].get_ylim()
+    assert beside[1] < 2

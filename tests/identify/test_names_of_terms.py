@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -40,10 +41,14 @@ def test_every_column_of_a_result_is_taken() -> None:
                 tvident.Term(written, drag)
 
 
-@pytest.mark.parametrize("name", ["angle", "torque", "velocity", "drag_stderr", "stiffness_stderr"])
+@pytest.mark.parametrize(
+    "name", ["angle", "torque", "velocity", "drag_stderr", "stiffness_stderr", "stderr", "natural frequency"]
+)
 def test_names_of_channels_and_errors_are_taken(name: str) -> None:
-    with pytest.raises(ValueError, match=f"must be its own; got '{name}'"):
+    with pytest.raises(ValueError, match=f"must be its own; got '{name}'") as refused:
         tvident.Term(name, drag)
+    (proposed,) = re.findall(r"call it '(.*)', say", str(refused.value))
+    assert tvident.Term(proposed, drag).name == proposed
 
 
 @pytest.mark.parametrize(

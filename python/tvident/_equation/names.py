@@ -29,7 +29,7 @@ _COLUMNS = (
 
 _CHANNELS = ("angle", "velocity", "acceleration", "torque", "mask")
 
-_ERRORS = "_stderr"
+_ERRORS = "stderr"
 """Ends the name of a column of standard errors."""
 
 _TAKEN = frozenset((*_COLUMNS, *_CHANNELS, *TERM_NAMES))
@@ -45,10 +45,9 @@ def name_of_term(name: object) -> str:
             f"the name of a term must begin with a letter and hold nothing but letters, digits, spaces, '_', '-' and '.', at most "
             f"{_MOST_LETTERS} of them; {got}; call it 'drag', say"
         )
-    plain = name.casefold()
+    plain = re.sub(r"[ .\-]", "_", name.casefold())
     if plain in _TAKEN or plain.endswith(_ERRORS):
+        own = f"own {plain.removesuffix(_ERRORS)[:20]}".rstrip(" _")
         why = f"names that end in {_ERRORS!r} are" if plain.endswith(_ERRORS) else "this name is"
-        raise ValueError(
-            f"the name of a term must be its own; {got}; {why} taken in results: call it 'own {name[:20]}', say"
-        )
+        raise ValueError(f"the name of a term must be its own; {got}; {why} taken in results: call it {own!r}, say")
     return name

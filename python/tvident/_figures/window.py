@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from tvident._derivatives import LocalPolynomialFit, fit_local_polynomials
+from tvident import _arguments as arguments
+from tvident._derivatives import SHORTEST_WINDOW, LocalPolynomialFit, fit_local_polynomials
 from tvident._figures.style import ACCENT, FAINT, FOUND, MUTED, style
 
 
@@ -23,9 +24,9 @@ def plot_window(
     Parameters
     ----------
     y : array_like, shape (n,)
-        Samples.
+        Samples. Masked ones are missing, as NaN is.
     i : int
-        Sample at the window's centre.
+        Sample at the window's centre; near an end, the first or last full window is drawn.
     window_length : int, optional
         Samples in the window, odd.
     sample_rate : float, optional
@@ -40,7 +41,9 @@ def plot_window(
     Raises
     ------
     ValueError
-        If the window is even, too short or longer than the record, or the order is too high.
+        If the window is even, too short or longer than the record, the order is too high, or there are several records.
+    TypeError
+        If `y` holds no numbers, or a number is not whole.
 
     See Also
     --------
@@ -59,11 +62,16 @@ def plot_window(
     >>> figure = figures.plot_window(rig.angle, 1000, sample_rate=1000)
     >>> figure.savefig("window.png")
     """
-    samples = np.asarray(y, dtype=np.float64)
-    half = window_length // 2
-    centre = int(np.clip(i, half, samples.size - 1 - half))
+    samples = arguments.real_array("y", y).astype(np.float64, copy=False)
+    if samples.ndim != 1:
+        raise ValueError(f"y must be a single record; got an array of shape {samples.shape}; take one record")
+    place, period = arguments.whole_number("i", i), arguments.sample_period(samples.size, sample_rate=sample_rate)
+    length = arguments.window_length("window_length", window_length, period, odd=True)
+    arguments.check_window("window_length", length, samples.size, least=SHORTEST_WINDOW)
+    half = length // 2
+    centre = min(max(place, half), samples.size - 1 - half)
     window = samples[centre - half : centre + half + 1]
-    fit = fit_local_polynomials(window, window_length, sample_rate=sample_rate, max_order=max_order)
+    fit = fit_local_polynomials(window, length, sample_rate=sample_rate, max_order=max_order)
     with style():
         figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
         _draw_window(left, fit, window, centre, sample_rate)
