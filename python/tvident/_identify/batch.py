@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -14,8 +14,10 @@ from tvident._equation import COEFFICIENTS
 from tvident._results import Estimates
 from tvident._status import Status
 
-_LOOKED_AT = 4096
-"""Samples at which a long record is looked at."""
+_Numbers: TypeAlias = npt.NDArray[np.float64]
+
+_LOOKED_AT = 1 << 14
+"""Samples of all records that are looked at."""
 
 
 def estimates(
@@ -52,10 +54,17 @@ def estimates(
         return np.array(values).reshape(shape) if shape else float(values[0])
 
     values, errors, factors, constants = {}, {}, {}, {}
-    believed = [_believed(one) for one in found]
+    status = joined([one.status for one in found])
     for place, name in enumerate(names):
         each = [one.unknowns[place] for one in found]
-        values[name], errors[name] = (joined([numbers[which][place] for numbers in believed]) for which in (0, 1))
+        values[name], errors[name] = joined([one.values for one in each]), joined([one.stderr for one in each])
+    windowed = {
+        name: np.array([one.unknowns[place].kind == "windowed" for one in found]).reshape(*shape, 1)
+        for place, name in enumerate(names)
+    }
+    status = _leave_out_what_has_no_error(values, errors, status, windowed)
+    for place, name in enumerate(names):
+        each = [one.unknowns[place] for one in found]
         if any(one.factor != 1 for one in each):
             factors[name] = np.array([one.factor for one in each]).reshape(*shape, 1)
         if all(one.kind == "constant" for one in each):
@@ -82,41 +91,39 @@ def estimates(
         condition=joined([one.condition for one in found]),
         residual_std=joined([one.residual_std for one in found]),
         order=joined([one.order for one in found]) if has_orders else np.zeros((*shape, count), np.uint8),
-        status=joined([status for _, _, status in believed]),
+        status=status,
         record_status=flags.reshape(shape) if shape else Status(int(flags[0])),
     )
 
 
-def _believed(
-    one: _core.Identification,
-) -> tuple[list[npt.NDArray[np.float64]], list[npt.NDArray[np.float64]], npt.NDArray[np.uint16]]:
-    """Return the values of one record, their errors and the status: a number whose error has no double is no number.
+def _leave_out_what_has_no_error(
+    values: dict[str, _Numbers],
+    errors: dict[str, _Numbers],
+    status: npt.NDArray[np.uint16],
+    windowed: Mapping[str, npt.NDArray[np.bool_]],
+) -> npt.NDArray[np.uint16]:
+    """Leave out numbers whose standard error has no double, and return the status that says so.
 
-    Powers of very large or very small samples leave the range of doubles, mostly in the whole record. So of long records only some
-    samples are looked at, which costs nothing.
+    Powers of very large or very small samples leave the range of doubles, mostly in the whole record. So of many samples only some
+    are looked at, which costs nothing.
     """
-    values, errors = [unknown.values for unknown in one.unknowns], [unknown.stderr for unknown in one.unknowns]
-    status = one.status
-    for place in range(len(values)):
-        value, error = values[place], errors[place]
-        some = slice(None, None, max(1, value.size // _LOOKED_AT))
-        if not _odd(value[some], error[some], status[some] if value.size > 1 else status).any():
+    before, some = status, slice(None, None, max(1, status.size // _LOOKED_AT))
+    for name, value in values.items():
+        error = errors[name]
+        if not _odd(value[..., some], error[..., some], status[..., some]).any():
             continue
         missing = ~(np.isfinite(value) & np.isfinite(error))
-        values[place], errors[place] = np.where(missing, np.nan, value), np.where(missing, np.nan, error)
+        values[name], errors[name] = np.where(missing, np.nan, value), np.where(missing, np.nan, error)
         status = np.where(missing, status | np.uint16(Status.INVALID), status)
-    if status is not one.status:
+    if status is not before:
         # What is windowed was solved together with what is missing now.
-        invalid = status & Status.INVALID != 0
-        windowed = [place for place, unknown in enumerate(one.unknowns) if unknown.kind == "windowed"]
-        for place in windowed:
-            values[place], errors[place] = (np.where(invalid, np.nan, of[place]) for of in (values, errors))
-    return values, errors, status
+        for name, is_windowed in windowed.items():
+            invalid = is_windowed & (status & Status.INVALID != 0)
+            values[name], errors[name] = (np.where(invalid, np.nan, of[name]) for of in (values, errors))
+    return status
 
 
-def _odd(
-    value: npt.NDArray[np.float64], error: npt.NDArray[np.float64], status: npt.NDArray[np.uint16]
-) -> npt.NDArray[np.bool_]:
+def _odd(value: _Numbers, error: _Numbers, status: npt.NDArray[np.uint16]) -> npt.NDArray[np.bool_]:
     """Return where a number, its error and the status do not tell the same."""
     there = np.isfinite(value) & np.isfinite(error)
     missing = np.isnan(value) & np.isnan(error) & (status & Status.INVALID != 0)
