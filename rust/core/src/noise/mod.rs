@@ -3,6 +3,7 @@
 pub(crate) mod channel;
 pub(crate) mod quantisation;
 pub(crate) mod spectrum;
+pub(crate) mod transform;
 
 pub use channel::{FEWEST_SAMPLES, noise};
 pub use quantisation::quantisation_step;

@@ -1,14 +1,12 @@
-//! Power spectra: Fourier transforms, and the averaged spectrum of a record.
+//! Power spectra: the averaged spectrum of a record.
 
 use std::f64::consts::PI;
 use std::ops::Range;
-use std::sync::Arc;
-
-use realfft::{RealFftPlanner, RealToComplex};
 
 use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
+use crate::noise::transform::Transform;
 use crate::record::samples::{Samples, all_usable, is_usable};
 
 /// The most segments that are averaged, spread over the record: so many, or fewer long ones with so many samples together.
@@ -18,35 +16,6 @@ const FEWEST_SEGMENTS: usize = 32;
 
 /// Segments that a piece of work sums.
 const TOGETHER: usize = 16;
-
-/// The discrete Fourier transform of real sequences of one length.
-pub(crate) struct Transform(Arc<dyn RealToComplex<f64>>);
-
-impl Transform {
-    pub(crate) fn new(length: usize) -> Self {
-        Self(RealFftPlanner::new().plan_fft_forward(length))
-    }
-
-    /// Frequencies from zero to half the sample rate, real and imaginary parts. The samples are used up.
-    pub(crate) fn of(&self, samples: &mut [f64]) -> Vec<[f64; 2]> {
-        let mut values = self.0.make_output_vec();
-        // It fails only for another length; the result is zero then.
-        let done = self.0.process(samples, &mut values);
-        debug_assert!(done.is_ok(), "a transform is for sequences of its length");
-        values.iter().map(|value| [value.re, value.im]).collect()
-    }
-
-    /// The frequency response of a kernel that is centred on its middle sample.
-    pub(crate) fn response(&self, kernel: &[f64]) -> Vec<[f64; 2]> {
-        let (half, length) = (kernel.len() / 2, self.0.len());
-        let mut padded = vec![0.0; length];
-        for (k, &value) in kernel.iter().enumerate() {
-            // A dot product reads forwards in time, so the response is that of the kernel turned round.
-            padded[(length + half - k) % length] += value;
-        }
-        self.of(&mut padded)
-    }
-}
 
 /// The power of a record by frequency, so that its mean over all frequencies, both signs, is the mean square: of segments of `length`
 /// samples that overlap by half and fade in and out. Unusable samples are bridged by a line, and segments with a majority of them
@@ -123,7 +92,7 @@ impl<'a> Segments<'a> {
             }
             let mean = samples.iter().sum::<f64>() / self.length as f64;
             samples.iter_mut().zip(&self.fade).for_each(|(value, fade)| *value = (*value - mean) * fade);
-            for (sum, [real, imaginary]) in sum.iter_mut().zip(self.transform.of(&mut samples)) {
+            for (sum, [real, imaginary]) in sum.iter_mut().zip(self.transform.of(&samples)) {
                 *sum += (real * real + imaginary * imaginary) / self.energy;
             }
             count += 1;
@@ -175,39 +144,11 @@ mod tests {
     }
 
     #[test]
-    fn a_transform_is_the_sum_it_is_defined_by() {
-        for length in [1_u32, 2, 8, 64] {
-            let samples: Vec<f64> = (0..length).map(|i| (f64::from(i) * 1.7).sin() + 0.1 * f64::from(i)).collect();
-            let found = Transform::new(samples.len()).of(&mut samples.clone());
-            for (k, [real, imaginary]) in found.into_iter().enumerate() {
-                let angle = |i: usize| -2.0 * PI * (k * i) as f64 / f64::from(length);
-                let expected = [
-                    samples.iter().enumerate().map(|(i, value)| value * angle(i).cos()).sum::<f64>(),
-                    samples.iter().enumerate().map(|(i, value)| value * angle(i).sin()).sum::<f64>(),
-                ];
-                assert!((real - expected[0]).abs() < 1e-11 && (imaginary - expected[1]).abs() < 1e-11);
-            }
-        }
-    }
-
-    #[test]
     fn a_sine_has_its_power_at_its_frequency() {
         let samples: Vec<f64> = (0..4096).map(|i| 3.0 + 2.0 * (2.0 * PI * 0.125 * f64::from(i)).sin()).collect();
         let spectrum = power(&samples.as_slice(), 512);
         let total = 2.0 * spectrum[1..256].iter().sum::<f64>() / 512.0;
         assert!((total - 2.0).abs() < 1e-6, "{total}");
         assert!(2.0 * spectrum[62..=66].iter().sum::<f64>() / 512.0 > 1.999);
-    }
-
-    #[test]
-    fn a_response_tells_what_a_kernel_makes_of_a_sine() {
-        let kernel: Vec<f64> = (-3..=3).map(|k| f64::from(k * k + k)).collect();
-        let found = Transform::new(32).response(&kernel)[5];
-        let omega = 2.0 * PI * 5.0 / 32.0;
-        let expected = kernel.iter().enumerate().fold([0.0, 0.0], |[real, imaginary], (k, value)| {
-            let angle = omega * (k as f64 - 3.0);
-            [real + value * angle.cos(), imaginary + value * angle.sin()]
-        });
-        assert!((found[0] - expected[0]).abs() < 1e-12 && (found[1] - expected[1]).abs() < 1e-12);
     }
 }

@@ -13,7 +13,7 @@ use faer::linalg::solvers::{DenseSolveCore, Llt, Solve};
 use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
-use crate::noise::spectrum::Transform;
+use crate::noise::transform::Transform;
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 
 /// Exponents tried.
@@ -88,8 +88,8 @@ pub(crate) struct Candidates {
 
 struct Tried {
     function: TestFunction,
-    /// Responses of the kernels for inertia, damping and stiffness, by frequency, within their passband.
-    responses: [Vec<[f64; 2]>; 3],
+    /// Responses of the kernels for inertia, damping and stiffness, by frequency, within their passband: real, imaginary, real.
+    responses: [Vec<f64>; 3],
     /// Products of the kernels with each other.
     gram: [[f64; 3]; 3],
     /// The usable share of its rows.
@@ -136,11 +136,17 @@ impl Candidates {
 impl Tried {
     fn new(function: TestFunction, transform: &Transform, share: f64) -> Self {
         let kernels = function.kernels(0.0).values;
-        let mut responses = [0, 1, 2].map(|i: usize| transform.response(&kernels[i]));
-        let through = |response: &[[f64; 2]]| {
-            let largest = response.iter().map(|[a, b]| a * a + b * b).fold(0.0, f64::max);
-            let last = response.iter().rposition(|[a, b]| a * a + b * b > NOTHING * NOTHING * largest);
-            last.map_or(0, |last| last + 1)
+        // The kernels of inertia and stiffness are even and so have real responses, that of damping is odd.
+        let [inertia, damping, stiffness] = &kernels;
+        let inertia = transform.response(inertia).into_iter().map(|[real, _]| real).collect();
+        let second = function.half_width() as f64 * function.delta();
+        let both: Vec<f64> = stiffness.iter().zip(damping).map(|(even, odd)| even + second * odd).collect();
+        let both = transform.response(&both);
+        let (damping, stiffness) = both.into_iter().map(|[real, imaginary]| (imaginary / second, real)).unzip();
+        let mut responses: [Vec<f64>; 3] = [inertia, damping, stiffness];
+        let through = |response: &[f64]| {
+            let largest = response.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+            response.iter().rposition(|value| value.abs() > NOTHING * largest).map_or(0, |last| last + 1)
         };
         let bins = responses.iter().map(|response| through(response)).max().unwrap_or(0);
         for response in &mut responses {
@@ -162,28 +168,29 @@ impl Tried {
             let both = if bin == 0 || bin == length / 2 { 1.0 } else { 2.0 };
             let weight = both * evidence.samples as f64 / length as f64;
             let omega = 2.0 * std::f64::consts::PI * bin as f64 / (length as f64 * evidence.delta);
-            let at: [[f64; 2]; 3] = std::array::from_fn(|i| self.responses[i][bin]);
-            let [inertia, damping, stiffness] = at;
-            let mixed: [f64; 2] = std::array::from_fn(|part| (0..3).map(|i| parameters[i] * at[i][part]).sum());
-            let row = torque_noise * (stiffness[0].powi(2) + stiffness[1].powi(2))
-                + angle_noise * (mixed[0].powi(2) + mixed[1].powi(2));
+            let [inertia, damping, stiffness] = std::array::from_fn(|i| self.responses[i][bin]);
+            let [even, odd] = [parameters[0] * inertia + parameters[2] * stiffness, parameters[1] * damping];
+            let row = torque_noise * stiffness * stiffness + angle_noise * (even * even + odd * odd);
             // The error of I θ̈ + C θ̇ when the kernels replace the derivatives of φ.
-            let error = [
-                parameters[0] * (inertia[0] + omega * omega * stiffness[0])
-                    + parameters[1] * (damping[0] + omega * stiffness[1]),
-                parameters[0] * (inertia[1] + omega * omega * stiffness[1])
-                    + parameters[1] * (damping[1] - omega * stiffness[0]),
-            ];
+            let error =
+                [parameters[0] * (inertia + omega * omega * stiffness), parameters[1] * (damping - omega * stiffness)];
             let signal = (power - angle_noise).max(0.0);
-            for i in 0..3 {
-                for j in 0..3 {
-                    let product = weight * (at[i][0] * at[j][0] + at[i][1] * at[j][1]);
-                    information[i][j] += product * power;
-                    noisy[i][j] += product * power * row;
-                }
-                quadrature[i] += weight * (at[i][0] * error[0] + at[i][1] * error[1]) * signal;
+            // An even and an odd response are a quarter of a turn apart: their products have no real part.
+            for (i, j, product) in [
+                (0, 0, inertia * inertia),
+                (0, 2, inertia * stiffness),
+                (1, 1, damping * damping),
+                (2, 2, stiffness * stiffness),
+            ] {
+                information[i][j] += weight * product * power;
+                noisy[i][j] += weight * product * power * row;
+            }
+            for (i, product) in [(0, inertia * error[0]), (1, damping * error[1]), (2, stiffness * error[0])] {
+                quadrature[i] += weight * product * signal;
             }
         }
+        information[2][0] = information[0][2];
+        noisy[2][0] = noisy[0][2];
         let gram = |i: usize, j: usize| evidence.samples as f64 * angle_noise * self.gram[i][j];
         let chosen: Vec<usize> = (0..3).filter(|&i| evidence.unknown[i]).collect();
         let size = chosen.len();
