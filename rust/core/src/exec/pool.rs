@@ -63,13 +63,23 @@ pub(crate) fn run_long<P: Send, S>(
 ) -> Result<(), Error> {
     let total = pieces.iter().map(|piece| piece.size).sum();
     let workers = workers.get().min(pieces.len());
-    let finished = if workers <= 1 {
-        run_here(pieces, total, scratch, work, watch)
-    } else {
-        run_in_pool(pieces, total, workers, &scratch, &work, watch)?
+    let queue = Mutex::new(pieces.into_iter());
+    let worker = |account: &dyn Fn(usize), go_on: &GoOn<'_>| {
+        let mut scratch = scratch();
+        while go_on() {
+            let Some(piece) = queue.lock().unwrap_or_else(PoisonError::into_inner).next() else { break };
+            work(piece.content, &mut scratch, go_on);
+            account(piece.size);
+        }
     };
+    // What is the same for every kind of work is compiled once.
+    let finished =
+        if workers <= 1 { run_here(&worker, total, watch) } else { run_in_pool(&worker, total, workers, watch)? };
     if finished && watch(total, total) { Ok(()) } else { Err(Error::Cancelled) }
 }
+
+/// Takes piece after piece while the second function says so, and tells the first the size of each that is done.
+type Worker<'a> = dyn Fn(&dyn Fn(usize), &GoOn<'_>) + Sync + 'a;
 
 /// Ranges of rows, as pieces of work.
 pub(crate) fn ranges(rows: usize) -> Vec<Piece<Range<usize>>> {
@@ -96,14 +106,7 @@ pub(crate) fn map<P: Send, S, R: Send>(
     Ok(results.into_iter().filter_map(|result| result.into_inner().unwrap_or_else(PoisonError::into_inner)).collect())
 }
 
-fn run_here<P, S>(
-    pieces: Vec<Piece<P>>,
-    total: usize,
-    scratch: impl Fn() -> S,
-    work: impl Fn(P, &mut S, &GoOn<'_>),
-    watch: &mut Watch<'_>,
-) -> bool {
-    let mut scratch = scratch();
+fn run_here(worker: &Worker<'_>, total: usize, watch: &mut Watch<'_>) -> bool {
     let watch = RefCell::new(watch);
     let (done, last, going) = (Cell::new(0), Cell::new(Instant::now()), Cell::new(true));
     let go_on = || {
@@ -113,39 +116,23 @@ fn run_here<P, S>(
         }
         going.get()
     };
-    for Piece { size, content } in pieces {
-        work(content, &mut scratch, &go_on);
-        done.set(done.get() + size);
-        if !go_on() {
-            return false;
-        }
-    }
-    true
+    worker(&|size| done.set(done.get() + size), &go_on);
+    going.get()
 }
 
-fn run_in_pool<P: Send, S>(
-    pieces: Vec<Piece<P>>,
-    total: usize,
-    workers: usize,
-    scratch: &(impl Fn() -> S + Sync),
-    work: &(impl Fn(P, &mut S, &GoOn<'_>) + Sync),
-    watch: &mut Watch<'_>,
-) -> Result<bool, Error> {
-    let queue = Mutex::new(pieces.into_iter());
+fn run_in_pool(worker: &Worker<'_>, total: usize, workers: usize, watch: &mut Watch<'_>) -> Result<bool, Error> {
     let done = AtomicUsize::new(0);
     let cancelled = AtomicBool::new(false);
     let active = Active { count: Mutex::new(workers), none_left: Condvar::new() };
+    let account = |size| {
+        done.fetch_add(size, Ordering::Relaxed);
+    };
     let go_on = || !cancelled.load(Ordering::Relaxed);
     pool(workers)?.in_place_scope(|scope| {
         for _ in 0..workers {
             scope.spawn(|_| {
                 let _leaving = Leaving(&active);
-                let mut scratch = scratch();
-                while go_on() {
-                    let Some(piece) = queue.lock().unwrap_or_else(PoisonError::into_inner).next() else { break };
-                    work(piece.content, &mut scratch, &go_on);
-                    done.fetch_add(piece.size, Ordering::Relaxed);
-                }
+                worker(&account, &go_on);
             });
         }
         while active.wait() {

@@ -2,6 +2,7 @@
 
 pub(crate) mod centred_windows;
 pub(crate) mod constants;
+pub(crate) mod dyadic_kernels;
 pub(crate) mod dyadic_windows;
 pub(crate) mod fit;
 pub(crate) mod layout;
@@ -20,6 +21,7 @@ pub(crate) mod solve;
 pub(crate) mod solved;
 pub(crate) mod subsample;
 pub(crate) mod summary;
+pub(crate) mod summary_table;
 pub(crate) mod whitening;
 pub(crate) mod window_length;
 
