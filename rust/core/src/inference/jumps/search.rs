@@ -11,6 +11,7 @@
 //! and `τ` minimises the sum of squares. It is accepted if this is significantly smaller than what the same windows leave when they predict
 //! the rows between them without a jump.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
@@ -19,6 +20,7 @@ use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
 use crate::inference::jumps::jump::{Jump, JumpSearch, Lines, UNLIKELY};
 use crate::inference::jumps::placement::JumpPlace;
+use crate::inference::jumps::shared_windows::SharedWindows;
 use crate::inference::windows_around::Around;
 use crate::regression::window_length::{Cells, SHORTEST_ALONE, Scale};
 
@@ -45,12 +47,14 @@ impl JumpSearch<'_> {
     pub(crate) fn find(&self, errors: &[f64], known: &[Jump], stages: &mut Stages<'_, '_>) -> Result<Vec<Jump>, Error> {
         let room = self.apart() * self.stride;
         let samples = self.first * 2 + (self.problem.rows() - 1) * self.stride;
+        let conspicuous = self.conspicuous(errors);
+        let places = known.len() + conspicuous.len();
+        let shared = SharedWindows::new(self.problem, self.scales, places, self.instructions);
         let pieces = known.iter().map(|jump| Piece { size: room, content: jump });
-        let again = stages.map(pieces.collect(), || (), |jump: &Jump, (): &mut ()| self.again(jump, room))?;
+        let again = stages.map(pieces.collect(), || (), |jump: &Jump, (): &mut ()| self.again(jump, room, &shared))?;
         let mut jumps: BTreeMap<usize, Jump> = again.into_iter().map(|jump| (jump.sample, jump)).collect();
-        let conspicuous = self.conspicuous(errors).into_iter();
-        let pieces = conspicuous.map(|rows| Piece { size: rows.len() * self.stride, content: rows });
-        let new = stages.map(pieces.collect(), || (), |rows: Range<usize>, (): &mut ()| self.within(&rows))?;
+        let pieces = conspicuous.into_iter().map(|rows| Piece { size: rows.len() * self.stride, content: rows });
+        let new = stages.map(pieces.collect(), || (), |rows: Range<usize>, (): &mut ()| self.within(&rows, &shared))?;
         for jump in new.into_iter().flatten() {
             let near = jump.sample.saturating_sub(room)..jump.sample + room;
             if jumps.range(near).next().is_none() && jump.sample >= room && jump.sample + room <= samples {
@@ -61,9 +65,9 @@ impl JumpSearch<'_> {
     }
 
     /// Places a known jump again. It moves by less than a quarter of the least distance between jumps.
-    fn again(&self, jump: &Jump, room: usize) -> Jump {
+    fn again(&self, jump: &Jump, room: usize, shared: &SharedWindows<'_>) -> Jump {
         let row = (jump.sample - self.first).div_ceil(self.stride);
-        let solved = self.solve(&(row..row + 1));
+        let solved = self.solve(&(row..row + 1), shared);
         let windows = around(&solved);
         let placed = windows.iter().rev().find_map(|windows| self.placed(windows, jump.sample));
         let near = placed.map(|(placed, _)| placed).filter(|placed| 4 * placed.sample.abs_diff(jump.sample) < room);
@@ -71,8 +75,8 @@ impl JumpSearch<'_> {
     }
 
     /// The jumps in some rows, the most conspicuous first.
-    fn within(&self, rows: &Range<usize>) -> Vec<Jump> {
-        let solved = self.solve(rows);
+    fn within(&self, rows: &Range<usize>, shared: &SharedWindows<'_>) -> Vec<Jump> {
+        let solved = self.solve(rows, shared);
         let windows = around(&solved);
         let mut suspected = self.suspected(&windows, rows);
         suspected.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -83,7 +87,7 @@ impl JumpSearch<'_> {
                 continue;
             }
             looked.insert(row);
-            jumps.extend(self.place(&windows[scale], row));
+            jumps.extend(self.place(&windows[scale], row, shared));
         }
         jumps
     }
@@ -110,13 +114,13 @@ impl JumpSearch<'_> {
     }
 
     /// Windows of every length around some rows.
-    fn solve(&self, rows: &Range<usize>) -> Vec<(Scale, Cells)> {
+    fn solve<'s>(&self, rows: &Range<usize>, shared: &'s SharedWindows<'_>) -> Vec<(Scale, Cow<'s, Cells>)> {
         let solve = |&scale: &Scale| {
             let all = scale.one_sided_cells(self.problem.rows());
             let reach = self.function.len() / self.stride;
             let first = scale.cell(rows.start.saturating_sub(reach)).max(all.start).min(all.end);
             let end = (scale.cell(rows.end + reach) + 1).min(all.end).max(first);
-            (scale, scale.solve_here(self.problem, &(first..end), self.instructions))
+            (scale, shared.of(scale, &(first..end)))
         };
         self.lengths.iter().map(solve).collect()
     }
@@ -159,9 +163,9 @@ impl JumpSearch<'_> {
     }
 
     /// Places a jump near a row, or returns `None` if there is none.
-    fn place(&self, windows: &Around<'_>, row: usize) -> Option<Jump> {
+    fn place(&self, windows: &Around<'_>, row: usize, shared: &SharedWindows<'_>) -> Option<Jump> {
         let (jump, (over, left)) = self.placed(windows, self.first + row * self.stride)?;
-        self.is_believed(&over, left).then_some(jump)
+        self.is_believed(&over, left, shared).then_some(jump)
     }
 
     /// Places a jump near a sample. Returns it with the rows over which residuals are summed, and their sum of squares.
@@ -195,13 +199,13 @@ impl JumpSearch<'_> {
     }
 
     /// Whether a jump is significant: windows of no length may predict the rows around it nearly as well without one.
-    fn is_believed(&self, over: &Range<usize>, left: f64) -> bool {
+    fn is_believed(&self, over: &Range<usize>, left: f64, shared: &SharedWindows<'_>) -> bool {
         let rows: Vec<usize> = over.clone().filter(|&row| self.whole.usable[row]).collect();
         let noise = self.noise(left, rows.len() as f64);
         // Short windows follow steep slopes, so they reject most candidates.
         let mut tried = false;
         let beaten = |without: f64| (without - left) / noise < BELIEVED || left > LEFT * without;
-        for without in self.scales.iter().filter_map(|scale| self.without(*scale, over, &rows)) {
+        for without in self.scales.iter().filter_map(|scale| self.without(*scale, over, &rows, shared)) {
             if beaten(without) {
                 return false;
             }
@@ -211,13 +215,13 @@ impl JumpSearch<'_> {
     }
 
     /// The sum of squares that windows of one length leave in the rows between them, or `None` if they do not reach all rows.
-    fn without(&self, scale: Scale, over: &Range<usize>, rows: &[usize]) -> Option<f64> {
+    fn without(&self, scale: Scale, over: &Range<usize>, rows: &[usize], shared: &SharedWindows<'_>) -> Option<f64> {
         let all = scale.one_sided_cells(self.problem.rows());
         let cells = scale.cell(over.start).max(all.start)..(scale.cell(over.end) + 1).min(all.end);
         if cells.is_empty() {
             return None;
         }
-        let cells = scale.solve_here(self.problem, &cells, self.instructions);
+        let cells = shared.of(scale, &cells);
         let windows = Around::new(scale, &cells, &[]);
         let error = |&row: &usize| {
             let window = windows.at_row(self.problem, row, 1)?;
@@ -244,7 +248,7 @@ impl JumpSearch<'_> {
     }
 }
 
-fn around(solved: &[(Scale, Cells)]) -> Vec<Around<'_>> {
+fn around<'a>(solved: &'a [(Scale, Cow<'_, Cells>)]) -> Vec<Around<'a>> {
     solved.iter().map(|(scale, cells)| Around::new(*scale, cells, &[])).collect()
 }
 
