@@ -157,6 +157,8 @@ impl<'a> Near<'a> {
         }
         let basis = Basis::new(length, highest + 1);
         let degrees: Vec<usize> = (0..=highest).collect();
+        let rows: Vec<Vec<f64>> =
+            degrees.iter().map(|&degree| (0..length).map(|index| basis.value(degree, index)).collect()).collect();
         let plan = Coefficients::new(&basis, &degrees, false, target.instructions);
         let (mut scratch, mut projected) = (plan.scratch(), Projected::default());
         // The outermost window is one of them, whichever end this is.
@@ -198,10 +200,15 @@ impl<'a> Near<'a> {
             let differences = (0..projected.level.len()).flat_map(difference).filter(|difference| !difference.is_nan());
             let (sum, compared) =
                 differences.fold((0.0, 0_usize), |(sum, count), difference| (sum + difference * difference, count + 1));
-            let kernel = |index: usize| weights.iter().enumerate().map(|(j, w)| w * basis.value(j, index)).sum();
-            let kernel: Vec<f64> = (0..length).map(kernel).collect();
             let own: f64 = weights.iter().map(|weight| weight * weight).sum();
-            let shared = product(&kernel, &self.kernel, place);
+            // The kernel, where it meets that of the reference.
+            let reach = self.kernel.len() / 2;
+            let meeting = place.saturating_sub(reach)..length.min(place + reach + 1);
+            let mut kernel = vec![0.0; meeting.len()];
+            for (row, weight) in rows.iter().zip(&weights) {
+                kernel.iter_mut().zip(&row[meeting.clone()]).for_each(|(sum, value)| *sum += weight * value);
+            }
+            let shared = product(&kernel, &self.kernel, place - meeting.start);
             let risk = sum / compared as f64 + variance * (2.0 * shared - self.gain);
             shrunk.risks.push(if compared < FEWEST_WINDOWS { f64::INFINITY } else { risk.max(variance * own) });
         }

@@ -23,6 +23,8 @@ pub struct Basis {
     degrees: usize,
     /// `b_0 = 0, b_1, …, b_degrees` of the recurrence.
     recurrence: Vec<DoubleDouble>,
+    /// Their reciprocals.
+    inverses: Vec<DoubleDouble>,
     /// `b_j / b_{j+1}` and `1 / b_{j+1}` in working precision.
     steps: Vec<(f64, f64)>,
     /// `q_j` at the positions that are not negative, position by position.
@@ -57,12 +59,16 @@ impl Basis {
         let recurrence = recurrence(length, degrees);
         let steps =
             recurrence.windows(2).map(|b| ((b[0] / b[1]).to_f64(), (DoubleDouble::ONE / b[1]).to_f64())).collect();
-        let mut basis = Self { length, degrees, recurrence, steps, values: Vec::new() };
+        let inverses = recurrence.iter().map(|&b| DoubleDouble::ONE / b).collect();
+        let mut basis = Self { length, degrees, recurrence, inverses, steps, values: Vec::new() };
         let rows = length - length / 2;
         let mut values = Vec::with_capacity(rows * degrees);
+        let (mut row_of, lower) = (vec![DoubleDouble::ZERO; degrees], vec![DoubleDouble::ZERO; degrees]);
+        row_of[0] = basis.mean();
         for row in 0..rows {
             let position = basis.position(length / 2 + row);
-            values.extend(basis.polynomials(position, 0).iter().map(|value| value.to_f64()));
+            basis.climb(position, 0, &lower, &mut row_of);
+            values.extend(row_of.iter().map(|value| value.to_f64()));
         }
         basis.values = values;
         basis
@@ -156,25 +162,35 @@ impl Basis {
     ///
     /// Differentiating the recurrence `d` times adds `d q_j^{(d-1)}` to its right-hand side.
     fn polynomials(&self, position: f64, derivative: usize) -> Vec<DoubleDouble> {
-        let x = DoubleDouble::from(position);
         let mut lower = vec![DoubleDouble::ZERO; self.degrees];
         let mut values = lower.clone();
         for d in 0..=derivative {
             std::mem::swap(&mut lower, &mut values);
-            values[0] = if d == 0 {
-                DoubleDouble::ONE / DoubleDouble::from(self.length as f64).sqrt()
-            } else {
-                DoubleDouble::ZERO
-            };
-            for j in 0..self.degrees - 1 {
-                let mut value = x * values[j] + DoubleDouble::from(d as f64) * lower[j];
-                if j > 0 {
-                    value = value - self.recurrence[j] * values[j - 1];
-                }
-                values[j + 1] = value / self.recurrence[j + 1];
-            }
+            values[0] = if d == 0 { self.mean() } else { DoubleDouble::ZERO };
+            self.climb(position, d, &lower, &mut values);
         }
         values
+    }
+
+    /// The polynomial of degree zero.
+    fn mean(&self) -> DoubleDouble {
+        DoubleDouble::ONE / DoubleDouble::from(self.length as f64).sqrt()
+    }
+
+    /// The `d`-th derivative of every polynomial from that of degree zero and the derivatives before. Products with inverses take
+    /// a third of the time that quotients take.
+    fn climb(&self, position: f64, d: usize, lower: &[DoubleDouble], values: &mut [DoubleDouble]) {
+        let x = DoubleDouble::from(position);
+        for j in 0..self.degrees - 1 {
+            let mut value = x * values[j];
+            if d > 0 {
+                value = value + DoubleDouble::from(d as f64) * lower[j];
+            }
+            if j > 0 {
+                value = value - self.recurrence[j] * values[j - 1];
+            }
+            values[j + 1] = value * self.inverses[j + 1];
+        }
     }
 }
 

@@ -7,6 +7,9 @@ use crate::record::subsample::stretches;
 const MOST_DIFFERENCES: usize = 1 << 12;
 const FEWEST_DIFFERENCES: usize = 16;
 
+/// So many of the smallest differences are searched before all of them.
+const SMALLEST: usize = 32;
+
 /// Number of stretches in the subsample of a longer record.
 pub(crate) const STRETCHES: usize = 64;
 
@@ -33,12 +36,22 @@ pub fn quantisation_step(record: &dyn Samples) -> f64 {
         differences.extend(samples.windows(2).map(|pair| (pair[1] - pair[0]).abs()));
     }
     differences.retain(|&difference| is_usable(difference) && difference > 0.0);
-    differences.sort_unstable_by(f64::total_cmp);
     if differences.len() < FEWEST_DIFFERENCES {
         return 0.0;
     }
-    let step = |precision: &f64| common_step(&differences, precision * largest);
-    PRECISIONS.iter().find_map(step).unwrap_or(0.0)
+    // What is true of all differences is true of the smallest: without a step of theirs there is none, and the rest need no order.
+    let smallest = differences.len().min(SMALLEST);
+    differences.select_nth_unstable_by(smallest - 1, f64::total_cmp);
+    differences[..smallest].sort_unstable_by(f64::total_cmp);
+    let step = |differences: &[f64]| {
+        PRECISIONS.iter().find_map(|precision| common_step(differences, precision * largest)).unwrap_or(0.0)
+    };
+    let of_smallest = step(&differences[..smallest]);
+    if of_smallest == 0.0 || smallest == differences.len() {
+        return of_smallest;
+    }
+    differences.sort_unstable_by(f64::total_cmp);
+    step(&differences)
 }
 
 /// The largest step of which all differences, in rising order, are multiples within rounding: Euclid's algorithm for numbers that
