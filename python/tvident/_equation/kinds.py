@@ -29,6 +29,10 @@ def parameter(name: str, value: object, shape: tuple[int, ...]) -> Kind | float 
             )
         kind: Kind = next(kind for kind in kinds if kind == value)
         return kind
+    if isinstance(value, bool | np.bool_):
+        raise TypeError(
+            f"{name} must be a number, an array or a kind; got {value}; write 'windowed' where it is unknown"
+        )
     known = arguments.any_array(name, value)  # type: ignore[arg-type] # which is what it checks
     if known.ndim == 0:
         number = float(known)
