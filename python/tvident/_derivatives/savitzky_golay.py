@@ -139,7 +139,10 @@ def savgol_filter(
         samples = _padded(samples.astype(np.float64, copy=False), length, mode, beyond)
     derivatives = core_plan.estimate(samples, ends=ends, workers=arguments.worker_count(None)).derivatives
     filtered: npt.NDArray[Any] = np.moveaxis(derivatives[0], -1, axis)
-    return filtered.astype(np.float32) if array.dtype == np.float32 else filtered
+    if array.dtype != np.float32:
+        return filtered
+    with np.errstate(all="ignore"):
+        return filtered.astype(np.float32)
 
 
 def _derivative(deriv: int, delta: float, order: int) -> tuple[int, float]:

@@ -56,7 +56,7 @@ _STYLE: Any = {
 
 @contextmanager
 def style() -> Iterator[None]:
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(_STYLE), np.errstate(all="ignore"):
         yield
 
 

@@ -112,6 +112,13 @@ class Task:
                 workers=data.workers,
                 progress=report,
             )
+        return self._result(found)
+
+    # What leaves the range of doubles here is NaN or next to zero, whatever NumPy is told to do about it.
+    @np.errstate(all="ignore")
+    def _result(self, found: Sequence[_core.Identification]) -> Identification:
+        """Return the result of what the core found in every record."""
+        data, request = self._data, self._request
         known = {
             name: value if isinstance(value, float) else value[..., :: data.step] for name, value in self._known.items()
         }

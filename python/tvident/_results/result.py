@@ -38,6 +38,7 @@ def _range(value: Any) -> str:
     return str(least) if least == most else f"{least} to {most}"
 
 
+@np.errstate(all="ignore")
 def _product(factor: Array, error: Array) -> Array:
     """Return standard errors times their variance-inflation factor."""
     return np.asarray(factor * error)
@@ -211,6 +212,7 @@ class Identification:
         """
         write_table(path, self.columns(), UNITS)
 
+    @np.errstate(all="ignore")
     def summary(self) -> str:
         """Return a table of the parameters, and in words what was chosen and what to do.
 
