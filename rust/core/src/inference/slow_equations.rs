@@ -67,6 +67,19 @@ impl Slow<'_> {
     }
 }
 
+impl Slow<'_> {
+    /// The right-hand side of an equation of a window, with what the slow coefficients of the previous round took from it.
+    fn rhs(&self, window: usize, row: f64, equation: usize) -> f64 {
+        let full = &self.fit.full;
+        let (fields, all) = (full.fields, full.fields.layout.constant);
+        let own = full.field(fields.left(equation, all))[window];
+        (equation..self.coefficients).fold(own, |rhs, j| {
+            let entry = full.field(fields.left(equation, j))[window];
+            rhs + entry * self.current.map_or(0.0, |current| current.at(j, row).0)
+        })
+    }
+}
+
 /// Fills gaps with the nearest number, or returns `None` if there is none.
 fn fill(values: &[Option<f64>]) -> Option<Vec<f64>> {
     let known: Vec<(usize, f64)> =
@@ -105,12 +118,15 @@ impl Kernel for Points<'_, '_> {
             .filter(|&window| is_determined(full, window))
             .map(|window| (window, slow.fit.centre(window)))
             .collect();
+        // Every window is near many points, but the curve of the previous round at its centre is the same for all of them.
+        let rhs: Vec<f64> =
+            usable.iter().flat_map(|&(window, row)| (0..all).map(move |i| slow.rhs(window, row, i))).collect();
         for first in (0..points).step_by(WIDTH) {
             summary.fill(Packet::ZERO);
             let point = |lane: usize| (first + lane) as f64 * spacing;
             let near = usable.partition_point(|(_, row)| *row < point(0) - reach)
                 ..usable.partition_point(|(_, row)| *row <= point(WIDTH - 1) + reach);
-            for &(window, row) in &usable[near] {
+            for (&(window, row), rhs) in usable[near.clone()].iter().zip(rhs[near.start * all..].chunks(all.max(1))) {
                 let distance: [f64; WIDTH] = std::array::from_fn(|lane| (row - point(lane)) / reach);
                 let weight = Packet(distance.map(|distance| {
                     let seen = distance.abs() < 1.0 && distance.abs() * reach >= hole;
@@ -121,11 +137,9 @@ impl Kernel for Points<'_, '_> {
                 for i in 0..all {
                     let row_of = &mut rows[i * columns..(i + 1) * columns];
                     row_of.fill(Packet::ZERO);
-                    let mut rhs = full.field(from.left(i, all))[window];
                     for j in i..all {
                         let entry = full.field(from.left(i, j))[window];
                         if j < slow_ones {
-                            rhs += entry * slow.current.map_or(0.0, |current| current.at(j, row).0);
                             let mut value = root * Packet::splat(entry);
                             for term in 0..TERMS {
                                 row_of[j * TERMS + term] = value;
@@ -135,7 +149,7 @@ impl Kernel for Points<'_, '_> {
                             row_of[layout.windowed + j - slow_ones] = root * Packet::splat(entry);
                         }
                     }
-                    row_of[columns - 1] = root * Packet::splat(rhs);
+                    row_of[columns - 1] = root * Packet::splat(rhs[i]);
                 }
                 absorb(layout, &mut summary, &mut rows, all, false);
                 let sums = layout.noise() - 3;
