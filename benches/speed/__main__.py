@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from speed import environment, memory, table
+from speed.corners import CORNERS
 from speed.rows import ROWS, Row
 from speed.timing import Effort, alternate
 from tvident import _core
@@ -15,19 +16,20 @@ _README = Path(__file__).parents[1] / "README.md"
 _FULL = Effort(seconds=8.0, least=7)
 _QUICK = Effort(seconds=1.0, least=3)
 _QUICK_SHARE = 0.2
+_ALL = [*ROWS, *CORNERS]
 
 
 def main() -> int:
     """Run the command line."""
     arguments = _parser().parse_args()
-    unknown = set(arguments.only) - {row.name for row in ROWS}
+    unknown = set(arguments.only) - {row.name for row in _ALL}
     if unknown:
         print(f"no row is called {', '.join(sorted(unknown))}; see --list", file=sys.stderr)
         return 2
     if arguments.store and (arguments.only or arguments.quick):
         print("only a whole table is stored; leave out --only and --quick", file=sys.stderr)
         return 2
-    chosen = [row for row in ROWS if not arguments.only or row.name in arguments.only]
+    chosen = [row for row in _ALL if not arguments.only or row.name in arguments.only]
     if arguments.list:
         for row in chosen:
             print(f"{row.name:28}{row.work}")

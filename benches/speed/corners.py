@@ -1,0 +1,166 @@
+"""Rows for what is away from the usual: short and many records, rare results, automatic choices, records with events."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+import tvident
+from speed import signals
+from speed.rows import Duel, Row
+from speed.timing import Work
+
+_FEW_MILLIONS = 3_600_000
+_LEAST = 100_000
+"""Records are not shortened below that."""
+
+
+def _unchecked() -> None:
+    """Pass: both sides of these rows are this library's, or compute different things; the tests compare what they compute."""
+
+
+def _many_records(axis: int) -> Callable[[float], Duel]:
+    def prepare(share: float) -> Duel:
+        records = np.random.default_rng(22).standard_normal((max(100, int(5000 * share)), 400)).cumsum(axis=1)
+        turned = np.ascontiguousarray(np.moveaxis(records, 1, axis))
+        return Duel(
+            [
+                lambda: tvident.fit_local_polynomials(turned, 51, axis=axis, workers=1),
+                lambda: savgol_filter(records, 51, 5),
+            ],
+            _unchecked,
+            records.size,
+        )
+
+    return prepare
+
+
+def _against_plain(samples: int, signal: str, *positional: Any, **options: Any) -> Callable[[float], Duel]:
+    """Pit a call of `fit_local_polynomials` against the plain one with window 201."""
+
+    def prepare(share: float) -> Duel:
+        count = max(min(samples, _LEAST), int(samples * share))
+        generator = np.random.default_rng(23)
+        sine = np.sin(np.arange(count) / 50) + 0.01 * generator.standard_normal(count)
+        y = {"sine": sine, "walk": generator.standard_normal(count).cumsum(), "constant": np.ones(count)}[signal]
+        window = positional or (201,)
+        return Duel(
+            [
+                lambda: tvident.fit_local_polynomials(y, *window, workers=1, **options),
+                lambda: tvident.fit_local_polynomials(y, 201, workers=1),
+            ],
+            _unchecked,
+            count,
+        )
+
+    return prepare
+
+
+def _automatic(**kinds: str) -> Callable[[float], Duel]:
+    def prepare(share: float) -> Duel:
+        angle, torque = signals.recording(max(_LEAST, int(_FEW_MILLIONS * share)))
+
+        def work(**options: Any) -> Work:
+            return lambda: tvident.identify(angle, torque, sample_rate=signals.RATE, workers=1, **options)
+
+        return Duel([work(**kinds), work(method="paper")], _unchecked, angle.size)
+
+    return prepare
+
+
+def _events(share: float) -> Duel:
+    """Pit a record with a break every 4 s against a quarter of it."""
+    samples = max(400_000, int(4_000_000 * share))
+    angle, torque = signals.recording(4000)
+    generator = np.random.default_rng(24)
+    angle = np.resize(angle, samples) + 1e-5 * generator.standard_normal(samples)
+    torque = np.resize(torque, samples) + 1e-2 * generator.standard_normal(samples)
+
+    def work(count: int) -> Work:
+        return lambda: tvident.identify(angle[:count], torque[:count], sample_rate=signals.RATE, workers=1)
+
+    return Duel([work(samples), work(samples // 4)], _unchecked, samples)
+
+
+def _spoilt(share: float) -> Duel:
+    """Pit recordings of many kinds against each other; the clean one is the fastest."""
+    samples = max(_LEAST, int(400_000 * share))
+    angle, torque = signals.recording(samples)
+    hum = np.sin(2 * np.pi * 50 * np.arange(samples) / signals.RATE)
+    smooth = np.ones(25) / 25
+    largest = float(np.abs(angle).max())
+    kinds = [
+        (angle, torque),
+        (np.convolve(angle, smooth, "same"), np.convolve(torque, smooth, "same")),
+        (np.clip(angle, -0.6 * largest, 0.6 * largest), torque),
+        (np.repeat(angle[::10], 10)[:samples], torque),
+        (angle, torque + 0.5 * hum),
+    ]
+
+    def work(angle: signals.Array, torque: signals.Array) -> Work:
+        return lambda: tvident.identify(angle, torque, sample_rate=signals.RATE, workers=1)
+
+    return Duel([work(*kind) for kind in kinds], _unchecked, samples)
+
+
+_SHORT, _PLAIN = "5000 records of 400 samples, window 51", "window 201"
+
+CORNERS = [
+    Row("many-records", f"{_SHORT}, three derivatives", "one pass of `savgol_filter`", _many_records(1), most=0.7),
+    Row("many-records-axis-0", "the same along axis 0", "one pass along axis 1", _many_records(0), most=0.7),
+    Row("step-100", "`step=100`, 10⁶ samples", "`step=1`", _against_plain(10**6, "sine", step=100), most=0.25),
+    Row(
+        "average",
+        '`selection="average"`, 10⁶ samples',
+        '`selection="window"`',
+        _against_plain(10**6, "sine", selection="average"),
+        most=3,
+    ),
+    *(
+        Row(
+            f"automatic-window-{signal}",
+            f'`fit_local_polynomials(y, "auto")`, 10⁶ samples, a {signal}',
+            _PLAIN,
+            _against_plain(10**6, signal, "auto"),
+            most=10,
+        )
+        for signal in ("sine", "walk")
+    ),
+    *(
+        Row(
+            f"automatic-window-short-{signal}",
+            f"the same, 4000 samples, a {signal}",
+            _PLAIN,
+            _against_plain(4000, signal, "auto"),
+            most=30,
+        )
+        for signal in ("sine", "walk", "constant")
+    ),
+    Row(
+        "identify-automatic",
+        "`identify`, all automatic, 3.6 million samples",
+        '`method="paper"`',
+        _automatic(),
+        most=4,
+    ),
+    Row(
+        "identify-constant",
+        "`identify`, all constant",
+        '`method="paper"`',
+        _automatic(inertia="constant", damping="constant", stiffness="constant"),
+        most=4,
+    ),
+    Row("events", "`identify`, 4 million samples, a break every 4 s", "a quarter of them", _events, most=5),
+    Row(
+        "spoilt",
+        "`identify`, 400 000 samples: clean, low-passed, clipped, held, with hum: the slowest",
+        "the fastest",
+        _spoilt,
+        most=3,
+        slowest_over_fastest=True,
+    ),
+]
+"""Bars that are not reached yet are there to fail."""
