@@ -94,8 +94,7 @@ impl JudgedTerm<'_> {
         let fit = self.fit.again(&problem, self.expected, self.instructions, stages)?;
         let Some(fit) = fit else { return Ok(None) };
         let Layout { constant, .. } = problem.layout;
-        let variances = fit.covariance(&problem, self.covariance, stages)?;
-        let variance = self.inflation * variances[constant * constant - 1];
+        let variance = self.inflation * fit.variance_of(&problem, constant - 1, self.covariance, stages)?;
         Ok(Some((fit.pooled.values[constant - 1], variance.sqrt())))
     }
 }

@@ -96,14 +96,42 @@ impl Fit {
         covariance: &RowCovariance,
         stages: &mut Stages<'_, '_>,
     ) -> Result<Vec<f64>, Error> {
-        let each = || (0..problem.layout.constant).map(|constant| Piece { size: problem.rows(), content: constant });
+        let columns = self.influences(problem, stages)?;
+        let each = (0..columns.len()).map(|constant| Piece { size: problem.rows(), content: constant });
+        let products = |constant: usize, (): &mut ()| products(&columns, constant, covariance);
+        let products = stages.map(each.collect(), || (), products)?;
+        Ok(between(&products.concat(), &self.pooled.inverse, columns.len()))
+    }
+
+    /// The variance of one of these constants alone: that of what all rows together move it by.
+    pub(crate) fn variance_of(
+        &self,
+        problem: &Problem<'_>,
+        constant: usize,
+        covariance: &RowCovariance,
+        stages: &mut Stages<'_, '_>,
+    ) -> Result<f64, Error> {
+        let columns = self.influences(problem, stages)?;
+        let mut moved = vec![0.0; columns.first().map_or(0, Vec::len)];
+        for (column, weight) in columns.iter().zip(&self.pooled.inverse[constant * columns.len()..]) {
+            moved.iter_mut().zip(column).for_each(|(sum, value)| *sum += weight * value);
+        }
+        let mut noisy = vec![0.0; moved.len()];
+        stages.fill([&mut noisy], |rows, parts| {
+            for part in parts {
+                covariance.add_product(&moved, rows.clone(), part);
+            }
+        })?;
+        Ok(moved.iter().zip(&noisy).map(|(a, b)| a * b).sum())
+    }
+
+    /// The influence of every row on each of the constants.
+    fn influences(&self, problem: &Problem<'_>, stages: &mut Stages<'_, '_>) -> Result<Vec<Vec<f64>>, Error> {
+        let each = (0..problem.layout.constant).map(|constant| Piece { size: problem.rows(), content: constant });
         let windows = 0..self.full.len();
         let influence =
             |constant: usize, (): &mut ()| self.influence(problem, &windows, &self.pooled.weights, constant);
-        let columns = stages.map(each().collect(), || (), influence)?;
-        let products = |constant: usize, (): &mut ()| products(&columns, constant, covariance);
-        let products = stages.map(each().collect(), || (), products)?;
-        Ok(between(&products.concat(), &self.pooled.inverse, columns.len()))
+        stages.map(each.collect(), || (), influence)
     }
 
     /// The same for constants estimated from some of the windows.
@@ -254,5 +282,20 @@ mod tests {
             assert_near(*found, 3.0 * inverse, 1e-12);
         }
         assert_eq!(fit.covariance_of(&problem, 0..1, &fit.pooled, &covariance), found);
+    }
+
+    #[test]
+    fn the_variance_of_one_constant_is_that_in_the_covariance_of_all() {
+        let rows = rows(3000, |time| [1.0 + 0.1 * time, 0.1], 0.5);
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let fit = Fit::in_rows(&problem, 200, white(0.25), Instructions::Scalar).expect("constants");
+        let covariance = RowCovariance { lags: vec![0.5, 0.2, -0.1, 0.05] };
+        let all = staged(|stages| fit.covariance(&problem, &covariance, stages));
+        let size = problem.layout.constant;
+        for constant in 0..size {
+            let alone = staged(|stages| fit.variance_of(&problem, constant, &covariance, stages));
+            // Sums over 3000 rows.
+            assert_near(alone, all[constant * (size + 1)], 1e-11);
+        }
     }
 }

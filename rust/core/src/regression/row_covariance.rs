@@ -10,6 +10,9 @@ use crate::weak_form::test_function::Kernels;
 /// Correlations that exceed their standard deviation so many times are significant.
 const CHANCE: f64 = 5.0;
 
+/// Rows that are multiplied at a time.
+const PIECE: usize = 1 << 11;
+
 /// Covariance of rows by their distance.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RowCovariance {
@@ -84,8 +87,17 @@ impl RowCovariance {
     /// The covariance times a column.
     pub(crate) fn times(&self, column: &[f64]) -> Vec<f64> {
         let mut result = vec![0.0; column.len()];
-        self.add(column, 0..column.len(), |lag| [self.lags[lag]; 2], &mut result);
+        // In pieces that stay in the nearest cache, however many lags there are.
+        for (piece, part) in result.chunks_mut(PIECE).enumerate() {
+            let first = piece * PIECE;
+            self.add_product(column, first..first + part.len(), part);
+        }
         result
+    }
+
+    /// Adds some rows of the covariance times a column.
+    pub(crate) fn add_product(&self, column: &[f64], rows: Range<usize>, sums: &mut [f64]) {
+        self.add(column, rows, |lag| [self.lags[lag]; 2], sums);
     }
 
     /// The covariance times the windowed regressors and their companions, whose times count from their own row.
