@@ -4,6 +4,8 @@
 //! the covariance Γ of the rows, estimated from the residuals, least squares have the covariance `N⁻¹ Xᵀ Γ X N⁻¹`
 //! instead of `σ² N⁻¹` (Newey and West 1987).
 
+use std::cmp::Ordering;
+
 use crate::least_squares::stacked_qr::Summary;
 use crate::regression::row_covariance::RowCovariance;
 use crate::regression::sandwich::sandwich;
@@ -77,8 +79,12 @@ pub(crate) fn enlarge(covariance: &mut [f64], factors: &[f64]) {
     }
 }
 
-/// A covariance whose standard errors are at least those of another.
+/// A covariance whose standard errors are at least those of another, or that other one where the first has a variance that is not
+/// positive: rows that gaps leave apart take its middle matrix its sign.
 pub(crate) fn at_least(mut honest: Vec<f64>, ordinary: &[f64], unknowns: usize) -> Vec<f64> {
+    if (0..unknowns).any(|unknown| honest[unknown * (unknowns + 1)].partial_cmp(&0.0) != Some(Ordering::Greater)) {
+        return ordinary.to_vec();
+    }
     let factors = factors(ordinary, &honest, unknowns);
     enlarge(&mut honest, &factors);
     honest
@@ -113,6 +119,15 @@ pub(crate) mod tests {
         assert!((factor(1) - 1.0).abs() < 0.1);
         let expected = 20.0_f64.sqrt();
         assert!((factor(20) / expected - 1.0).abs() < 0.15, "{}", factor(20));
+    }
+
+    #[test]
+    fn a_variance_that_is_not_positive_is_no_variance() {
+        let ordinary = [4.0, 1.0, 1.0, 9.0];
+        assert_eq!(at_least(vec![1.0, 0.0, 0.0, 36.0], &ordinary, 2), [4.0, 0.0, 0.0, 36.0]);
+        for wrong in [-1e-3, 0.0, f64::NAN] {
+            assert_eq!(at_least(vec![16.0, 0.0, 0.0, wrong], &ordinary, 2), ordinary);
+        }
     }
 
     #[test]
