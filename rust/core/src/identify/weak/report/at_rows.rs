@@ -6,6 +6,7 @@ use crate::identify::results::RowResults;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::report::tracks::Tracks;
+use crate::identify::weak::report::window_sums::WindowSums;
 use crate::identify::weak::session::Session;
 use crate::regression::fit::Fit;
 use crate::regression::layout::symmetric;
@@ -143,24 +144,18 @@ fn deviation(
             }
         }
     })?;
-    let mut sums = vec![[0.0, 0.0]];
-    let (mut sum, mut count) = (0.0, 0.0);
-    sums.extend(errors.iter().zip(problem.usable).map(|(error, &usable)| {
-        if usable && error.is_finite() {
-            sum += error * error;
-            count += 1.0;
-        }
-        [sum, count]
-    }));
+    let counted = errors
+        .iter()
+        .zip(problem.usable)
+        .map(|(error, &usable)| if usable && error.is_finite() { [error * error, 1.0] } else { [0.0, 0.0] });
+    let sums = WindowSums::new(&counted.collect::<Vec<_>>(), span);
     let mut deviation = vec![f64::NAN; tracks.status.len()];
     stages.fill([&mut deviation], |places, columns| {
         for (place, deviation) in places.zip(&mut *columns[0]) {
             let row = (tracks.first + place.cast_signed()).max(0).unsigned_abs();
-            let rows = errors.len();
-            let (first, end) = (row.saturating_sub(span / 2).min(rows), (row + span.div_ceil(2)).min(rows));
-            let (sum, count) = (sums[end][0] - sums[first][0], sums[end][1] - sums[first][1]);
+            let [sum, count] = sums.around(row);
             if count > 0.0 {
-                *deviation = (sum / count).max(0.0).sqrt();
+                *deviation = (sum / count).sqrt();
             }
         }
     })?;

@@ -5,3 +5,4 @@ pub(crate) mod errors;
 pub(crate) mod missing_terms;
 pub(crate) mod record;
 pub(crate) mod tracks;
+pub(crate) mod window_sums;
