@@ -141,6 +141,14 @@ pub enum Error {
     /// The work was cancelled by whoever watched it.
     #[error("the work was cancelled")]
     Cancelled,
+    /// The system does not have the memory.
+    #[error(
+        "the work needs {bytes} bytes of memory more than there is; use a shorter record or window, or fewer workers"
+    )]
+    Memory {
+        /// What was asked for.
+        bytes: usize,
+    },
     /// The system did not give the threads.
     #[error("could not start {threads} threads ({cause}); ask for fewer workers")]
     Threads {

@@ -12,6 +12,7 @@ use tvident::exec::{Watch, workers as threads};
 use tvident::noise::noise;
 use tvident::simd::Instructions;
 
+use crate::arrays::zeros;
 use crate::records::records;
 use crate::watch::watched;
 
@@ -47,11 +48,11 @@ pub(crate) fn estimate_automatically<'py>(
     let records = records(samples)?;
     let count = samples.shape().last().copied().unwrap_or(0);
     let mut shape = samples.shape().to_vec();
-    let order = PyArrayDyn::<u8>::zeros(py, shape.clone(), false);
-    let status = PyArrayDyn::<u16>::zeros(py, shape.clone(), false);
+    let order = zeros::<u8>(py, &shape)?;
+    let status = zeros::<u16>(py, &shape)?;
     shape.insert(0, derivatives.len());
-    let values = PyArrayDyn::<f64>::zeros(py, shape.clone(), false);
-    let errors = PyArrayDyn::<f64>::zeros(py, shape, false);
+    let values = zeros::<f64>(py, &shape)?;
+    let errors = zeros::<f64>(py, &shape)?;
     let (mut chosen, mut noises) = (vec![Vec::new(); derivatives.len()], Vec::new());
     {
         let (mut values, mut errors) = (values.readwrite(), errors.readwrite());

@@ -6,6 +6,7 @@
     reason = "what Python passes arrives by value, and keyword arguments are many"
 )]
 
+mod arrays;
 mod automatic;
 mod identified;
 mod identify;
@@ -13,6 +14,7 @@ mod local_polynomials;
 mod motions;
 mod noise;
 mod records;
+mod reserve;
 mod rolling;
 mod watch;
 

@@ -12,8 +12,9 @@ use tvident::local_polynomials::{Criterion, Estimates, LocalPolynomials as Plan,
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
+use crate::arrays::zeros;
 use crate::records::records;
-use crate::watch::{exception, watched};
+use crate::watch::watched;
 
 /// What was estimated in every window.
 #[pyclass(frozen, get_all, module = "tvident._core")]
@@ -44,6 +45,7 @@ impl LocalPolynomials {
     #[new]
     #[pyo3(signature = (window_length, order, max_order, criterion, selection, derivatives, delta, noise, quantisation))]
     fn new(
+        py: Python<'_>,
         window_length: usize,
         order: Option<usize>,
         max_order: usize,
@@ -79,7 +81,12 @@ impl LocalPolynomials {
             quantisation,
             instructions,
         };
-        Ok(Self { plan: Plan::new(options).map_err(|error| exception(&error))? })
+        let mut plan = None;
+        watched(py, None, |watch| {
+            plan = Some(Plan::watched(options, watch)?);
+            Ok(())
+        })?;
+        plan.map(|plan| Self { plan }).ok_or_else(|| PyValueError::new_err("no plan was made"))
     }
 
     /// Number of orders in play.
@@ -120,7 +127,11 @@ impl LocalPolynomials {
     fn scores<'py>(&self, samples: &Bound<'py, PyUntypedArray>, sample: usize) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let records = records(samples)?;
         let record = records.first().ok_or_else(|| PyValueError::new_err("there is no record"))?;
-        let scores = self.plan.scores(record, sample).map_err(|error| exception(&error))?;
+        let mut scores = Vec::new();
+        watched(samples.py(), None, |_| {
+            scores = self.plan.scores(record, sample)?;
+            Ok(())
+        })?;
         Ok(scores.into_pyarray(samples.py()))
     }
 }
@@ -149,11 +160,11 @@ impl LocalPolynomials {
         }
         let noise = options.noise || matches!(options.order, Order::Chosen { .. });
         let diagnostics = if noise { shape.clone() } else { vec![0] };
-        let order = PyArrayDyn::<u8>::zeros(py, diagnostics.clone(), false);
-        let status = PyArrayDyn::<u16>::zeros(py, diagnostics.clone(), false);
-        let sigma = PyArrayDyn::<f64>::zeros(py, diagnostics, false);
+        let order = zeros::<u8>(py, &diagnostics)?;
+        let status = zeros::<u16>(py, &diagnostics)?;
+        let sigma = zeros::<f64>(py, &diagnostics)?;
         shape.insert(0, options.derivatives.len());
-        let derivatives = PyArrayDyn::<f64>::zeros(py, shape, false);
+        let derivatives = zeros::<f64>(py, &shape)?;
         {
             let (mut derivatives, mut order) = (derivatives.readwrite(), order.readwrite());
             let (mut status, mut sigma) = (status.readwrite(), sigma.readwrite());

@@ -9,6 +9,9 @@ use tvident::simd::Instructions;
 use crate::records::records;
 use crate::watch::watched;
 
+/// Records between two looks at the watch: each takes well below a millisecond.
+const RECORDS: usize = 100;
+
 /// The noise of one record: its standard deviation, and the step that samples were rounded to.
 #[pyclass(frozen, get_all, module = "tvident._core")]
 pub(crate) struct Noise {
@@ -23,10 +26,13 @@ pub(crate) fn noise(samples: &Bound<'_, PyUntypedArray>, quantisation: Option<f6
     let records = records(samples)?;
     let instructions = Instructions::current();
     let mut noises = Vec::new();
-    watched(samples.py(), None, |_| {
-        for record in &records {
+    watched(samples.py(), None, |watch| {
+        for (done, record) in records.iter().enumerate() {
             let found = core_noise(record, quantisation, instructions)?;
             noises.push(Noise { sigma: found.sigma, quantisation: found.quantisation });
+            if !watch(done, records.len()) {
+                return Err(Error::Cancelled);
+            }
         }
         Ok::<(), Error>(())
     })?;
@@ -36,6 +42,16 @@ pub(crate) fn noise(samples: &Bound<'_, PyUntypedArray>, quantisation: Option<f6
 /// The smallest quantisation step of the records along the last axis, zero where one of them has none.
 #[pyfunction]
 pub(crate) fn quantisation_step(samples: &Bound<'_, PyUntypedArray>) -> PyResult<f64> {
-    let steps = records(samples)?.into_iter().map(|record| core_step(&record));
-    Ok(steps.reduce(f64::min).unwrap_or(0.0))
+    let records = records(samples)?;
+    let mut least = f64::INFINITY;
+    watched(samples.py(), None, |watch| {
+        for (done, record) in records.iter().enumerate() {
+            least = least.min(core_step(record));
+            if done % RECORDS == RECORDS - 1 && !watch(done, records.len()) {
+                return Err(Error::Cancelled);
+            }
+        }
+        Ok(())
+    })?;
+    Ok(if records.is_empty() { 0.0 } else { least })
 }

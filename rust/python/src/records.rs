@@ -3,7 +3,10 @@
 use numpy::{PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods, dtype};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use tvident::Error;
 use tvident::record::Samples;
+
+use crate::watch::exception;
 
 /// A number type that arrays may hold.
 #[derive(Clone, Copy, Debug)]
@@ -101,7 +104,11 @@ pub(crate) fn records(array: &Bound<'_, PyUntypedArray>) -> PyResult<Vec<Strided
             place.wrapping_offset(here.cast_signed() * jump)
         })
     };
-    Ok((0..count).map(|index| StridedSamples { first: place(index), stride, len, number }).collect())
+    let mut records = Vec::new();
+    let bytes = size_of::<StridedSamples>().saturating_mul(count);
+    records.try_reserve_exact(count).map_err(|_| exception(&Error::Memory { bytes }))?;
+    records.extend((0..count).map(|index| StridedSamples { first: place(index), stride, len, number }));
+    Ok(records)
 }
 
 fn number(array: &Bound<'_, PyUntypedArray>) -> PyResult<Number> {

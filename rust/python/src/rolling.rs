@@ -2,7 +2,7 @@
 
 use std::num::NonZeroUsize;
 
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArray};
+use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArray};
 use pyo3::prelude::*;
 use tvident::exec::workers as threads;
 use tvident::lanes::Elements;
@@ -11,6 +11,7 @@ use tvident::least_squares::{Equations, Regressions, RollingLeastSquares};
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
+use crate::arrays::zeros;
 use crate::records::records;
 use crate::watch::{exception, watched};
 
@@ -18,12 +19,12 @@ use crate::watch::{exception, watched};
 #[pyclass(frozen, get_all, module = "tvident._core")]
 pub(crate) struct RollingRegressions {
     /// By regressor, right-hand side and window.
-    params: Py<PyArray3<f64>>,
-    stderr: Py<PyArray3<f64>>,
+    params: Py<PyArrayDyn<f64>>,
+    stderr: Py<PyArrayDyn<f64>>,
     /// Residual sums of squares by right-hand side and window.
-    rss: Py<PyArray2<f64>>,
-    condition: Py<PyArray1<f64>>,
-    status: Py<PyArray1<u16>>,
+    rss: Py<PyArrayDyn<f64>>,
+    condition: Py<PyArrayDyn<f64>>,
+    status: Py<PyArrayDyn<u16>>,
 }
 
 /// Least squares in every window of rows; regressors and right-hand sides have the rows along their last axis.
@@ -46,11 +47,11 @@ pub(crate) fn rolling_least_squares<'py>(
     let plan = plan.map_err(|error| exception(&error))?;
     let count = rows.div_ceil(step);
 
-    let parameters = PyArray3::zeros(py, [p, q, count], false);
-    let errors = PyArray3::zeros(py, [p, q, count], false);
-    let residuals = PyArray2::zeros(py, [q, count], false);
-    let condition = PyArray1::zeros(py, [count], false);
-    let status = PyArray1::zeros(py, [count], false);
+    let parameters = zeros::<f64>(py, &[p, q, count])?;
+    let errors = zeros::<f64>(py, &[p, q, count])?;
+    let residuals = zeros::<f64>(py, &[q, count])?;
+    let condition = zeros::<f64>(py, &[count])?;
+    let status = zeros::<u16>(py, &[count])?;
     {
         let (mut parameters, mut errors) = (parameters.readwrite(), errors.readwrite());
         let (mut residuals, mut condition, mut status) =

@@ -13,6 +13,7 @@ use crate::auto_derivatives::candidates::Target;
 use crate::auto_derivatives::global_choice::{Pair, SHORTEST, Survey, rounded};
 use crate::auto_derivatives::local_average::DerivativeOutputs;
 use crate::error::Error;
+use crate::exec::memory;
 use crate::exec::pool::Watch;
 use crate::local_polynomials::boundary::End;
 use crate::local_polynomials::options::HIGHEST_ORDER;
@@ -64,6 +65,9 @@ pub struct AutomaticChoice {
     pub order: usize,
 }
 
+/// Numbers that are kept of a sample at most, beside the estimates.
+const NUMBERS: usize = 4;
+
 /// Steps of a quantised signal that half of the shortest window must span, on average.
 const STEPS: f64 = 2.0;
 
@@ -103,6 +107,7 @@ pub fn estimate_automatically(
     if highest < derivative {
         return Err(Error::OrderTooLow { order: highest, derivative });
     }
+    memory::ask_for_numbers(samples.saturating_mul(NUMBERS))?;
     let (shortest, variance) = match samples_per_step(record, sigma) {
         // A caller who denies quantisation may give less noise than rounding makes.
         Some((step, each)) => {

@@ -1,5 +1,8 @@
 //! Memory for results of a whole record.
 
+use crate::error::Error;
+use crate::exec::memory::ask_for;
+
 /// Bytes of a huge page, and of a small one.
 #[cfg(target_os = "linux")]
 const HUGE: usize = 1 << 21;
@@ -8,7 +11,11 @@ const PAGE: usize = 1 << 12;
 
 /// A column of zeros. For a long one the system is asked for huge pages, as NumPy asks for its arrays: a page that is touched first costs
 /// about as much as writing it, and an hour of results has 7000 small ones a column.
-pub(crate) fn zeros<T: Copy + Default>(count: usize) -> Vec<T> {
+///
+/// # Errors
+/// If there is not so much memory.
+pub(crate) fn zeros<T: Copy + Default>(count: usize) -> Result<Vec<T>, Error> {
+    ask_for(count.saturating_mul(size_of::<T>()))?;
     let column = vec![T::default(); count];
     #[cfg(target_os = "linux")]
     if count * size_of::<T>() >= 2 * HUGE {
@@ -18,7 +25,7 @@ pub(crate) fn zeros<T: Copy + Default>(count: usize) -> Vec<T> {
         // contents. Refused advice is no error.
         unsafe { libc::madvise(first.cast_mut().cast(), (count - before) * size_of::<T>(), libc::MADV_HUGEPAGE) };
     }
-    column
+    Ok(column)
 }
 
 #[cfg(test)]
@@ -28,7 +35,9 @@ mod tests {
     #[test]
     fn zeros_are_zeros_however_many() {
         for count in [0, 1, 1000, 1 << 19, (1 << 20) + 3] {
-            assert!(zeros::<f64>(count).iter().all(|&value| value == 0.0) && zeros::<u8>(count).len() == count);
+            let numbers = zeros::<f64>(count).expect("a few megabytes");
+            assert!(numbers.len() == count && numbers.iter().all(|&value| value == 0.0));
+            assert_eq!(zeros::<u8>(count).map(|column| column.len()), Ok(count));
         }
     }
 }

@@ -1,6 +1,7 @@
-//! Long calls: threads, stages with progress and cancellation, memory for long results.
+//! Long calls: threads, stages with progress and cancellation, memory that a caller decides about.
 
 pub(crate) mod huge_pages;
+pub(crate) mod memory;
 pub(crate) mod pool;
 pub(crate) mod stages;
 

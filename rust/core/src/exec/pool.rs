@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::Error;
+use crate::exec::memory;
 
 /// The calling thread calls the watch at least this often.
 const WATCH: Duration = Duration::from_millis(50);
@@ -189,6 +190,15 @@ impl Owned {
 /// The newest pool.
 static POOL: Mutex<Option<Owned>> = Mutex::new(None);
 
+/// Bytes that a thread needs to begin: its stack, and a little beside it.
+const THREAD: usize = 9 << 18;
+
+/// Addresses that the C library reserves for a thread's allocations, if there are so many.
+const ARENA: usize = 1 << 27;
+
+/// Where there is no memory for so many threads, the lack of memory is why there are none.
+const SOME: usize = 16;
+
 /// How often the lock of the newest pool is tried. It is held for the copy of a pointer.
 const TRIES: usize = 100;
 
@@ -214,11 +224,16 @@ fn pool(threads: usize) -> Result<Arc<ThreadPool>, Error> {
     {
         return Ok(Arc::clone(&owned.pool));
     }
-    let pool = ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .thread_name(|index| format!("tvident-{index}"))
-        .build()
-        .map_err(|error| Error::Threads { threads, cause: error.to_string() })?;
+    memory::ask_for(threads.saturating_mul(THREAD))?;
+    let pool =
+        ThreadPoolBuilder::new().num_threads(threads).thread_name(|index| format!("tvident-{index}")).build().map_err(
+            |error| match memory::ask_for(threads.min(SOME) * (THREAD + ARENA)) {
+                Ok(()) => Error::Threads { threads, cause: error.to_string() },
+                Err(error) => error,
+            },
+        )?;
+    // Threads that begin when memory has run out end the process.
+    pool.broadcast(|_| ());
     let pool = Arc::new(pool);
     let fresh = Owned { process, pool: Arc::clone(&pool) };
     // A call that was faster may have stored a larger pool; then this one ends with its call.

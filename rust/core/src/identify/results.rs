@@ -94,8 +94,8 @@ impl RowResults {
         let carried = self.values.iter().zip(&self.slopes).map(|(column, slopes)| (column, Some(slopes)));
         let kept = self.errors.iter().chain(&self.covariances).chain([&self.deviation, &self.condition]);
         let sources: Vec<Source<'_>> = carried.chain(kept.map(|column| (column, None))).collect();
-        let mut columns: Vec<Vec<f64>> = sources.iter().map(|_| zeros(count)).collect();
-        let mut status = vec![0; count];
+        let mut columns: Vec<Vec<f64>> = sources.iter().map(|_| zeros(count)).collect::<Result<_, _>>()?;
+        let mut status = zeros(count)?;
         let mut pieces = Vec::new();
         {
             let mut columns: Vec<&mut [f64]> = columns.iter_mut().map(Vec::as_mut_slice).collect();

@@ -4,11 +4,12 @@ use std::num::NonZeroUsize;
 use std::ops::Range;
 
 use crate::error::Error;
+use crate::exec::memory;
 use crate::exec::pool::{self, GoOn, Piece, Watch};
-use crate::least_squares::givens_factor::{Few, Many};
+use crate::least_squares::givens_factor::{Dimensions, Few, Many};
 use crate::least_squares::kernel::RollingKernel;
 use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares, Slots};
-use crate::least_squares::side_by_side::{RollingRun, RollingScratch};
+use crate::least_squares::side_by_side::{RollingRun, RollingScratch, SEGMENT};
 use crate::simd::vectors::dispatch;
 
 /// Rows in a piece of work, about.
@@ -21,12 +22,21 @@ impl RollingLeastSquares {
         RollingScratch::new(self)
     }
 
+    /// Asks for what the scratch memory of so many threads will take.
+    pub(crate) fn ask_for_scratch(&self, threads: usize) -> Result<(), Error> {
+        let run = self.window.saturating_mul(self.instructions.lanes() + 2).saturating_mul(self.columns() + 1);
+        let factors = self.window.min(SEGMENT) + self.window / SEGMENT;
+        let factor = Many { regressors: self.regressors, rhs_count: self.rhs_count }.size() * self.instructions.lanes();
+        let numbers = run.saturating_add(factors.saturating_mul(factor));
+        memory::ask_for_numbers(numbers.saturating_mul(threads))
+    }
+
     /// Solves the windows around all rows, in parallel. Every element of the outputs must belong to a row.
     ///
     /// The numbers do not depend on the number of workers.
     ///
     /// # Errors
-    /// If the watch cancels.
+    /// If there is not the memory for the windows, or the watch cancels.
     pub fn run(
         &self,
         equations: &Equations<'_>,
@@ -40,6 +50,7 @@ impl RollingLeastSquares {
             let part = regressions.split_off_before(piece.end);
             pieces.push(Piece { size: piece.len(), content: (piece, part) });
         }
+        self.ask_for_scratch(workers.get().min(pieces.len()))?;
         let work =
             |(rows, mut part): (Range<usize>, Regressions<'_>), scratch: &mut RollingScratch, go_on: &GoOn<'_>| {
                 self.solve_while(equations, rows, &mut part, scratch, go_on);

@@ -11,6 +11,12 @@
 //! what makes choosing the order cheap. The recurrence loses digits where the degree comes near the window's length, and a raw
 //! Vandermonde matrix loses all of them; every table here is computed with twice the precision and rounded once.
 
+use std::num::NonZeroUsize;
+use std::ops::Range;
+
+use crate::error::Error;
+use crate::exec::memory;
+use crate::exec::pool::{self, Piece, Watch};
 use crate::local_polynomials::double_double::DoubleDouble;
 
 /// The most degrees that any kernel has.
@@ -52,9 +58,17 @@ impl Basis {
     /// Costs `O(length · degrees)`.
     ///
     /// # Panics
-    /// If `degrees` is zero or larger than `length`: that many polynomials are not independent on the window.
+    /// If `degrees` is zero or larger than `length`: that many polynomials are not independent on the window. If there is not the memory.
     #[must_use]
     pub fn new(length: usize, degrees: usize) -> Self {
+        Self::watched(length, degrees, &mut |_, _| true).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// The same for windows of any length, watched.
+    ///
+    /// # Errors
+    /// If there is not the memory, or the watch cancels.
+    pub(crate) fn watched(length: usize, degrees: usize, watch: &mut Watch<'_>) -> Result<Self, Error> {
         assert!((1..=length).contains(&degrees), "{degrees} polynomials are not independent on {length} samples");
         let recurrence = recurrence(length, degrees);
         let steps =
@@ -62,16 +76,25 @@ impl Basis {
         let inverses = recurrence.iter().map(|&b| DoubleDouble::ONE / b).collect();
         let mut basis = Self { length, degrees, recurrence, inverses, steps, values: Vec::new() };
         let rows = length - length / 2;
-        let mut values = Vec::with_capacity(rows * degrees);
-        let (mut row_of, lower) = (vec![DoubleDouble::ZERO; degrees], vec![DoubleDouble::ZERO; degrees]);
-        row_of[0] = basis.mean();
-        for row in 0..rows {
-            let position = basis.position(length / 2 + row);
-            basis.climb(position, 0, &lower, &mut row_of);
-            values.extend(row_of.iter().map(|value| value.to_f64()));
-        }
+        memory::ask_for_numbers(rows.saturating_mul(degrees))?;
+        let mut values = vec![0.0; rows * degrees];
+        let pieces = pool::ranges(rows).into_iter().zip(values.chunks_mut(pool::ROWS * degrees));
+        let pieces = pieces.map(|(Piece { size, content }, values)| Piece { size, content: (content, values) });
+        let lower = vec![DoubleDouble::ZERO; degrees];
+        let tabulate = |(rows, values): (Range<usize>, &mut [f64]), row_of: &mut Vec<DoubleDouble>| {
+            for (row, values) in rows.zip(values.chunks_exact_mut(degrees)) {
+                basis.climb(basis.position(length / 2 + row), 0, &lower, row_of);
+                values.iter_mut().zip(&*row_of).for_each(|(value, exact)| *value = exact.to_f64());
+            }
+        };
+        let scratch = || {
+            let mut row_of = lower.clone();
+            row_of[0] = basis.mean();
+            row_of
+        };
+        pool::run(pieces.collect(), NonZeroUsize::MIN, scratch, tabulate, watch)?;
         basis.values = values;
-        basis
+        Ok(basis)
     }
 
     /// Samples in a window.

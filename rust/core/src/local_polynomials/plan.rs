@@ -9,8 +9,9 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 use crate::error::Error;
+use crate::exec::memory;
 use crate::exec::pool::{self, Piece, Watch};
-use crate::local_polynomials::basis::Basis;
+use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
 use crate::local_polynomials::boundary::{End, Ends};
 use crate::local_polynomials::criterion::Criterion;
 use crate::local_polynomials::engine::{Walk, engine};
@@ -51,9 +52,17 @@ impl LocalPolynomials {
     /// Costs `O(M · D)` with `D` the number of orders.
     ///
     /// # Errors
-    /// If the window is shorter than one sample, if an order is higher than [`HIGHEST_ORDER`], or if a fixed order is not determined
-    /// by the window.
+    /// If the window is shorter than one sample, if an order is higher than [`HIGHEST_ORDER`], if a fixed order is not determined
+    /// by the window, or if there is not the memory.
     pub fn new(options: PolynomialOptions) -> Result<Self, Error> {
+        Self::watched(options, &mut |_, _| true)
+    }
+
+    /// The same, watched: the tables of a window of millions of samples take seconds.
+    ///
+    /// # Errors
+    /// Likewise, or if the watch cancels.
+    pub fn watched(options: PolynomialOptions, watch: &mut Watch<'_>) -> Result<Self, Error> {
         let window_length = options.window_length;
         if window_length == 0 {
             return Err(Error::WindowTooShort { window_length, least: 1 });
@@ -77,7 +86,9 @@ impl LocalPolynomials {
         if degrees == 0 {
             return Err(Error::WindowTooShort { window_length, least: 4 });
         }
-        let basis = Basis::new(window_length, degrees);
+        // Both tables of half a window: of the basis, and for the kernels.
+        memory::ask_for_numbers(window_length.saturating_mul(MOST_DEGREES))?;
+        let basis = Basis::watched(window_length, degrees, watch)?;
         let residual = options.noise || matches!(options.order, Order::Chosen { .. });
         let engine = engine(&basis, Finish::new(&options, &basis), residual, options.instructions);
         let ends = Ends::new(&options);
@@ -250,7 +261,9 @@ impl LocalPolynomials {
             };
             debug_assert_eq!(outcome, Ok(()), "the lengths of all records were checked");
         };
-        pool::run(self.pieces(records, ends, Wanted::Derivatives)?, workers, || self.scratch(), work, watch)
+        let pieces = self.pieces(records, ends, Wanted::Derivatives)?;
+        self.ask_for_scratch(Wanted::Derivatives, workers.get().min(pieces.len()))?;
+        pool::run(pieces, workers, || self.scratch(), work, watch)
     }
 
     /// Standard errors in the place of derivatives, at all samples of several records, in parallel.
@@ -271,7 +284,20 @@ impl LocalPolynomials {
             debug_assert_eq!(outcome, Ok(()), "the lengths of all records were checked");
         };
         let pieces = self.pieces(records, true, Wanted::Errors)?;
+        self.ask_for_scratch(Wanted::Errors, workers.get().min(pieces.len()))?;
         pool::run(pieces, workers, || self.scratch_for(Wanted::Errors), work, watch)
+    }
+
+    /// Asks for what the scratch memory of so many threads will take.
+    pub(crate) fn ask_for_scratch(&self, wanted: Wanted, threads: usize) -> Result<(), Error> {
+        let window = self.options.window_length;
+        // A run's samples as they are and side by side, and those of a window at an end.
+        let run = window.saturating_mul(3).saturating_add(2 * PIECE + 4 * self.stride());
+        // By order the coefficients, residuals and shares of the windows that are looked at together, and sums over their neighbours.
+        let looked =
+            self.selector(wanted).map_or(0, |selector| (2 * window).saturating_add(PIECE.max(selector.least_piece())));
+        let numbers = run.saturating_add(looked.saturating_mul(4 * self.orders() + 8));
+        memory::ask_for_numbers(numbers.saturating_mul(threads))
     }
 
     /// Cuts records into pieces of work.
@@ -311,6 +337,7 @@ impl LocalPolynomials {
             Order::Fixed(_) => Criterion::default(),
             Order::Chosen { criterion, .. } => criterion,
         };
+        memory::ask_for_numbers(self.options.window_length)?;
         let mut samples = vec![0.0; self.options.window_length];
         record.read(window, &mut samples);
         let Some(window) = Window::project(&self.basis, &samples, self.options.quantisation_floor()) else {

@@ -110,8 +110,10 @@ pub(crate) fn constants(
 ) -> Result<Vec<Identification>, Error> {
     let elements = Elements { first: 0, step };
     let wanted = |motion: &Motion<'_>| motion.angle.len().div_ceil(step);
-    let mut outputs: Vec<(Vec<u8>, Vec<u16>)> =
-        motions.iter().map(|motion| (zeros(wanted(motion)), zeros(wanted(motion)))).collect();
+    let mut outputs: Vec<(Vec<u8>, Vec<u16>)> = motions
+        .iter()
+        .map(|motion| Ok((zeros(wanted(motion))?, zeros(wanted(motion))?)))
+        .collect::<Result<_, Error>>()?;
     let records = motions.iter().zip(&mut outputs).map(|(motion, (order, status))| {
         let regressions = Regressions { elements, status, ..Regressions::default() };
         (motion.clone(), Identified { regressions, order })

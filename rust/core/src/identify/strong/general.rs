@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use crate::equation::motion::{Motion, unknowns};
 use crate::error::Error;
+use crate::exec::memory;
 use crate::exec::pool::Watch;
 use crate::exec::stages::Stages;
 use crate::identify::kinds::Kind;
@@ -32,6 +33,10 @@ use crate::status::Status;
 
 /// Stages of a call, about: only for showing progress.
 const STAGES: usize = 6;
+
+/// Numbers that are kept of a sample at most: in any case, and for every unknown.
+const NUMBERS: usize = 30;
+const NUMBERS_OF_AN_UNKNOWN: usize = 10;
 
 /// How to identify.
 #[derive(Clone, Debug)]
@@ -82,6 +87,8 @@ pub(crate) fn identify_strong(
     watch: &mut Watch<'_>,
 ) -> Result<StrongIdentified, Error> {
     let samples = motion.angle.len();
+    // Measured: 40 to 52 numbers a sample with three unknowns.
+    memory::ask_for_numbers(samples.saturating_mul(NUMBERS + NUMBERS_OF_AN_UNKNOWN * motion.unknowns()))?;
     let mut stages = Stages::new(workers, samples, STAGES, watch);
     let differentiated = differentiate(derivatives, motion, (options.lag, options.filter_torque), &mut stages)?;
     let rows = rows(derivatives, motion, mask, options.linear, &differentiated);

@@ -11,6 +11,7 @@ use crate::exec::pool::{GoOn, Piece, Watch};
 use crate::lanes::output::{Elements, split_off};
 use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares};
 use crate::local_polynomials::estimates::Estimates;
+use crate::local_polynomials::order_shares::Wanted;
 use crate::local_polynomials::plan::LocalPolynomials;
 use crate::record::samples::{Samples, is_usable};
 use crate::record::subsample::stretches;
@@ -176,6 +177,9 @@ pub(crate) fn identify_parts(
             pieces.push(Piece { size: samples.len(), content: (motion, samples, part) });
         }
     }
+    let threads = workers.get().min(pieces.len());
+    derivatives.ask_for_scratch(Wanted::Derivatives, threads)?;
+    least_squares.ask_for_scratch(threads)?;
     let scratch = || (Chunk::new(derivatives, least_squares.columns()), least_squares.scratch());
     let failed = Mutex::new(None);
     let work = |(motion, samples, mut part): (&Motion<'_>, Range<usize>, Identified<'_>),

@@ -27,17 +27,17 @@ struct Columns {
 }
 
 impl Columns {
-    fn new(unknowns: usize, pairs: usize, elements: usize) -> Self {
-        let columns = |count: usize| (0..count).map(|_| zeros(elements)).collect();
-        Self {
-            values: columns(unknowns),
-            stderr: columns(unknowns),
-            covariances: columns(pairs),
-            residual_std: zeros(elements),
-            condition: zeros(elements),
-            status: zeros(elements),
-            order: zeros(elements),
-        }
+    fn new(unknowns: usize, pairs: usize, elements: usize) -> Result<Self, Error> {
+        let columns = |count: usize| (0..count).map(|_| zeros(elements)).collect::<Result<_, _>>();
+        Ok(Self {
+            values: columns(unknowns)?,
+            stderr: columns(unknowns)?,
+            covariances: columns(pairs)?,
+            residual_std: zeros(elements)?,
+            condition: zeros(elements)?,
+            status: zeros(elements)?,
+            order: zeros(elements)?,
+        })
     }
 
     fn outputs(&mut self, elements: Elements) -> Identified<'_> {
@@ -74,7 +74,7 @@ pub(crate) fn windows(
     let (rows, instructions) = (form.regression_window, derivatives.options().instructions);
     let least_squares = RollingLeastSquares::new(rows, unknowns, 1, pairs.clone(), HARDLY_TOLD_APART, instructions)?;
     let wanted = |motion: &Motion<'_>| Columns::new(unknowns, pairs.len(), motion.angle.len().div_ceil(step));
-    let mut columns: Vec<Columns> = motions.iter().map(wanted).collect();
+    let mut columns: Vec<Columns> = motions.iter().map(wanted).collect::<Result<_, _>>()?;
     let outputs = columns.iter_mut().map(|columns| columns.outputs(Elements { first: 0, step }));
     let records = motions.iter().cloned().zip(outputs).collect();
     let factors = if step == 1 {

@@ -1,0 +1,43 @@
+//! Memory whose size a caller decides.
+//!
+//! Where memory runs out in the midst of work, Rust ends the process. So what grows with a record or a window is asked for before.
+
+use crate::error::Error;
+
+/// So little memory is not asked for.
+const LITTLE: usize = 1 << 20;
+
+/// So much is asked for at least. Glibc learns from what is given back, up to 32 MB: later columns of that size would not come from the
+/// system, as zeros that cost nothing, but from its heap.
+const LEAST: usize = 33 << 20;
+
+/// Asks the system for memory and gives it back: work that follows will find it.
+pub(crate) fn ask_for(bytes: usize) -> Result<(), Error> {
+    if bytes < LITTLE {
+        return Ok(());
+    }
+    let mut memory: Vec<u8> = Vec::new();
+    let got = memory.try_reserve_exact(bytes.max(LEAST));
+    // Or the compiler sees that nobody needs it.
+    std::hint::black_box(&memory);
+    got.map_err(|_| Error::Memory { bytes })
+}
+
+/// Asks for memory for so many numbers, of 8 bytes each.
+pub(crate) fn ask_for_numbers(count: usize) -> Result<(), Error> {
+    ask_for(count.saturating_mul(size_of::<f64>()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_there_is_can_be_had_and_nothing_else() {
+        assert_eq!(ask_for(1 << 24), Ok(()));
+        for bytes in [1 << 60, usize::MAX] {
+            assert_eq!(ask_for(bytes), Err(Error::Memory { bytes }));
+        }
+        assert_eq!(ask_for_numbers(usize::MAX / 2), Err(Error::Memory { bytes: usize::MAX }));
+    }
+}

@@ -1,0 +1,17 @@
+//! NumPy arrays for results.
+
+use numpy::{Element, PyArray, PyArrayDyn, dtype};
+use pyo3::exceptions::PyMemoryError;
+use pyo3::prelude::*;
+
+/// An array of zeros, or the `MemoryError` that NumPy raises; the numpy crate's own constructors would panic.
+pub(crate) fn zeros<'py, T: Element>(py: Python<'py>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
+    let bytes = shape.iter().try_fold(size_of::<T>(), |bytes, &extent| bytes.checked_mul(extent));
+    if bytes.is_none_or(|bytes| isize::try_from(bytes).is_err()) {
+        return Err(PyMemoryError::new_err(format!(
+            "results of shape {shape:?} need more memory than can be addressed"
+        )));
+    }
+    let array = py.import("numpy")?.call_method1("zeros", (shape.to_vec(), dtype::<T>(py)))?;
+    Ok(array.cast_into::<PyArray<T, _>>()?)
+}

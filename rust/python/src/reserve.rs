@@ -1,0 +1,104 @@
+//! Memory in reserve, for the little that a call still needs when there is no more: Rust would end the process.
+//!
+//! The core asks for what is large before it needs it. What is small is allocated in too many places to ask in each: where the system has
+//! no more, the reserve is given up, and the watch of the call sees to it that the call ends with a `MemoryError`.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::ptr;
+use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering};
+use std::thread;
+
+/// Bytes of the reserve. They are never touched, so they are addresses only, and no memory.
+const BYTES: usize = 1 << 26;
+
+/// How often memory is tried again, since another thread may just be giving up the reserve.
+const TRIES: usize = 100;
+
+static RESERVE: AtomicPtr<u8> = AtomicPtr::new(ptr::null_mut());
+
+/// What could not be had since the reserve was last filled, in bytes.
+static MISSED: AtomicUsize = AtomicUsize::new(0);
+
+#[global_allocator]
+static ALLOCATOR: WithReserve = WithReserve;
+
+/// Fills the reserve where it was given up. Returns the bytes that there are not, if so.
+pub(crate) fn fill() -> Result<(), usize> {
+    if !RESERVE.load(Ordering::Acquire).is_null() {
+        return Ok(());
+    }
+    // SAFETY: the layout has a size.
+    let fresh = unsafe { System.alloc(layout()) };
+    if fresh.is_null() {
+        return Err(BYTES);
+    }
+    if RESERVE.compare_exchange(ptr::null_mut(), fresh, Ordering::AcqRel, Ordering::Relaxed).is_err() {
+        // SAFETY: another thread was faster, and nobody else knows of this memory.
+        unsafe { System.dealloc(fresh, layout()) };
+    }
+    MISSED.store(0, Ordering::Release);
+    Ok(())
+}
+
+/// Bytes that could not be had since the reserve was last filled.
+pub(crate) fn missed() -> Option<usize> {
+    Some(MISSED.load(Ordering::Acquire)).filter(|&bytes| bytes > 0)
+}
+
+fn layout() -> Layout {
+    Layout::new::<[u64; BYTES / 8]>()
+}
+
+/// The system's allocator, and the reserve where that has no more.
+struct WithReserve;
+
+// SAFETY: all memory comes from the system's allocator and goes back to it with the layout that it came with. Nothing here panics.
+unsafe impl GlobalAlloc for WithReserve {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: what the caller promises.
+        or_again(layout.size(), || unsafe { System.alloc(layout) })
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: what the caller promises.
+        or_again(layout.size(), || unsafe { System.alloc_zeroed(layout) })
+    }
+
+    unsafe fn realloc(&self, place: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        // SAFETY: what the caller promises; where there is no memory the old one stays as it is.
+        or_again(size, || unsafe { System.realloc(place, layout, size) })
+    }
+
+    unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
+        // SAFETY: what the caller promises.
+        unsafe { System.dealloc(place, layout) };
+    }
+}
+
+#[inline]
+fn or_again(bytes: usize, ask: impl Fn() -> *mut u8) -> *mut u8 {
+    let place = ask();
+    if place.is_null() { again(bytes, &ask) } else { place }
+}
+
+#[cold]
+fn again(bytes: usize, ask: &dyn Fn() -> *mut u8) -> *mut u8 {
+    if bytes >= BYTES {
+        // The reserve is no help.
+        return ptr::null_mut();
+    }
+    for _ in 0..TRIES {
+        let reserve = RESERVE.swap(ptr::null_mut(), Ordering::AcqRel);
+        if !reserve.is_null() {
+            MISSED.fetch_max(bytes, Ordering::AcqRel);
+            // SAFETY: whoever takes the reserve out of its place is the only one to have it.
+            unsafe { System.dealloc(reserve, layout()) };
+        }
+        let place = ask();
+        if !place.is_null() {
+            return place;
+        }
+        thread::yield_now();
+    }
+    ptr::null_mut()
+}
