@@ -141,6 +141,37 @@ def test_ctrl_c_is_raised_within_a_tenth_of_a_second(name: str, workers: int, mo
     assert elapsed - began < BUSY
 
 
+def test_a_sample_that_another_thread_writes_is_read_whole() -> None:
+    either = np.ones(200_000), np.full(200_000, 2.0**0.5)
+    y, stop = either[0].copy(), threading.Event()
+
+    def write() -> None:
+        while not stop.is_set():
+            for values in either:
+                y[:] = values
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    try:
+        found = np.concatenate([tvident.savgol_filter(y, 1, 0, mode="nearest") for _ in range(20)])
+    finally:
+        stop.set()
+        writer.join()
+    np.testing.assert_array_equal(np.unique(found), np.unique(either)[np.isin(np.unique(either), found)])
+
+
+@pytest.mark.parametrize("offset", [0, 1, 4])
+def test_samples_are_read_from_any_place(offset: int) -> None:
+    values = np.random.default_rng(1).standard_normal(500)
+    memory = bytearray(offset) + bytearray(values.tobytes())
+    y = np.frombuffer(memory, np.float64, offset=offset)
+    np.testing.assert_array_equal(tvident.savgol_filter(y, 21, 3), tvident.savgol_filter(values, 21, 3))
+    mask = np.arange(500, dtype=np.uint8).view(np.bool_)
+    expected = tvident.identify(values, values[::-1], sample_rate=1, mask=np.arange(500) % 256 > 0, **paper())
+    found = tvident.identify(y, values[::-1], sample_rate=1, mask=mask, **paper())
+    np.testing.assert_array_equal(found.stiffness, expected.stiffness)
+
+
 def everything(y: npt.NDArray[np.float64]) -> dict[str, npt.NDArray[np.float64]]:
     """Call every function that has threads, and give some of what it returned."""
     result = tvident.identify(y, np.roll(y, 3), sample_rate=1000, method="paper", workers=2)

@@ -2,7 +2,7 @@
 
 use std::num::NonZeroUsize;
 
-use numpy::PyReadonlyArray1;
+use numpy::PyUntypedArray;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tvident::exec::workers as threads;
@@ -12,6 +12,7 @@ use tvident::simd::Instructions;
 use crate::identified::{Identification, kind};
 use crate::local_polynomials::LocalPolynomials;
 use crate::motions::Motions;
+use crate::records::flags;
 use crate::watch::watched;
 
 /// Settings of the weak form, one of each a record. What is None is chosen from the record.
@@ -104,7 +105,7 @@ pub(crate) fn identify<'py>(
     delta: f64,
     lag: Vec<Option<f64>>,
     quantisation: Option<f64>,
-    masks: Option<Vec<PyReadonlyArray1<'py, bool>>>,
+    masks: Option<Vec<Bound<'py, PyUntypedArray>>>,
     propagate: bool,
     step: usize,
     diagnose: bool,
@@ -122,7 +123,7 @@ pub(crate) fn identify<'py>(
         instructions: Instructions::current(),
     };
     // A mask may be written by other threads while the interpreter's lock is away.
-    let masks: Option<Vec<Vec<bool>>> = masks.map(|masks| masks.iter().map(|mask| mask.as_array().to_vec()).collect());
+    let masks = masks.map(|masks| masks.iter().map(flags).collect::<PyResult<Vec<_>>>()).transpose()?;
     let mut tasks = Vec::new();
     for (record, motion) in motions.all()?.into_iter().enumerate() {
         let lag = *lag.get(record).ok_or_else(|| PyValueError::new_err("every record needs a lag"))?;
