@@ -121,7 +121,12 @@ fn identify(
     let mut session = Session { record, options, noise: [levels[0], levels[1]], stages };
     let model = session.model();
     let (chosen, decided, lag) = session.choose_and_decide(&model)?;
-    let mut found = session.report(chosen, &decided)?;
+    let (mut found, at_rows) = session.report(chosen, &decided)?;
+    // Rows and windows take as much memory as the results.
+    drop(decided);
+    if let Some(at_rows) = at_rows {
+        found.results = at_rows.at_samples(samples, options.step, &mut session.stages)?;
+    }
     session.stages.finish()?;
     found.lag = lag;
     Ok(found)

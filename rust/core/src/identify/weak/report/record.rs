@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::error::Error;
-use crate::identify::results::{Constant, SampleResults};
+use crate::identify::results::{Constant, RowResults, SampleResults};
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::found::WeakIdentified;
@@ -23,13 +23,17 @@ use crate::status::Status;
 use crate::weak_form::weak_rows::WeakRows;
 
 impl Session<'_, '_, '_> {
-    /// What there is to say of a record.
-    pub(crate) fn report(&mut self, chosen: Chosen, decided: &Decided) -> Result<WeakIdentified, Error> {
+    /// What there is to say of a record, but for the numbers at its samples: those at the rows, for which nothing else is needed any more.
+    pub(crate) fn report(
+        &mut self,
+        chosen: Chosen,
+        decided: &Decided,
+    ) -> Result<(WeakIdentified, Option<RowResults>), Error> {
         let Chosen { mut weak, at_end, .. } = chosen;
         let stride = weak.stride;
         let ordered = decided.ordered();
         let mut found = self.nothing_yet(&weak, decided);
-        let Some(fit) = &decided.fit else { return Ok(self.undetermined(found, decided)) };
+        let Some(fit) = &decided.fit else { return Ok((self.undetermined(found, decided), None)) };
         let given = self.options.regression_window.filter(|_| !self.options.averaging);
         found.regression_window = given.unwrap_or(fit.span * stride).min(self.record.angle.len());
         let errors = self.errors(&weak, decided, fit)?;
@@ -41,7 +45,7 @@ impl Session<'_, '_, '_> {
         };
         let problem = ordered.problem(rows, decided.rhs(rows), self.noise[0], Some(&correlated));
         let all = self.all_unknowns(&problem, decided, fit, &errors)?;
-        let Some(all) = all.as_deref() else { return Ok(self.undetermined(found, decided)) };
+        let Some(all) = all.as_deref() else { return Ok((self.undetermined(found, decided), None)) };
         found.condition = all.pooled.condition;
         found.weakest = weakest(&all.full, &all.pooled.weights);
         found.covariance = all.covariance(&problem, &errors.covariance, &mut self.stages)?;
@@ -86,8 +90,7 @@ impl Session<'_, '_, '_> {
         let rhs = decided.rhs(&weak.rows).to_vec();
         found.suspects = self.suspects(&mut weak, decided, fit, &rhs, &errors)?;
         found.record_status = errors.status | record_status(&found, decided, fit, at_end);
-        found.results = results.at_samples(self.record.angle.len(), self.options.step, &mut self.stages)?;
-        Ok(found)
+        Ok((found, Some(results)))
     }
 
     /// What is known before anything is fitted.
