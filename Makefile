@@ -54,6 +54,11 @@ attack: SECONDS ?= 3600
 attack: $(BUILT)  ## random and hostile calls, files and signals, drawn anew, for an hour or SECONDS=
 	TVIDENT_ATTACK=$(SECONDS) $(BIN)/python -m pytest tests/hostile
 
+.PHONY: sanitize
+sanitize: TARGET = $(shell rustc --version --verbose | sed -n 's/^host: //p')
+sanitize:  ## unit tests of the core under AddressSanitizer (needs Rust's nightly toolchain)
+	ASAN_OPTIONS=allocator_may_return_null=1 RUSTFLAGS=-Zsanitizer=address cargo +nightly test --package tvident --lib --target $(TARGET) --target-dir target/sanitize
+
 .PHONY: docs
 docs: $(BUILT) rooms  ## make anew what documents show of the program: the picture, the command line's help, the rooms
 	$(BIN)/tvident demo
