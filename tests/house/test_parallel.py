@@ -69,6 +69,12 @@ WORKS: dict[str, tuple[int, Prepare]] = {
         3_000_000,
         lambda y, workers: lambda: tvident.identify(y, y, sample_rate=1000, method="paper", workers=workers),
     ),
+    "identify, nothing to find": (
+        1,
+        lambda _y, workers: (
+            lambda: tvident.identify(*2 * [np.broadcast_to(1.0, 30_000_000)], sample_rate=1000, workers=workers)
+        ),
+    ),
     "identify, long windows": (
         3_000_000,
         lambda y, workers: (

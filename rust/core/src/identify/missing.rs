@@ -1,19 +1,30 @@
 //! The treatment of results around missing samples, where they shall be NaN.
 
 use crate::equation::motion::Motion;
+use crate::error::Error;
+use crate::exec::pool::Watch;
 use crate::identify::identification::{Identification, Unknown};
 use crate::status::Status;
 
 /// Samples that are read at a time: what both channels need stays in the nearest cache.
 const PIECE: usize = 1 << 11;
 
+/// Samples between two looks at the watch: some milliseconds.
+const WATCHED: usize = 1 << 20;
+
 /// Numbers of the samples at which angle or torque holds no finite number, in order.
-pub(crate) fn holes(motion: &Motion<'_>) -> Vec<usize> {
+///
+/// # Errors
+/// If the watch cancels.
+pub(crate) fn holes(motion: &Motion<'_>, watch: &mut Watch<'_>) -> Result<Vec<usize>, Error> {
     let samples = motion.angle.len();
     let most = PIECE.min(samples);
     let (mut angle, mut torque) = (vec![0.0; most], vec![0.0; most]);
     let mut holes = Vec::new();
     for first in (0..samples).step_by(PIECE) {
+        if first % WATCHED == WATCHED - PIECE && !watch(0, samples) {
+            return Err(Error::Cancelled);
+        }
         let count = PIECE.min(samples - first);
         let (angle, torque) = (&mut angle[..count], &mut torque[..count]);
         motion.angle.read(first, angle);
@@ -25,7 +36,7 @@ pub(crate) fn holes(motion: &Motion<'_>) -> Vec<usize> {
             holes.extend((0..count).filter(lost).map(|place| first + place));
         }
     }
-    holes
+    Ok(holes)
 }
 
 /// Takes the numbers away whose windows hold a hole, but for constants, whose window is the record.

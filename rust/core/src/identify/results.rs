@@ -69,16 +69,22 @@ pub(crate) struct SampleResults {
 
 impl SampleResults {
     /// Nothing but a status.
-    pub(crate) fn undetermined(changing: usize, elements: usize) -> Self {
-        let nothing = || vec![f64::NAN; elements];
-        Self {
-            values: (0..changing).map(|_| nothing()).collect(),
-            errors: (0..changing).map(|_| nothing()).collect(),
+    pub(crate) fn undetermined(changing: usize, elements: usize, stages: &mut Stages<'_, '_>) -> Result<Self, Error> {
+        let filled = |columns: usize, value: f64, stages: &mut Stages<'_, '_>| -> Result<Vec<Vec<f64>>, Error> {
+            let mut columns: Vec<Vec<f64>> = (0..columns).map(|_| zeros(elements)).collect::<Result<_, _>>()?;
+            stages.fill(&mut columns, |_, parts| parts.iter_mut().for_each(|part| part.fill(value)))?;
+            Ok(columns)
+        };
+        let mut status = zeros(elements)?;
+        status.fill((Status::INVALID | Status::RANK_DEFICIENT).bits());
+        Ok(Self {
+            values: filled(changing, f64::NAN, stages)?,
+            errors: filled(changing, f64::NAN, stages)?,
             covariances: Vec::new(),
-            deviation: nothing(),
-            condition: vec![f64::INFINITY; elements],
-            status: vec![(Status::INVALID | Status::RANK_DEFICIENT).bits(); elements],
-        }
+            deviation: filled(1, f64::NAN, stages)?.remove(0),
+            condition: filled(1, f64::INFINITY, stages)?.remove(0),
+            status,
+        })
     }
 }
 

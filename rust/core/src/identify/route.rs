@@ -39,7 +39,7 @@ pub fn identify_all(
 ) -> Result<Vec<Identification>, Error> {
     let mut found: Vec<Option<Identification>> = tasks.iter().map(|_| None).collect();
     // Asked once, since the answer may need every sample of the record.
-    let routes: Vec<Pieces> = tasks.iter().map(|task| route(task, options)).collect();
+    let routes: Vec<Pieces> = tasks.iter().map(|task| route(task, options, watch)).collect::<Result<_, Error>>()?;
     for pieces in [Pieces::Windowed, Pieces::Constant] {
         for (form, places) in together(tasks, &routes, pieces) {
             let motions: Vec<Motion<'_>> = places.iter().map(|&place| tasks[place].motion.clone()).collect();
@@ -77,7 +77,7 @@ fn alone(
         }
     };
     if options.propagate {
-        let holes = holes(&task.motion);
+        let holes = holes(&task.motion, &mut |_, total| watch(total, total))?;
         if !holes.is_empty() {
             propagate(&mut found, &holes, options.step);
         }
@@ -102,18 +102,18 @@ fn together<'a, 'b>(tasks: &'a [Task<'b>], routes: &[Pieces], pieces: Pieces) ->
 }
 
 /// How a record is worked on; in weak form as a whole.
-fn route(task: &Task<'_>, options: &Options) -> Pieces {
-    let Method::Strong(form) = &task.method else { return Pieces::Whole };
+fn route(task: &Task<'_>, options: &Options, watch: &mut Watch<'_>) -> Result<Pieces, Error> {
+    let Method::Strong(form) = &task.method else { return Ok(Pieces::Whole) };
     let is_plain = !form.filter_torque && task.lag == Some(0.0) && task.mask.is_none();
     let kinds = in_strong_form(&options.kinds, &regressors(&task.motion));
     let all = |kind: Kind| is_plain && kinds.iter().all(|one| *one == kind);
-    if all(Kind::Constant) {
+    Ok(if all(Kind::Constant) {
         Pieces::Constant
-    } else if all(Kind::Windowed) && !form.linear && (options.propagate || holes(&task.motion).is_empty()) {
+    } else if all(Kind::Windowed) && !form.linear && (options.propagate || holes(&task.motion, watch)?.is_empty()) {
         Pieces::Windowed
     } else {
         Pieces::Whole
-    }
+    })
 }
 
 /// Says of what the record was to decide, and strong form took as constant, that nothing tested it.

@@ -104,7 +104,7 @@ pub(crate) fn identify_strong(
         Fit::in_rows(&problem, options.regression_window, any, instructions)
     };
     let order = differentiated.order.iter().copied().step_by(options.step).collect();
-    let Some(fit) = fit else { return Ok(undetermined(&model, samples, options.step, order)) };
+    let Some(fit) = fit else { return undetermined(&model, samples.div_ceil(options.step), order, &mut stages) };
     let constants = fit.pooled.values.clone();
     let count = constants.len();
 
@@ -226,16 +226,21 @@ fn listed(model: &Model, values: &[f64], covariance: &[f64]) -> Vec<Constant> {
 }
 
 /// Nothing but a status.
-fn undetermined(model: &Model, samples: usize, step: usize, order: Vec<u8>) -> StrongIdentified {
+fn undetermined(
+    model: &Model,
+    elements: usize,
+    order: Vec<u8>,
+    stages: &mut Stages<'_, '_>,
+) -> Result<StrongIdentified, Error> {
     let nan = |&unknown: &usize| Constant { unknown, value: f64::NAN, error: f64::NAN, test: None };
-    StrongIdentified {
+    Ok(StrongIdentified {
         constants: model.constant.iter().map(nan).collect(),
         changing: model.windowed.clone(),
         pairs: Vec::new(),
         record_status: Status::RANK_DEFICIENT,
-        results: SampleResults::undetermined(model.windowed.len(), samples.div_ceil(step)),
+        results: SampleResults::undetermined(model.windowed.len(), elements, stages)?,
         order,
-    }
+    })
 }
 
 /// The covariance of rows that residuals show, for residuals of some variance; of a long record, those of stretches.

@@ -33,7 +33,7 @@ impl Session<'_, '_, '_> {
         let stride = weak.stride;
         let ordered = decided.ordered();
         let mut found = self.nothing_yet(&weak, decided);
-        let Some(fit) = &decided.fit else { return Ok((self.undetermined(found, decided), None)) };
+        let Some(fit) = &decided.fit else { return Ok((self.undetermined(found, decided)?, None)) };
         let given = self.options.regression_window.filter(|_| !self.options.averaging);
         found.regression_window = given.unwrap_or(fit.span * stride).min(self.record.angle.len());
         let errors = self.errors(&weak, decided, fit)?;
@@ -45,7 +45,7 @@ impl Session<'_, '_, '_> {
         };
         let problem = ordered.problem(rows, decided.rhs(rows), self.noise[0], Some(&correlated));
         let all = self.all_unknowns(&problem, decided, fit, &errors)?;
-        let Some(all) = all.as_deref() else { return Ok((self.undetermined(found, decided), None)) };
+        let Some(all) = all.as_deref() else { return Ok((self.undetermined(found, decided)?, None)) };
         found.condition = all.pooled.condition;
         found.weakest = weakest(&all.full, &all.pooled.weights);
         found.covariance = all.covariance(&problem, &errors.covariance, &mut self.stages)?;
@@ -138,14 +138,14 @@ impl Session<'_, '_, '_> {
     }
 
     /// Nothing but a status.
-    fn undetermined(&self, mut found: WeakIdentified, decided: &Decided) -> WeakIdentified {
+    fn undetermined(&mut self, mut found: WeakIdentified, decided: &Decided) -> Result<WeakIdentified, Error> {
         let elements = self.record.angle.len().div_ceil(self.options.step);
         for &unknown in &decided.model.constant {
             found.constants.push(Constant { unknown, value: f64::NAN, error: f64::NAN, test: None });
         }
         found.record_status = Status::RANK_DEFICIENT;
-        found.results = SampleResults::undetermined(found.changing.len(), elements);
-        found
+        found.results = SampleResults::undetermined(found.changing.len(), elements, &mut self.stages)?;
+        Ok(found)
     }
 }
 
