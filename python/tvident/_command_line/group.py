@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import sys
 import warnings
 from collections.abc import Iterator
@@ -45,8 +46,21 @@ def _in_plain_words() -> Iterator[None]:
     except OSError as error:
         if error.errno == errno.EPIPE:
             raise  # whoever reads the output has had enough: click ends without a word
+        _let_go_of_output()
         place = "the output" if error.filename is None else printable(error.filename)
         raise click.ClickException(f"{place}: {_line(error.strerror)}") from None
+
+
+def _let_go_of_output() -> None:
+    """Forget what standard output cannot take: the interpreter would try once more at its end, complain, and exit with 120."""
+    output = sys.__stdout__
+    try:
+        if output is not None:
+            output.flush()
+    except OSError:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, output.fileno())
+        os.close(nowhere)
 
 
 def _line(message: object) -> str:
