@@ -54,9 +54,10 @@ def _in_plain_words() -> Iterator[None]:
 def _let_go_of_output() -> None:
     """Forget what standard output cannot take: the interpreter would try once more at its end, complain, and exit with 120."""
     output = sys.__stdout__
+    if output is None:
+        return
     try:
-        if output is not None:
-            output.flush()
+        output.flush()
     except OSError:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, output.fileno())
