@@ -65,9 +65,7 @@ impl Slow<'_> {
         }
         Some(Varying { first: 0.0, spacing, values, variances, constants })
     }
-}
 
-impl Slow<'_> {
     /// The right-hand side of an equation of a window, with what the slow coefficients of the previous round took from it.
     fn rhs(&self, window: usize, row: f64, equation: usize) -> f64 {
         let full = &self.fit.full;

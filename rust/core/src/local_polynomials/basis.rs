@@ -71,9 +71,9 @@ impl Basis {
     pub(crate) fn watched(length: usize, degrees: usize, watch: &mut Watch<'_>) -> Result<Self, Error> {
         assert!((1..=length).contains(&degrees), "{degrees} polynomials are not independent on {length} samples");
         let recurrence = recurrence(length, degrees);
-        let steps =
-            recurrence.windows(2).map(|b| ((b[0] / b[1]).to_f64(), (DoubleDouble::ONE / b[1]).to_f64())).collect();
-        let inverses = recurrence.iter().map(|&b| DoubleDouble::ONE / b).collect();
+        let inverses: Vec<DoubleDouble> = recurrence.iter().map(|&b| DoubleDouble::ONE / b).collect();
+        let pairs = recurrence.windows(2).zip(&inverses[1..]);
+        let steps = pairs.map(|(b, inverse)| ((b[0] / b[1]).to_f64(), inverse.to_f64())).collect();
         let mut basis = Self { length, degrees, recurrence, inverses, steps, values: Vec::new() };
         let rows = length - length / 2;
         memory::ask_for_numbers(rows.saturating_mul(degrees))?;

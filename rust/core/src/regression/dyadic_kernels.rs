@@ -69,12 +69,11 @@ impl Kernel for Summaries<'_, '_> {
     }
 }
 
-/// Writes the sums of neighbouring summaries and others, whose rows begin `later` seconds after theirs. Without summaries the others
-/// are added to what is there.
+/// Writes the sums of neighbouring summaries and others, whose rows begin `later` seconds after theirs, from the beginning of a table
+/// on. Without summaries the others are added to what is there.
 pub(crate) struct Merges<'a> {
     pub(crate) layout: Layout,
     pub(crate) table: &'a mut Table,
-    pub(crate) place: usize,
     pub(crate) summaries: Option<(&'a Table, usize)>,
     pub(crate) others: (&'a Table, usize),
     pub(crate) count: usize,
@@ -87,7 +86,7 @@ impl Kernel for Merges<'_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, _simd: S) {
-        let Self { layout, table, place, summaries, others: (others, from), count, later, memory } = self;
+        let Self { layout, table, summaries, others: (others, from), count, later, memory } = self;
         with_layout!(layout, S::F64_LANES, {
             let (summary, rest) = memory.split_at_mut(layout.size());
             let (more, rows) = rest.split_at_mut(layout.size());
@@ -96,11 +95,11 @@ impl Kernel for Merges<'_> {
             for packet in (0..count).step_by(WIDTH) {
                 match summaries {
                     Some((summaries, first)) => summaries.load(first + packet, summary),
-                    None => table.load(place + packet, summary),
+                    None => table.load(packet, summary),
                 }
                 others.load(from + packet, more);
                 merge(layout, summary, more, later, rows);
-                table.store(place + packet, summary);
+                table.store(packet, summary);
             }
         });
     }

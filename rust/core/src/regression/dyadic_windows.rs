@@ -122,16 +122,10 @@ impl DyadicWindows<'_, '_> {
             let Some((&(begin, level), rest)) = pieces.split_first() else { continue };
             for place in (0..windows).step_by(CHUNK) {
                 let count = CHUNK.min(windows - place);
-                let alone = (&tables[level], place + begin);
-                let mut held = Some(alone);
+                let mut held = Some((&tables[level], place + begin));
                 for &(first, level) in rest {
-                    self.merge(
-                        (&mut *chunk, 0),
-                        held.take(),
-                        (&tables[level], place + first),
-                        (count, first - begin),
-                        memory,
-                    );
+                    let others = (&tables[level], place + first);
+                    self.merge(chunk, held.take(), others, (count, first - begin), memory);
                 }
                 let summaries = held.unwrap_or((&*chunk, 0));
                 let later = shape.centre * self.problem.period - begin as f64 * self.block_period();
@@ -167,21 +161,21 @@ impl DyadicWindows<'_, '_> {
             let (below, table) = tables.split_at_mut(level + 1);
             let (below, table) = (&below[level], &mut table[0]);
             table.resize(layout.size(), count);
-            self.merge((&mut *table, 0), Some((below, 0)), (below, half), (count, half), memory);
+            self.merge(table, Some((below, 0)), (below, half), (count, half), memory);
         }
     }
 
     /// Writes the sums of summaries and others that begin some blocks later; without summaries the others are added to what is there.
     fn merge(
         &self,
-        (table, place): (&mut Table, usize),
+        table: &mut Table,
         summaries: Option<(&Table, usize)>,
         others: (&Table, usize),
         (count, blocks_later): (usize, usize),
         memory: &mut [Packet],
     ) {
         let later = blocks_later as f64 * self.block_period();
-        let merges = Merges { layout: self.problem.layout, table, place, summaries, others, count, later, memory };
+        let merges = Merges { layout: self.problem.layout, table, summaries, others, count, later, memory };
         dispatch(self.instructions, merges);
     }
 }
