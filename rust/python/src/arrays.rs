@@ -3,6 +3,10 @@
 use numpy::{Element, PyArray, PyArrayDyn, dtype};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+
+/// NumPy's own function, looked up once: a short call makes half a dozen arrays.
+static ZEROS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
 
 /// An array of zeros, or the `MemoryError` that NumPy raises; the numpy crate's own constructors would panic.
 pub(crate) fn zeros<'py, T: Element>(py: Python<'py>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
@@ -12,6 +16,6 @@ pub(crate) fn zeros<'py, T: Element>(py: Python<'py>, shape: &[usize]) -> PyResu
             "results of shape {shape:?} need more memory than can be addressed"
         )));
     }
-    let array = py.import("numpy")?.call_method1("zeros", (shape.to_vec(), dtype::<T>(py)))?;
+    let array = ZEROS.import(py, "numpy", "zeros")?.call1((shape.to_vec(), dtype::<T>(py)))?;
     Ok(array.cast_into::<PyArray<T, _>>()?)
 }
