@@ -16,6 +16,7 @@ __all__ = [
     "Motions",
     "Noise",
     "OutsideMask",
+    "Responses",
     "RollingRegressions",
     "StrongForm",
     "Suspect",
@@ -29,6 +30,7 @@ __all__ = [
     "instructions",
     "noise",
     "quantisation_step",
+    "respond",
     "rolling_least_squares",
     "status_flags",
 ]
@@ -103,6 +105,15 @@ class AutomaticEstimates:
     def chosen(self) -> list[list[tuple[int, int]]]: ...
     @property
     def noise(self) -> list[tuple[float, float]]: ...
+
+@final
+class Responses:
+    @property
+    def angle(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def velocity(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def lost(self) -> list[int | None]: ...
 
 @final
 class RollingRegressions:
@@ -252,6 +263,19 @@ def identify(
     progress: Callable[[int, int], object] | None = None,
 ) -> list[Identification]: ...
 def built_in_terms() -> list[str]: ...
+def respond(
+    coefficients: list[npt.NDArray[np.number] | float],
+    terms: list[tuple[str, npt.NDArray[np.number] | float]],
+    torque: npt.NDArray[np.number],
+    *,
+    delta: float,
+    lag: list[float],
+    bridged: int,
+    angle: npt.NDArray[np.number] | None = None,
+    initial: list[list[float]] | None = None,
+    spans: list[tuple[int, int, int]] | None = None,
+    workers: int | None = None,
+) -> Responses: ...
 def rolling_least_squares(
     regressors: npt.NDArray[np.number],
     rhs: npt.NDArray[np.number],

@@ -24,6 +24,7 @@ ROOMS = (
     "auto_derivatives",
     "least_squares",
     "equation",
+    "response",
     "weak_form",
     "regression",
     "inference",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,8 @@ from tvident._derivatives import SHORTEST_WINDOW, plan, quantisation_step
 from tvident._equation import COEFFICIENTS, Kind, Unknown, all_terms, parameter
 from tvident._identify.batch import estimates
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm, exponent_of
-from tvident._identify.settings import Request, plain
-from tvident._results import Estimates, Identification, Words
+from tvident._identify.settings import Request, plain, resolve
+from tvident._results import Estimates, Identification, Recorded, Words
 
 _WINDOW_OF_TERMS = 51
 """Samples of the polynomials that terms of one's own get angle and velocity from in weak form."""
@@ -94,8 +95,8 @@ class Task:
         self._names = [one.name for one in self._unknowns]
         self._known = {name: value for name, value in self._parameters.items() if not isinstance(value, str)}
 
-    def run(self, progress: arguments.Progress) -> Identification:
-        """Identify every record."""
+    def run(self, progress: arguments.Progress, *, diagnose: bool = True) -> Identification:
+        """Identify every record, and look for what may be missing in the equation."""
         data, request = self._data, self._request
         form, core_plan = self._form()
         with arguments.reporter(progress, "identification") as report:
@@ -109,6 +110,7 @@ class Task:
                 masks=data.masks,
                 propagate=data.propagate,
                 step=data.step,
+                diagnose=diagnose,
                 workers=data.workers,
                 progress=report,
             )
@@ -133,6 +135,22 @@ class Task:
             jumps=jumps if data.batch else jumps[0],
             words=explain(found, batch, settings),
             settings=plain(settings),
+            recorded=Recorded(
+                data.angles,
+                data.torques,
+                own={term.name: term.own for term in self._terms if term.own is not None},
+                again=partial(self._again, plain(settings)),
+            ),
+        )
+
+    def _again(self, settings: dict[str, Any], angles: npt.NDArray[np.number]) -> Identification:
+        """Identify another angle with what was chosen; its missing values are left out."""
+        given: dict[str, Any] = {name: value for name, value in self._known.items() if not isinstance(value, float)}
+        if settings["own_terms"]:
+            given["terms"] = [(term.own or term.name, settings["kinds"][term.name]) for term in self._terms]
+        request = resolve("auto", given, settings, settings["sample_rate"])
+        return Task(replace(self._data, angles=angles, propagate=False, step=1), request).run(
+            progress=None, diagnose=False
         )
 
     def _form(self) -> tuple[_core.WeakForm | _core.StrongForm, _core.LocalPolynomials | None]:

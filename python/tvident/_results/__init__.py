@@ -1,7 +1,8 @@
 """Holds the result of an identification: parameters by name, standard errors, natural frequency, the summary."""
 
 from tvident._results.estimates import Estimates
+from tvident._results.recorded import Recorded
 from tvident._results.result import Identification
 from tvident._results.words import Words
 
-__all__ = ["Estimates", "Identification", "Words"]
+__all__ = ["Estimates", "Identification", "Recorded", "Words"]

@@ -14,6 +14,8 @@ from tvident._equation import UNITS
 from tvident._files import aligned, write_table
 from tvident._results.estimates import Estimates
 from tvident._results.oscillator import Oscillator
+from tvident._results.recorded import Recorded
+from tvident._results.simulated import Simulated
 from tvident._results.standard_errors import StandardErrors
 from tvident._results.words import Words
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status, describe
@@ -44,7 +46,7 @@ def _product(factor: Array, error: Array) -> Array:
     return np.asarray(factor * error)
 
 
-class Identification:
+class Identification(Simulated):
     r"""What :func:`tvident.identify` found. ``n`` is the number of samples, or of every ``step``-th of them.
 
     Attributes
@@ -115,7 +117,9 @@ class Identification:
         jumps: tuple[Any, ...],
         words: Words,
         settings: dict[str, Any],
+        recorded: Recorded | None = None,
     ) -> None:
+        super().__init__(recorded)
         self.time = time
         self.inertia = found.values["inertia"]
         self.damping = found.values["damping"]
@@ -219,12 +223,15 @@ class Identification:
         Returns
         -------
         str
-            Median, range and median standard error of every parameter; what was chosen and why; what to do about what looks wrong;
-            how often each flag of the status occurs.
+            How much the model explains of a part of the record that was held back; median, range and median standard error of every
+            parameter; what was chosen and why; what to do about what looks wrong; how often each flag of the status occurs.
         """
         s = self.settings
         n, seconds = self.time.size, float(self.time[-1] - self.time[0]) if self.time.size else 0.0
-        lines = [f"{n} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz, method {s['method']}"]
+        lines = [
+            self.held_back().words(),
+            f"{n} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz, method {s['method']}",
+        ]
         length, rows = (_range(s[name]) for name in ("window_length", "regression_window"))
         if s["form"] == "strong":
             lines.append(

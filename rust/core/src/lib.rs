@@ -12,6 +12,7 @@ pub mod local_polynomials;
 pub mod noise;
 pub mod record;
 pub mod regression;
+pub mod response;
 pub mod simd;
 mod status;
 pub mod weak_form;

@@ -15,6 +15,7 @@ mod motions;
 mod noise;
 mod records;
 mod reserve;
+mod respond;
 mod rolling;
 mod watch;
 
@@ -41,6 +42,8 @@ mod _core {
     use crate::motions::Motions;
     #[pymodule_export]
     use crate::noise::{Noise, noise, quantisation_step};
+    #[pymodule_export]
+    use crate::respond::{Responses, respond};
     #[pymodule_export]
     use crate::rolling::{RollingRegressions, rolling_least_squares};
 

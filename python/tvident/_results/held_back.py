@@ -1,0 +1,98 @@
+"""How much of a part of the record that was held back the model explains."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._results.response import Model, accounted_for, without_gaps
+
+PARTS = 10
+"""The last tenth of each is held back."""
+
+_SHARE = 0.1
+
+_FUNCTIONS = 10
+"""Test functions that a part must be long, so that the held-back tenth of it is as long as one."""
+
+
+@dataclass(frozen=True)
+class HeldBack:
+    r"""What a model explains of samples that it was not fitted to, in percent of the variance of their angle.
+
+    Parameters
+    ----------
+    simulated : float or ndarray, shape (\*)
+        From the state before a held-back part to its end.
+    predicted : float or ndarray, shape (\*)
+        One test function ahead.
+    parts : int
+        Parts of the record whose last tenth was held back: ten, or fewer in a short record.
+    why_not : str
+        Why there are no numbers; empty if there are.
+    """
+
+    simulated: Any = np.nan
+    predicted: Any = np.nan
+    parts: int = PARTS
+    why_not: str = ""
+
+    def words(self) -> str:
+        """Return it as a line."""
+        if self.why_not:
+            return f"how much of a held-back part the model explains is not known: {self.why_not}"
+        several = np.ndim(self.simulated) > 0
+        simulated, predicted = (_percent(float(np.nanmedian(value))) for value in (self.simulated, self.predicted))
+        where = "the last tenth of every tenth" if self.parts == PARTS else f"the last tenth of {self.parts} parts"
+        whose = " (median of all records)" if several else ""
+        return (
+            f"explains {simulated} of the angle simulated and {predicted} predicted one test function ahead in {where}, "
+            f"held back from the fit{whose}"
+        )
+
+
+def _percent(value: float) -> str:
+    """Return a share with two digits of what it leaves: 99.9964 is far from 100."""
+    left = abs(100 - value)
+    digits = min(6, max(0, 1 - math.floor(math.log10(left)))) if 0 < left < np.inf else 0
+    return f"{value:.{digits}f} %"
+
+
+def parts_of(samples: int, window_length: int) -> list[tuple[int, int, int]]:
+    """Return the parts of a record: first sample, first that is held back, end."""
+    count = min(PARTS, max(1, samples // (_FUNCTIONS * window_length)))
+    ends = [round(samples * part / count) for part in range(count + 1)]
+    return [(begin, end - max(1, round(_SHARE * (end - begin))), end) for begin, end in pairwise(ends)]
+
+
+def evaluated(
+    model: Model,
+    angle: npt.NDArray[np.number],
+    torque: npt.NDArray[np.number],
+    parts: list[tuple[int, int, int]],
+    window_length: int,
+) -> HeldBack:
+    """Return what a model that was fitted to the rest explains of the ends of the parts."""
+    held = np.zeros(angle.shape[-1], bool)
+    pieces = []
+    for begin, first, end in parts:
+        held[first:end] = True
+        before = min(window_length, first - begin)
+        pieces += [(start - before, start, min(start + before, end)) for start in range(first, end, max(1, before))]
+    # A part that was held back has no parameters of its own.
+    values = {name: without_gaps(value) if value.shape[-1] > 1 else value for name, value in model.values.items()}
+    model = replace(model, values=values)
+    # What a piece tells of its first half is no prediction: the piece before overwrites it.
+    shares = []
+    for spans in (parts, pieces[::-1]):
+        simulated, _ = model.respond(torque, angle=angle, spans=spans)
+        share = accounted_for(angle[..., held], simulated[..., held])
+        shares.append(share if share.ndim else float(share))
+    if not np.isfinite(shares[0]).any():
+        return HeldBack(why_not="no sample that was held back has an angle and parameters")
+    return HeldBack(shares[0], shares[1], len(parts))

@@ -1,0 +1,51 @@
+"""The record that a result was found in, as far as its simulation needs it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._equation import Term
+
+Numbers: TypeAlias = npt.NDArray[np.number]
+
+_LOOKED_AT = 1024
+"""Samples of each channel by which a record is known again: whoever writes another recording into the same arrays changes most of them."""
+
+
+@dataclass(frozen=True)
+class Recorded:
+    r"""A record, by reference: its channels are not copied.
+
+    Parameters
+    ----------
+    angles, torques : ndarray, shape (\*, n)
+    own : mapping of str to Term
+        Terms of the user's own.
+    again : callable
+        Identifies once more, with the same settings and another angle.
+    """
+
+    angles: Numbers
+    torques: Numbers
+    own: Mapping[str, Term]
+    again: Callable[[Numbers], Any]
+    _mark: bytes = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_mark", _mark(self.angles) + _mark(self.torques))
+
+    @property
+    def is_unchanged(self) -> bool:
+        """Whether nobody has written another record into the arrays meanwhile."""
+        return self._mark == _mark(self.angles) + _mark(self.torques)
+
+
+def _mark(channel: Numbers) -> bytes:
+    flat = channel.reshape(-1, channel.shape[-1])
+    rows, samples = (max(1, size // some) for size, some in ((flat.shape[0], 8), (flat.shape[1], _LOOKED_AT)))
+    return np.ascontiguousarray(flat[::rows, ::samples]).tobytes()

@@ -1,0 +1,12 @@
+//! The response of a system whose parameters are known to a torque: integration over samples, and the state to begin in.
+
+pub(crate) mod friction;
+pub(crate) mod gaps;
+pub(crate) mod initial_state;
+pub(crate) mod integrator;
+pub(crate) mod spans;
+pub(crate) mod system;
+pub(crate) mod transition;
+
+pub use spans::{Begins, Response, Span, respond};
+pub use system::{Factor, System};
