@@ -1,5 +1,6 @@
 """Identification of inertia, damping and stiffness that change while they are measured, and derivatives of noisy recordings."""
 
+from tvident._compare import ModelComparison, compare_models
 from tvident._derivatives import LocalPolynomialFit, fit_local_polynomials, savgol_filter
 from tvident._equation import Term
 from tvident._identify import StrongForm, WeakForm, identify
@@ -11,12 +12,14 @@ from tvident._status import Status
 __all__ = [
     "Identification",
     "LocalPolynomialFit",
+    "ModelComparison",
     "Recording",
     "RollingRegression",
     "Status",
     "StrongForm",
     "Term",
     "WeakForm",
+    "compare_models",
     "fit_local_polynomials",
     "identify",
     "rolling_least_squares",

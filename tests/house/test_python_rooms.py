@@ -26,6 +26,7 @@ ROOMS = (
     "_results",
     "_advice",
     "_identify",
+    "_compare",
     "recordings",  # doors: what users import by the room's name
     "figures",
     "tvident",  # the front door

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import stat
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import click
 
@@ -13,6 +13,7 @@ import tvident
 from tvident import _arguments as arguments
 from tvident import recordings
 from tvident._command_line.channels import channel_of, mask_of, scaled, source_of
+from tvident._command_line.equation import lag_of, parameter_of, terms_of
 from tvident._command_line.group import main
 from tvident._command_line.method import METHOD, NAMES, method_of
 from tvident._command_line.options import (
@@ -28,7 +29,7 @@ from tvident._command_line.options import (
     wanted_progress,
 )
 from tvident._command_line.output import give, save_figure
-from tvident._equation import COEFFICIENTS, TERM_NAMES, UNITS, Kind
+from tvident._equation import COEFFICIENTS, TERM_NAMES, UNITS
 from tvident._files import printable, replaced
 
 _MOST_BYTES = 100_000_000
@@ -107,13 +108,13 @@ def identify(
         scaled(source_of(channels, torque, file), torque_scale, channels, file),
         method=form,
         t=None if time_channel is None else channel_of(channels, time_channel, file),
-        lag=None if lag is None else _lag(lag),
+        lag=None if lag is None else lag_of(lag),
         mask=None if mask is None else mask_of(source_of(channels, mask, file)),
         settings=None if settings is None else _read_settings(settings),
-        terms=_terms(terms),
+        terms=terms_of(terms),
         progress=wanted_progress(progress),
         **{
-            name: _parameter(value, channels, file) if name in COEFFICIENTS else value
+            name: parameter_of(value, channels, file) if name in COEFFICIENTS else value
             for name, value in given(options).items()
             if name not in NAMES
         },
@@ -127,41 +128,6 @@ def identify(
     give(result.columns(), UNITS, "\n".join(words), output)
     if plot is not None:
         save_figure(result.plot(), Path(plot))
-
-
-def _parameter(value: str, channels: recordings.Channels, file: str | None) -> Any:
-    """Return a kind, a number, or a channel."""
-    if value in get_args(Kind):
-        return value
-    try:
-        return float(value)
-    except ValueError:
-        return recordings.channel(channels, value, file or "the command line")
-
-
-def _terms(texts: tuple[str, ...]) -> list[Any] | None:
-    """Return terms from ``name`` or ``name:kind``; nothing where none are given, none where ``none`` is."""
-    if texts == ("none",):
-        return []
-    parts = [text.partition(":") for text in texts]
-    return [(name, kind) if kind else name for name, _, kind in parts] or None
-
-
-def _lag(text: str) -> float | Literal["auto"]:
-    """Return a time in seconds from a number, or from one with a unit; ``auto`` as it is."""
-    if text == "auto":
-        return "auto"
-    try:
-        return float(text)
-    except ValueError:
-        pass
-    sign, magnitude = (-1.0, text.strip()[1:]) if text.strip().startswith("-") else (1.0, text)
-    try:
-        return sign * arguments.seconds("lag", magnitude)
-    except ValueError:
-        raise click.UsageError(
-            f"lag must be seconds, a time such as '2 ms', or 'auto'; got {text!r}; repair it"
-        ) from None
 
 
 def _read_settings(path: str) -> dict[str, Any]:

@@ -8,8 +8,9 @@ except ImportError as error:  # pragma: no cover - the extra is installed where 
     ) from error
 
 from tvident._figures.derivatives import plot_derivatives
+from tvident._figures.models import plot_models
 from tvident._figures.parameters import plot_identification
 from tvident._figures.recording import plot_recording
 from tvident._figures.window import plot_window
 
-__all__ = ["plot_derivatives", "plot_identification", "plot_recording", "plot_window"]
+__all__ = ["plot_derivatives", "plot_identification", "plot_models", "plot_recording", "plot_window"]

@@ -1,0 +1,46 @@
+"""Parameters, terms and lags of the equation of motion as the options give them."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, get_args
+
+import click
+
+from tvident import _arguments as arguments
+from tvident import recordings
+from tvident._equation import Kind
+
+
+def parameter_of(value: str, channels: recordings.Channels, file: str | None) -> Any:
+    """Return a kind, a number, or a channel."""
+    if value in get_args(Kind):
+        return value
+    try:
+        return float(value)
+    except ValueError:
+        return recordings.channel(channels, value, file or "the command line")
+
+
+def terms_of(texts: tuple[str, ...]) -> list[Any] | None:
+    """Return terms from ``name`` or ``name:kind``; nothing where none are given, none where ``none`` is."""
+    if texts == ("none",):
+        return []
+    parts = [text.partition(":") for text in texts]
+    return [(name, kind) if kind else name for name, _, kind in parts] or None
+
+
+def lag_of(text: str) -> float | Literal["auto"]:
+    """Return a time in seconds from a number, or from one with a unit; ``auto`` as it is."""
+    if text == "auto":
+        return "auto"
+    try:
+        return float(text)
+    except ValueError:
+        pass
+    sign, magnitude = (-1.0, text.strip()[1:]) if text.strip().startswith("-") else (1.0, text)
+    try:
+        return sign * arguments.seconds("lag", magnitude)
+    except ValueError:
+        raise click.UsageError(
+            f"lag must be seconds, a time such as '2 ms', or 'auto'; got {text!r}; repair it"
+        ) from None

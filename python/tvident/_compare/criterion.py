@@ -1,0 +1,71 @@
+"""The criterion that models are compared by, and the weights that follow from it."""
+
+from __future__ import annotations
+
+import math
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._results import Identification
+
+Array: TypeAlias = npt.NDArray[np.float64]
+
+
+def effective_observations(samples: int, window_length: int, exponent: int) -> float:
+    """Return how many independent observations overlapping rows are worth: samples over the sum of their squared autocorrelations.
+
+    White noise of the torque makes rows whose autocorrelation is that of the test function. The logarithm of their mean square then
+    scatters as that of so many independent ones (Bartlett), and a regressor that is not needed, with the rows' spectrum, lowers it by
+    one over this number.
+    """
+    x = np.linspace(-1, 1, window_length)
+    function = (1 - x**2) ** exponent
+    autocorrelation = np.correlate(function, function, mode="full")
+    return float(samples / np.sum((autocorrelation / autocorrelation.max()) ** 2))
+
+
+def effective_parameters(result: Identification, samples: int) -> float:
+    """Return how many parameters were estimated: one a constant; of what changes as many as windows have coefficients."""
+    settings, count = result.settings, 0.0
+    known = settings["known"]
+    for name in ("inertia", "damping", "stiffness", *result.terms):
+        if name in known:
+            continue
+        if name in result.constants:
+            count += 1
+        else:
+            count += samples / settings["regression_window"] * (2 if settings["variation"] == "linear" else 1)
+    return count
+
+
+def aicc(mean_square: float, observations: float, parameters: float) -> float:
+    """Return the corrected Akaike information criterion; infinite where there are not more observations than parameters."""
+    k = parameters + 1  # and the variance
+    if not 0 < mean_square < math.inf or observations <= k + 1:
+        return math.inf
+    return observations * math.log(mean_square) + 2 * k * observations / (observations - k - 1)
+
+
+def akaike_weights(scores: Array) -> Array:
+    """Return the weight of each model; a model without a score has none."""
+    if not np.isfinite(scores).any():
+        return np.zeros(scores.size)
+    relative = np.exp(-0.5 * (scores - scores.min()))
+    return np.asarray(relative / relative.sum())
+
+
+def averaged(values: Array, errors: Array, weights: Array) -> tuple[Array, Array]:
+    """Return means over models, the first axis, and errors that know of the choice: Σ w √(error² + (value - mean)²).
+
+    Where a model has no number the others count.
+    """
+    weights = weights.reshape(-1, *(1,) * (values.ndim - 1))
+    there = np.isfinite(values) & np.isfinite(errors) & (weights > 0)
+    share = np.where(there, weights, 0.0)
+    with np.errstate(all="ignore"):
+        share = share / share.sum(axis=0)
+        values, errors = np.where(there, values, 0.0), np.where(there, errors, 0.0)
+        mean = np.sum(share * values, axis=0)
+        return np.asarray(mean), np.asarray(np.sum(share * np.hypot(errors, values - mean), axis=0))

@@ -1,0 +1,139 @@
+"""Comparison of models: the criterion finds the equation, weights and averages know of the choice."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from click.testing import CliRunner
+
+import tvident
+from tvident._command_line import main
+from tvident._compare.criterion import aicc, akaike_weights, averaged, effective_observations
+
+Array = npt.NDArray[np.float64]
+
+CONSTANT: dict[str, Any] = {"inertia": "constant", "damping": "constant", "stiffness": "constant"}
+
+CANDIDATES: dict[str, dict[str, Any]] = {
+    "plain": {"terms": ()},
+    "cubic": {"terms": ("cubic",)},
+    "coulomb": {"terms": ("coulomb",)},
+}
+
+
+def oscillator(seed: int, *, cubic: float = 0.0, n: int = 6000) -> tuple[Array, Array]:
+    """Give a motion and the torque that its equation asks for, 0.01 θ̈ + 0.05 θ̇ + 12 θ + cubic θ³, with white noise of the torque."""
+    generator = np.random.default_rng(seed)
+    t = np.arange(n) / 1000
+    angle, velocity, acceleration = np.zeros((3, n))
+    for frequency in (1.1, 2.3, 4.7):
+        rate, phase = 2 * np.pi * frequency, generator.uniform(0, 6)
+        angle += 0.1 * np.sin(rate * t + phase)
+        velocity += 0.1 * rate * np.cos(rate * t + phase)
+        acceleration -= 0.1 * rate**2 * np.sin(rate * t + phase)
+    torque = 0.01 * acceleration + 0.05 * velocity + 12 * angle + cubic * angle**3
+    return angle + 1e-6 * generator.standard_normal(n), torque + 0.05 * generator.standard_normal(n)
+
+
+def test_the_equation_is_found_and_no_other_term_is_believed() -> None:
+    assert (
+        tvident.compare_models(*oscillator(1, cubic=20), models=CANDIDATES, sample_rate=1000, **CONSTANT).best
+        == "cubic"
+    )
+    chosen = [
+        tvident.compare_models(*oscillator(seed), models=CANDIDATES, sample_rate=1000, **CONSTANT) for seed in range(40)
+    ]
+    # A term that is not needed lowers 2 ln L by more than AICc's 2 in 16 % of records; 40 records with two such terms: 13 are expected,
+    # and more than 23 with a probability of 1e-3.
+    assert sum(one.best != "plain" for one in chosen) <= 23
+    # A difference of 10 is one in 1000.
+    assert sum(float(one.averaged["cubic"][0]) > 3 * float(one.averaged["cubic"][1]) for one in chosen) <= 2
+
+
+def test_errors_know_of_the_choice() -> None:
+    compared = tvident.compare_models(*oscillator(3, cubic=1.5), models=CANDIDATES, sample_rate=1000, **CONSTANT)
+    weights = dict(zip(compared.table["model"], compared.table["weight"], strict=True))
+    assert sum(weights.values()) == pytest.approx(1)
+    value, error = compared.averaged["stiffness"]
+    each = {name: one.constants["stiffness"] for name, one in compared.results.items()}
+    assert value == pytest.approx(sum(weights[name] * each[name][0] for name in each))
+    assert error == pytest.approx(sum(weights[name] * np.hypot(each[name][1], each[name][0] - value) for name in each))
+    assert error > min(error for _, error in each.values())
+    assert compared.averaged["cubic"][0] == pytest.approx(weights["cubic"] * each_of(compared, "cubic"))
+
+
+def each_of(compared: tvident.ModelComparison, name: str) -> float:
+    return float(compared.results[name].constants[name][0])
+
+
+def test_the_criterion_is_akaikes() -> None:
+    assert aicc(2.0, 50, 3) == pytest.approx(50 * np.log(2) + 2 * 4 * 50 / 45)
+    assert aicc(2.0, 4, 3) == np.inf
+    np.testing.assert_allclose(
+        akaike_weights(np.array([3.0, 1.0, np.inf])), np.array([np.exp(-1), 1, 0]) / (1 + np.exp(-1))
+    )
+    assert not akaike_weights(np.full(2, np.inf)).any()
+    mean, error = averaged(
+        np.array([[1.0], [3.0], [np.nan]]), np.array([[0.0], [0.0], [1.0]]), np.array([0.25, 0.25, 0.5])
+    )
+    assert (mean[0], error[0]) == (2.0, 1.0)
+
+
+def test_overlapping_rows_are_worth_so_many_independent_ones() -> None:
+    """The variance of the logarithm of the mean square of N independent normal numbers is 2/N."""
+    generator = np.random.default_rng(1)
+    x = np.linspace(-1, 1, 41)
+    rows = np.array([np.convolve(generator.standard_normal(4000), (1 - x**2) ** 8, mode="valid") for _ in range(400)])
+    scatter = np.var(np.log(np.mean(rows**2, axis=1)))
+    # 400 draws tell a variance to 7 %.
+    assert 2 / scatter == pytest.approx(effective_observations(3960, 41, 8), rel=0.2)
+
+
+def test_default_candidates_windowed_stiffness_and_words(tmp_path: Path) -> None:
+    rig = tvident.simulate_torsional_rig(duration=3.0, seed=2)
+    compared = tvident.compare_models(rig.angle, rig.torque, sample_rate=1000)
+    assert compared.table["model"][-1] == "undamped"
+    value, error = compared.averaged["stiffness"]
+    assert np.median(np.abs(value / rig.stiffness - 1)) < 0.02
+    assert (error > 0).all()
+    words = compared.summary()
+    assert words.splitlines()[0].startswith("8 models, ")
+    assert "best: " in words or "hardly tells" in words
+    compared.save(str(tmp_path / "table.csv"))
+    assert (tmp_path / "table.csv").read_text(encoding="utf-8").startswith("model,parameters,residual_std [N m],aicc,")
+    assert "ModelComparison of 8 models" in repr(compared)
+    assert compared.plot().axes[0].get_title(loc="left") == "Models compared"
+    pandas = pytest.importorskip("pandas")
+    assert isinstance(compared.to_pandas(), pandas.DataFrame)
+
+
+def test_what_cannot_be_compared_is_refused_with_the_rule() -> None:
+    angle, torque = oscillator(1, n=3000)
+    with pytest.raises(ValueError, match=r"on a single record; got shape \(1, 3000\)"):
+        tvident.compare_models(angle[np.newaxis], torque[np.newaxis], sample_rate=1000)
+    with pytest.raises(ValueError, match=r"needs two models or more; got 1"):
+        tvident.compare_models(angle, torque, sample_rate=1000, models={"one": {}})
+    with pytest.raises(TypeError, match=r"mapping of names to arguments; got \['cubic'\]"):
+        tvident.compare_models(angle, torque, sample_rate=1000, models=["cubic"])  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"same weak form, or their rows differ; got StrongForm"):
+        tvident.compare_models(
+            angle, torque, sample_rate=1000, models={"weak": {}, "strong": {"method": tvident.StrongForm()}}
+        )
+
+
+def test_the_command_compares(tmp_path: Path) -> None:
+    angle, torque = oscillator(5, cubic=30)
+    np.savetxt(tmp_path / "r.csv", np.stack([angle, torque], axis=1), delimiter=",", header="angle,torque", comments="")
+    call = ["compare", str(tmp_path / "r.csv"), "--angle", "angle", "--torque", "torque", "--sample-rate", "1000"]
+    call += ["--stiffness", "constant", "--model", "none", "--model", "cubic", "--model", "cubic,offset"]
+    done = CliRunner().invoke(main, [*call, "-o", str(tmp_path / "t.csv")])
+    assert done.exit_code == 0, done.output
+    assert "3 models" in done.output
+    assert (tmp_path / "t.csv").read_text(encoding="utf-8").splitlines()[1].startswith(
+        "'cubic"
+    ) or "cubic" in done.output
+    assert CliRunner().invoke(main, call[:6]).exit_code == 2
