@@ -47,6 +47,9 @@ pub(crate) fn quantisation_step(samples: &Bound<'_, PyUntypedArray>) -> PyResult
     watched(samples.py(), None, |watch| {
         for (done, record) in records.iter().enumerate() {
             least = least.min(core_step(record));
+            if least == 0.0 {
+                break;
+            }
             if done % RECORDS == RECORDS - 1 && !watch(done, records.len()) {
                 return Err(Error::Cancelled);
             }
