@@ -71,7 +71,8 @@ def fit_local_polynomials(
     axis : int, optional
         Axis of time.
     step : int, optional
-        Every how many samples an estimate is wanted: the same numbers as ``[::step]`` of all of them.
+        Every how many samples an estimate is wanted: the same numbers as ``[::step]`` of all of them, to rounding. From a tenth of
+        a window on each window is projected by itself and the cost is that of the windows that are wanted; below, the bits are the same.
     nan_policy : {"propagate", "raise"}, optional
         ``"propagate"``: windows that contain a value that is not finite are NaN, and no others. ``"raise"``: raise an error.
     quantisation : float, optional
@@ -116,9 +117,9 @@ def fit_local_polynomials(
     window and order known afterwards, and 20 to 30 % below it if the signal is a chirp. Windows that contain a value that is not finite
     are left out; samples that no candidate's window reaches are NaN.
 
-    The cost is about 15 ns a sample and thread for any window length on a processor with AVX-512, about twice that with AVX2; pooled or
-    averaged about 300 ns, because the orders of every window need logarithms; ``"auto"`` about 0.2 s per derivative for the first 65 000
-    samples and 500 ns a sample and derivative beyond.
+    The cost is about 15 ns a sample and thread for any window length on a processor with AVX-512, about twice that with AVX2; averaged
+    about twice as much; pooled about 300 ns, because the orders of every window need logarithms; ``"auto"`` about 0.2 s per derivative
+    for the first 65 000 samples and 500 ns a sample and derivative beyond.
 
     See Also
     --------

@@ -193,7 +193,7 @@ proptest! {
     fn of_local_polynomials(
         (seed, length, more) in (any::<u64>(), lengths(), 0_usize..3000),
         (order, derivatives) in (orders(), prop::collection::vec(0_usize..4, 1..4)),
-        (noise, step) in (any::<bool>(), 1_usize..5),
+        (noise, step) in (any::<bool>(), prop_oneof![3 => 1_usize..5, 1 => 5_usize..500]),
         (bad, cuts, path) in (bad_samples(), cuts(), paths()),
     ) {
         let record = record(seed, length + more, &bad);

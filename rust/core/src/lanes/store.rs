@@ -114,6 +114,33 @@ impl Write<'_, '_> {
     }
 }
 
+/// Writes the first window of every lane, which the tile holds, to neighbouring elements.
+pub(crate) fn write_row(
+    tile: &Tile,
+    lanes: usize,
+    elements: Range<usize>,
+    fixed_order: Option<u8>,
+    outputs: &mut Outputs<'_>,
+) {
+    let one = |field: usize, lane: usize| tile.one(field, 0, lane, lanes);
+    for (field, values) in outputs.values.iter_mut().enumerate().filter(|(_, values)| !values.is_empty()) {
+        for (lane, value) in values[elements.clone()].iter_mut().enumerate() {
+            *value = one(field, lane);
+        }
+    }
+    let code = |lane: usize| fixed_order.map_or_else(|| parts(one(outputs.values.len(), lane)), |order| (order, 0));
+    if !outputs.order.is_empty() {
+        for (lane, order) in outputs.order[elements.clone()].iter_mut().enumerate() {
+            *order = code(lane).0;
+        }
+    }
+    if !outputs.status.is_empty() {
+        for (lane, status) in outputs.status[elements].iter_mut().enumerate() {
+            *status = code(lane).1;
+        }
+    }
+}
+
 /// The order and the flags of a code.
 fn parts(code: f64) -> (u8, u16) {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number below 2^24")]

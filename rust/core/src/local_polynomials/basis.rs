@@ -166,19 +166,23 @@ impl Basis {
         differences
     }
 
-    /// The `derivative`-th derivative of every polynomial at a sample of the window from the derivative below it.
+    /// Every polynomial at the sample that mirrors one of the window or is it itself: at the position that is not negative. And whether
+    /// it is mirrored, so that odd polynomials change their sign.
+    pub(crate) fn row(&self, index: usize) -> (&[f64], bool) {
+        let mirrored = index < self.length / 2;
+        let outward = if mirrored { self.length - 1 - index } else { index } - self.length / 2;
+        (&self.values[outward * self.degrees..][..self.degrees], mirrored)
+    }
+
+    /// `b_j / b_{j+1}` and `1 / b_{j+1}`, by which each derivative of every polynomial follows from the one below it:
     ///
-    /// One recurrence in working precision, `O(degrees)`: for many positions, where [`Basis::evaluate`] would be slow.
-    pub(crate) fn differentiate(&self, index: usize, derivative: usize, values: &mut [f64; MOST_DEGREES]) {
-        let (x, d) = (self.position(index), derivative as f64);
-        // The derivative of q_j and of the one before it, while `values` still holds the lower derivative from q_j on.
-        let (mut last, mut current) = (0.0, 0.0);
-        for (value, &(ratio, inverse)) in values.iter_mut().zip(&self.steps) {
-            // Only one product and one sum wait for the degree before.
-            let next = (d * inverse * *value - ratio * last) + x * inverse * current;
-            *value = current;
-            (last, current) = (current, next);
-        }
+    /// ```text
+    /// q_{j+1}^(d) = (d q_j^(d-1) + x q_j^(d) - b_j q_{j-1}^(d)) / b_{j+1}.
+    /// ```
+    ///
+    /// In working precision, `O(degrees)` a position: for many of them, where [`Basis::evaluate`] would be slow.
+    pub(crate) fn steps(&self) -> &[(f64, f64)] {
+        &self.steps
     }
 
     /// `q_j^{(derivative)}(position)` for every degree, to twice the precision.
@@ -244,30 +248,6 @@ mod tests {
         for (index, expected) in slope.into_iter().enumerate() {
             assert!((basis.value(0, index) - 1.0 / 5_f64.sqrt()).abs() < f64::EPSILON);
             assert!((basis.value(1, index) - expected).abs() < f64::EPSILON);
-        }
-    }
-
-    #[test]
-    fn derivatives_in_working_precision_are_as_good_as_it() {
-        for length in [5, 17, 18, 51, 201, 2001, 20_001] {
-            let basis = Basis::new(length, length.min(MOST_DEGREES));
-            for index in (0..length).step_by(1 + length / 50) {
-                let mut values = std::array::from_fn(|j| if j < basis.degrees() { basis.value(j, index) } else { 0.0 });
-                for derivative in 1..4 {
-                    basis.differentiate(index, derivative, &mut values);
-                    let expected = basis.evaluate(basis.position(index), derivative);
-                    let mut size = 0.0_f64;
-                    for (j, (value, expected)) in values.iter().zip(&expected).enumerate() {
-                        size = size.max(expected.abs());
-                        let error = (value - expected).abs();
-                        // Three roundings a degree, and derivatives upon each other.
-                        assert!(
-                            error <= 100.0 * f64::EPSILON * size,
-                            "degree {j}, derivative {derivative}, sample {index} of {length}"
-                        );
-                    }
-                }
-            }
         }
     }
 

@@ -2,25 +2,24 @@
 //!
 //! The gain of noise towards a window's end is steep: that of the second derivative grows 15 fold for order 5 and 49 fold for order 9.
 //! The order that fits the window best need not be the best to evaluate there. So each derivative takes, at each position, the order
-//! `n` with the least estimated squared bias plus variance. With `d_n` its estimate by order `n`, and `top` the window's order,
-//!
-//! ```text
-//! bias_n² = max(0, (d_n - d_top)² - var(d_n - d_top)),   var(d_n - d_top) = σ² Σ_{n<j≤top} q_j^(d)(x)²,   var(d_n) = σ² Σ_{j≤n} q_j^(d)(x)².
-//! ```
-//!
-//! Orders below the derivative's are left out where the window's own order is not one of them: zero with an error of zero is no estimate.
+//! with the least estimated squared bias plus variance (see [`crate::local_polynomials::off_centre`]).
 //!
 //! Where several orders share in a window (see [`crate::local_polynomials::order_selection`]), each of them is `top` in
 //! its turn, and what comes of it is averaged.
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
-use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
+use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::estimates::Estimates;
+use crate::local_polynomials::off_centre::{Evaluated, OffCentre, Tabulate, Top};
 use crate::local_polynomials::options::{Order, PolynomialOptions};
+use crate::local_polynomials::order_average::Akaike;
 use crate::local_polynomials::order_shares::Wanted;
 use crate::local_polynomials::single_window::Window;
 use crate::record::samples::Samples;
+use crate::simd::instructions::Instructions;
+use crate::simd::vectors::dispatch;
 use crate::status::Status;
 
 /// One end of a record.
@@ -40,7 +39,17 @@ pub(crate) struct Ends {
     delta: f64,
     /// Residuals are at least this.
     floor: f64,
+    /// Where orders are averaged.
+    akaike: Option<Akaike>,
+    /// Where an order is chosen: what residuals are multiplied by before orders are compared.
+    weights: Vec<f64>,
+    /// Made when it is first needed.
+    table: OnceLock<Vec<f64>>,
+    instructions: Instructions,
 }
+
+/// A table of the polynomials that is kept has at most so many numbers: 1 MB.
+const LARGEST_TABLE: usize = 1 << 17;
 
 /// A derivative at one position and its standard error.
 #[derive(Clone, Copy, Debug)]
@@ -50,9 +59,25 @@ pub(crate) struct Estimate {
 }
 
 impl Ends {
-    pub(crate) fn new(options: &PolynomialOptions) -> Self {
-        let (order, floor) = (options.order, options.quantisation_floor());
-        Self { order, derivatives: options.derivatives.clone(), delta: options.delta, floor }
+    pub(crate) fn new(options: &PolynomialOptions, basis: &Basis) -> Self {
+        let (order, floor, instructions) = (options.order, options.quantisation_floor(), options.instructions);
+        let akaike = Akaike::of(options, basis.degrees());
+        let weights = match order {
+            Order::Fixed(_) => Vec::new(),
+            Order::Chosen { criterion, .. } => {
+                (0..basis.degrees()).map(|order| criterion.weight(order, basis.length())).collect()
+            }
+        };
+        let (derivatives, delta) = (options.derivatives.clone(), options.delta);
+        Self { order, derivatives, delta, floor, akaike, weights, table: OnceLock::new(), instructions }
+    }
+
+    /// The orders that share in a window where they are averaged, and their shares.
+    fn averaged(&self, window: &Window) -> Option<Vec<(usize, f64)>> {
+        let least = window.floor.max(f64::MIN_POSITIVE);
+        let residuals: Vec<f64> = window.residuals.iter().map(|residual| residual.max(least)).collect();
+        let shares = self.akaike.as_ref()?.shares(&residuals).into_iter().enumerate();
+        Some(shares.filter(|(_, share)| *share > 0.0).collect())
     }
 
     /// Writes what is wanted of the given samples, all of them at one end of the record. `orders` are those that share in the window
@@ -69,20 +94,23 @@ impl Ends {
         estimates: &mut Estimates<'_>,
     ) {
         let (first, fit) = self.fit(basis, record, end, orders);
-        for element in estimates.elements.of(samples) {
-            let sample = estimates.elements.sample(element);
-            if let Some(fit) = &fit {
-                self.evaluate(basis, fit, sample - first, |slot, estimate| {
-                    estimates.derivatives[slot][element] = match wanted {
-                        Wanted::Derivatives => estimate.value,
-                        Wanted::Errors => estimate.error,
-                    };
-                });
-                estimates.diagnose(element, fit.order, Status::EDGE | fit.status, fit.sigma);
-            } else {
+        let elements = estimates.elements.of(samples);
+        let Some(fit) = fit else {
+            for element in elements {
                 estimates.invalidate(element);
                 estimates.diagnose(element, 0, Status::EDGE | Status::INVALID, f64::NAN);
             }
+            return;
+        };
+        let places: Vec<usize> = elements.clone().map(|element| estimates.elements.sample(element) - first).collect();
+        self.evaluate(basis, (end, &fit), &places, |place, slot, estimate| {
+            estimates.derivatives[slot][elements.start + place] = match wanted {
+                Wanted::Derivatives => estimate.value,
+                Wanted::Errors => estimate.error,
+            };
+        });
+        for element in elements {
+            estimates.diagnose(element, fit.order, Status::EDGE | fit.status, fit.sigma);
         }
     }
 
@@ -102,32 +130,92 @@ impl Ends {
         let mut samples = vec![0.0; length];
         record.read(first, &mut samples);
         let window = Window::project(basis, &samples, self.floor);
-        (first, window.map(|window| BoundaryFit::new(window, self.order, orders, length)))
+        let fit = |window: Window| {
+            let (order, chosen) = match self.order {
+                Order::Fixed(order) => (order, false),
+                Order::Chosen { .. } => (window.best(&self.weights), true),
+            };
+            let orders = orders.or_else(|| self.averaged(&window)).unwrap_or_else(|| vec![(order, 1.0)]);
+            BoundaryFit::new(window, orders, chosen, length)
+        };
+        (first, window.map(fit))
     }
 
-    /// Gives every derivative at sample `place` of the window to `give`, with its place among those asked for.
-    fn evaluate(&self, basis: &Basis, fit: &BoundaryFit, place: usize, mut give: impl FnMut(usize, Estimate)) {
-        let degrees = basis.degrees();
-        let highest = self.derivatives.iter().max().copied().unwrap_or(0);
-        let mut polynomials = [0.0; MOST_DEGREES];
-        for (degree, value) in polynomials[..degrees].iter_mut().enumerate() {
-            *value = basis.value(degree, place);
+    /// Gives every derivative at some samples of the window, by the place among those samples and among the derivatives asked for.
+    fn evaluate(
+        &self,
+        basis: &Basis,
+        (end, fit): (End, &BoundaryFit),
+        places: &[usize],
+        mut give: impl FnMut(usize, usize, Estimate),
+    ) {
+        let (lanes, numbers) = (self.instructions.lanes(), self.numbers(basis));
+        let table = self.table(basis);
+        let mut own = vec![0.0; if table.is_some() { 0 } else { numbers }];
+        let mut found = vec![Evaluated::default(); self.highest() + 1];
+        // The last window is looked at from its end, in reversed time: there odd polynomials and odd derivatives change their sign.
+        let outward = |place: usize| if end == End::First { place } else { basis.length() - 1 - place };
+        let mut coefficients = fit.window.coefficients.clone();
+        if end == End::Last {
+            coefficients.iter_mut().skip(1).step_by(2).for_each(|odd| *odd = -*odd);
         }
-        let mut scale = 1.0;
-        for derivative in 0..=highest {
-            if derivative > 0 {
-                scale /= self.delta;
-                basis.differentiate(place, derivative, &mut polynomials);
+        let mut first = 0;
+        while let Some(place) = places.get(first) {
+            let group = outward(*place) / lanes;
+            let some = places[first..].iter().take_while(|place| outward(**place) / lanes == group);
+            let table = if let Some(table) = table {
+                &table[group * numbers..][..numbers]
+            } else {
+                dispatch(self.instructions, Tabulate { basis, place: group * lanes, table: &mut own });
+                &own
+            };
+            let (coefficients, tops, chosen) = (&coefficients, &fit.tops, fit.chosen);
+            dispatch(self.instructions, OffCentre { table, coefficients, tops, chosen, found: &mut found });
+            let mut next = first;
+            for place in some {
+                let lane = outward(*place) % lanes;
+                let mut scale = 1.0;
+                for (derivative, found) in found.iter().enumerate() {
+                    if derivative > 0 {
+                        scale /= self.delta;
+                    }
+                    let sign = if end == End::Last && derivative % 2 == 1 { -scale } else { scale };
+                    let level = if derivative == 0 { fit.window.reference } else { 0.0 };
+                    let (value, error) = (found.values[lane] * sign + level, found.errors[lane] * scale);
+                    for (slot, _) in self.derivatives.iter().enumerate().filter(|(_, wanted)| **wanted == derivative) {
+                        give(next, slot, Estimate { value, error });
+                    }
+                }
+                next += 1;
             }
-            let mut wanted =
-                self.derivatives.iter().enumerate().filter(|(_, wanted)| **wanted == derivative).peekable();
-            if wanted.peek().is_some() {
-                let Estimate { value, error } = fit.best(&polynomials, derivative);
-                let level = if derivative == 0 { fit.window.reference } else { 0.0 };
-                wanted
-                    .for_each(|(slot, _)| give(slot, Estimate { value: value * scale + level, error: error * scale }));
-            }
+            first = next;
         }
+    }
+
+    fn highest(&self) -> usize {
+        self.derivatives.iter().max().copied().unwrap_or(0)
+    }
+
+    /// Numbers that [`Tabulate`] gives for one group of places.
+    fn numbers(&self, basis: &Basis) -> usize {
+        (self.highest() + 1) * basis.degrees() * self.instructions.lanes()
+    }
+
+    /// The polynomials at all places before the centre, group by group, unless they take too much memory.
+    fn table(&self, basis: &Basis) -> Option<&[f64]> {
+        let (lanes, numbers) = (self.instructions.lanes(), self.numbers(basis));
+        let groups = (basis.length() / 2).div_ceil(lanes);
+        if groups * numbers > LARGEST_TABLE {
+            return None;
+        }
+        let table = self.table.get_or_init(|| {
+            let mut table = vec![0.0; groups * numbers];
+            for (group, table) in table.chunks_exact_mut(numbers).enumerate() {
+                dispatch(self.instructions, Tabulate { basis, place: group * lanes, table });
+            }
+            table
+        });
+        Some(table)
     }
 }
 
@@ -142,17 +230,8 @@ struct BoundaryFit {
     chosen: bool,
 }
 
-/// An order that the window is fitted with.
-struct Top {
-    order: usize,
-    share: f64,
-    variance: f64,
-}
-
 impl BoundaryFit {
-    fn new(window: Window, order: Order, shares: Option<Vec<(usize, f64)>>, length: usize) -> Self {
-        let chosen = matches!(order, Order::Chosen { .. });
-        let shares = shares.unwrap_or_else(|| vec![(window.order(order, length), 1.0)]);
+    fn new(window: Window, shares: Vec<(usize, f64)>, chosen: bool, length: usize) -> Self {
         let variance = |order: usize| {
             let freedom = length - order - 1;
             if freedom == 0 { f64::NAN } else { window.residuals[order].max(window.floor) / freedom as f64 }
@@ -175,45 +254,5 @@ impl BoundaryFit {
         }
         let sigma = tops.iter().map(|top| top.share * top.variance).sum::<f64>().sqrt();
         Self { window, tops, order, sigma, status, chosen }
-    }
-
-    /// The sum `Σ c_j q_j` up to the best order for it, with its standard error. Orders below `lowest` are not looked at.
-    fn best(&self, polynomials: &[f64; MOST_DEGREES], lowest: usize) -> Estimate {
-        // Value and gain of every order.
-        let mut sums = [(0.0, 0.0); MOST_DEGREES];
-        let (mut value, mut gain) = (0.0, 0.0);
-        for ((sum, c), q) in sums.iter_mut().zip(&self.window.coefficients).zip(polynomials) {
-            value += c * q;
-            gain += q * q;
-            *sum = (value, gain);
-        }
-        if let [top] = self.tops.as_slice() {
-            return self.best_below(top, &sums, lowest);
-        }
-        let estimates: Vec<Estimate> = self.tops.iter().map(|top| self.best_below(top, &sums, lowest)).collect();
-        let shared = |number: &dyn Fn(&Estimate) -> f64| -> f64 {
-            self.tops.iter().zip(&estimates).map(|(top, estimate)| top.share * number(estimate)).sum()
-        };
-        let value = shared(&|estimate| estimate.value);
-        Estimate { value, error: shared(&|estimate| estimate.error.hypot(estimate.value - value)) }
-    }
-
-    /// The best of the orders up to one that fits the window.
-    fn best_below(&self, top: &Top, sums: &[(f64, f64); MOST_DEGREES], lowest: usize) -> Estimate {
-        let (order, variance) = (top.order, top.variance);
-        let (top_value, top_gain) = sums[order];
-        if !self.chosen || variance.is_nan() {
-            return Estimate { value: top_value, error: (variance * top_gain).sqrt() };
-        }
-        let mut best = (variance * top_gain, order);
-        for (order, &(value, gain)) in sums[..order].iter().enumerate().skip(lowest).rev() {
-            let bias = ((value - top_value).powi(2) - variance * (top_gain - gain)).max(0.0);
-            let error = bias + variance * gain;
-            if error <= best.0 {
-                best = (error, order);
-            }
-        }
-        let (value, gain) = sums[best.1];
-        Estimate { value, error: (variance * gain).sqrt() }
     }
 }

@@ -3,7 +3,7 @@
 //! A record's windows are numbered by their first sample. Span `g` holds the windows `g S … (g+1) S - 1`; its start lies in its
 //! middle, at `g S + S/2`, or at the record's last window where that comes first. Blocks are one span, or several short ones, and are
 //! worked on in runs, as many side by side as there are lanes. Which spans share a run does not matter, since lanes keep apart, so
-//! any cutting of a record gives the same bits.
+//! any cutting of a record gives the same bits. Where few windows are wanted, each is projected on its own (`apart.rs`).
 
 use std::fmt::Debug;
 use std::ops::Range;
@@ -12,6 +12,7 @@ use crate::lanes::interleaved::Strips;
 use crate::lanes::output::Outputs;
 use crate::lanes::store::Write;
 use crate::lanes::tile::{TILE, Tile};
+use crate::local_polynomials::apart::{self, Apart, ApartScratch};
 use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::estimates::Estimates;
 use crate::local_polynomials::evaluate::{Finish, Functional};
@@ -30,6 +31,8 @@ const STRETCH: usize = 1 << 13;
 /// What an engine can do, whatever the number of its degrees.
 pub(crate) trait Walk: Debug + Send + Sync {
     fn block(&self) -> usize;
+    /// Windows from one piece of work to the next, where every `step`-th is wanted: multiples of it waste no work.
+    fn stride(&self, step: usize) -> usize;
     fn scratch(&self) -> EngineScratch;
     fn functionals(&self) -> &[Functional];
     fn walk(
@@ -76,11 +79,18 @@ pub(crate) struct EngineScratch {
     /// States between stepping and finishing.
     states: Aligned,
     tile: Tile,
+    /// For windows that are projected one by one.
+    apart: Option<ApartScratch>,
 }
 
 impl<const D: usize, const RESIDUAL: bool> Engine<D, RESIDUAL> {
     pub(crate) fn new(basis: &Basis, finish: Finish, instructions: Instructions) -> Self {
         Self { projection: Projection::new(basis), finish, instructions }
+    }
+
+    /// Whether every `step`-th window is projected on its own.
+    fn apart(&self, step: usize) -> bool {
+        apart::serves(self.projection.length(), self.projection.span(), step)
     }
 
     /// Samples of a window before the one it is said to be around: its centre, or the last one before that.
@@ -92,6 +102,10 @@ impl<const D: usize, const RESIDUAL: bool> Engine<D, RESIDUAL> {
 impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
     fn block(&self) -> usize {
         self.projection.block()
+    }
+
+    fn stride(&self, step: usize) -> usize {
+        self.instructions.lanes() * if self.apart(step) { step } else { self.block() }
     }
 
     fn functionals(&self) -> &[Functional] {
@@ -108,6 +122,7 @@ impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
             state: Aligned::zeros(states::<D>(1, lanes)),
             states: Aligned::zeros(states::<D>(STEPS, lanes)),
             tile: Tile::new(self.finish.fields(RESIDUAL), TILE, lanes),
+            apart: None,
         }
     }
 
@@ -124,15 +139,22 @@ impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
         // The last span's start may have to move down to the last window; that span then runs alone.
         let in_span = last % self.projection.span();
         let moved = if in_span < backward { last - in_span } else { last + 1 };
-        // What a run reads, and how much of it is not read again by the next.
-        let (read, advance) = (scratch.strips.samples().cast_signed(), (lanes * block).cast_signed());
-        scratch.stretch.load(record, 0..0);
         let Estimates { elements, derivatives, order, status, sigma } = estimates;
         let mut values: Vec<&mut [f64]> = derivatives.iter_mut().map(|values| &mut **values).collect();
         if RESIDUAL {
             values.push(sigma);
         }
         let mut outputs = Outputs { elements: *elements, values, order, status };
+        if self.apart(outputs.elements.step) {
+            let Self { projection, finish, instructions } = self;
+            let apart =
+                Apart::<D, RESIDUAL> { projection, finish, instructions: *instructions, step: outputs.elements.step };
+            apart.walk(record, windows, &mut outputs, &mut scratch.apart);
+            return;
+        }
+        // What a run reads, and how much of it is not read again by the next.
+        let (read, advance) = (scratch.strips.samples().cast_signed(), (lanes * block).cast_signed());
+        scratch.stretch.load(record, 0..0);
         let mut window = windows.start;
         while window < windows.end {
             let (base, end) = if window >= moved {
@@ -168,14 +190,17 @@ impl<const D: usize, const RESIDUAL: bool> EngineRun<'_, D, RESIDUAL> {
     fn work(&self, scratch: &mut EngineScratch, outputs: &mut Outputs<'_>) {
         let Engine { projection, finish, instructions } = self.engine;
         let (instructions, span, wanted) = (*instructions, projection.span(), self.rows());
-        let EngineScratch { stretch, strips, references, start: at_start, state, states, tile } = scratch;
+        let EngineScratch { stretch, strips, references, start: at_start, state, states, tile, .. } = scratch;
         dispatch(instructions, Fill { samples: stretch.from(self.base, strips.samples()), strips });
         // A short block is written whole, with its spans together; a long one tile by tile.
         let whole = projection.block() <= TILE;
         for first in (wanted.start - wanted.start % span..wanted.end).step_by(span) {
             let start = first + projection.backward();
             self.take_references(stretch, start, references);
-            dispatch(instructions, Start { projection, strips, references, row: start, state: at_start });
+            dispatch(
+                instructions,
+                Start::<D, RESIDUAL> { projection, strips, references, row: start, state: at_start },
+            );
             let forwards = wanted.end.min(first + span).saturating_sub(start);
             let backwards = start.saturating_sub(wanted.start.max(first));
             for (direction, count) in [(Direction::Forward, forwards), (Direction::Backward, backwards)] {
@@ -198,13 +223,14 @@ impl<const D: usize, const RESIDUAL: bool> EngineRun<'_, D, RESIDUAL> {
                         ready,
                     };
                     let lost;
-                    (done, lost) = dispatch(instructions, sweep);
+                    (done, lost) = sweep.go(instructions);
                     ready = lost != 0;
                     if ready {
                         // The next window of some lanes is projected afresh.
                         let mut fresh = state.clone();
                         let row = direction.row(start, done);
-                        dispatch(instructions, Start { projection, strips, references, row, state: &mut fresh });
+                        let afresh = Start::<D, RESIDUAL> { projection, strips, references, row, state: &mut fresh };
+                        dispatch(instructions, afresh);
                         direction.turn::<D>(&mut fresh);
                         replace(state, &fresh, lost, instructions.lanes());
                     } else if !whole {

@@ -4,6 +4,7 @@ use crate::lanes::tile::Tile;
 use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
 use crate::local_polynomials::criterion::{Tables, choose};
 use crate::local_polynomials::options::{Order, PolynomialOptions};
+use crate::local_polynomials::order_average::Akaike;
 use crate::local_polynomials::sliding_projection::State;
 use crate::simd::unroll::unroll;
 use crate::simd::vectors::{Lanes, TABLE};
@@ -26,6 +27,8 @@ pub(crate) struct Finish {
     functionals: Vec<Functional>,
     tables: Tables,
     fixed_order: u8,
+    /// Where orders are averaged.
+    akaike: Option<Akaike>,
 }
 
 /// An order and flags as one whole number.
@@ -98,7 +101,13 @@ impl Finish {
         }
         tables.exact = code(0, Status::EXACT);
         tables.floor = options.quantisation_floor();
-        Self { functionals: options.derivatives.iter().map(functional).collect(), tables, fixed_order }
+        let functionals = options.derivatives.iter().map(functional).collect();
+        Self { functionals, tables, fixed_order, akaike: Akaike::of(options, degrees) }
+    }
+
+    /// Whether orders are averaged.
+    pub(crate) fn averages(&self) -> bool {
+        self.akaike.is_some()
     }
 
     /// Gives, instead of derivatives, the reference of the window's samples and then the coefficients of some degrees.
@@ -120,6 +129,35 @@ impl Finish {
     /// Numbers known of every window: its functionals and, where the residual is followed, noise, order and flags.
     pub(crate) fn fields(&self, residual: bool) -> usize {
         self.functionals.len() + if residual { 2 } else { 0 }
+    }
+
+    /// Finishes one window of each lane by the average over orders.
+    #[inline(always)]
+    pub(crate) fn finish_average<S: Lanes, const D: usize>(
+        &self,
+        simd: S,
+        state: &State<S, D>,
+        reference: S::f64s,
+        backward: bool,
+        tile: &mut Tile,
+        place: usize,
+    ) {
+        let Some(akaike) = &self.akaike else { return };
+        let average = akaike.average(simd, state);
+        let fields = self.functionals.len();
+        let exact = simd.select_f64s(average.exact, simd.splat_f64s(self.tables.exact), simd.splat_f64s(0.0));
+        let code = simd.table_lookup(&self.tables.code, average.order);
+        tile.put(simd, fields, place, simd.sqrt_f64s(average.variance));
+        tile.put(simd, fields + 1, place, simd.add_f64s(code, exact));
+        for (field, functional) in self.functionals.iter().enumerate() {
+            let mut sum = simd.mul_f64s(reference, simd.splat_f64s(functional.constant));
+            unroll!(J < D, {
+                let shared = simd.mul_f64s(average.reach[J], state.coefficients[J]);
+                sum = simd.mul_add_f64s(simd.splat_f64s(functional.weights[J]), shared, sum);
+            });
+            let turned = functional.odd && backward;
+            tile.put(simd, field, place, if turned { simd.neg_f64s(sum) } else { sum });
+        }
     }
 
     /// Finishes one window of each lane.

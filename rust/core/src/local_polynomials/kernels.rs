@@ -6,7 +6,8 @@ use crate::lanes::interleaved::Strips;
 use crate::lanes::tile::{TILE, Tile};
 use crate::local_polynomials::evaluate::Finish;
 use crate::local_polynomials::sliding_projection::{Projection, State};
-use crate::simd::vectors::{Kernel, Lanes};
+use crate::simd::instructions::Instructions;
+use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
 /// Windows that are stepped to before they are finished. Each step depends on the one before, finishing does not: in separate loops each
 /// keeps the processor busy, and so few states stay in the nearest cache.
@@ -88,7 +89,7 @@ impl Kernel for Fill<'_> {
 }
 
 /// Projects the window at one row of each lane's block.
-pub(crate) struct Start<'a, const D: usize> {
+pub(crate) struct Start<'a, const D: usize, const RESIDUAL: bool> {
     pub(crate) projection: &'a Projection<D>,
     pub(crate) strips: &'a Strips,
     pub(crate) references: &'a [f64],
@@ -96,13 +97,14 @@ pub(crate) struct Start<'a, const D: usize> {
     pub(crate) state: &'a mut [f64],
 }
 
-impl<const D: usize> Kernel for Start<'_, D> {
+impl<const D: usize, const RESIDUAL: bool> Kernel for Start<'_, D, RESIDUAL> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
         let reference = simd.load(self.references, 0);
-        self.projection.start(simd, self.strips, self.row, reference).store(simd, self.state, 0);
+        let start = self.projection.start::<S, RESIDUAL>(simd, self.strips, self.row, reference);
+        start.store(simd, self.state, 0);
     }
 }
 
@@ -128,7 +130,36 @@ impl<const D: usize, const RESIDUAL: bool> Kernel for Sweep<'_, D, RESIDUAL> {
     type Output = (usize, u32);
 
     #[inline(always)]
-    fn run<S: Lanes>(mut self, simd: S) -> (usize, u32) {
+    fn run<S: Lanes>(self, simd: S) -> (usize, u32) {
+        self.through::<S, false>(simd)
+    }
+}
+
+/// The same where orders are averaged: a kernel of its own, so that each has the registers to itself.
+struct Averaging<'a, const D: usize, const RESIDUAL: bool>(Sweep<'a, D, RESIDUAL>);
+
+impl<const D: usize, const RESIDUAL: bool> Kernel for Averaging<'_, D, RESIDUAL> {
+    type Output = (usize, u32);
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, simd: S) -> (usize, u32) {
+        self.0.through::<S, true>(simd)
+    }
+}
+
+impl<const D: usize, const RESIDUAL: bool> Sweep<'_, D, RESIDUAL> {
+    /// Runs the kernel that serves.
+    pub(crate) fn go(self, instructions: Instructions) -> (usize, u32) {
+        // Orders are known where residuals are.
+        if RESIDUAL && self.finish.averages() {
+            dispatch(instructions, Averaging(self))
+        } else {
+            dispatch(instructions, self)
+        }
+    }
+
+    #[inline(always)]
+    fn through<S: Lanes, const AVERAGE: bool>(mut self, simd: S) -> (usize, u32) {
         let reference = simd.load(self.references, 0);
         let backward = self.direction == Direction::Backward;
         let mut first = self.windows.start;
@@ -138,7 +169,11 @@ impl<const D: usize, const RESIDUAL: bool> Kernel for Sweep<'_, D, RESIDUAL> {
             for index in first..come_to {
                 let state = State::<S, D>::load(simd, self.states, index - first);
                 let row = self.direction.row(self.start, index);
-                self.finish.finish::<S, D, RESIDUAL>(simd, &state, reference, backward, self.tile, row);
+                if AVERAGE {
+                    self.finish.finish_average::<S, D>(simd, &state, reference, backward, self.tile, row);
+                } else {
+                    self.finish.finish::<S, D, RESIDUAL>(simd, &state, reference, backward, self.tile, row);
+                }
             }
             if lost != 0 {
                 return (come_to, lost);
@@ -147,9 +182,7 @@ impl<const D: usize, const RESIDUAL: bool> Kernel for Sweep<'_, D, RESIDUAL> {
         }
         (self.windows.end, 0)
     }
-}
 
-impl<const D: usize, const RESIDUAL: bool> Sweep<'_, D, RESIDUAL> {
     /// Steps to some windows and keeps their states. Returns the window come to and the lanes that must start afresh there.
     #[inline(always)]
     fn step<S: Lanes>(&mut self, simd: S, reference: S::f64s, windows: Range<usize>) -> (usize, u32) {

@@ -1,5 +1,6 @@
 //! Local polynomials: a fit in every window, its order chosen by a criterion, and the derivatives of the fit.
 
+pub(crate) mod apart;
 pub(crate) mod basis;
 pub(crate) mod boundary;
 pub(crate) mod coefficients;
@@ -10,7 +11,9 @@ pub(crate) mod estimates;
 pub(crate) mod evaluate;
 pub(crate) mod kernels;
 pub(crate) mod neighbour_sums;
+pub(crate) mod off_centre;
 pub(crate) mod options;
+pub(crate) mod order_average;
 pub(crate) mod order_selection;
 pub(crate) mod order_shares;
 pub(crate) mod plan;

@@ -6,11 +6,9 @@ use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::coefficients::{self, Coefficients, Projected};
 use crate::local_polynomials::neighbour_sums::Pool;
 use crate::local_polynomials::options::{Order, PolynomialOptions, Selection};
+use crate::local_polynomials::order_average::Akaike;
 use crate::local_polynomials::sliding_projection::ROUNDING;
 use crate::record::samples::Samples;
-
-/// An order whose criterion is twice this much above the best has no share: it would be less than 1e-17.
-const NEGLIGIBLE: f64 = 40.0;
 
 /// What is written to the outputs of derivatives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,6 +26,7 @@ pub(crate) struct Selector {
     /// What residuals are multiplied by before orders are compared.
     pub(crate) weights: Vec<f64>,
     pub(crate) derivatives: Vec<Derivative>,
+    akaike: Akaike,
     /// Residuals are at least this.
     floor: f64,
 }
@@ -70,11 +69,13 @@ impl Selector {
             let weights = basis.evaluate(0.0, derivative).iter().map(|value| value * scale).collect();
             Derivative { weights, constant: f64::from(u8::from(derivative == 0)) }
         };
+        let weights: Vec<f64> = all.iter().map(|&order| criterion.weight(order, length)).collect();
         Some(Self {
+            akaike: Akaike::new(&weights, length, options.quantisation_floor()),
             coefficients: Coefficients::new(basis, &all, true, options.instructions),
             selection: options.selection,
             length,
-            weights: all.iter().map(|&order| criterion.weight(order, length)).collect(),
+            weights,
             derivatives: options.derivatives.iter().map(derivative).collect(),
             floor: options.quantisation_floor(),
         })
@@ -215,16 +216,10 @@ impl Selector {
                 *best = best.min(residual * weight);
             }
         }
-        let half = self.length as f64 / 2.0;
-        // Negligible shares are recognised by their residuals, without a logarithm.
-        let negligible = (NEGLIGIBLE / half).exp();
         for ((residuals, weight), shares) in residuals.iter().zip(&self.weights).zip(&mut *shares) {
             shares.clear();
-            let share = |(residual, best): (&f64, &f64)| {
-                let ratio = residual * weight / best;
-                if ratio < negligible { (-half * ratio.ln()).exp() } else { 0.0 }
-            };
-            shares.extend(residuals.iter().zip(&*best).map(share));
+            shares.extend(residuals.iter().zip(&*best).map(|(residual, best)| best / (residual * weight)));
+            self.akaike.raise(shares);
             for (total, share) in total.iter_mut().zip(&*shares) {
                 *total += share;
             }

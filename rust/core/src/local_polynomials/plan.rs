@@ -21,6 +21,7 @@ use crate::local_polynomials::options::{HIGHEST_ORDER, Order, PolynomialOptions,
 use crate::local_polynomials::order_shares::{SelectionScratch, Selector, Wanted};
 use crate::local_polynomials::single_window::Window;
 use crate::record::samples::Samples;
+use crate::simd::vectors::MOST_LANES;
 
 /// Samples in a piece of work, about: well below 20 ms on any processor, so that a call can be interrupted.
 const PIECE: usize = 1 << 14;
@@ -91,7 +92,7 @@ impl LocalPolynomials {
         let basis = Basis::watched(window_length, degrees, watch)?;
         let residual = options.noise || matches!(options.order, Order::Chosen { .. });
         let engine = engine(&basis, Finish::new(&options, &basis), residual, options.instructions);
-        let ends = Ends::new(&options);
+        let ends = Ends::new(&options, &basis);
         Ok(Self { options, basis, ends, engine, selector: OnceLock::new() })
     }
 
@@ -125,7 +126,7 @@ impl LocalPolynomials {
 
     /// What looks at all orders, where it is needed: standard errors say how far the orders disagree.
     fn selector(&self, wanted: Wanted) -> Option<&Selector> {
-        if wanted == Wanted::Derivatives && self.options.selection == Selection::Window {
+        if wanted == Wanted::Derivatives && self.options.selection != Selection::Pooled {
             return None;
         }
         self.selector.get_or_init(|| Selector::new(&self.options, &self.basis)).as_ref()
@@ -229,7 +230,7 @@ impl LocalPolynomials {
         }
     }
 
-    /// The orders that share in a window, where it does not choose for itself.
+    /// The orders that share in a window, where it does not know by itself.
     fn orders_at(
         &self,
         record: &dyn Samples,
@@ -292,7 +293,7 @@ impl LocalPolynomials {
     pub(crate) fn ask_for_scratch(&self, wanted: Wanted, threads: usize) -> Result<(), Error> {
         let window = self.options.window_length;
         // A run's samples as they are and side by side, and those of a window at an end.
-        let run = window.saturating_mul(3).saturating_add(2 * PIECE + 4 * self.stride());
+        let run = window.saturating_mul(3 + 2 * MOST_LANES).saturating_add(2 * PIECE + 4 * self.stride());
         // By order the coefficients, residuals and shares of the windows that are looked at together, and sums over their neighbours.
         let looked =
             self.selector(wanted).map_or(0, |selector| (2 * window).saturating_add(PIECE.max(selector.least_piece())));
@@ -308,11 +309,11 @@ impl LocalPolynomials {
         wanted: Wanted,
     ) -> Result<Vec<Piece<Part<'a, 'b>>>, Error> {
         let least = self.selector(wanted).map_or(0, Selector::least_piece);
-        let piece = PIECE.max(least).next_multiple_of(self.stride());
         let mut pieces = Vec::new();
         for (record, mut estimates) in records {
             let (windows, before) = (self.windows(record.len())?, self.before_centre());
             let samples = if ends { 0..record.len() } else { before..before + windows };
+            let piece = PIECE.max(least).next_multiple_of(self.engine.stride(estimates.elements.step));
             let mut first = samples.start;
             while first < samples.end {
                 let next = (first.max(before) - before) / piece * piece + piece + before;

@@ -1,8 +1,6 @@
 //! A single window, projected directly: for the ends of a record and for the values of the criterion.
 
 use crate::local_polynomials::basis::Basis;
-use crate::local_polynomials::criterion::Criterion;
-use crate::local_polynomials::options::Order;
 use crate::local_polynomials::sliding_projection::ROUNDING;
 use crate::record::samples::is_usable;
 
@@ -60,16 +58,9 @@ impl Window {
         Some(Self { reference, coefficients, residuals, floor: floor.max(ROUNDING * energy) })
     }
 
-    /// The order that the window takes: fixed, or the one that minimises the criterion, the lowest of several.
-    pub(crate) fn order(&self, order: Order, length: usize) -> usize {
-        match order {
-            Order::Fixed(order) => order,
-            Order::Chosen { criterion, .. } => self.best(criterion, length),
-        }
-    }
-
-    fn best(&self, criterion: Criterion, length: usize) -> usize {
-        let score = |order: usize| self.residuals[order].max(self.floor) * criterion.weight(order, length);
+    /// The order whose residual, multiplied by its weight, is the smallest; the lowest of several.
+    pub(crate) fn best(&self, weights: &[f64]) -> usize {
+        let score = |order: usize| self.residuals[order].max(self.floor) * weights[order];
         (0..self.residuals.len()).fold(0, |best, order| if score(order) < score(best) { order } else { best })
     }
 }
