@@ -58,6 +58,8 @@ class Explained:
 
     def _words(self) -> Words:
         flags = Status(self.found.record_status)
+        if self.found.unexplained and Status.RANK_DEFICIENT in flags:
+            return Words((self._noise(),), (self._unexplained(),))
         if Status.RANK_DEFICIENT in flags:
             undetermined = (
                 f"the record does not determine {listed(list(self.names))}: nothing moves, or a single frequency does not separate "
@@ -91,6 +93,14 @@ class Explained:
     def _noise(self) -> str:
         angle, torque = np.sqrt(self.found.noise or (np.nan, np.nan))
         return f"noise, assumed to be white: {angle:.2g} rad in the angle, {torque:.2g} N m in the torque"
+
+    def _unexplained(self) -> str:
+        return (
+            f"the motion explains no more of the torque than chance does, so the record does not determine {listed(list(self.names))}: the "
+            "torque is noise, as in a free decay, the angle is noise, or the channels do not belong together; record a torque that exceeds "
+            "its noise, or, if no torque acts, give a torque of zeros and one parameter, such as inertia=1: the others follow in its unit, "
+            "natural frequency and damping ratio whatever its value"
+        )
 
     def _test_function(self) -> str:
         words = f"test function of {self.found.window_length} samples, exponent {self.found.exponent}"
@@ -160,6 +170,17 @@ class Explained:
             words.append(
                 f"{listed(list(agreeing))} constant: noise explains the differences between eight parts of the record (p = {chances})"
             )
+        untested = [name for name, one in self._constants() if one.test is None]
+        if untested:
+            pronoun = "it" if len(untested) == 1 else "them"
+            words.append(
+                f"{listed(untested)} constant: not tested, since single parts of the record do not determine {pronoun}"
+            )
+        freed = [name for name in self._changing() if name in self.tested and name != "stiffness"]
+        if self.found.pooling is None and freed:
+            words.append(
+                f"{listed(freed)} in windows: parts of the record differ by more than noise, and everything else is constant"
+            )
         if self.found.pooling is not None:
             varying = [name for name, one in zip(self.names, self.found.unknowns, strict=True) if one.kind == "varying"]
             slow = varying or [name for name in ("inertia", "damping") if name in self._changing()]
@@ -222,6 +243,8 @@ class Explained:
         return words
 
     def _told_apart(self, flags: Status) -> list[str]:
+        if self.found.unexplained:
+            return [f"do not trust these numbers: {self._unexplained()}"]
         if Status.ILL_CONDITIONED not in flags:
             return []
         constants = [name for name, _ in self._constants()]

@@ -56,6 +56,7 @@ pub(crate) struct Identification {
     constants_condition: f64,
     weakest: Vec<f64>,
     mostly_noise: bool,
+    unexplained: bool,
     lag: Option<(f64, f64)>,
     suspects: Vec<Py<Suspect>>,
     outside_mask: Option<Py<OutsideMask>>,
@@ -111,6 +112,7 @@ impl Identification {
             constants_condition: weak.map_or(1.0, |weak| weak.condition),
             weakest: weak.map(|weak| weak.weakest.clone()).unwrap_or_default(),
             mostly_noise: weak.is_some_and(|weak| weak.mostly_noise),
+            unexplained: weak.is_some_and(|weak| weak.unexplained),
             lag: weak.and_then(|weak| weak.lag).map(|lag| (lag.value, lag.error)),
             suspects: weak.map_or(Ok(Vec::new()), |weak| weak.suspects.iter().map(suspect).collect::<PyResult<_>>())?,
             outside_mask: found

@@ -110,6 +110,7 @@ pub(crate) fn weak(
         condition: found.condition,
         weakest: found.weakest,
         mostly_noise: found.mostly_noise,
+        unexplained: found.unexplained,
         lag: found.lag,
         suspects: found.suspects,
         outside_mask,

@@ -80,6 +80,8 @@ pub struct WeakDetails {
     pub weakest: Vec<f64>,
     /// Whether that combination is mostly the angle's noise.
     pub mostly_noise: bool,
+    /// Whether the motion explains no more of the torque than chance, so that nothing is determined.
+    pub unexplained: bool,
     /// The lag that was estimated; `None` if it was given or is not determined.
     pub lag: Option<Lag>,
     /// What may have been left out.

@@ -63,19 +63,30 @@ pub(crate) fn error(
     rows: std::ops::Range<usize>,
     variance: f64,
 ) -> f64 {
-    let Some(leave_gap_out) = &fit.leave_gap_out else { return f64::NAN };
-    let rhs = without_constants(problem, &fit.pooled.values);
-    let predictor = Predictor::new(leave_gap_out, &fit.pooled.values);
+    let Some(left) = left_of_rows(problem, scale, fit) else { return f64::NAN };
     let (mut sum, mut count) = (0.0, 0.0);
     for row in rows.filter(|&row| problem.usable[row]) {
-        let cell = scale.cell(row);
-        let Some(place) = predictor.place(cell) else { continue };
-        let later = (row as f64 - scale.centres(cell)[1]) * problem.period;
-        let error = rhs[row] - predictor.predict(problem, place, row, later);
+        let Some(error) = left(row) else { continue };
         sum += (error * error / variance).min(MOST);
         count += 1.0;
     }
     if count > 0.0 { sum / count } else { f64::INFINITY }
+}
+
+/// What predictions from the windows on both sides of a row leave of it; nothing where there are no such windows.
+pub(crate) fn left_of_rows<'a>(
+    problem: &'a Problem<'_>,
+    scale: Scale,
+    fit: &'a Fit,
+) -> Option<impl Fn(usize) -> Option<f64> + 'a> {
+    let rhs = without_constants(problem, &fit.pooled.values);
+    let predictor = Predictor::new(fit.leave_gap_out.as_ref()?, &fit.pooled.values);
+    Some(move |row: usize| {
+        let cell = scale.cell(row);
+        let place = predictor.place(cell)?;
+        let later = (row as f64 - scale.centres(cell)[1]) * problem.period;
+        Some(rhs[row] - predictor.predict(problem, place, row, later))
+    })
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
-//! Statistical inference: cross-validation, tests of constancy, jumps, identifiability and missing terms.
+//! Statistical inference: cross-validation, tests of constancy, jumps, identifiability, missing terms and whether anything is explained.
 
 pub(crate) mod constancy;
 pub(crate) mod cross_validation;
+pub(crate) mod explained;
 pub(crate) mod identifiability;
 pub(crate) mod jumps;
 pub(crate) mod missing_terms;

@@ -34,6 +34,8 @@ pub(crate) struct WeakIdentified {
     pub(crate) weakest: Vec<f64>,
     /// Whether that combination is mostly the angle's noise.
     pub(crate) mostly_noise: bool,
+    /// Whether the motion explains no more of the torque than chance, so that nothing is determined.
+    pub(crate) unexplained: bool,
     /// What may have been left out.
     pub(crate) suspects: Vec<Suspect>,
     /// The estimated lag, or `None` if it was given or is not determined.

@@ -18,6 +18,8 @@ pub(crate) struct Errors {
     pub(crate) inflation: f64,
     /// Mean squared error of predicting rows, or of what is left of them where nothing is windowed, over the noise's variance.
     pub(crate) error: f64,
+    /// Variance of what is left of the rows.
+    pub(crate) left: f64,
     /// What is wrong with the noise.
     pub(crate) status: Status,
 }
@@ -30,9 +32,11 @@ impl Session<'_, '_, '_> {
             expected: decided.expected,
             inflation: decided.error.max(1.0),
             error: decided.error,
+            left: f64::NAN,
             status: Status::GOOD,
         };
         let (shown, coloured) = self.shown(weak, decided, fit)?;
+        errors.left = shown.variance();
         if coloured {
             errors.status |= Status::COLOURED;
         }

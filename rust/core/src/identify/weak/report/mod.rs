@@ -2,6 +2,7 @@
 
 pub(crate) mod at_rows;
 pub(crate) mod errors;
+pub(crate) mod explained;
 pub(crate) mod missing_terms;
 pub(crate) mod record;
 pub(crate) mod tracks;

@@ -11,6 +11,7 @@ use crate::identify::weak::found::WeakIdentified;
 use crate::identify::weak::outside_mask::Inside;
 use crate::identify::weak::report::at_rows::Fitted;
 use crate::identify::weak::report::errors::Errors;
+use crate::identify::weak::report::explained::Explained;
 use crate::identify::weak::session::Session;
 use crate::inference::constancy::NO_CHANCE;
 use crate::inference::identifiability::is_mostly_noise;
@@ -37,6 +38,7 @@ impl Session<'_, '_, '_> {
         let given = self.options.regression_window.filter(|_| !self.options.averaging);
         found.regression_window = given.unwrap_or(fit.span * stride).min(self.record.angle.len());
         let errors = self.errors(&weak, decided, fit)?;
+        let explained = self.is_explained(&weak, decided, fit, errors.left)?;
         found.prediction_error = errors.error;
         let rows = decided.rows(&weak.rows);
         let correlated = match &decided.correlated {
@@ -62,6 +64,15 @@ impl Session<'_, '_, '_> {
         let mut values = vec![0.0; slow];
         values.extend(&fit.pooled.values);
         found.constants = constants(decided, &values, &found.covariance);
+        found.unexplained = match explained {
+            Explained::Plainly => false,
+            Explained::NoTorque => true,
+            Explained::BesideOutliers | Explained::ByNothing => !self.is_moved_by(&found.constants),
+        };
+        if found.unexplained && explained != Explained::BesideOutliers {
+            let nothing = WeakIdentified { unexplained: true, jumps: Vec::new(), ..self.nothing_yet(&weak, decided) };
+            return Ok((self.undetermined(nothing, decided)?, None));
+        }
         found.constant_pairs = pairs_of(&ordered.constant, slow, &found.covariance);
         let weakest = &found.weakest;
         let noise = self.noise[0];
@@ -109,6 +120,7 @@ impl Session<'_, '_, '_> {
             condition: f64::INFINITY,
             weakest: Vec::new(),
             mostly_noise: false,
+            unexplained: false,
             suspects: Vec::new(),
             lag: None,
             outside_mask: None,
@@ -170,7 +182,7 @@ fn record_status(found: &WeakIdentified, decided: &Decided, fit: &Fit, at_end: b
     if at_end || decided.scales.first().is_some_and(|first| Some(*first) == fit.scale) && decided.scales.len() > 1 {
         status |= Status::WINDOW_LIMIT;
     }
-    if found.condition > HARDLY_TOLD_APART || found.mostly_noise {
+    if found.condition > HARDLY_TOLD_APART || found.mostly_noise || found.unexplained {
         status |= Status::ILL_CONDITIONED;
     }
     for suspect in found.suspects.iter().filter(|suspect| suspect.is_conspicuous()) {
