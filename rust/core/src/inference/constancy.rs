@@ -1,7 +1,8 @@
 //! A test of whether a constant coefficient is the same in all parts of the record.
 //!
 //! Each constant is estimated separately in eight blocks of the record. If it does not change, the squared differences
-//! between the blocks, over the variances that the noise explains, follow a χ² distribution (Wald's test).
+//! between the blocks, over the variances that the noise explains, follow a χ² distribution (Wald's test). Windows that are too long for a
+//! block are cut to it: each block is then a record of its own.
 
 use std::ops::Range;
 
@@ -14,6 +15,7 @@ use crate::regression::constants::{Expected, pool};
 use crate::regression::fit::Fit;
 use crate::regression::problem::Problem;
 use crate::regression::row_covariance::RowCovariance;
+use crate::regression::solved::is_determined;
 use crate::simd::instructions::Instructions;
 
 /// Blocks that a record is cut into.
@@ -45,15 +47,17 @@ pub(crate) fn test(
     let constants = problem.layout.constant;
     let (step, span) = (fit.step, fit.span);
     let estimate = |block: usize, (): &mut ()| {
-        let (first, end) = (block * rows / BLOCKS, (block + 1) * rows / BLOCKS);
-        let windows = within(fit, first..end, step, span);
-        if windows.is_empty() {
-            return None;
-        }
-        let pooled = pool(&fit.full, windows.clone(), expected, instructions)?;
-        let variances = fit.covariance_of(problem, windows, &pooled, covariance);
+        let block = block * rows / BLOCKS..(block + 1) * rows / BLOCKS;
+        let windows = within(fit, block.clone(), step, span);
+        let (values, variances) = if windows.is_empty() {
+            alone(problem, block, expected, covariance, instructions)?
+        } else {
+            let pooled = pool(&fit.full, windows.clone(), expected, instructions)?;
+            let variances = fit.covariance_of(problem, windows, &pooled, covariance);
+            (pooled.values, variances)
+        };
         let variances: Vec<f64> = (0..constants).map(|i| inflation * variances[i * constants + i]).collect();
-        Some((pooled.values, variances))
+        Some((values, variances))
     };
     let blocks = (0..BLOCKS).map(|block| Piece { size: rows.div_ceil(BLOCKS), content: block });
     let estimates = stages.map(blocks.collect(), || (), estimate)?;
@@ -66,6 +70,40 @@ pub(crate) fn test(
         })
         .collect();
     Ok(tests)
+}
+
+/// The constants of some rows as if there were no others, and their covariance: in windows as long as they are, or in the longest that jumps
+/// leave of them.
+fn alone(
+    problem: &Problem<'_>,
+    rows: Range<usize>,
+    expected: Expected,
+    covariance: &RowCovariance,
+    instructions: Instructions,
+) -> Option<(Vec<f64>, Vec<f64>)> {
+    let jumps: Vec<usize> =
+        problem.jumps.iter().filter(|&&jump| rows.contains(&jump)).map(|jump| jump - rows.start).collect();
+    let part = Problem {
+        windowed: cut(&problem.windowed, &rows),
+        companions: cut(&problem.companions, &rows),
+        constants: cut(&problem.constants, &rows),
+        rhs: &problem.rhs[rows.clone()],
+        usable: &problem.usable[rows.clone()],
+        jumps: &jumps,
+        correlated: None,
+        ..problem.clone()
+    };
+    let shortened = [1, 2, 4].map(|part| rows.len() / part);
+    let enough = shortened.into_iter().filter(|&length| length > problem.layout.regressors());
+    let mut fits = enough.filter_map(|length| Fit::in_rows(&part, length, expected, instructions));
+    let fit = fits.find(|fit| (0..fit.full.len()).any(|window| is_determined(&fit.full, window)))?;
+    let covariance = fit.covariance_of(&part, 0..fit.full.len(), &fit.pooled, covariance);
+    Some((fit.pooled.values, covariance))
+}
+
+/// Some rows of some columns.
+fn cut<'a>(columns: &[&'a [f64]], rows: &Range<usize>) -> Vec<&'a [f64]> {
+    columns.iter().map(|column| &column[rows.clone()]).collect()
 }
 
 /// Windows that lie within some rows.

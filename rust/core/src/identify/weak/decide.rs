@@ -1,5 +1,7 @@
 //! Decisions from the record: the length of windows, and which unknowns are constant.
 
+use std::borrow::Cow;
+
 use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::identify::kinds::Kind;
@@ -73,14 +75,29 @@ impl Session<'_, '_, '_> {
         }
         self.fit_constants(&chosen.weak, &mut decided)?;
         decided.slow = self.of_kind(Kind::Varying);
+        let mut model = Cow::Borrowed(model);
         loop {
             if !decided.slow.is_empty() {
-                self.set_free(rows, model, &mut decided)?;
+                self.set_free(rows, &model, &mut decided)?;
             }
             let Some(worst) = self.test(rows, &mut decided)? else { break };
-            decided.slow.push(worst);
+            if model.windowed.is_empty() {
+                // Beside constants it is followed in windows, as a stiffness is.
+                let constant = model.constant.iter().copied().filter(|&one| one != worst).collect();
+                model = Cow::Owned(Model { windowed: vec![worst], constant, linear: self.options.linear });
+                let before = decided.clone();
+                (decided.model, decided.white, decided.correlated) = (model.clone().into_owned(), None, None);
+                (decided.covariance, decided.expected) = self.covariance(&chosen.weak, chosen.parameters);
+                self.fit_constants(&chosen.weak, &mut decided)?;
+                if decided.fit.is_none() {
+                    decided = before;
+                    break;
+                }
+            } else {
+                decided.slow.push(worst);
+            }
         }
-        self.set_others_free(rows, model, &mut decided)?;
+        self.set_others_free(rows, &model, &mut decided)?;
         Ok(decided)
     }
 
@@ -101,7 +118,8 @@ impl Session<'_, '_, '_> {
             tested.contains(one) && !decided.slow.contains(one) && test.probability < constancy::NO_CHANCE
         });
         let worst = conspicuous.min_by(|a, b| a.1.probability.total_cmp(&b.1.probability)).map(|(one, _)| *one);
-        Ok(worst.filter(|_| fit.scale.is_some()))
+        let alone = decided.model.windowed.is_empty() && self.options.averaging;
+        Ok(worst.filter(|_| fit.scale.is_some() || alone))
     }
 
     /// Sets all that was tested free where one of them changes and yet the rows are predicted badly: what changes beside what is held

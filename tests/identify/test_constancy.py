@@ -1,0 +1,74 @@
+"""Constancy is tested in every record: also where windows are as long as the record, and where nothing is windowed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import tvident
+from tvident import Status
+
+Array = npt.NDArray[np.float64]
+
+RATE = 1000.0
+SAMPLES = 20_000
+TIME = np.arange(SAMPLES) / RATE
+INERTIA, DAMPING, STIFFNESS = 0.0123, 0.03, 13.0
+
+
+def recording(seed: int, inertia: Any = INERTIA, damping: Any = DAMPING) -> tuple[Array, Array]:
+    """Return a motion of many frequencies, and the torque that moves so: both with white noise."""
+    draw = np.random.default_rng(seed)
+    frequencies, phases = np.linspace(0.5, 8.0, 40), draw.uniform(0, 6, 40)
+    waves = [np.exp(1j * (2 * np.pi * f * TIME + p)) for f, p in zip(frequencies, phases, strict=True)]
+    angle, velocity, acceleration = (
+        0.02 * np.real(sum((2j * np.pi * f) ** order * wave for f, wave in zip(frequencies, waves, strict=True)))
+        for order in range(3)
+    )
+    torque = inertia * acceleration + damping * velocity + STIFFNESS * angle
+    angle = angle + 1e-3 * angle.std() * draw.standard_normal(SAMPLES)
+    return angle, torque + 0.1 * torque.std() * draw.standard_normal(SAMPLES)
+
+
+def grown(value: float, by: float) -> Array:
+    return value * (1 + by * TIME / TIME[-1])
+
+
+@pytest.mark.parametrize("kinds", [{}, {"stiffness": "constant"}])
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("name", "by", "wrong"), [("inertia", 0.05, 0.01), ("inertia", 0.5, 0.01), ("damping", 0.5, 0.03)]
+)
+def test_what_grows_beside_a_constant_stiffness_is_found(
+    name: str, by: float, wrong: float, seed: int, kinds: dict[str, Any]
+) -> None:
+    truth = grown({"inertia": INERTIA, "damping": DAMPING}[name], by)
+    result = tvident.identify(*recording(seed, **{name: truth}), sample_rate=RATE, **kinds)
+    assert result.settings["kinds"][name] == "varying"
+    assert np.sqrt(np.mean((getattr(result, name) / truth - 1) ** 2)) < wrong
+    assert np.sqrt(np.mean((result.stiffness / STIFFNESS - 1) ** 2)) < 0.01
+    assert f"{name} " in " ".join(result.reasons)
+
+
+@pytest.mark.parametrize("stiffness", ["windowed", "constant"])
+@pytest.mark.parametrize(("name", "by"), [("inertia", 0.05), ("damping", 0.5)])
+def test_a_constant_that_was_given_is_contradicted(name: str, by: float, stiffness: Any) -> None:
+    kinds: dict[str, Any] = {"inertia": "constant", "damping": "constant", "stiffness": stiffness}
+    truth = grown({"inertia": INERTIA, "damping": DAMPING}[name], by)
+    result = tvident.identify(*recording(0, **{name: truth}), sample_rate=RATE, **kinds)
+    assert result.record_status & Status.KIND_CONTRADICTED
+    assert f"{name} was given as constant" in " ".join(result.advice)
+    agreeing = tvident.identify(*recording(0), sample_rate=RATE, **kinds)
+    assert not agreeing.record_status & Status.KIND_CONTRADICTED
+    assert "constant: noise explains the differences between eight parts" in " ".join(agreeing.reasons)
+
+
+def test_what_cannot_be_tested_is_said() -> None:
+    """All but a tenth of the record is missing: there is one part."""
+    angle, torque = recording(0)
+    angle[SAMPLES // 10 :] = np.nan
+    result = tvident.identify(angle, torque, sample_rate=RATE, stiffness="constant")
+    assert "inertia, damping, stiffness and offset constant: not tested" in " ".join(result.reasons)
