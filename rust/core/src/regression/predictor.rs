@@ -1,36 +1,40 @@
 //! Predictions of rows from the windowed unknowns of solved windows.
 
+use std::borrow::Cow;
+
 use crate::regression::problem::Problem;
-use crate::regression::solved::{Solved, is_determined};
+use crate::regression::solved::{Solved, fewest_rows};
 
 /// The windowed unknowns of solved windows for given constants, ready to predict rows.
 #[derive(Clone, Debug)]
 pub(crate) struct Predictor<'a> {
     solved: &'a Solved,
     /// By unknown, by window.
-    values: Vec<Vec<f64>>,
-    usable: Vec<bool>,
+    values: Vec<Cow<'a, [f64]>>,
+    /// Rows of every window.
+    counts: &'a [f64],
 }
 
 impl<'a> Predictor<'a> {
+    /// Without constants nothing is copied: around a single row that costs next to nothing, however many windows there are.
     pub(crate) fn new(solved: &'a Solved, constants: &[f64]) -> Self {
         let (fields, layout) = (solved.fields, solved.fields.layout);
         let value = |unknown: usize| {
-            let mut values = solved.field(fields.solution(unknown, layout.constant)).to_vec();
+            let mut values = Cow::Borrowed(solved.field(fields.solution(unknown, layout.constant)));
             for (constant, factor) in constants.iter().enumerate() {
                 let column = solved.field(fields.solution(unknown, constant));
-                values.iter_mut().zip(column).for_each(|(value, slope)| *value -= slope * factor);
+                values.to_mut().iter_mut().zip(column).for_each(|(value, slope)| *value -= slope * factor);
             }
             values
         };
         let values = (0..layout.local()).map(value).collect();
-        let usable = (0..solved.len()).map(|window| is_determined(solved, window)).collect();
-        Self { solved, values, usable }
+        Self { solved, values, counts: solved.field(fields.count()) }
     }
 
     /// The place of a window, or `None` if it is not there or not determined.
     pub(crate) fn place(&self, window: isize) -> Option<usize> {
-        self.solved.place(window).filter(|&place| self.usable[place])
+        let fewest = fewest_rows(self.solved.fields.layout);
+        self.solved.place(window).filter(|&place| self.counts[place] >= fewest)
     }
 
     /// A windowed unknown at a time, in seconds after the window's centre.

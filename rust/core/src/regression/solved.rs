@@ -81,10 +81,14 @@ pub(crate) fn sensitivity(full: &Solved, window: usize, local: usize, constant: 
     -value
 }
 
+/// The fewest rows that determine a window: more than its unknowns and one.
+pub(crate) fn fewest_rows(layout: Layout) -> f64 {
+    (layout.regressors() + 2) as f64
+}
+
 /// Whether a window has more rows than unknowns.
 pub(crate) fn is_determined(solved: &Solved, window: usize) -> bool {
-    let Fields { layout } = solved.fields;
-    solved.field(solved.fields.count())[window] > (layout.regressors() + 1) as f64
+    solved.field(solved.fields.count())[window] >= fewest_rows(solved.fields.layout)
 }
 
 #[cfg(test)]

@@ -49,10 +49,16 @@ pub(crate) fn thinned_rows(rows: &Rows, stretches: &[Range<usize>]) -> Rows {
 const LONG: usize = 1 << 15;
 const MOST_ROWS: usize = 1 << 14;
 const STRETCHES: usize = 8;
+const MORE: usize = 4;
 
 /// The stretches that represent so many rows, or `None` if the rows are few.
 pub(crate) fn stretches_of_rows(rows: usize) -> Option<Vec<Range<usize>>> {
     (rows > LONG).then(|| stretches_of_blocks(rows, MOST_ROWS, STRETCHES))
+}
+
+/// More of them, for tests of constants beside which nothing is windowed: so much less is estimated from each row.
+pub(crate) fn more_stretches_of_rows(rows: usize) -> Option<Vec<Range<usize>>> {
+    (rows > MORE * LONG).then(|| stretches_of_blocks(rows, MORE * MOST_ROWS, STRETCHES))
 }
 
 /// Whether stretches of rows hold enough windows of a length.

@@ -16,6 +16,7 @@ use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
 use crate::regression::row_covariance::{RowCovariance, products};
+use crate::simd::f64x8::{Packet, WIDTH};
 
 /// Added to the variance of a row, relative to it, so that frequencies that the test function suppresses do not count.
 const RIDGE: f64 = 1e-6;
@@ -25,6 +26,9 @@ const SETTLED: f64 = 1e-8;
 
 /// The most rows after a gap before the factor is assumed stationary.
 const MOST: usize = 1 << 13;
+
+/// Rows that are whitened before the last of them move to the front of what stays in the nearest cache.
+const PIECE: usize = 256;
 
 /// The transformation that whitens rows.
 #[derive(Clone, Debug)]
@@ -71,10 +75,11 @@ impl Whitening {
 
     /// The whitened rows.
     pub(crate) fn apply(&self, rows: &Rows, stages: &mut Stages<'_, '_>) -> Result<Rows, Error> {
-        let columns = rows.regressors.iter().map(|regressor| &regressor.value).chain([&rows.rhs]);
-        let pieces = columns.map(|column| Piece { size: rows.len(), content: column });
+        let columns: Vec<&[f64]> =
+            rows.regressors.iter().map(|regressor| regressor.value.as_slice()).chain([rows.rhs.as_slice()]).collect();
+        let pieces = columns.chunks(WIDTH).map(|some| Piece { size: rows.len(), content: some });
         let mut white =
-            stages.map(pieces.collect(), || (), |column: &Vec<f64>, (): &mut ()| self.column(rows, column))?;
+            stages.map(pieces.collect(), || (), |some: &[&[f64]], (): &mut ()| self.columns(rows, some))?.concat();
         let rhs = white.pop().unwrap_or_default();
         let roots = self.noise(rows);
         let mut roots = roots.into_iter();
@@ -91,13 +96,29 @@ impl Whitening {
         Ok(Rows { regressors, rhs, rhs_noise, usable, jumps, period: rows.period })
     }
 
-    fn column(&self, rows: &Rows, column: &[f64]) -> Vec<f64> {
-        let mut white = vec![0.0; column.len()];
+    /// Some columns, whitened side by side: every row waits for those before it, so each column alone would wait as long.
+    fn columns(&self, rows: &Rows, columns: &[&[f64]]) -> Vec<Vec<f64>> {
+        let depth = self.factor.iter().map(Vec::len).max().unwrap_or(1) - 1;
+        let mut white = vec![vec![0.0; rows.len()]; columns.len()];
+        // Behind the last rows of the piece before.
+        let mut piece = vec![Packet::ZERO; depth + PIECE];
         for (row, since) in since_gaps(rows).enumerate() {
-            let Some(since) = since else { continue };
+            let place = depth + row % PIECE;
+            if place == depth {
+                piece.copy_within(PIECE.., 0);
+            }
+            let Some(since) = since else {
+                piece[place] = Packet::ZERO;
+                continue;
+            };
             let factor = self.at(since);
-            let before = factor[1..].iter().zip(white[..row].iter().rev());
-            white[row] = (column[row] - before.map(|(entry, value)| entry * value).sum::<f64>()) / factor[0];
+            let mut value = Packet::ZERO;
+            value.0.iter_mut().zip(columns).for_each(|(lane, column)| *lane = column[row]);
+            let before = factor[1..].iter().zip(piece[..place].iter().rev());
+            let sum = before.fold(Packet::ZERO, |sum, (entry, value)| sum + Packet::splat(*entry) * *value);
+            value = (value - sum) / Packet::splat(factor[0]);
+            piece[place] = value;
+            white.iter_mut().zip(value.0).for_each(|(column, value)| column[row] = value);
         }
         white
     }

@@ -8,7 +8,7 @@ use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::{JudgedTerm, Missing, Suspect};
 use crate::record::derived::Interpolated;
 use crate::regression::fit::Fit;
-use crate::regression::subsample::{holds, stretches_of_rows, thinned_column, thinned_rows};
+use crate::regression::subsample::{holds, more_stretches_of_rows, stretches_of_rows, thinned_column, thinned_rows};
 use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows};
 
 impl Session<'_, '_, '_> {
@@ -35,7 +35,11 @@ impl Session<'_, '_, '_> {
         });
         let record = Record { terms: terms.collect(), ..self.record.clone() };
         let (function, delta, workers) = (weak.function, self.options.delta, self.stages.workers);
-        let stretches = stretches_of_rows(weak.rows.len()).filter(|_| fit.scale.is_some_and(holds));
+        let stretches = match fit.scale {
+            Some(scale) => stretches_of_rows(weak.rows.len()).filter(|_| holds(scale)),
+            None if decided.model.windowed.is_empty() => more_stretches_of_rows(weak.rows.len()),
+            None => None,
+        };
         let mut rhs = rhs.to_vec();
         if let Some(stretches) = &stretches {
             (weak.rows, rhs) = (thinned_rows(&weak.rows, stretches), thinned_column(&rhs, stretches));
