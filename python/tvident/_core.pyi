@@ -5,10 +5,12 @@ import numpy as np
 import numpy.typing as npt
 
 __all__ = [
+    "CORRELATED_NOISE",
     "FEWEST_SAMPLES",
     "HARDLY_TOLD_APART",
     "NOISE_MODEL_FAILS",
     "NO_CHANCE",
+    "WEAK_INSTRUMENT",
     "AutomaticEstimates",
     "Identification",
     "LocalEstimates",
@@ -29,16 +31,19 @@ __all__ = [
     "identify",
     "instructions",
     "noise",
+    "noise_coherence",
     "quantisation_step",
     "respond",
     "rolling_least_squares",
     "status_flags",
 ]
 
+CORRELATED_NOISE: float
 FEWEST_SAMPLES: int
 HARDLY_TOLD_APART: float
 NOISE_MODEL_FAILS: float
 NO_CHANCE: float
+WEAK_INSTRUMENT: float
 
 @final
 class LocalPolynomials:
@@ -235,6 +240,8 @@ class Identification:
     def suspects(self) -> list[Suspect]: ...
     @property
     def outside_mask(self) -> OutsideMask | None: ...
+    @property
+    def instrument(self) -> tuple[float, float] | None: ...
 
 def estimate_automatically(
     samples: npt.NDArray[np.number],
@@ -248,6 +255,9 @@ def estimate_automatically(
     progress: Callable[[int, int], object] | None = None,
 ) -> AutomaticEstimates: ...
 def noise(samples: npt.NDArray[np.number], quantisation: float | None = None) -> list[Noise]: ...
+def noise_coherence(
+    angle: npt.NDArray[np.number], torque: npt.NDArray[np.number], variances: list[float]
+) -> list[float | None]: ...
 def quantisation_step(samples: npt.NDArray[np.number]) -> float: ...
 def identify(
     motions: Motions,
@@ -261,6 +271,7 @@ def identify(
     propagate: bool = False,
     step: int = 1,
     diagnose: bool = True,
+    instrument: npt.NDArray[np.number] | None = None,
     workers: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> list[Identification]: ...

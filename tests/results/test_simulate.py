@@ -127,7 +127,7 @@ def test_short_gaps_are_bridged_and_long_ones_are_nan(rig: tvident.Recording) ->
     n = rig.angle.size
     stiffness = np.array(rig.stiffness)
     result = tvident.identify(
-        rig.angle, rig.torque, sample_rate=1000, stiffness=stiffness, inertia=rig.inertia, damping=rig.damping
+        rig.angle, rig.torque, sample_rate=1000, stiffness=stiffness, inertia=rig.inertia, damping="constant"
     )
     whole = result.simulate(rig.torque, angle=rig.angle)
     length = result.settings["window_length"]
@@ -184,7 +184,8 @@ def test_what_cannot_be_simulated_is_refused_with_the_rule(
         result.vaf(rig.angle)
     with pytest.raises(ValueError, match=r"same shape; got \(5999,\) and \(6000,\)"):
         result.vaf(rig.angle[1:], rig.torque)
-    unstable = tvident.identify(rig.angle, rig.torque, sample_rate=1000, stiffness=-1e4, inertia=0.01, damping=0.0)
+    unstable = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
+    unstable.stiffness = np.full(rig.angle.size, -1e4)
     with pytest.raises(ValueError, match=r"is lost after .* s, since the identified system is unstable"):
         unstable.simulate(rig.torque, (1.0, 0.0))
     light: dict[str, Any] = {"sample_rate": 1000, "inertia": 0, "stiffness": "constant"}
@@ -220,7 +221,8 @@ def test_a_part_that_was_held_back_tells_a_good_model_from_a_bad_one(
     assert good.simulated > 99.5
     assert good.predicted > good.simulated
     assert good.parts == 10
-    bad = tvident.identify(rig.angle, rig.torque, sample_rate=1000, stiffness="constant").held_back()
+    constant: dict[str, Any] = {"inertia": "constant", "damping": "constant", "stiffness": "constant"}
+    bad = tvident.identify(rig.angle, rig.torque, sample_rate=1000, **constant).held_back()
     assert bad.simulated < 90 < bad.predicted < good.predicted
     first = result.summary().splitlines()[0]
     assert first.startswith("explains 99.")

@@ -43,6 +43,8 @@ class Explained:
         Unknowns that the record was to decide upon.
     period : float
         Seconds from one sample to the next.
+    coherence : float, optional
+        Of the noise of both channels, above the motion.
     """
 
     found: _core.Identification
@@ -50,6 +52,7 @@ class Explained:
     chosen: Collection[str]
     tested: Collection[str]
     period: float
+    coherence: float | None = None
 
     def words(self, *, method_chosen: bool = False) -> Words:
         """Return what there is to say, with the reason for the weak form where nobody asked for it."""
@@ -76,7 +79,7 @@ class Explained:
             *self._kinds(),
             *self._jumps(),
         )
-        advice = (*self._misfit(flags), *self._outside(), *self._suspects(), *self._contradictions())
+        advice = (*self._feedback(), *self._misfit(flags), *self._outside(), *self._suspects(), *self._contradictions())
         advice = (*advice, *self._told_apart(flags))
         return Words(reasons, (*advice, *self._limits(flags)))
 
@@ -129,6 +132,15 @@ class Explained:
         )
         many = f"{len(jumps)} times, at" if len(jumps) > 1 else "at"
         return [f"windowed parameters jump {many} {shown} s: windows end there"]
+
+    def _feedback(self) -> list[str]:
+        if self.coherence is None or self.coherence < _core.CORRELATED_NOISE:
+            return []
+        words = (
+            f"the torque holds the angle's noise (coherence {self.coherence:.2f} above the motion): a controller feeds it back, and "
+            "estimates are biased: give the reference or another channel that moves the system as instrument="
+        )
+        return [words]
 
     def _outside(self) -> list[str]:
         if self.found.outside_mask is None:

@@ -55,6 +55,11 @@ _MOST_BYTES = 100_000_000
     metavar="TERM[:KIND]",
     help=f"{', '.join(TERM_NAMES)}; may be repeated; none removes the default offset.",
 )
+@click.option(
+    "--instrument",
+    metavar="NAME",
+    help="Channel, or file, that moves the system and that no noise of the others reaches.",
+)
 @click.option("--lag", metavar="TIME", help="Delay of the torque: seconds, '2 ms', or auto.")
 @click.option(
     "--quantisation", type=float, help="Step to which the angle was rounded; estimated if not given; 0: none."
@@ -81,6 +86,7 @@ def identify(
     time_channel: str | None,
     method: str | None,
     terms: tuple[str, ...],
+    instrument: str | None,
     lag: str | None,
     mask: str | None,
     settings: str | None,
@@ -96,7 +102,14 @@ def identify(
     """
     check_outputs(
         {RESULTS: output, PICTURE: plot, SETTINGS: settings_output},
-        {RECORDING: file, "the angle": angle, "the torque": torque, "the mask": mask, "earlier settings": settings},
+        {
+            RECORDING: file,
+            "the angle": angle,
+            "the torque": torque,
+            "the mask": mask,
+            "the instrument": instrument,
+            "earlier settings": settings,
+        },
     )
     if not check_time(options["sample_rate"], options["delta"], time_channel):
         raise click.UsageError("identify needs the sample period; got none; give --sample-rate, --delta or --time")
@@ -108,6 +121,7 @@ def identify(
         scaled(source_of(channels, torque, file), torque_scale, channels, file),
         method=form,
         t=None if time_channel is None else channel_of(channels, time_channel, file),
+        instrument=None if instrument is None else source_of(channels, instrument, file),
         lag=None if lag is None else lag_of(lag),
         mask=None if mask is None else mask_of(source_of(channels, mask, file)),
         settings=None if settings is None else _read_settings(settings),

@@ -72,8 +72,8 @@ def compare_models(
 
     Notes
     -----
-    The cost is that of ``identify`` for every model, and once more: 1 to 15 µs a sample for each.
-    Weights compare the models that are given: if none of them holds, one is still the best. ``results[best].summary()`` says what it explains.
+    The cost is that of ``identify`` for every model, and once more: 1 to 15 µs a sample for each. Weights compare the models that are
+    given: if none of them holds, one is still the best. ``results[best].summary()`` says what it explains.
 
     See Also
     --------

@@ -29,6 +29,7 @@ def identify(
     damping: Parameter | None = None,
     stiffness: Parameter | None = None,
     terms: Sequence[GivenTerm] | None = None,
+    instrument: npt.ArrayLike | None = None,
     lag: float | Literal["auto"] | None = None,
     quantisation: float | None = None,
     mask: npt.ArrayLike | None = None,
@@ -75,6 +76,12 @@ def identify(
         Further terms of the left-hand side, each with an unknown factor: ``"offset"``, ``"coulomb"`` (the sign of the velocity),
         ``"cubic"`` (the cube of the angle), ``"gravity"`` (the sine of the angle) or a :class:`Term` of your own; or a pair of one of
         these and its kind. Without a kind a term is windowed if all unknown parameters are, and constant otherwise.
+    instrument : array_like, the angle's shape, optional
+        A channel that no noise of angle or torque reaches, but that moves the system: the reference of a controller, or excitation that was
+        added. Under feedback noise of the angle is part of the torque, and estimates without an instrument are biased. All unknowns are
+        then constant, and estimated by two-stage least squares: the instrument's past explains a motion, and rows of that
+        motion multiply those of the recorded one. The summary has a test of exogeneity (Durbin, Wu, Hausman) and says if the instrument
+        is weak.
     lag : float or "auto", optional
         Delay of the torque in seconds; it may be a fraction of a sample. ``"auto"``, in weak form: the lag nearest to zero at
         which the torque's rate explains nothing more, with its standard error in ``settings["lag_stderr"]``; zero if the record does
@@ -168,7 +175,12 @@ def identify(
         "lag": lag,
         "quantisation": quantisation,
     }
-    request = resolve(method, given, settings, 1 / period)
+    instruments = None if instrument is None else arguments.real_array("instrument", instrument)
+    if instruments is not None and instruments.shape != angles.shape:
+        raise ValueError(
+            f"an instrument must have the angle's shape {angles.shape}; got {instruments.shape}; resample it"
+        )
+    request = resolve(method, given, settings, 1 / period, has_instrument=instruments is not None)
     for name, array in (("angle", angles), ("torque", torques)):
         arguments.check_nan(name, array, nan_policy, arguments.RowPolicy)
     start = 0.0 if t is None else float(np.asarray(t)[0])
@@ -177,6 +189,7 @@ def identify(
         torques=torques,
         time=start + np.arange(samples, dtype=np.float64) * period,
         period=period,
+        instruments=instruments,
         mask=arguments.mask("mask", mask, angles.shape),
         propagate=nan_policy == "propagate",
         step=arguments.whole_number("step", step, least=1),

@@ -83,7 +83,14 @@ class Request:
         return value
 
 
-def resolve(method: Method, given: Mapping[str, Any], earlier: Mapping[str, Any] | None, sample_rate: float) -> Request:
+def resolve(
+    method: Method,
+    given: Mapping[str, Any],
+    earlier: Mapping[str, Any] | None,
+    sample_rate: float,
+    *,
+    has_instrument: bool = False,
+) -> Request:
     """Return what is asked for.
 
     Raises
@@ -104,6 +111,10 @@ def resolve(method: Method, given: Mapping[str, Any], earlier: Mapping[str, Any]
         if arguments.is_word(method, "auto"):
             name, form, by_record = _form_of_result(earlier)
     asked = _OF_METHOD["paper" if name == "paper" else "auto"] | before | given
+    if earlier is not None and earlier.get("instrument") and not has_instrument:
+        raise ValueError("settings of a result with an instrument need it again; got none; pass instrument=")
+    if has_instrument:
+        asked = _with_instrument(asked, {**before, **given})
     lag = asked["lag"]
     if isinstance(lag, tuple | list) and isinstance(form, WeakForm):
         by_record["lag"] = [arguments.finite_number("lag", one) for one in lag]
@@ -125,6 +136,33 @@ def resolve(method: Method, given: Mapping[str, Any], earlier: Mapping[str, Any]
         quantisation=asked["quantisation"],
         chosen=earlier is None and name == "auto",
     )
+
+
+def _with_instrument(asked: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is asked for with an instrument, which tells constants only: what was not given is one."""
+    asked = dict(asked)
+    for name in COEFFICIENTS:
+        kind = asked[name]
+        if name not in given or arguments.is_word(kind, "auto"):
+            asked[name] = "constant"
+        elif arguments.is_word(kind, "windowed") or arguments.is_word(kind, "varying"):
+            raise ValueError(
+                f"with an instrument unknowns must be constant; got {name}={kind!r}; give {name}='constant', or "
+                "split the record where it changes"
+            )
+    if arguments.is_word(asked["lag"], "auto"):
+        raise ValueError("with an instrument the lag must be known; got 'auto'; give lag= in seconds")
+    terms = asked["terms"]
+    for term in () if isinstance(terms, str | Term) else terms:
+        own, kind = term if isinstance(term, tuple | list) and len(term) == 2 else (term, "constant")  # noqa: PLR2004
+        if isinstance(own, Term):
+            raise ValueError(  # noqa: TRY004 - a term, but not one that will do
+                f"with an instrument terms must be built-in; got {own.name!r}, whose samples hold the angle's noise; use 'coulomb', "
+                "'cubic' or 'gravity', or leave the instrument out"
+            )
+        if kind != "constant":
+            raise ValueError(f"with an instrument unknowns must be constant; got term {own!r} {kind}; make it constant")
+    return asked
 
 
 def _method(method: Method) -> tuple[str, Form]:

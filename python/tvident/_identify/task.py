@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
-from tvident._advice import Explained, ExplainedStrong
+from tvident._advice import Explained, ExplainedStrong, words_with_instrument
 from tvident._derivatives import SHORTEST_WINDOW, plan, quantisation_step
 from tvident._equation import COEFFICIENTS, Kind, Unknown, all_terms, parameter
 from tvident._identify.batch import estimates
@@ -31,6 +31,7 @@ class Data:
     Parameters
     ----------
     angles, torques : ndarray, shape (\\*, n)
+    instruments : ndarray, shape (\\*, n), optional
     time : ndarray, shape (n,)
     period : float
         Seconds from one sample to the next.
@@ -44,6 +45,7 @@ class Data:
 
     angles: npt.NDArray[np.number]
     torques: npt.NDArray[np.number]
+    instruments: npt.NDArray[np.number] | None
     time: npt.NDArray[np.float64]
     period: float
     mask: npt.NDArray[np.bool_] | None
@@ -85,7 +87,8 @@ class Task:
         shape = data.angles.shape
         self._parameters = {name: parameter(name, value, shape) for name, value in request.parameters.items()}
         kinds: dict[str, Kind] = {name: value for name, value in self._parameters.items() if isinstance(value, str)}
-        default: Kind = "windowed" if all(kind == "windowed" for kind in kinds.values()) else "constant"
+        is_paper = data.instruments is None and all(kind == "windowed" for kind in kinds.values())
+        default: Kind = "windowed" if is_paper else "constant"
         self._terms = all_terms(request.terms, default)
         self._unknowns = [Unknown(name, kind) for name, kind in kinds.items()] + self._terms
         if not self._unknowns:
@@ -111,6 +114,7 @@ class Task:
                 propagate=data.propagate,
                 step=data.step,
                 diagnose=diagnose,
+                instrument=data.instruments,
                 workers=data.workers,
                 progress=report,
             )
@@ -126,7 +130,8 @@ class Task:
         }
         batch = estimates(data.batch, self._names, found, known)
         settings = self._settings(found)
-        explain = self._words_of_strong_form if isinstance(request.form, StrongForm) else self._words_of_weak_form
+        explain: Any = self._words_of_strong_form if isinstance(request.form, StrongForm) else self._words_of_weak_form
+        explain = self._words_with_instrument if data.instruments is not None else explain
         jumps = tuple(tuple(data.time[one.jumps].tolist()) for one in found)
         return Identification(
             batch,
@@ -148,7 +153,8 @@ class Task:
         given: dict[str, Any] = {name: value for name, value in self._known.items() if not isinstance(value, float)}
         if settings["own_terms"]:
             given["terms"] = [(term.own or term.name, settings["kinds"][term.name]) for term in self._terms]
-        request = resolve("auto", given, settings, settings["sample_rate"])
+        has_instrument = self._data.instruments is not None
+        request = resolve("auto", given, settings, settings["sample_rate"], has_instrument=has_instrument)
         return Task(replace(self._data, angles=angles, propagate=False, step=1), request).run(
             progress=None, diagnose=False
         )
@@ -275,6 +281,7 @@ class Task:
             **used,
             **lag,
             "quantisation": self._quantisation,
+            "instrument": data.instruments is not None,
             "kinds": kinds,
             "terms": [[term.name, kinds[term.name]] for term in self._terms],
             "own_terms": [term.name for term in self._terms if term.own is not None],
@@ -284,16 +291,27 @@ class Task:
             "chosen": chosen,
         }
 
+    def _words_with_instrument(
+        self, found: Sequence[_core.Identification], batch: Estimates, settings: dict[str, Any]
+    ) -> Words:
+        del batch, settings
+        each = [words_with_instrument(one) for one in found]
+        if not self._data.batch:
+            return each[0]
+        return Words((), tuple(f"record {place}: {line}" for place, words in enumerate(each) for line in words.advice))
+
     def _words_of_weak_form(
         self, found: Sequence[_core.Identification], batch: Estimates, settings: dict[str, Any]
     ) -> Words:
         del batch
         tested = [one.name for one in self._unknowns if one.kind == "auto"]
+        variances = [one.noise[0] if one.noise else 0.0 for one in found]
+        coherences = _core.noise_coherence(self._data.angles, self._data.torques, variances)
         each = [
-            Explained(one, self._names, settings["chosen"], tested, self._data.period).words(
+            Explained(one, self._names, settings["chosen"], tested, self._data.period, coherence).words(
                 method_chosen=self._request.chosen
             )
-            for one in found
+            for one, coherence in zip(found, coherences, strict=True)
         ]
         if not self._data.batch:
             return each[0]

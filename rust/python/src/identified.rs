@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use tvident::identify::{Identification as Found, Kind, Outside, Unknown as FoundUnknown};
+use tvident::identify::{Identification as Found, InstrumentTest, Kind, Outside, Unknown as FoundUnknown};
 use tvident::inference::Suspect as FoundSuspect;
 
 /// One unknown: what it turned out to be, its values and their standard errors, and what a test of its constancy said.
@@ -60,10 +60,12 @@ pub(crate) struct Identification {
     lag: Option<(f64, f64)>,
     suspects: Vec<Py<Suspect>>,
     outside_mask: Option<Py<OutsideMask>>,
+    /// With an instrument: the probability of the test of exogeneity, and the smallest F statistic of the first stage.
+    instrument: Option<(f64, f64)>,
 }
 
 impl Identification {
-    pub(crate) fn new(py: Python<'_>, found: Found) -> PyResult<Self> {
+    pub(crate) fn new(py: Python<'_>, found: Found, instrument: Option<InstrumentTest>) -> PyResult<Self> {
         let array = |values: Vec<f64>| PyArray1::from_vec(py, values).unbind();
         let unknown = |unknown: FoundUnknown| {
             Py::new(
@@ -103,6 +105,7 @@ impl Identification {
             status: PyArray1::from_vec(py, found.status).unbind(),
             record_status: found.record_status.bits(),
             order: PyArray1::from_vec(py, found.order).unbind(),
+            instrument: instrument.map(|test| (test.exogeneity, test.strength)),
             jumps: found.jumps,
             noise: weak.map(|weak| weak.noise.into()),
             lengths: weak.map(|weak| weak.lengths.clone()).unwrap_or_default(),

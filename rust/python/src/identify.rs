@@ -6,13 +6,17 @@ use numpy::PyUntypedArray;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tvident::exec::workers as threads;
-use tvident::identify::{Kind, Method, Options, StrongForm as Strong, Task, WeakForm as Weak, identify_all};
+use tvident::identify::{
+    Identification as Found, InstrumentTest, Kind, Method, Options, StrongForm as Strong, Task, WeakForm as Weak,
+    identify_all, identify_with_instruments,
+};
+use tvident::record::Samples;
 use tvident::simd::Instructions;
 
 use crate::identified::{Identification, kind};
 use crate::local_polynomials::LocalPolynomials;
 use crate::motions::Motions;
-use crate::records::flags;
+use crate::records::{flags, records};
 use crate::watch::watched;
 
 /// Settings of the weak form, one of each a record. What is None is chosen from the record.
@@ -92,10 +96,10 @@ impl Form<'_> {
 }
 
 /// Identifies every record. `kinds` holds one word an unknown, `lag` the samples by which the torque of each record comes late (None: estimate
-/// it), `masks` one mask a record.
+/// it), `masks` one mask a record, `instrument` a channel a record that noise does not reach.
 #[pyfunction]
 #[pyo3(signature = (
-    motions, kinds, method, *, delta, lag, quantisation=None, masks=None, propagate=false, step=1, diagnose=true, workers=None, progress=None
+    motions, kinds, method, *, delta, lag, quantisation=None, masks=None, propagate=false, step=1, diagnose=true, instrument=None, workers=None, progress=None
 ))]
 pub(crate) fn identify<'py>(
     py: Python<'py>,
@@ -109,6 +113,7 @@ pub(crate) fn identify<'py>(
     propagate: bool,
     step: usize,
     diagnose: bool,
+    instrument: Option<&Bound<'py, PyUntypedArray>>,
     workers: Option<NonZeroUsize>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Vec<Identification>> {
@@ -130,10 +135,19 @@ pub(crate) fn identify<'py>(
         let mask = masks.as_ref().and_then(|masks| masks.get(record)).map(Vec::as_slice);
         tasks.push(Task { motion, mask, method: method.of(record)?, lag });
     }
-    let mut found = Vec::new();
+    let instruments = instrument.map(records).transpose()?;
+    let mut found: Vec<(Found, Option<InstrumentTest>)> = Vec::new();
     watched(py, progress, |watch| {
-        found = identify_all(&tasks, &options, threads(workers), watch)?;
+        let workers = threads(workers);
+        found = match &instruments {
+            Some(instruments) => {
+                let pairs: Vec<_> = tasks.into_iter().zip(instruments.iter().map(|one| one as &dyn Samples)).collect();
+                let found = identify_with_instruments(&pairs, &options, workers, watch)?;
+                found.into_iter().map(|(found, test)| (found, Some(test))).collect()
+            }
+            None => identify_all(&tasks, &options, workers, watch)?.into_iter().map(|found| (found, None)).collect(),
+        };
         Ok(())
     })?;
-    found.into_iter().map(|one| Identification::new(py, one)).collect()
+    found.into_iter().map(|(found, test)| Identification::new(py, found, test)).collect()
 }

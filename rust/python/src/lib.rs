@@ -41,7 +41,7 @@ mod _core {
     #[pymodule_export]
     use crate::motions::Motions;
     #[pymodule_export]
-    use crate::noise::{Noise, noise, quantisation_step};
+    use crate::noise::{Noise, noise, noise_coherence, quantisation_step};
     #[pymodule_export]
     use crate::respond::{Responses, respond};
     #[pymodule_export]
@@ -56,6 +56,12 @@ mod _core {
     /// Condition number from which on equations hardly tell parameters apart.
     #[pymodule_export]
     const HARDLY_TOLD_APART: f64 = tvident::regression::HARDLY_TOLD_APART;
+    /// F statistic of the first stage below which an instrument is weak.
+    #[pymodule_export]
+    const WEAK_INSTRUMENT: f64 = tvident::identify::WEAK_INSTRUMENT;
+    /// Coherence of the noise of both channels from which on one is fed back into the other.
+    #[pymodule_export]
+    const CORRELATED_NOISE: f64 = tvident::noise::CORRELATED_NOISE;
     /// The shortest record that a window is chosen for.
     #[pymodule_export]
     const FEWEST_SAMPLES: usize = tvident::auto_derivatives::FEWEST_SAMPLES;

@@ -3,7 +3,7 @@
 use numpy::PyUntypedArray;
 use pyo3::prelude::*;
 use tvident::Error;
-use tvident::noise::{noise as core_noise, quantisation_step as core_step};
+use tvident::noise::{noise as core_noise, noise_coherence as core_coherence, quantisation_step as core_step};
 use tvident::simd::Instructions;
 
 use crate::records::records;
@@ -57,4 +57,25 @@ pub(crate) fn quantisation_step(samples: &Bound<'_, PyUntypedArray>) -> PyResult
         Ok(())
     })?;
     Ok(if records.is_empty() { 0.0 } else { least })
+}
+
+/// The coherence of the noise of angle and torque of every record, above the motion; `variances` are those of the angles' noise.
+#[pyfunction]
+pub(crate) fn noise_coherence(
+    angle: &Bound<'_, PyUntypedArray>,
+    torque: &Bound<'_, PyUntypedArray>,
+    variances: Vec<f64>,
+) -> PyResult<Vec<Option<f64>>> {
+    let (angles, torques) = (records(angle)?, records(torque)?);
+    let mut found = Vec::new();
+    watched(angle.py(), None, |watch| {
+        for ((angle, torque), variance) in angles.iter().zip(&torques).zip(variances) {
+            found.push(core_coherence(angle, torque, variance));
+            if !watch(found.len(), angles.len()) {
+                return Err(Error::Cancelled);
+            }
+        }
+        Ok::<(), Error>(())
+    })?;
+    Ok(found)
 }

@@ -3,6 +3,7 @@
 pub(crate) mod builder;
 pub(crate) mod form;
 pub(crate) mod identification;
+pub(crate) mod instrumented;
 pub(crate) mod kinds;
 pub(crate) mod missing;
 pub(crate) mod options;
@@ -13,6 +14,7 @@ pub(crate) mod weak;
 
 pub use builder::{Identify, Parameter, StrongSettings};
 pub use identification::{Covariance, Identification, Unknown, WeakDetails};
+pub use instrumented::record::{InstrumentTest, WEAK_INSTRUMENT, identify_with_instruments};
 pub use kinds::Kind;
 pub use options::{Method, Options, StrongForm, Task, WeakForm};
 pub use route::identify_all;

@@ -22,6 +22,8 @@ pub(crate) mod solved;
 pub(crate) mod subsample;
 pub(crate) mod summary;
 pub(crate) mod summary_table;
+pub(crate) mod tapered_sums;
+pub(crate) mod two_stage;
 pub(crate) mod whitening;
 pub(crate) mod window_length;
 

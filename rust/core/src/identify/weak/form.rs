@@ -18,6 +18,7 @@ use crate::local_polynomials::plan::LocalPolynomials;
 use crate::noise::channel::channel_variance;
 use crate::noise::spectrum::power;
 use crate::record::samples::Samples;
+use crate::simd::instructions::Instructions;
 use crate::weak_form::test_function_choice::{Evidence, spectrum_length};
 use crate::weak_form::weak_rows::{Record, TermSamples};
 
@@ -35,10 +36,27 @@ pub(crate) fn identify_weak(
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<WeakIdentified, Error> {
+    let lag = options.lag.unwrap_or(0.0);
+    with_record(motion, (mask, lag), (options.delta, options.instructions), (workers, watch), |record, watch| {
+        identify(record, options, workers, watch)
+    })
+}
+
+/// Does something with the record that a motion is, its terms evaluated at every sample.
+///
+/// # Errors
+/// If the work fails, or the watch cancels.
+pub(crate) fn with_record<R>(
+    motion: &Motion<'_>,
+    (mask, lag): (Option<&[bool]>, f64),
+    (delta, instructions): (f64, Instructions),
+    (workers, watch): (NonZeroUsize, &mut Watch<'_>),
+    work: impl FnOnce(Record<'_>, &mut Watch<'_>) -> Result<R, Error>,
+) -> Result<R, Error> {
     let of_velocity =
         |term: &Term<'_>| matches!(term, Term::BuiltIn(term) if matches!(term.function, TermFunction::OfVelocity(_)));
     let velocity = if motion.terms.iter().any(of_velocity) {
-        velocity(motion.angle, options, workers, watch)?
+        velocity(motion.angle, (delta, instructions), workers, watch)?
     } else {
         Vec::new()
     };
@@ -58,16 +76,16 @@ pub(crate) fn identify_weak(
         torque: motion.torque,
         coefficients: motion.coefficients,
         terms: terms.collect(),
-        lag: options.lag.unwrap_or(0.0),
+        lag,
         mask,
     };
-    identify(record, options, workers, watch)
+    work(record, watch)
 }
 
 /// The velocity at every sample, from local polynomials an eighth of a typical cycle to either side.
 fn velocity(
     angle: &dyn Samples,
-    options: &WeakOptions,
+    (delta, instructions): (f64, Instructions),
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<f64>, Error> {
@@ -75,8 +93,8 @@ fn velocity(
     let evidence = Evidence {
         power: power(angle, spectrum_length(samples, 200)),
         samples,
-        noise: [channel_variance(angle, None, options.instructions), 0.0],
-        delta: options.delta,
+        noise: [channel_variance(angle, None, instructions), 0.0],
+        delta,
         unknown: [true; 3],
     };
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a few samples")]
@@ -85,11 +103,11 @@ fn velocity(
         window_length: (2 * half + 1).min((samples.max(1) - 1) / 2 * 2 + 1),
         order: Order::Chosen { criterion: Criterion::Aicc, highest: 15 },
         derivatives: vec![1],
-        delta: options.delta,
+        delta,
         noise: false,
         selection: Selection::Window,
         quantisation: 0.0,
-        instructions: options.instructions,
+        instructions,
     })?;
     let mut velocity = vec![0.0; samples];
     let estimates = Estimates {

@@ -1,0 +1,4 @@
+//! Identification with an instrument: a channel that no noise of the others reaches.
+
+pub(crate) mod explained;
+pub(crate) mod record;

@@ -1,0 +1,255 @@
+//! One record with an instrument: rows of the recorded motion, rows of the motion that the instrument explains, two-stage least squares.
+
+use std::num::NonZeroUsize;
+
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use crate::equation::motion::{Motion, unknowns};
+use crate::equation::rows::Rows;
+use crate::error::Error;
+use crate::exec::pool::Watch;
+use crate::exec::stages::Stages;
+use crate::identify::identification::{Covariance, Identification, Unknown};
+use crate::identify::instrumented::explained::explained;
+use crate::identify::options::{Method, Options, StrongForm, Task, WeakForm};
+use crate::identify::strong::rows::{differentiate, rows as strong_rows};
+use crate::identify::weak::form::with_record;
+use crate::local_polynomials::options::{Order, PolynomialOptions};
+use crate::local_polynomials::plan::LocalPolynomials;
+use crate::record::samples::Samples;
+use crate::regression::limits::status_of;
+use crate::regression::two_stage::{TwoStage, two_stage};
+use crate::status::Status;
+use crate::weak_form::test_function::TestFunction;
+use crate::weak_form::weak_rows::WeakRows;
+
+/// Half-widths of test functions that are tried: from the narrowest that is right with torque held between samples, each wider by a factor.
+const NARROWEST: usize = 8;
+const WIDER: f64 = 1.4;
+
+/// Test functions that a record holds at least.
+const FUNCTIONS: usize = 16;
+
+/// The exponent where none is given.
+const EXPONENT: usize = 8;
+
+/// F statistic of the first stage below which estimates are biased by more than a tenth of what least squares are (Staiger, Stock 1997).
+pub const WEAK_INSTRUMENT: f64 = 10.0;
+
+/// What an instrument is worth.
+#[derive(Clone, Copy, Debug)]
+pub struct InstrumentTest {
+    /// Probability that noise which does not reach the regressors makes least squares differ as much from the instrument's estimates.
+    pub exogeneity: f64,
+    /// The smallest F statistic of the first stage.
+    pub strength: f64,
+}
+
+/// Identifies constants of every record, with one instrument each.
+///
+/// # Errors
+/// If a record is too short, or the watch cancels.
+pub fn identify_with_instruments(
+    tasks: &[(Task<'_>, &dyn Samples)],
+    options: &Options,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<(Identification, InstrumentTest)>, Error> {
+    tasks.iter().map(|(task, instrument)| one(task, *instrument, options, workers, watch)).collect()
+}
+
+/// Rows of both motions, with what made them.
+struct Both {
+    recorded: Rows,
+    explained: Rows,
+    reach: usize,
+    window_length: usize,
+    exponent: Option<usize>,
+}
+
+fn one(
+    task: &Task<'_>,
+    instrument: &dyn Samples,
+    options: &Options,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<(Identification, InstrumentTest), Error> {
+    let motion = explained(task.motion.angle, instrument);
+    let motion = motion.unwrap_or_else(|| vec![f64::NAN; task.motion.angle.len()]);
+    let motion = motion.as_slice();
+    let explained = Motion { angle: &motion, ..task.motion.clone() };
+    let mut best: Option<(f64, Both, Option<TwoStage>)> = None;
+    match &task.method {
+        Method::Weak(form) => {
+            for function in functions(form, task.motion.angle.len(), options.delta)? {
+                let both = weak(task, &explained, function, options, (workers, &mut *watch))?;
+                let found = solve(&both, &task.motion);
+                // The product of all errors; what determines nothing comes last.
+                let size = found.as_ref().map_or(f64::INFINITY, |found| {
+                    let count = found.values.len();
+                    (0..count).map(|one| found.covariance[one * (count + 1)].ln()).sum()
+                });
+                if best.as_ref().is_none_or(|(least, ..)| size < *least) {
+                    best = Some((size, both, found));
+                }
+            }
+        }
+        Method::Strong(form) => {
+            let both = strong(form, task, &explained, (workers, &mut *watch))?;
+            let found = solve(&both, &task.motion);
+            best = Some((0.0, both, found));
+        }
+    }
+    let (_, both, found) = best.ok_or(Error::NotDetermined)?;
+    Ok(identification(task, options, &both, found.as_ref()))
+}
+
+/// The test functions to try.
+fn functions(form: &WeakForm, samples: usize, delta: f64) -> Result<Vec<TestFunction>, Error> {
+    let exponent = form.exponent.unwrap_or(EXPONENT);
+    let widest = samples / FUNCTIONS;
+    let mut widths = Vec::new();
+    let mut width = NARROWEST;
+    while width <= widest {
+        widths.push(width);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "less than the record")]
+        let next = (WIDER * width as f64) as usize;
+        width = next;
+    }
+    let widths = form.window_length.map_or(widths, |length| vec![length / 2]);
+    if widths.is_empty() {
+        return Err(Error::RecordTooShortForWindows { samples, least: FUNCTIONS * NARROWEST });
+    }
+    widths.into_iter().map(|width| TestFunction::new(width, exponent, delta)).collect()
+}
+
+fn weak(
+    task: &Task<'_>,
+    explained: &Motion<'_>,
+    function: TestFunction,
+    options: &Options,
+    (workers, watch): (NonZeroUsize, &mut Watch<'_>),
+) -> Result<Both, Error> {
+    let lag = task.lag.unwrap_or(0.0);
+    let mut built = Vec::new();
+    for motion in [&task.motion, explained] {
+        let how = (options.delta, options.instructions);
+        built.push(with_record(motion, (task.mask, lag), how, (workers, &mut *watch), |record, watch| {
+            WeakRows::build(&record, function, options.delta, None, workers, watch)
+        })?);
+    }
+    let reach = built[0].reach();
+    let mut rows = built.into_iter().map(|built| built.rows);
+    let (recorded, explained) = (rows.next().unwrap_or_default(), rows.next().unwrap_or_default());
+    Ok(Both {
+        recorded,
+        explained,
+        reach: 2 * reach,
+        window_length: function.window_length(),
+        exponent: Some(function.exponent()),
+    })
+}
+
+fn strong(
+    form: &StrongForm<'_>,
+    task: &Task<'_>,
+    explained: &Motion<'_>,
+    (workers, watch): (NonZeroUsize, &mut Watch<'_>),
+) -> Result<Both, Error> {
+    // Orders chosen by the noise would smooth the motion away: inertia came out 2 to 3 % too large. Noise need not be smoothed, since
+    // what the instrument explains is smooth, and sums with it leave nothing else.
+    let options = form.derivatives.options();
+    let order = match options.order {
+        Order::Chosen { highest, .. } => Order::Fixed(highest.min(options.window_length.saturating_sub(2))),
+        order @ Order::Fixed(_) => order,
+    };
+    let plan = LocalPolynomials::new(PolynomialOptions { order, ..options.clone() })?;
+    let mut stages = Stages::new(workers, task.motion.angle.len(), 4, watch);
+    let mut built = Vec::new();
+    for motion in [&task.motion, explained] {
+        let lag = (task.lag.unwrap_or(0.0), form.filter_torque);
+        let differentiated = differentiate(&plan, motion, lag, &mut stages)?;
+        built.push(strong_rows(&plan, motion, task.mask, false, &differentiated));
+    }
+    let mut rows = built.into_iter();
+    let (recorded, explained) = (rows.next().unwrap_or_default(), rows.next().unwrap_or_default());
+    let window_length = form.derivatives.options().window_length;
+    Ok(Both { recorded, explained, reach: window_length, window_length, exponent: None })
+}
+
+/// Two-stage least squares of rows that both motions have.
+fn solve(both: &Both, motion: &Motion<'_>) -> Option<TwoStage> {
+    let (recorded, explained) = (&both.recorded, &both.explained);
+    let there: Vec<bool> = recorded.usable.iter().zip(&explained.usable).map(|(one, other)| *one && *other).collect();
+    let column = |values: &[f64]| -> Vec<f64> {
+        values.iter().zip(&there).map(|(value, there)| if *there { *value } else { 0.0 }).collect()
+    };
+    let numbers = unknowns(&motion.coefficients, motion.terms.len());
+    let of = |rows: &Rows| -> Vec<Vec<f64>> {
+        numbers.iter().map(|&number| column(&rows.regressors[number].value)).collect()
+    };
+    let (columns, instruments) = (of(recorded), of(explained));
+    let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let instruments: Vec<&[f64]> = instruments.iter().map(Vec::as_slice).collect();
+    two_stage(&columns, &instruments, &column(&recorded.rhs), both.reach)
+}
+
+/// What was found of one record.
+fn identification(
+    task: &Task<'_>,
+    options: &Options,
+    both: &Both,
+    found: Option<&TwoStage>,
+) -> (Identification, InstrumentTest) {
+    let motion = &task.motion;
+    let numbers = unknowns(&motion.coefficients, motion.terms.len());
+    let count = numbers.len();
+    let test = found.map_or(InstrumentTest { exogeneity: f64::NAN, strength: 0.0 }, |found| InstrumentTest {
+        exogeneity: beyond(found.contrast),
+        strength: found.strength,
+    });
+    let elements = motion.angle.len().div_ceil(options.step);
+    let mut record_status = found.map_or(Status::RANK_DEFICIENT, |found| status_of(found.condition));
+    if found.is_some() && test.strength < WEAK_INSTRUMENT {
+        record_status |= Status::ILL_CONDITIONED;
+    }
+    let status = if found.is_none() { (Status::INVALID | Status::RANK_DEFICIENT).bits() } else { 0 };
+    let value = |one: usize| found.map_or(f64::NAN, |found| found.values[one]);
+    let entry = |one: usize, other: usize| found.map_or(f64::NAN, |found| found.covariance[one * count + other]);
+    let constants = numbers.iter().enumerate();
+    let coefficients: Vec<usize> = (0..count).filter(|&one| numbers[one] < 3).collect();
+    let pairs = coefficients.iter().flat_map(|&other| coefficients.iter().map(move |&one| (one, other)));
+    let identification = Identification {
+        window_length: both.window_length,
+        exponent: both.exponent,
+        regression_window: match &task.method {
+            Method::Weak(_) => motion.angle.len(),
+            Method::Strong(form) => form.regression_window,
+        },
+        unknowns: constants
+            .map(|(one, &number)| Unknown::constant(number, value(one), entry(one, one).sqrt()))
+            .collect(),
+        covariances: pairs
+            .filter(|(one, other)| one < other)
+            .map(|pair| Covariance { pair, values: vec![entry(pair.0, pair.1)] })
+            .collect(),
+        condition: vec![found.map_or(f64::INFINITY, |found| found.condition)],
+        residual_std: vec![found.map_or(f64::NAN, |found| found.residual)],
+        status: vec![status; elements],
+        record_status,
+        order: Vec::new(),
+        jumps: Vec::new(),
+        weak: None,
+    };
+    (identification, test)
+}
+
+/// The probability of a squared distance at least as large, of a covariance that is estimated (Hotelling).
+fn beyond((squares, directions, freedom): (f64, usize, f64)) -> f64 {
+    let (directions, rest) = (directions as f64, freedom - directions as f64 + 1.0);
+    if directions == 0.0 || rest <= 0.0 {
+        return f64::NAN;
+    }
+    let statistic = squares * rest / (freedom * directions);
+    FisherSnedecor::new(directions, rest).map_or(f64::NAN, |fisher| fisher.sf(statistic))
+}

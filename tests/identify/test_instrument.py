@@ -1,0 +1,111 @@
+"""An instrument under feedback: estimates that noise does not bias, errors that hold, tests that say what it is worth."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import tvident
+from identify.closed_loop import RATE, TRUTH, closed_loop
+from tvident import Status
+
+Array = npt.NDArray[np.float64]
+
+CONSTANT: dict[str, Any] = {"inertia": "constant", "damping": "constant", "stiffness": "constant"}
+
+SEEDS = range(100)
+
+COVERED = (0.90, 0.98)
+"""Of 95 %. Of 300 intervals, 100 for each parameter, 2.5 standard deviations are 3.1 %."""
+
+STRONG = tvident.StrongForm(window_length=101)
+
+
+@pytest.fixture(scope="module")
+def records() -> tuple[Array, Array, Array]:
+    return closed_loop(SEEDS)
+
+
+@pytest.mark.parametrize("method", ["auto", STRONG], ids=["weak", "strong"])
+def test_estimates_are_right_under_feedback_and_their_errors_hold(
+    records: tuple[Array, Array, Array], method: Any
+) -> None:
+    inside = []
+    for angle, torque, reference in zip(*records, strict=True):
+        result = tvident.identify(angle, torque, sample_rate=RATE, method=method, instrument=reference)
+        for name, truth in TRUTH.items():
+            value, error = result.constants[name]
+            # 1 % is more than five standard errors.
+            assert value == pytest.approx(truth, rel=0.01)
+            inside.append(abs(value - truth) < 1.96 * error)
+    assert COVERED[0] <= np.mean(inside) <= COVERED[1]
+
+
+def test_without_an_instrument_feedback_is_said(records: tuple[Array, Array, Array]) -> None:
+    angle, torque, reference = (channel[0] for channel in records)
+    alone = tvident.identify(angle, torque, sample_rate=RATE, **CONSTANT)
+    assert any("holds the angle's noise" in line and "instrument=" in line for line in alone.advice)
+    result = tvident.identify(angle, torque, sample_rate=RATE, instrument=reference)
+    assert not any("holds the angle's noise" in line for line in result.advice)
+    assert "two-stage least squares" in result.summary()
+    assert "test of exogeneity" in result.summary()
+    assert "the instrument is strong" in result.summary()
+    assert result.vaf() > 90
+
+
+def test_open_loop_is_not_taken_for_feedback() -> None:
+    for seed in range(40):
+        rig = tvident.simulate_torsional_rig(duration=10.0, seed=seed, angle_noise=10.0 ** -(2 + seed % 4))
+        result = tvident.identify(rig.angle, rig.torque, sample_rate=1000, **CONSTANT)
+        assert not any("holds the angle's noise" in line for line in result.advice), seed
+
+
+def test_a_channel_that_says_nothing_is_no_instrument(records: tuple[Array, Array, Array]) -> None:
+    angle, torque, _ = (channel[0] for channel in records)
+    noise = np.random.default_rng(5).standard_normal(angle.size)
+    result = tvident.identify(angle, torque, sample_rate=RATE, instrument=noise)
+    assert result.record_status & Status.ILL_CONDITIONED
+    assert any("the instrument is weak" in line for line in result.advice)
+    assert not result.trusted.any()
+    nothing = tvident.identify(angle, torque, sample_rate=RATE, instrument=np.zeros(angle.size))
+    assert nothing.record_status & Status.RANK_DEFICIENT
+    assert np.isnan(nothing.inertia).all()
+    assert any("does not determine" in line for line in nothing.advice)
+
+
+def test_gaps_batches_terms_and_settings(records: tuple[Array, Array, Array]) -> None:
+    angle, torque, reference = (channel[:2].copy() for channel in records)
+    angle[0, 5000:5100], torque[1, 200], reference[1, 9000:9003] = np.nan, np.nan, np.nan
+    both = tvident.identify(angle, torque, sample_rate=RATE, instrument=reference, terms=["offset", "cubic"])
+    for name, truth in TRUTH.items():
+        assert both.constants[name][0] == pytest.approx(np.full(2, truth), rel=0.02)
+    assert np.abs(both.constants["cubic"][0] / both.constants["cubic"][1]).max() < 4
+    one = tvident.identify(angle[0], torque[0], sample_rate=RATE, instrument=reference[0], terms=["offset", "cubic"])
+    assert one.constants["inertia"][0] == both.constants["inertia"][0][0]
+    again = tvident.identify(angle[0], torque[0], sample_rate=RATE, instrument=reference[0], settings=one.settings)
+    assert again.constants == one.constants
+    with pytest.raises(ValueError, match=r"settings of a result with an instrument need it again"):
+        tvident.identify(angle[0], torque[0], sample_rate=RATE, settings=one.settings)
+
+
+def test_what_an_instrument_cannot_tell_is_refused_with_the_rule(records: tuple[Array, Array, Array]) -> None:
+    angle, torque, reference = (channel[0] for channel in records)
+
+    def call(**changed: Any) -> None:
+        tvident.identify(angle, torque, **{"sample_rate": RATE, "instrument": reference, **changed})
+
+    with pytest.raises(
+        ValueError, match=r"unknowns must be constant; got stiffness='windowed'; give stiffness='constant'"
+    ):
+        call(stiffness="windowed")
+    with pytest.raises(ValueError, match=r"unknowns must be constant; got term 'offset' windowed"):
+        call(terms=[("offset", "windowed")])
+    with pytest.raises(ValueError, match=r"terms must be built-in; got 'own'"):
+        call(terms=[tvident.Term("own", np.add)])
+    with pytest.raises(ValueError, match=r"lag must be known; got 'auto'"):
+        call(lag="auto")
+    with pytest.raises(ValueError, match=r"must have the angle's shape \(20000,\); got \(100,\)"):
+        call(instrument=reference[:100])
