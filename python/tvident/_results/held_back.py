@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tvident._equation import COEFFICIENTS
 from tvident._results.response import Model, accounted_for, without_gaps
 
 PARTS = 10
@@ -79,17 +80,20 @@ def evaluated(
 ) -> HeldBack:
     """Return what a model that was fitted to the rest explains of the ends of the parts."""
     held = np.zeros(angle.shape[-1], bool)
-    pieces = []
+    pieces, whole = [], []
+    # Where a term is not linear the state takes many simulations; the last ten test functions tell it.
+    is_linear = set(model.values) <= {*COEFFICIENTS, "offset"}
     for begin, first, end in parts:
         held[first:end] = True
         before = min(window_length, first - begin)
+        whole.append((begin if is_linear else max(begin, first - _FUNCTIONS * window_length), first, end))
         pieces += [(start - before, start, min(start + before, end)) for start in range(first, end, max(1, before))]
     # A part that was held back has no parameters of its own.
     values = {name: without_gaps(value) if value.shape[-1] > 1 else value for name, value in model.values.items()}
     model = replace(model, values=values)
     # What a piece tells of its first half is no prediction: the piece before overwrites it.
     shares = []
-    for spans in (parts, pieces[::-1]):
+    for spans in (whole, pieces[::-1]):
         simulated, _ = model.respond(torque, angle=angle, spans=spans)
         share = accounted_for(angle[..., held], simulated[..., held])
         shares.append(share if share.ndim else float(share))
