@@ -1,6 +1,6 @@
 //! The noise of a channel is found whatever its signal, and never below quantisation and rounding.
 
-use tvident::noise::{FEWEST_SAMPLES, noise};
+use tvident::noise::{CorrelatedNoise, FEWEST_SAMPLES, coloured_noise, noise};
 use tvident::simd::Instructions;
 
 /// Sums of twelve uniform numbers: nearly normal, of variance one.
@@ -68,4 +68,54 @@ fn a_record_of_less_than_a_window_is_refused() {
     let message = noise(&short.as_slice(), None, Instructions::current()).expect_err("too short").to_string();
     assert!(message.contains("at least 25 samples"), "{message}");
     assert!(noise(&[0.0; FEWEST_SAMPLES].as_slice(), None, Instructions::current()).is_ok());
+}
+
+/// First-order noise of correlation `ρ`, of variance one, over a signal.
+fn first_order(correlation: f64, seed: u64, signal: impl Fn(f64) -> f64) -> Vec<f64> {
+    let mut level = 0.0;
+    let fresh = (1.0 - correlation * correlation).sqrt();
+    let noise = normal(seed, 21_000).into_iter().map(|e| {
+        level = correlation * level + fresh * e;
+        level
+    });
+    noise.skip(1000).enumerate().map(|(i, e)| e + signal(i as f64)).collect()
+}
+
+#[test]
+fn the_colour_of_noise_is_found_beside_a_signal() {
+    for correlation in [0.3, 0.5, 0.8, 0.9] {
+        for amplitude in [0.0, 30.0] {
+            let samples = first_order(correlation, 7, |i| amplitude * (i * 0.02).sin());
+            let white = sigma(&samples).powi(2);
+            let found = coloured_noise(&samples.as_slice(), white, Instructions::current());
+            let truth = CorrelatedNoise::new(0.0, vec![(correlation, 1.0)]);
+            // Below these frequencies the signal is. A twentieth is what few noises miss, and 20 000 samples know an octave to as much.
+            for frequency in [0.05, 0.1, 0.3, 1.0, 3.0] {
+                let ratio = found.density(frequency) / truth.density(frequency);
+                assert!((0.75..=1.33).contains(&ratio), "{correlation} at {frequency}: {ratio}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_white_or_no_noise_has_no_colour() {
+    let colour = |samples: &[f64]| coloured_noise(&samples, 1.0, Instructions::current());
+    let white: Vec<f64> = wave(20_000).zip(normal(11, 20_000)).map(|(wave, e)| 30.0 * wave + e).collect();
+    assert_eq!(colour(&white), CorrelatedNoise::white(1.0));
+    // A random walk goes on rising to the lowest frequencies, and steps are rare and large.
+    let mut level = 0.0;
+    let walk = normal(12, 20_000).into_iter().map(|e| {
+        level += e;
+        level
+    });
+    assert!(colour(&walk.collect::<Vec<f64>>()).is_white());
+    let steps: Vec<f64> = normal(13, 20_000)
+        .into_iter()
+        .enumerate()
+        .map(|(i, e)| 0.1 * e + if i % 900 < 450 { 3.0 } else { 0.0 })
+        .collect();
+    assert!(colour(&steps).is_white());
+    assert!(colour(&first_order(0.8, 14, |_| 0.0)[..500]).is_white());
+    assert!(colour(&[f64::NAN; 2000]).is_white());
 }

@@ -9,7 +9,7 @@ use tvident::auto_derivatives::{
     AutomaticEstimates as Slices, AutomaticOptions, estimate_automatically as core_estimate,
 };
 use tvident::exec::{Watch, workers as threads};
-use tvident::noise::noise;
+use tvident::noise::{coloured_noise, noise};
 use tvident::simd::Instructions;
 
 use crate::arrays::zeros;
@@ -65,10 +65,11 @@ pub(crate) fn estimate_automatically<'py>(
             let mut flags = vec![0; count];
             for (index, record) in records.iter().enumerate() {
                 let found = noise(record, quantisation, instructions)?;
-                noises.push((found.sigma, found.quantisation));
+                let coloured = coloured_noise(record, found.sigma * found.sigma, instructions);
+                noises.push((coloured.variance().sqrt(), found.quantisation));
                 for (row, &derivative) in derivatives.iter().enumerate() {
-                    let sigma = found.sigma;
-                    let options = AutomaticOptions { derivative, highest, fixed, delta, sigma, instructions };
+                    let options =
+                        AutomaticOptions { derivative, highest, fixed, delta, noise: &coloured, instructions };
                     let place = (row * records.len() + index) * count;
                     let own = index * count..(index + 1) * count;
                     let mut estimates = Slices {

@@ -1,7 +1,7 @@
 //! Window length and order chosen together: for a record as a whole, then locally.
 //!
 //! For each derivative of each record `global_choice` finds the window and the order of least mean squared error.
-//! Around them `candidate_weights` weighs candidates sample by sample, and `local_average` averages them. Within half a
+//! A record that is a parabola and noise has no such window: `trend` finds out. Around them `candidate_weights` weighs candidates sample by sample, and `local_average` averages them. Within half a
 //! window of the ends, `boundary` estimates with shrunk coefficients. Each derivative of a record has its own windows,
 //! since the best ones differ.
 
@@ -12,11 +12,13 @@ use crate::auto_derivatives::candidate_weights::Refinement;
 use crate::auto_derivatives::candidates::Target;
 use crate::auto_derivatives::global_choice::{Pair, SHORTEST, Survey, rounded};
 use crate::auto_derivatives::local_average::DerivativeOutputs;
+use crate::auto_derivatives::trend::trend;
 use crate::error::Error;
 use crate::exec::memory;
 use crate::exec::pool::Watch;
 use crate::local_polynomials::boundary::End;
 use crate::local_polynomials::options::HIGHEST_ORDER;
+use crate::noise::correlated::CorrelatedNoise;
 use crate::noise::quantisation::quantisation_step;
 use crate::record::samples::{Samples, is_usable};
 use crate::record::subsample::stretches;
@@ -28,7 +30,7 @@ pub const FEWEST_SAMPLES: usize = 64;
 
 /// What to estimate.
 #[derive(Clone, Copy, Debug)]
-pub struct AutomaticOptions {
+pub struct AutomaticOptions<'a> {
     /// Which derivative; 0 is the value.
     pub derivative: usize,
     /// The highest order, which is the only one where it is fixed.
@@ -37,8 +39,8 @@ pub struct AutomaticOptions {
     pub fixed: bool,
     /// Sample period in seconds.
     pub delta: f64,
-    /// Standard deviation of the noise: see [`crate::noise`].
-    pub sigma: f64,
+    /// The noise: see [`crate::noise`].
+    pub noise: &'a CorrelatedNoise,
     /// Instructions to use.
     pub instructions: Instructions,
 }
@@ -90,13 +92,13 @@ const STRETCHES: usize = 64;
 /// If the record has fewer than [`FEWEST_SAMPLES`], if the derivative is higher than the order or the order too high, or if the watch cancels.
 pub fn estimate_automatically(
     record: &dyn Samples,
-    options: &AutomaticOptions,
+    options: &AutomaticOptions<'_>,
     estimates: &mut AutomaticEstimates<'_>,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Option<AutomaticChoice>, Error> {
     let samples = record.len();
-    let &AutomaticOptions { derivative, highest, fixed, delta, sigma, instructions } = options;
+    let &AutomaticOptions { derivative, highest, fixed, delta, noise, instructions } = options;
     if samples < FEWEST_SAMPLES {
         return Err(Error::RecordTooShort { samples, least: FEWEST_SAMPLES });
     }
@@ -108,18 +110,28 @@ pub fn estimate_automatically(
         return Err(Error::OrderTooLow { order: highest, derivative });
     }
     memory::ask_for_numbers(samples.saturating_mul(NUMBERS))?;
-    let (shortest, variance) = match samples_per_step(record, sigma) {
+    let variance = noise.variance();
+    let of_rounding;
+    let (shortest, noise) = match samples_per_step(record, variance.sqrt()) {
         // A caller who denies quantisation may give less noise than rounding makes.
         Some((step, each)) => {
-            let rounding = (sigma * sigma).min(step * step / 12.0);
-            (shortest_window(each, samples), (sigma * sigma).max(rounding * crowding(each)))
+            let rounding = variance.min(step * step / 12.0);
+            of_rounding = CorrelatedNoise::white(variance.max(rounding * crowding(each)));
+            (shortest_window(each, samples), &of_rounding)
         }
-        None => (SHORTEST, sigma * sigma),
+        None => (SHORTEST, noise),
     };
-    let target = Target { derivative, highest, fixed, shortest, delta, instructions };
+    let target = Target { derivative, highest, fixed, shortest, delta, noise, instructions };
     let total = 2 * samples;
-    let best = Survey::new(record).best(&target, variance, &mut || check_cancelled(watch, 0, total))?;
-    let planned = best.and_then(|pair| Some((pair, Refinement::new(samples, pair, &target, variance)?)));
+    let trend = trend(record, noise).and_then(|degree| Some((longest_window(&target, degree, samples)?, degree)));
+    let (best, target, at_ends) = match trend {
+        Some((pair, degree)) => {
+            let only = Target { highest: pair.order, fixed: true, ..target };
+            (Some(pair), only, Target { highest: pair.order.max(degree), ..target })
+        }
+        None => (Survey::new(record).best(&target, &mut || check_cancelled(watch, 0, total))?, target, target),
+    };
+    let planned = best.and_then(|pair| Some((pair, Refinement::new(samples, pair, &target)?)));
     let Some((pair, refinement)) = planned else {
         estimates.values.fill(f64::NAN);
         estimates.errors.fill(f64::NAN);
@@ -132,7 +144,7 @@ pub fn estimate_automatically(
     refinement.estimate(record, &mut outputs, workers, watch)?;
     for end in [End::First, End::Last] {
         let mut check_cancelled = || check_cancelled(watch, total, total);
-        let at_end = boundary::estimate(record, end, pair, &target, variance, &mut check_cancelled)?;
+        let at_end = boundary::estimate(record, end, pair, &at_ends, &mut check_cancelled)?;
         for (place, (&value, &error)) in at_end.values.iter().zip(&at_end.errors).enumerate() {
             let sample = if end == End::First { place } else { samples - 1 - place };
             // Places that the windows at the end do not reach may still be reached by shorter ones inside.
@@ -155,6 +167,13 @@ pub fn estimate_automatically(
     }
     let Pair { half, order } = pair;
     Ok(Some(AutomaticChoice { window_length: 2 * half + 1, order }))
+}
+
+/// The longest window, and the lowest order in it that follows a trend of some degree. The next higher one is the same at the centre.
+fn longest_window(target: &Target<'_>, degree: usize, samples: usize) -> Option<Pair> {
+    let half = (samples / 2 - 1) / 2;
+    let order = target.orders(half).into_iter().find(|order| order + 1 >= degree)?;
+    Some(Pair { half, order })
 }
 
 /// The step of a quantised signal that the noise does not hide, and how many samples it needs to move by one where it does not rest.

@@ -20,16 +20,18 @@
 
 use std::ops::Range;
 
-use faer::Mat;
-use faer::linalg::solvers::Qr;
+use faer::linalg::solvers::{Llt, Qr};
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::{Mat, Par, Side};
 
 use crate::auto_derivatives::candidate_weights::Reference;
-use crate::auto_derivatives::candidates::{Target, product};
+use crate::auto_derivatives::candidates::{Target, correlated, product};
 use crate::auto_derivatives::global_choice::{CheckCancelled, Pair, rounded};
 use crate::error::Error;
 use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::boundary::End;
 use crate::local_polynomials::coefficients::{Coefficients, Projected};
+use crate::noise::correlated::CorrelatedNoise;
 use crate::record::samples::Samples;
 
 /// The windows over the record's best, in half steps of a doubling.
@@ -85,8 +87,7 @@ pub(crate) fn estimate(
     record: &dyn Samples,
     end: End,
     pair: Pair,
-    target: &Target,
-    variance: f64,
+    target: &Target<'_>,
     check_cancelled: &mut CheckCancelled<'_>,
 ) -> Result<AtEnd, Error> {
     let samples = record.len();
@@ -101,7 +102,7 @@ pub(crate) fn estimate(
     for step in LADDER {
         let half = rounded(pair.half as f64 * (0.5 * f64::from(step)).exp2());
         if (SHORTEST..samples.div_ceil(4)).contains(&half) && 2 * half < samples / 2 {
-            found.extend(near.shrink(half, pair.half, target, variance));
+            found.extend(near.shrink(half, pair.half, target));
         }
         check_cancelled()?;
     }
@@ -148,7 +149,8 @@ impl<'a> Near<'a> {
     }
 
     /// The estimates of windows of one length at the first `count` places, or `None` if the outermost window cannot be used.
-    fn shrink(&self, half: usize, count: usize, target: &Target, variance: f64) -> Option<Shrunk> {
+    fn shrink(&self, half: usize, count: usize, target: &Target<'_>) -> Option<Shrunk> {
+        let variance = target.noise.variance();
         let length = 2 * half + 1;
         let (highest, count) = (target.highest(half), count.min(length));
         let windows = self.samples.start..(self.samples.end + 1).checked_sub(length)?;
@@ -175,7 +177,8 @@ impl<'a> Near<'a> {
         if projected.level[outermost].is_nan() {
             return None;
         }
-        let shrinkage = shrinkage(&projected, variance);
+        let correlations = correlations(&rows, target.noise);
+        let shrinkage = shrinkage(&projected, variance, &correlations);
         let scale = target.scale();
         let constant = f64::from(u8::from(target.derivative == 0));
         let mut shrunk = Shrunk { values: Vec::with_capacity(count), risks: Vec::with_capacity(count), order: highest };
@@ -200,15 +203,16 @@ impl<'a> Near<'a> {
             let differences = (0..projected.level.len()).flat_map(difference).filter(|difference| !difference.is_nan());
             let (sum, compared) =
                 differences.fold((0.0, 0_usize), |(sum, count), difference| (sum + difference * difference, count + 1));
-            let own: f64 = weights.iter().map(|weight| weight * weight).sum();
+            let own = quadratic(&weights, &correlations);
             // The kernel, where it meets that of the reference.
-            let reach = self.kernel.len() / 2;
+            let reference = correlated(self.kernel.clone(), place.max(length - place), target.noise);
+            let reach = reference.len() / 2;
             let meeting = place.saturating_sub(reach)..length.min(place + reach + 1);
             let mut kernel = vec![0.0; meeting.len()];
             for (row, weight) in rows.iter().zip(&weights) {
                 kernel.iter_mut().zip(&row[meeting.clone()]).for_each(|(sum, value)| *sum += weight * value);
             }
-            let shared = product(&kernel, &self.kernel, place - meeting.start);
+            let shared = product(&kernel, &reference, place - meeting.start);
             let risk = sum / compared as f64 + variance * (2.0 * shared - self.gain);
             shrunk.risks.push(if compared < FEWEST_WINDOWS { f64::INFINITY } else { risk.max(variance * own) });
         }
@@ -240,8 +244,27 @@ impl BoundaryEstimates {
     }
 }
 
-/// The matrix that shrinks coefficients, row by row; symmetric.
-fn shrinkage(projected: &Projected, variance: f64) -> Vec<Vec<f64>> {
+/// The correlations `QᵀRQ` that the noise gives to coefficients, of which the rows of `Q` are given by degree.
+fn correlations(rows: &[Vec<f64>], noise: &CorrelatedNoise) -> Mat<f64> {
+    if noise.is_white() {
+        return Mat::identity(rows.len(), rows.len());
+    }
+    let correlated: Vec<Vec<f64>> = rows.iter().map(|row| noise.correlate(row)).collect();
+    // Even and odd degrees are uncorrelated; sums of what cancels would leave rounding.
+    let product = |i: usize, j: usize| rows[i].iter().zip(&correlated[j]).map(|(a, b)| a * b).sum();
+    Mat::from_fn(rows.len(), rows.len(), |i, j| if (i + j) % 2 == 0 { product(i, j) } else { 0.0 })
+}
+
+/// `wᵀMw`.
+fn quadratic(weights: &[f64], matrix: &Mat<f64>) -> f64 {
+    let row = |i: usize| weights.iter().enumerate().map(|(j, weight)| matrix[(i, j)] * weight).sum::<f64>();
+    weights.iter().enumerate().map(|(i, weight)| weight * row(i)).sum()
+}
+
+/// The matrix that shrinks coefficients, row by row: `ĉ = Σ_i matrix_ij c_j` for the weights of derivatives, which are rows from the left.
+///
+/// With `σ² LLᵀ` the covariance of the noise, `L⁻¹c` has noise of equal variance in all directions.
+fn shrinkage(projected: &Projected, variance: f64, correlations: &Mat<f64>) -> Vec<Vec<f64>> {
     let rows = &projected.coefficients;
     let usable: Vec<usize> = (0..projected.level.len()).filter(|&window| !projected.level[window].is_nan()).collect();
     let mut matrix = vec![vec![0.0; rows.len()]; rows.len()];
@@ -249,18 +272,26 @@ fn shrinkage(projected: &Projected, variance: f64) -> Vec<Vec<f64>> {
     for first in [1, 2] {
         let degrees: Vec<usize> = (first..rows.len()).step_by(2).collect();
         let size = degrees.len();
+        let own = Mat::from_fn(size, size, |i, j| correlations[(degrees[i], degrees[j])]);
+        let Ok(factor) = Llt::new(own.as_ref(), Side::Lower) else { continue };
+        let lower = factor.L();
         // Singular values of the coefficients rather than eigenvalues of their moments: squares would lose what is small beside the rest.
-        let coefficients = Mat::from_fn(usable.len(), size, |row, j| rows[degrees[j]][usable[row]]);
+        let mut coefficients = Mat::from_fn(size, usable.len(), |j, row| rows[degrees[j]][usable[row]]);
+        solve_lower_triangular_in_place(lower, coefficients.as_mut(), Par::Seq);
         // The triangular factor has the same singular values and directions as the thousands of rows that it is made of.
-        let Ok(decomposed) = Qr::new(coefficients.as_ref()).thin_R().thin_svd() else { continue };
+        let Ok(decomposed) = Qr::new(coefficients.transpose()).thin_R().thin_svd() else { continue };
         let (singular, vectors) = (decomposed.S().column_vector(), decomposed.V());
+        // ĉ = L U diag(λ/(λ + σ²)) Uᵀ L⁻¹ c: directions on both sides.
+        let outwards = lower * vectors;
+        let mut inwards = vectors.to_owned();
+        solve_upper_triangular_in_place(lower.transpose(), inwards.as_mut(), Par::Seq);
         for k in 0..singular.nrows() {
             let value = singular[k] * singular[k] / usable.len() as f64 - variance;
             if value > variance {
                 let factor = value / (value + variance);
                 for i in 0..size {
                     for j in 0..size {
-                        matrix[degrees[i]][degrees[j]] += factor * vectors[(i, k)] * vectors[(j, k)];
+                        matrix[degrees[j]][degrees[i]] += factor * outwards[(i, k)] * inwards[(j, k)];
                     }
                 }
             }
@@ -290,6 +321,10 @@ mod tests {
         Projected { level: vec![0.0, 0.0, 0.0, 0.0, f64::NAN], coefficients, residual: Vec::new() }
     }
 
+    fn white() -> Mat<f64> {
+        Mat::identity(4, 4)
+    }
+
     /// Compares with what two eigenvalues leave of the coefficients along each of the pair.
     fn assert_shrinks(matrix: &[Vec<f64>], factors: [f64; 2]) {
         for (i, row) in matrix.iter().enumerate() {
@@ -307,13 +342,13 @@ mod tests {
     #[test]
     fn coefficients_shrink_as_wiener_says() {
         // Moments of 10 and 4 are signals of 9 and 3 beside noise of 1; a signal below the noise counts as none.
-        assert_shrinks(&shrinkage(&projected([10.0, 4.0]), 1.0), [0.9, 0.75]);
-        assert_shrinks(&shrinkage(&projected([10.0, 1.9]), 1.0), [0.9, 0.0]);
+        assert_shrinks(&shrinkage(&projected([10.0, 4.0]), 1.0, &white()), [0.9, 0.75]);
+        assert_shrinks(&shrinkage(&projected([10.0, 1.9]), 1.0, &white()), [0.9, 0.0]);
     }
 
     #[test]
     fn without_noise_small_coefficients_stay_beside_large_ones() {
         // The square of the smaller one is below the rounding of the larger one's.
-        assert_shrinks(&shrinkage(&projected([1.0, 1e-20]), 0.0), [1.0, 1.0]);
+        assert_shrinks(&shrinkage(&projected([1.0, 1e-20]), 0.0, &white()), [1.0, 1.0]);
     }
 }

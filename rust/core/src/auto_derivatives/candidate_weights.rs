@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::auto_derivatives::candidates::{self, Bank, Target, product};
+use crate::auto_derivatives::candidates::{self, Bank, Target, correlated, product};
 use crate::auto_derivatives::global_choice::{OPTIMISM, Pair, rounded};
 use crate::auto_derivatives::symmetric_grid::Blocks;
 use crate::record::samples::Samples;
@@ -46,7 +46,7 @@ pub(crate) struct Reference {
 
 impl Reference {
     /// The same order in a window so much shorter, or else in the same window.
-    pub(crate) fn new(pair: Pair, shorter: f64, target: &Target) -> Option<Self> {
+    pub(crate) fn new(pair: Pair, shorter: f64, target: &Target<'_>) -> Option<Self> {
         let with_order = |half: usize| {
             let bank = Bank::new(half, target)?;
             let candidate = bank.orders.iter().position(|&order| order == pair.order)?;
@@ -74,18 +74,19 @@ pub(crate) struct AverageScratch {
 
 impl Refinement {
     /// Prepares the candidates around a record's best pair.
-    pub(crate) fn new(samples: usize, pair: Pair, target: &Target, variance: f64) -> Option<Self> {
+    pub(crate) fn new(samples: usize, pair: Pair, target: &Target<'_>) -> Option<Self> {
+        let variance = target.noise.variance();
         let half = pair.half as f64;
         let reference = Reference::new(pair, REFERENCE, target)?;
         let mut halves: Vec<usize> = WINDOWS.iter().map(|ratio| rounded(half * ratio)).collect();
         halves.dedup();
         halves.retain(|&half| half >= target.shortest && 2 * half < samples / 2);
         let banks: Vec<Bank> = halves.into_iter().filter_map(|half| Bank::new(half, target)).collect();
-        let compared = reference.bank.kernel(reference.candidate);
         let reference_gain = reference.bank.gains[reference.candidate];
         let (mut offsets, mut differences, mut temperatures) = (Vec::new(), Vec::new(), Vec::new());
         let (mut variances, mut orders) = (Vec::new(), Vec::new());
         for bank in &banks {
+            let compared = correlated(reference.bank.kernel(reference.candidate), bank.half, target.noise);
             for (candidate, (gain, leverage)) in bank.gains.iter().zip(&bank.leverages).enumerate() {
                 let shared = product(&bank.kernel(candidate), &compared, bank.half);
                 offsets.push(variance * (2.0 * shared + (OPTIMISM - 1.0) * gain));

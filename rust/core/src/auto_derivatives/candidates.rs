@@ -11,12 +11,13 @@ use std::ops::Range;
 
 use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::coefficients::{self, Coefficients, Projected};
+use crate::noise::correlated::CorrelatedNoise;
 use crate::record::samples::Samples;
 use crate::simd::instructions::Instructions;
 
 /// The derivative to be estimated, and its orders.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Target {
+pub(crate) struct Target<'a> {
     pub(crate) derivative: usize,
     /// The highest order, which is the only one where it is fixed.
     pub(crate) highest: usize,
@@ -24,10 +25,11 @@ pub(crate) struct Target {
     /// Half-width of the shortest window.
     pub(crate) shortest: usize,
     pub(crate) delta: f64,
+    pub(crate) noise: &'a CorrelatedNoise,
     pub(crate) instructions: Instructions,
 }
 
-impl Target {
+impl Target<'_> {
     /// `1/Δ^d`.
     pub(crate) fn scale(&self) -> f64 {
         self.delta.powi(i32::try_from(self.derivative).unwrap_or(i32::MAX)).recip()
@@ -39,7 +41,7 @@ impl Target {
     }
 
     /// The candidates in a window, lowest first.
-    fn orders(&self, half: usize) -> Vec<usize> {
+    pub(crate) fn orders(&self, half: usize) -> Vec<usize> {
         let all: Vec<usize> = (self.derivative..=self.highest(half)).step_by(2).collect();
         if !self.fixed {
             return all;
@@ -75,7 +77,7 @@ pub(crate) struct CandidateScratch {
 
 impl Bank {
     /// Prepares the tables, or returns `None` if windows of this length have no candidate.
-    pub(crate) fn new(half: usize, target: &Target) -> Option<Self> {
+    pub(crate) fn new(half: usize, target: &Target<'_>) -> Option<Self> {
         let orders = target.orders(half);
         let (derivative, highest) = (target.derivative, *orders.last()?);
         let basis = Basis::new(2 * half + 1, highest + 1);
@@ -89,7 +91,15 @@ impl Bank {
         let leverages = orders.iter().map(|&order| leverages[order]).collect();
         let coefficients = Coefficients::new(&basis, &degrees, false, target.instructions);
         let constant = f64::from(u8::from(derivative == 0));
-        Some(Self { half, orders, gains, leverages, basis, coefficients, weights, first, constant })
+        let mut bank = Self { half, orders, gains, leverages, basis, coefficients, weights, first, constant };
+        if !target.noise.is_white() {
+            let gain = |candidate| {
+                let kernel = bank.kernel(candidate);
+                kernel.iter().zip(target.noise.correlate(&kernel)).map(|(a, b)| a * b).sum()
+            };
+            bank.gains = (0..bank.orders.len()).map(gain).collect();
+        }
+        Some(bank)
     }
 
     pub(crate) fn scratch(&self) -> CandidateScratch {
@@ -134,6 +144,19 @@ impl Bank {
             |index| weights.iter().enumerate().map(|(l, weight)| weight * self.basis.value(degree(l), index)).sum();
         (0..self.basis.length()).map(weight).collect()
     }
+}
+
+/// A kernel times the matrix of the noise's correlations, at the samples of its own window and at least as far as `half` from its centre.
+/// The product with another kernel is their covariance over the noise's variance.
+pub(crate) fn correlated(kernel: Vec<f64>, half: usize, noise: &CorrelatedNoise) -> Vec<f64> {
+    if noise.is_white() {
+        return kernel;
+    }
+    let more = half.saturating_sub(kernel.len() / 2);
+    let mut padded = vec![0.0; more];
+    padded.extend(kernel);
+    padded.resize(padded.len() + more, 0.0);
+    noise.correlate(&padded)
 }
 
 /// The sum of all numbers up to each.

@@ -4,11 +4,11 @@
 //! reference estimate `r` of less bias:
 //!
 //! ```text
-//! risk_c = ⟨(d_c - d_r)²⟩ + 2 σ² ⟨k_c, k_r⟩ = b_c² + σ² g_c + what is the same for all c,   if b_r ≪ b_c,
+//! risk_c = ⟨(d_c - d_r)²⟩ + 2 σ² k_cᵀR k_r = b_c² + σ² g_c + what is the same for all c,   if b_r ≪ b_c,
 //! ```
 //!
-//! with `k` the weights of the samples. In the frequency domain this is `Σ_f P|H_c - (iω)^d|² + σ²‖k_c‖²`, `P` the spectrum
-//! of the record. The reference must have less bias than the candidates, and no more noise than can be averaged out.
+//! with `k` the weights of the samples, `R` the correlations of the noise ([`crate::noise::colour`]) and `g_c = k_cᵀR k_c`. In the frequency domain this is `Σ_f P|H_c - (iω)^d|² + S|H_c|²`, `P` the spectrum
+//! of the record and `S` that of its noise. The reference must have less bias than the candidates, and no more noise than can be averaged out.
 //! Therefore it is refined iteratively. It begins with the shortest window and its highest order. Among the candidates
 //! with at least a hundredth of its variance the best is found; the window `√2` times shorter, of the same order, is the
 //! next reference. This is repeated until nothing changes. Since the least of many estimated risks is too small, the
@@ -23,8 +23,9 @@
 
 use std::ops::Range;
 
-use crate::auto_derivatives::candidates::{Bank, Target, product};
+use crate::auto_derivatives::candidates::{Bank, Target, correlated, product};
 use crate::error::Error;
+use crate::noise::correlated::CorrelatedNoise;
 use crate::record::samples::Samples;
 
 /// Half-width of the shortest window.
@@ -97,8 +98,7 @@ impl<'a> Survey<'a> {
     /// Those of `check_cancelled`, at once.
     pub(crate) fn best(
         &self,
-        target: &Target,
-        variance: f64,
+        target: &Target<'_>,
         check_cancelled: &mut CheckCancelled<'_>,
     ) -> Result<Option<Pair>, Error> {
         let mut ladder = Vec::new();
@@ -108,18 +108,17 @@ impl<'a> Survey<'a> {
             }
             check_cancelled()?;
         }
-        let Some((pair, (window, candidate))) = best_of(&ladder, variance) else { return Ok(None) };
+        let Some((pair, (window, candidate))) = best_of(&ladder, target.noise) else { return Ok(None) };
         let looked = ladder.swap_remove(window);
         drop(ladder);
         let reference = JudgedWindow { looked: &looked, candidate, risk: f64::NAN };
-        self.refine(target, variance, pair, reference, check_cancelled).map(Some)
+        self.refine(target, pair, reference, check_cancelled).map(Some)
     }
 
     /// Finds the window, and the order, between those of the ladder.
     fn refine(
         &self,
-        target: &Target,
-        variance: f64,
+        target: &Target<'_>,
         pair: Pair,
         reference: JudgedWindow<'_>,
         check_cancelled: &mut CheckCancelled<'_>,
@@ -128,7 +127,7 @@ impl<'a> Survey<'a> {
         let best_of = |half: usize, best: Option<&(Surveyed, usize, f64)>| {
             let looked = self.look(Bank::new(half, target)?);
             let best = best.map(|&(ref looked, candidate, risk)| JudgedWindow { looked, candidate, risk });
-            let risks = risks(reference, &looked, best, variance);
+            let risks = risks(reference, &looked, best, target.noise);
             let (candidate, risk) = risks.into_iter().enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
             Some((looked, candidate, risk))
         };
@@ -179,7 +178,7 @@ impl<'a> Survey<'a> {
 }
 
 /// The best pair of a ladder, by iterative refinement of the reference. Returns it with the place of its reference.
-fn best_of(ladder: &[Surveyed], variance: f64) -> Option<(Pair, (usize, usize))> {
+fn best_of(ladder: &[Surveyed], noise: &CorrelatedNoise) -> Option<(Pair, (usize, usize))> {
     let mut reference = (0, ladder.first()?.bank.orders.len() - 1);
     let mut seen = Vec::new();
     let mut best = None;
@@ -189,7 +188,7 @@ fn best_of(ladder: &[Surveyed], variance: f64) -> Option<(Pair, (usize, usize))>
         let compared = JudgedWindow { looked: &ladder[reference.0], candidate: reference.1, risk: f64::NAN };
         let (mut shorter_best, mut least): (_, Option<(f64, usize, usize)>) = (None, None);
         for (window, looked) in ladder.iter().enumerate() {
-            let risks = risks(compared, looked, shorter_best, variance).into_iter().enumerate();
+            let risks = risks(compared, looked, shorter_best, noise).into_iter().enumerate();
             let judged =
                 risks.filter(|&(candidate, risk)| looked.bank.gains[candidate] >= least_gain && risk.is_finite());
             let Some((candidate, risk)) = judged.min_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
@@ -208,8 +207,15 @@ fn best_of(ladder: &[Surveyed], variance: f64) -> Option<(Pair, (usize, usize))>
 
 /// The risk of every candidate of a window, by comparison with a reference; infinite where they cannot be compared. Given another
 /// candidate whose risk is known, it is that risk plus the difference where both windows fit.
-fn risks(reference: JudgedWindow<'_>, looked: &Surveyed, beside: Option<JudgedWindow<'_>>, variance: f64) -> Vec<f64> {
-    let kernel = reference.looked.bank.kernel(reference.candidate);
+fn risks(
+    reference: JudgedWindow<'_>,
+    looked: &Surveyed,
+    beside: Option<JudgedWindow<'_>>,
+    noise: &CorrelatedNoise,
+) -> Vec<f64> {
+    let variance = noise.variance();
+    let longest = looked.bank.half.max(beside.map_or(0, |other| other.looked.bank.half));
+    let kernel = correlated(reference.looked.bank.kernel(reference.candidate), longest, noise);
     let compare = &reference.looked.rows[reference.candidate];
     let fits = |place: usize| {
         let other = beside.map_or(0.0, |other| other.looked.rows[other.candidate][place]);
@@ -259,12 +265,14 @@ mod tests {
 
     #[test]
     fn a_window_is_judged_where_it_and_what_it_is_compared_with_fit() {
+        let noise = CorrelatedNoise::white(0.0);
         let target = Target {
             derivative: 1,
             highest: 3,
             fixed: false,
             shortest: 4,
             delta: 1.0,
+            noise: &noise,
             instructions: Instructions::current(),
         };
         let surveyed = |half: usize, outside: f64, inside: f64| {
@@ -277,13 +285,13 @@ mod tests {
         let (reference, short, long) = (surveyed(4, 9.0, 0.0), surveyed(8, 0.0, 0.1), surveyed(30, f64::NAN, 0.3));
         let judged = |looked, candidate, risk| JudgedWindow { looked, candidate, risk };
         let reference = judged(&reference, 0, f64::NAN);
-        let of_short = risks(reference, &short, None, 0.0)[0];
-        let of_long = risks(reference, &long, Some(judged(&short, 0, of_short)), 0.0)[0];
+        let of_short = risks(reference, &short, None, &noise)[0];
+        let of_long = risks(reference, &long, Some(judged(&short, 0, of_short)), &noise)[0];
         assert!((of_short - 0.6 * 81.0 - 0.4 * 0.01).abs() < 1e-12);
         assert!((of_long - of_short - (0.09 - 0.01)).abs() < 1e-12);
         // The other way round as well.
-        let alone = risks(reference, &long, None, 0.0)[0];
-        let beside = risks(reference, &short, Some(judged(&long, 0, alone)), 0.0)[0];
+        let alone = risks(reference, &long, None, &noise)[0];
+        let beside = risks(reference, &short, Some(judged(&long, 0, alone)), &noise)[0];
         assert!((alone - beside - (0.09 - 0.01)).abs() < 1e-12);
     }
 }

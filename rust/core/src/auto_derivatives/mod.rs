@@ -7,5 +7,6 @@ pub(crate) mod candidates;
 pub(crate) mod global_choice;
 pub(crate) mod local_average;
 pub(crate) mod symmetric_grid;
+pub(crate) mod trend;
 
 pub use automatic::{AutomaticChoice, AutomaticEstimates, AutomaticOptions, FEWEST_SAMPLES, estimate_automatically};

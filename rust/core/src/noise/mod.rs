@@ -1,11 +1,15 @@
-//! The noise of a channel: its variance, its quantisation and its spectrum.
+//! The noise of a channel: its variance, its colour, its quantisation and its spectrum.
 
 pub(crate) mod channel;
 pub(crate) mod coherence;
+pub(crate) mod colour;
+pub(crate) mod correlated;
 pub(crate) mod quantisation;
 pub(crate) mod spectrum;
 pub(crate) mod transform;
 
 pub use channel::{FEWEST_SAMPLES, noise};
 pub use coherence::{CORRELATED_NOISE, noise_coherence};
+pub use colour::coloured_noise;
+pub use correlated::CorrelatedNoise;
 pub use quantisation::quantisation_step;

@@ -1,0 +1,118 @@
+//! Whether a record is no more than a parabola and noise.
+//!
+//! Then no window is too long. Risks of candidates cannot tell that: of windows as long as a good part of the record there are few, and by
+//! chance one of high order seems to follow what others miss. So a constant, a line or a parabola is tested for what is left of it: in
+//! windows of all the record, of an eighth, of an eighth of that and so on, the coefficients of the degrees above have the variance of
+//! the noise alone,
+//!
+//! ```text
+//! mean of c_j² / q_jᵀΓq_j = 1 ± √(2/ν).
+//! ```
+
+use crate::local_polynomials::basis::Basis;
+use crate::noise::correlated::CorrelatedNoise;
+use crate::record::samples::{Samples, is_usable};
+
+/// Degrees of a trend, and those that are tested.
+const TRENDS: usize = 3;
+const DEGREES: usize = 16;
+
+/// Windows are so much shorter from one test to the next, to these last.
+const SHORTER: usize = 8;
+const SHORTEST: usize = DEGREES + 1;
+
+/// Degrees that are tested together: a band of frequencies. Where a motion adds less to a band than its noise, no polynomial gains by following it.
+const GROUP: usize = 4;
+
+/// Of longer records windows are chosen: there are many of any length.
+const LONGEST: usize = 1 << 16;
+
+/// What is left may exceed the noise by so many standard deviations, and white noise and coloured noise at low frequencies are known to so much.
+const CHANCE: f64 = 3.5;
+const WHITE: f64 = 0.05;
+const COLOURED: f64 = 0.25;
+
+/// The degree of the trend that is all there is, 0 to 2, or `None`.
+pub(crate) fn trend(record: &dyn Samples, noise: &CorrelatedNoise) -> Option<usize> {
+    let samples = record.len();
+    if samples > LONGEST || noise.variance().is_nan() || noise.variance() <= 0.0 {
+        return None;
+    }
+    let mut values = vec![0.0; samples];
+    record.read(0, &mut values);
+    if !values.iter().all(|&value| is_usable(value)) {
+        return None;
+    }
+    let known = if noise.is_white() { WHITE } else { COLOURED };
+    let mut degree = 0;
+    let halving = std::iter::successors(Some(samples), |length| Some(length / SHORTER));
+    // The shortest windows see the highest frequencies.
+    for length in halving.take_while(|&length| length > 2 * SHORTEST).chain([SHORTEST]) {
+        let power = powers(&values, length, noise);
+        let count = (samples / length) as f64;
+        let noise_alone = |group: &[f64]| {
+            let freedom = count * group.len() as f64;
+            let excess = group.iter().sum::<f64>() / group.len() as f64 - 1.0;
+            excess <= CHANCE * (2.0 / freedom + known * known).sqrt()
+        };
+        degree = (degree..TRENDS).find(|&degree| power[degree + 1..].chunks(GROUP).all(noise_alone))?;
+    }
+    Some(degree)
+}
+
+/// By degree, the mean square of the coefficients of windows side by side, over that of the noise.
+fn powers(values: &[f64], length: usize, noise: &CorrelatedNoise) -> Vec<f64> {
+    let basis = Basis::new(length, DEGREES);
+    let total = noise.variance();
+    let power = |degree: usize| {
+        let row: Vec<f64> = (0..length).map(|index| basis.value(degree, index)).collect();
+        let expected: f64 = row.iter().zip(noise.correlate(&row)).map(|(a, b)| a * b).sum();
+        let windows = values.chunks_exact(length);
+        let count = windows.len() as f64;
+        // The reference keeps the digits of a small motion on a large offset.
+        let square = |window: &[f64]| {
+            window.iter().zip(&row).map(|(value, q)| (value - window[length / 2]) * q).sum::<f64>().powi(2)
+        };
+        windows.map(square).sum::<f64>() / count / (expected * total)
+    };
+    (0..DEGREES).map(power).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::quantisation::tests::uniform;
+
+    /// Noise of variance one.
+    fn noise() -> Vec<f64> {
+        uniform(4000).into_iter().map(|value| value * 12.0_f64.sqrt()).collect()
+    }
+
+    fn found(signal: impl Fn(f64) -> f64) -> Option<usize> {
+        let samples: Vec<f64> = noise().iter().enumerate().map(|(i, e)| e + signal(i as f64 / 4000.0)).collect();
+        trend(&samples.as_slice(), &CorrelatedNoise::white(1.0))
+    }
+
+    #[test]
+    fn a_constant_a_line_and_a_parabola_are_trends() {
+        assert_eq!(found(|_| 1e6), Some(0));
+        assert_eq!(found(|t| 10.0 * t - 3.0), Some(1));
+        assert_eq!(found(|t| 10.0 * t * t), Some(2));
+    }
+
+    #[test]
+    fn motions_slow_and_fast_are_none() {
+        for cycles in [1.0, 5.0, 30.0, 200.0, 1000.0] {
+            assert_eq!(found(|t| (cycles * std::f64::consts::TAU * t).sin()), None, "{cycles}");
+        }
+        assert_eq!(found(|t| if t > 0.6 { 1.0 } else { 0.0 }), None);
+    }
+
+    #[test]
+    fn missing_samples_and_no_noise_are_no_trend() {
+        let mut samples = noise();
+        assert_eq!(trend(&samples.as_slice(), &CorrelatedNoise::white(0.0)), None);
+        samples[100] = f64::NAN;
+        assert_eq!(trend(&samples.as_slice(), &CorrelatedNoise::white(1.0)), None);
+    }
+}

@@ -1,0 +1,266 @@
+//! The colour of a channel's noise, from the coefficients of polynomials in windows of many lengths.
+//!
+//! As in [`crate::noise::channel`], the highest degrees of a window see noise only. From window to window, each √2 as long as the last, they see
+//! lower frequencies, until the signal appears:
+//!
+//! ```text
+//! v_i = mean of c_12² … c_15² in windows of half-width h_i = 8, 10, 12, 17 … n/16,   then degrees 8 … 11, 5 … 7, 3 … 4 and 2,
+//! E v_i = Σ_m a_m E_im,   E_im the mean of q_jᵀ Γ_m q_j.
+//! ```
+//!
+//! Noise is white where the four shortest windows agree, which are two octaves of frequency. Otherwise the amounts `a_m ≥ 0` of white noise and of
+//! first-order noises ([`crate::noise::correlated`]) are fitted to as many `v_i` as they explain, from the shortest window on. Such a sum falls at
+//! most with the square of the frequency. A smooth signal falls faster, so it ends the sequence, and it has no part in the noise.
+//!
+//! Not every rough channel is noise. It is not if its coefficients are not normally distributed: steps are few and large. It is not if its
+//! density still rises with the square of the period at the lowest frequencies, as that of a random walk: no window would tell that from motion.
+
+use std::f64::consts::{LN_2, PI};
+use std::ops::Range;
+
+use crate::local_polynomials::basis::Basis;
+use crate::local_polynomials::coefficients::{Coefficients, Projected};
+use crate::noise::correlated::CorrelatedNoise;
+use crate::record::samples::Samples;
+use crate::record::subsample::stretches;
+use crate::simd::instructions::Instructions;
+
+/// Half-widths of the windows; none is longer than an eighth of the record.
+const HALVES: [usize; 15] = [8, 10, 12, 17, 24, 35, 50, 70, 100, 140, 200, 280, 400, 560, 800];
+const PART: usize = 16;
+
+/// Degrees that are seen in each, and lower ones in the longest.
+const HIGH: Range<usize> = 12..16;
+const LOW: [Range<usize>; 4] = [8..12, 5..8, 3..5, 2..3];
+
+/// So many of the shortest windows agree where noise is white; so many at least must be explained by coloured noise.
+const WHITE: usize = 4;
+const FEWEST: usize = 7;
+
+/// The frequency where the density of a first-order noise is half its largest, in radians a sample: this one, and so many half as
+/// large, each than the last.
+const CORNER: f64 = 1.5;
+const OCTAVES: i32 = 11;
+
+/// The most windows of a length that are used, and in how many stretches.
+const MOST_WINDOWS: usize = 1 << 14;
+const STRETCHES: usize = 16;
+
+/// What the sum of few noises misses of a spectrum, and how many standard deviations a mean may be away from it.
+const MISFIT: f64 = 0.05;
+const AWAY: f64 = 3.5;
+
+/// A noise is left out if the sum of squared misfits grows by no more: that of two parameters by Akaike's criterion.
+const NEEDED: f64 = 2.0;
+
+/// Kurtosis of a normal distribution is 3. Steps of a record have 10 and more.
+const KURTOSIS: f64 = 4.5;
+const TAILS: usize = 2;
+
+/// The density may fall by so much in the lowest three octaves: noise of density `1/f` has 8, a random walk 64.
+const STEEPEST: f64 = 24.0;
+
+/// How much the density falls in the lowest two octaves and in the next two, where it is `1/f`: four times each. Above its corner a first-order
+/// noise falls 8 times and more in the next two, below it hardly in the first.
+const FALL: Range<f64> = 2.0..6.5;
+
+/// Rounds and relative change of the search for amounts.
+const ROUNDS: usize = 1000;
+const CHANGE: f64 = 1e-6;
+
+/// What some degrees of windows of one length see.
+struct Seen {
+    /// Angular frequency per sample, about.
+    frequency: f64,
+    /// Mean of the squared coefficients, relative standard deviation of that mean, and kurtosis of the coefficients.
+    power: f64,
+    deviation: f64,
+    kurtosis: f64,
+    /// The power of every noise of variance one: white, then by octave.
+    of_noises: Vec<f64>,
+}
+
+/// The noise of a channel, whose variance is given for the case that it is white or that its colour cannot be told.
+pub fn coloured_noise(record: &dyn Samples, variance: f64, instructions: Instructions) -> CorrelatedNoise {
+    let white = CorrelatedNoise::white(variance);
+    let halves: Vec<usize> = HALVES.into_iter().filter(|half| half * PART <= record.len()).collect();
+    if halves.len() < FEWEST || variance.is_nan() || variance <= 0.0 {
+        return white;
+    }
+    let mut seen = Vec::new();
+    for &half in &halves[..WHITE] {
+        seen.extend(look(record, half, &[HIGH], instructions));
+    }
+    if seen.len() < WHITE || explains(&seen, &[0]).is_some() || seen[TAILS].kurtosis > KURTOSIS {
+        return white;
+    }
+    for &half in &halves[WHITE..] {
+        let longest = half == halves[halves.len() - 1];
+        let degrees: Vec<Range<usize>> = std::iter::once(HIGH).chain(LOW.into_iter().filter(|_| longest)).collect();
+        seen.extend(look(record, half, &degrees, instructions));
+    }
+    coloured(&seen).unwrap_or(white)
+}
+
+/// The coloured noise that explains what is seen, from the highest frequencies on, or `None`.
+fn coloured(seen: &[Seen]) -> Option<CorrelatedNoise> {
+    let all: Vec<usize> = (0..=corners().count()).collect();
+    let explained = (WHITE..=seen.len()).take_while(|&count| explains(&seen[..count], &all).is_some()).last()?;
+    if explained < FEWEST {
+        return None;
+    }
+    // The last may hold some of the signal that ends the sequence.
+    let whole = explained == seen.len();
+    let part = &seen[..if whole { explained } else { explained - 1 }];
+    let lowest = part[part.len() - 1].frequency;
+    let slow = |corner: f64| corner < lowest / if whole { 2.0 } else { 4.0 };
+    let mut used: Vec<usize> = std::iter::once(0)
+        .chain(corners().enumerate().filter(|(_, corner)| !slow(*corner)).map(|(m, _)| m + 1))
+        .collect();
+    let (misfit, mut amounts) = fit(part, &used);
+    // Few noises: what scatters at low frequencies would otherwise be taken for a noise of its own.
+    loop {
+        let without = |place: usize| {
+            let mut rest = used.clone();
+            rest.remove(place);
+            let (misfit, amounts) = fit(part, &rest);
+            (misfit, amounts, rest)
+        };
+        let best = (0..used.len()).map(without).min_by(|a, b| a.0.total_cmp(&b.0));
+        match best {
+            Some((least, fitted, rest)) if !rest.is_empty() && least <= misfit + NEEDED => {
+                used = rest;
+                amounts = fitted;
+            }
+            _ => break,
+        }
+    }
+    let corners: Vec<f64> = corners().collect();
+    let (mut white, mut first_order) = (0.0, Vec::new());
+    for (&one, &amount) in used.iter().zip(&amounts) {
+        match one.checked_sub(1) {
+            None => white = amount,
+            Some(place) if amount > 0.0 => first_order.push(((-corners[place]).exp(), amount)),
+            Some(_) => {}
+        }
+    }
+    extend(&mut first_order, white, lowest);
+    let found = CorrelatedNoise::new(white, first_order);
+    let steep = found.density(lowest) > STEEPEST * found.density(8.0 * lowest);
+    let no_noise = found.is_white() || (whole && steep);
+    (!no_noise).then_some(found)
+}
+
+/// Continues noise of density `1/f` to lower frequencies than are seen. The noises of one octave after the other have the same variance `a`
+/// then, and the density at `ω` is `π a / (ω ln 2)`.
+fn extend(first_order: &mut Vec<(f64, f64)>, white: f64, lowest: f64) {
+    let found = CorrelatedNoise::new(white, first_order.clone());
+    let density = |octaves: f64| found.density(lowest * octaves.exp2());
+    let falls = [density(0.0) / density(2.0), density(2.0) / density(4.0)];
+    if !falls.iter().all(|fall| FALL.contains(fall)) {
+        return;
+    }
+    // Few noises make a bumpy line of it.
+    let bumps = [0.0, 1.0, 2.0, 3.0].map(|octaves: f64| (density(octaves) * octaves.exp2()).ln());
+    let variance = (bumps.iter().sum::<f64>() / 4.0).exp() * lowest * LN_2 / PI;
+    let slower = corners().filter(|&corner| corner < lowest / 2.0);
+    first_order.extend(slower.map(|corner| ((-corner).exp(), variance)));
+}
+
+/// The corners of the first-order noises.
+fn corners() -> impl Iterator<Item = f64> {
+    (0..OCTAVES).map(|octave| CORNER * f64::from(-octave).exp2())
+}
+
+/// Looks at the noise of a record through some degrees of windows of one length.
+fn look(record: &dyn Samples, half: usize, groups: &[Range<usize>], instructions: Instructions) -> Vec<Seen> {
+    let length = 2 * half + 1;
+    let basis = Basis::new(length, HIGH.end);
+    let degrees: Vec<usize> = groups.iter().cloned().flatten().collect();
+    let plan = Coefficients::new(&basis, &degrees, false, instructions);
+    let (mut scratch, mut projected) = (plan.scratch(), Projected::default());
+    let (mut squares, mut fourths) = (vec![0.0; degrees.len()], vec![0.0; degrees.len()]);
+    let (mut windows, mut used) = (0_usize, 0);
+    for places in stretches(record.len() + 1 - length, MOST_WINDOWS, STRETCHES) {
+        used += places.len() + length;
+        plan.project(record, places, 1, &mut projected, &mut scratch);
+        windows += projected.level.iter().filter(|level| !level.is_nan()).count();
+        for ((row, square), fourth) in projected.coefficients.iter().zip(&mut squares).zip(&mut fourths) {
+            for c in row.iter().filter(|c| !c.is_nan()) {
+                *square += c * c;
+                *fourth += (c * c) * (c * c);
+            }
+        }
+    }
+    if windows == 0 {
+        return Vec::new();
+    }
+    let mean = |sums: &[f64]| sums.iter().sum::<f64>() / (sums.len() * windows) as f64;
+    let mut first = 0;
+    let group = |group: &Range<usize>| {
+        let own = first..first + group.len();
+        first = own.end;
+        let power = mean(&squares[own.clone()]);
+        let independent = (group.len() * used.min(record.len())) as f64 / length as f64;
+        Seen {
+            frequency: (group.start + group.end + 1) as f64 / 2.0 / half as f64,
+            power,
+            deviation: (2.0 / independent + MISFIT * MISFIT).sqrt(),
+            kurtosis: mean(&fourths[own]) / (power * power),
+            of_noises: powers(&basis, group),
+        }
+    };
+    groups.iter().map(group).collect()
+}
+
+/// The mean square of some degrees' coefficients for every noise of variance one.
+fn powers(basis: &Basis, degrees: &Range<usize>) -> Vec<f64> {
+    let rows: Vec<Vec<f64>> =
+        degrees.clone().map(|degree| (0..basis.length()).map(|index| basis.value(degree, index)).collect()).collect();
+    let of = |noise: CorrelatedNoise| {
+        let power = |row: &Vec<f64>| row.iter().zip(noise.correlate(row)).map(|(a, b)| a * b).sum::<f64>();
+        rows.iter().map(power).sum::<f64>() / rows.len() as f64
+    };
+    let first_order = corners().map(|corner| of(CorrelatedNoise::new(0.0, vec![((-corner).exp(), 1.0)])));
+    std::iter::once(1.0).chain(first_order).collect()
+}
+
+/// The amounts of some noises, if they explain everything that is seen.
+fn explains(seen: &[Seen], noises: &[usize]) -> Option<Vec<f64>> {
+    let amounts = fit(seen, noises).1;
+    seen.iter().all(|one| misfit(one, noises, &amounts).abs() <= AWAY).then_some(amounts)
+}
+
+/// How far the noises are from what is seen, in standard deviations.
+fn misfit(seen: &Seen, noises: &[usize], amounts: &[f64]) -> f64 {
+    let sum: f64 = noises.iter().zip(amounts).map(|(&noise, amount)| amount * seen.of_noises[noise]).sum();
+    (sum / seen.power - 1.0) / seen.deviation
+}
+
+/// The amounts, none below zero, of least squared misfit, and that misfit: by descent along one after the other.
+fn fit(seen: &[Seen], noises: &[usize]) -> (f64, Vec<f64>) {
+    let row = |one: &Seen| -> Vec<f64> {
+        noises.iter().map(|&noise| one.of_noises[noise] / one.power / one.deviation).collect()
+    };
+    let rows: Vec<Vec<f64>> = seen.iter().map(row).collect();
+    let sum = |term: &dyn Fn(&[f64], &Seen) -> f64| rows.iter().zip(seen).map(|(row, one)| term(row, one)).sum::<f64>();
+    let count = noises.len();
+    let normal: Vec<Vec<f64>> =
+        (0..count).map(|i| (0..count).map(|j| sum(&|row, _| row[i] * row[j])).collect()).collect();
+    let right: Vec<f64> = (0..count).map(|i| sum(&|row, one| row[i] / one.deviation)).collect();
+    let mut amounts = vec![0.0; count];
+    for _ in 0..ROUNDS {
+        let mut largest = 0.0_f64;
+        for i in 0..count {
+            let product: f64 = normal[i].iter().zip(&amounts).map(|(a, b)| a * b).sum();
+            let new = (amounts[i] + (right[i] - product) / normal[i][i]).max(0.0);
+            // In the unit of what is seen: noises of different memory are of different size.
+            largest = largest.max((new - amounts[i]).abs() * normal[i][i].sqrt());
+            amounts[i] = new;
+        }
+        if largest <= CHANGE {
+            break;
+        }
+    }
+    (seen.iter().map(|one| misfit(one, noises, &amounts).powi(2)).sum(), amounts)
+}

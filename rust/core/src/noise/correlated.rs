@@ -1,0 +1,104 @@
+//! Coloured noise as a sum of white noise and of noises that forget exponentially.
+//!
+//! A first-order noise has the autocovariance `a ρ^|l|`. Sums of several of them with `a ≥ 0`, their memories doubled from one to the next,
+//! come near every spectrum that falls at most with the square of the frequency: autoregressive noise of the first order, and noise of
+//! density `1/f` (a sum of relaxations, as Bernamont found it in resistors in 1937). A sequence is multiplied by such a covariance
+//! matrix in two recursions.
+
+/// White noise and first-order noises.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CorrelatedNoise {
+    white: f64,
+    /// `ρ` and `a` of each.
+    first_order: Vec<(f64, f64)>,
+}
+
+impl CorrelatedNoise {
+    /// White noise of some variance.
+    #[must_use]
+    pub fn white(variance: f64) -> Self {
+        Self { white: variance, first_order: Vec::new() }
+    }
+
+    /// White noise and noises with the autocovariances `variance · correlation^|lag|`, given as correlation and variance.
+    #[must_use]
+    pub fn new(white: f64, first_order: Vec<(f64, f64)>) -> Self {
+        Self { white, first_order }
+    }
+
+    /// The variance of a sample.
+    #[must_use]
+    pub fn variance(&self) -> f64 {
+        self.white + self.first_order.iter().map(|(_, variance)| variance).sum::<f64>()
+    }
+
+    /// Whether samples are independent.
+    #[must_use]
+    pub fn is_white(&self) -> bool {
+        self.first_order.is_empty()
+    }
+
+    /// The density at an angular frequency per sample: that of white noise is its variance.
+    #[must_use]
+    pub fn density(&self, frequency: f64) -> f64 {
+        let of = |&(correlation, variance): &(f64, f64)| {
+            variance * (1.0 - correlation * correlation)
+                / (1.0 + correlation * correlation - 2.0 * correlation * frequency.cos())
+        };
+        self.white + self.first_order.iter().map(of).sum::<f64>()
+    }
+
+    /// The product of the matrix of correlations (its diagonal is one) and a sequence.
+    pub(crate) fn correlate(&self, sequence: &[f64]) -> Vec<f64> {
+        if self.is_white() {
+            return sequence.to_vec();
+        }
+        let total = self.variance();
+        let mut product: Vec<f64> = sequence.iter().map(|value| value * (self.white / total)).collect();
+        for &(correlation, variance) in &self.first_order {
+            let share = variance / total;
+            let mut sum = 0.0;
+            for (product, value) in product.iter_mut().zip(sequence) {
+                sum = correlation * sum + value;
+                *product += share * sum;
+            }
+            // The recursion backwards begins with what comes after: a sample itself counted above.
+            let mut sum = 0.0;
+            for (product, value) in product.iter_mut().zip(sequence).rev() {
+                *product += share * correlation * sum;
+                sum = correlation * sum + value;
+            }
+        }
+        product
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sequence_is_multiplied_by_the_matrix_of_correlations() {
+        let noise = CorrelatedNoise::new(1.0, vec![(0.5, 2.0), (0.9, 1.0)]);
+        assert_eq!(noise.variance(), 4.0);
+        let sequence: [f64; 6] = [1.0, -2.0, 0.5, 0.0, 3.0, -1.0];
+        for (i, found) in noise.correlate(&sequence).into_iter().enumerate() {
+            let row = (0..6).map(|j| {
+                let lag = i32::try_from(i.abs_diff(j)).unwrap_or(i32::MAX);
+                let white = if lag == 0 { 1.0 } else { 0.0 };
+                sequence[j] * (white + 2.0 * 0.5_f64.powi(lag) + 0.9_f64.powi(lag)) / 4.0
+            });
+            assert!((found - row.sum::<f64>()).abs() < 1e-14, "row {i}");
+        }
+        assert_eq!(CorrelatedNoise::white(9.0).correlate(&sequence), sequence);
+    }
+
+    #[test]
+    fn the_density_is_the_transform_of_the_autocovariance() {
+        let noise = CorrelatedNoise::new(0.3, vec![(0.8, 1.0)]);
+        for frequency in [0.0, 0.1, 1.0, 3.0] {
+            let sum: f64 = (1..400).map(|lag| 2.0 * 0.8_f64.powi(lag) * (frequency * f64::from(lag)).cos()).sum();
+            assert!((noise.density(frequency) - (1.3 + sum)).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,121 @@
+"""Derivatives under noise whose samples are correlated, beside the best Savitzky-Golay filter known afterwards."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.signal import lfilter, savgol_filter
+
+import tvident
+from tvident import Status
+
+Array = npt.NDArray[np.float64]
+
+RATE = 1000.0
+SAMPLES = 4000
+INSIDE = slice(200, -200)
+
+AT_MOST = 1.5
+"""Error over that of the best filter."""
+
+COVERAGE = (0.90, 0.98)
+"""Of nominal 95 % intervals over several records."""
+
+
+def noise(kind: str, seed: int, samples: int = SAMPLES) -> Array:
+    """Return noise of variance one: first-order autoregressive, or of density 1/f."""
+    white = np.random.default_rng(seed).standard_normal(samples + 2000)
+    if kind == "1/f":
+        spectrum = np.fft.rfft(white)
+        spectrum[1:] /= np.sqrt(np.arange(1, spectrum.size))
+        coloured: Array = np.asarray(np.fft.irfft(spectrum, n=white.size), dtype=np.float64)
+    else:
+        coloured = np.asarray(lfilter([1.0], [1.0, -float(kind)], white), dtype=np.float64)
+    coloured = coloured[2000:]
+    return np.asarray(coloured / coloured.std())
+
+
+def motion(kind: str) -> list[Array]:
+    """Return a motion and its two derivatives."""
+    t = np.arange(SAMPLES) / RATE
+    if kind == "constant":
+        return [np.ones_like(t), 0 * t, 0 * t]
+    if kind == "line":
+        return [3 * t, 3 + 0 * t, 0 * t]
+    frequencies: Array = np.array([3.0]) if kind == "sine" else np.arange(0.5, 12, 0.5, dtype=np.float64)
+    amplitudes: Array = np.where(frequencies == 3.0, 1.0, 0.2)
+    phases: Array = np.square(np.arange(frequencies.size, dtype=np.float64))
+    turns = 2j * np.pi * frequencies
+    waves = amplitudes * np.exp(1j * phases) * np.exp(np.outer(t, turns))
+    return [np.asarray((waves * turns**d).sum(axis=1).imag) for d in range(3)]
+
+
+def rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def best_filter(y: Array, truth: Array, derivative: int) -> float:
+    """Return the least error of any Savitzky-Golay filter of up to half the record."""
+    errors = []
+    for window in (11, 31, 51, 71, 101, 141, 201, 281, 301, 401, 561, 801, 1121, 1601, 1999):
+        # SciPy's own filters of high order lose all digits in long windows.
+        for order in range(derivative, 6 if window <= 401 else 4, 2):
+            found = savgol_filter(y, window, order, deriv=derivative, delta=1 / RATE)
+            errors.append(rms((found - truth)[INSIDE]))
+    return min(errors)
+
+
+@pytest.mark.parametrize("colour", ["0.5", "0.8", "0.9", "1/f"])
+@pytest.mark.parametrize("kind", ["sine", "several sines", "constant", "line"])
+def test_no_worse_than_the_best_filter(kind: str, colour: str) -> None:
+    """Taken for white, noise of correlation 0.8 made the second derivative 450 times worse: the shortest windows seemed best."""
+    truth = motion(kind)
+    ratios, covered = [], []
+    for seed in range(4):
+        y = truth[0] + 0.03 * noise(colour, seed)
+        fit = tvident.fit_local_polynomials(y, "auto", sample_rate=RATE)
+        errors = [(fit.derivatives[d] - truth[d]) for d in range(3)]
+        ratios.append([rms(errors[d][INSIDE]) / best_filter(y, truth[d], d) for d in range(3)])
+        covered.append([np.mean(np.abs(errors[d]) <= 1.96 * fit.stderr[d]) for d in range(3)])
+    assert (np.exp(np.mean(np.log(ratios), axis=0)) <= AT_MOST).all(), ratios
+    if kind not in {"constant", "line"} and colour != "1/f":
+        # Errors of windows as long as half the record are the same all along it: four records give few of them.
+        low, high = COVERAGE
+        assert (np.mean(covered, axis=0) >= low).all(), covered
+        assert (np.mean(covered, axis=0)[1:] <= high).all(), covered
+
+
+def test_the_noise_that_is_reported_is_all_of_it() -> None:
+    y = motion("sine")[0] + 0.03 * noise("0.8", 5)
+    fit = tvident.fit_local_polynomials(y, "auto", sample_rate=RATE)
+    # 4000 samples of correlation 0.8 know their variance as well as 880 independent ones.
+    assert fit.settings["noise"] == pytest.approx(0.03, rel=0.15)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_random_walk_is_motion(seed: int) -> None:
+    y = np.random.default_rng(seed).standard_normal(SAMPLES).cumsum()
+    fit = tvident.fit_local_polynomials(y, "auto", max_deriv=0)
+    assert rms(fit.derivatives[0] - y) < 1.0
+
+
+def test_steps_are_motion() -> None:
+    y = np.sign(np.sin(np.arange(SAMPLES) * 0.016 + 0.3))
+    noisy = y + 0.03 * noise("0.8", 6)
+    fit = tvident.fit_local_polynomials(noisy, "auto", max_deriv=0)
+    assert rms(fit.derivatives[0] - y) < 0.1
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e6])
+@pytest.mark.parametrize("gain", [1e-6, 1.0, 1e6])
+def test_scale_offset_and_reversed_time(gain: float, offset: float) -> None:
+    y = motion("sine")[0] + 0.03 * noise("0.8", 7)
+    plain = tvident.fit_local_polynomials(y, "auto")
+    other = tvident.fit_local_polynomials(gain * (y + offset)[::-1], "auto")
+    np.testing.assert_array_equal(other.window_length, plain.window_length)
+    sign = np.array([[1], [-1], [1]])
+    allowed = 1e-6 * np.abs(plain.derivatives).max(axis=1, keepdims=True)
+    turned = other.derivatives[:, ::-1] * sign / gain - np.array([[offset], [0], [0]])
+    assert (np.abs(turned - plain.derivatives) <= allowed * (1 + 1e-3 * offset)).all()
+    np.testing.assert_array_equal(other.status[::-1] & Status.INVALID, plain.status & Status.INVALID)
