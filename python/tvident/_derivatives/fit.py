@@ -25,7 +25,7 @@ class LocalPolynomialFit:
         :func:`fit_local_polynomials`).
     sigma : ndarray of float64, shape y.shape
         Standard deviation of the noise in each window, in the unit of ``y``: the root of RSS/(M - n - 1). Where windows were chosen, that
-        of the record.
+        of the record, also of noise that is correlated from sample to sample.
     status : ndarray of uint16, shape y.shape
         Flags of :class:`tvident.Status`, 0 is good.
     window_length : int or ndarray of int

@@ -6,7 +6,7 @@ use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use tvident::Error;
 use tvident::auto_derivatives::{
-    AutomaticEstimates as Slices, AutomaticOptions, estimate_automatically as core_estimate,
+    AutomaticEstimates as Slices, AutomaticOptions, AutomaticRecord, estimate_automatically as core_estimate,
 };
 use tvident::exec::{Watch, workers as threads};
 use tvident::noise::{coloured_noise, noise};
@@ -67,9 +67,9 @@ pub(crate) fn estimate_automatically<'py>(
                 let found = noise(record, quantisation, instructions)?;
                 let coloured = coloured_noise(record, found.sigma * found.sigma, instructions);
                 noises.push((coloured.variance().sqrt(), found.quantisation));
+                let prepared = AutomaticRecord::new(record, &coloured, highest, instructions);
                 for (row, &derivative) in derivatives.iter().enumerate() {
-                    let options =
-                        AutomaticOptions { derivative, highest, fixed, delta, noise: &coloured, instructions };
+                    let options = AutomaticOptions { derivative, highest, fixed, delta };
                     let place = (row * records.len() + index) * count;
                     let own = index * count..(index + 1) * count;
                     let mut estimates = Slices {
@@ -80,7 +80,7 @@ pub(crate) fn estimate_automatically<'py>(
                     };
                     let done = index * derivatives.len() + row;
                     let mut watch = part_of(watch, done, units);
-                    let pair = core_estimate(record, &options, &mut estimates, threads(workers), &mut watch)?;
+                    let pair = core_estimate(&prepared, &options, &mut estimates, threads(workers), &mut watch)?;
                     chosen[row].push(pair.map_or((0, 0), |pair| (pair.window_length, pair.order)));
                     for (status, flags) in status[own].iter_mut().zip(&flags) {
                         *status |= flags;

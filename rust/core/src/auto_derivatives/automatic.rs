@@ -30,7 +30,7 @@ pub const FEWEST_SAMPLES: usize = 64;
 
 /// What to estimate.
 #[derive(Clone, Copy, Debug)]
-pub struct AutomaticOptions<'a> {
+pub struct AutomaticOptions {
     /// Which derivative; 0 is the value.
     pub derivative: usize,
     /// The highest order, which is the only one where it is fixed.
@@ -39,10 +39,47 @@ pub struct AutomaticOptions<'a> {
     pub fixed: bool,
     /// Sample period in seconds.
     pub delta: f64,
-    /// The noise: see [`crate::noise`].
-    pub noise: &'a CorrelatedNoise,
-    /// Instructions to use.
-    pub instructions: Instructions,
+}
+
+/// A record whose derivatives are to be estimated, and what all of them need to know of it.
+pub struct AutomaticRecord<'a> {
+    survey: Survey<'a>,
+    noise: CorrelatedNoise,
+    /// Half-width of the shortest window.
+    shortest: usize,
+    /// The degree of the parabola that is all there is.
+    trend: Option<usize>,
+    instructions: Instructions,
+}
+
+impl<'a> AutomaticRecord<'a> {
+    /// Prepares a record for orders up to the highest, with the noise that [`crate::noise`] finds.
+    #[must_use]
+    pub fn new(record: &'a dyn Samples, noise: &CorrelatedNoise, highest: usize, instructions: Instructions) -> Self {
+        let variance = noise.variance();
+        let (shortest, noise) = match samples_per_step(record, variance.sqrt()) {
+            // A caller who denies quantisation may give less noise than rounding makes.
+            Some((step, each)) => {
+                let rounding = variance.min(step * step / 12.0);
+                let noise = CorrelatedNoise::white(variance.max(rounding * crowding(each)));
+                (shortest_window(each, record.len()), noise)
+            }
+            None => (SHORTEST, noise.clone()),
+        };
+        let trend = trend(record, &noise);
+        let survey = Survey::new(record, highest.min(HIGHEST_ORDER), instructions);
+        Self { survey, noise, shortest, trend, instructions }
+    }
+}
+
+impl std::fmt::Debug for AutomaticRecord<'_> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter
+            .debug_struct("AutomaticRecord")
+            .field("noise", &self.noise)
+            .field("trend", &self.trend)
+            .finish_non_exhaustive()
+    }
 }
 
 /// Where the estimates of all samples go. Slices that are empty are not wanted.
@@ -91,14 +128,15 @@ const STRETCHES: usize = 64;
 /// # Errors
 /// If the record has fewer than [`FEWEST_SAMPLES`], if the derivative is higher than the order or the order too high, or if the watch cancels.
 pub fn estimate_automatically(
-    record: &dyn Samples,
-    options: &AutomaticOptions<'_>,
+    prepared: &AutomaticRecord<'_>,
+    options: &AutomaticOptions,
     estimates: &mut AutomaticEstimates<'_>,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Option<AutomaticChoice>, Error> {
+    let AutomaticRecord { survey, noise, shortest, trend, instructions } = prepared;
+    let (record, &AutomaticOptions { derivative, highest, fixed, delta }) = (survey.record(), options);
     let samples = record.len();
-    let &AutomaticOptions { derivative, highest, fixed, delta, noise, instructions } = options;
     if samples < FEWEST_SAMPLES {
         return Err(Error::RecordTooShort { samples, least: FEWEST_SAMPLES });
     }
@@ -110,26 +148,15 @@ pub fn estimate_automatically(
         return Err(Error::OrderTooLow { order: highest, derivative });
     }
     memory::ask_for_numbers(samples.saturating_mul(NUMBERS))?;
-    let variance = noise.variance();
-    let of_rounding;
-    let (shortest, noise) = match samples_per_step(record, variance.sqrt()) {
-        // A caller who denies quantisation may give less noise than rounding makes.
-        Some((step, each)) => {
-            let rounding = variance.min(step * step / 12.0);
-            of_rounding = CorrelatedNoise::white(variance.max(rounding * crowding(each)));
-            (shortest_window(each, samples), &of_rounding)
-        }
-        None => (SHORTEST, noise),
-    };
-    let target = Target { derivative, highest, fixed, shortest, delta, noise, instructions };
+    let target = Target { derivative, highest, fixed, shortest: *shortest, delta, noise, instructions: *instructions };
     let total = 2 * samples;
-    let trend = trend(record, noise).and_then(|degree| Some((longest_window(&target, degree, samples)?, degree)));
+    let trend = trend.and_then(|degree| Some((longest_window(&target, degree, samples)?, degree)));
     let (best, target, at_ends) = match trend {
         Some((pair, degree)) => {
             let only = Target { highest: pair.order, fixed: true, ..target };
             (Some(pair), only, Target { highest: pair.order.max(degree), ..target })
         }
-        None => (Survey::new(record).best(&target, &mut || check_cancelled(watch, 0, total))?, target, target),
+        None => (survey.best(&target, &mut || check_cancelled(watch, 0, total))?, target, target),
     };
     let planned = best.and_then(|pair| Some((pair, Refinement::new(samples, pair, &target)?)));
     let Some((pair, refinement)) = planned else {
@@ -144,7 +171,7 @@ pub fn estimate_automatically(
     refinement.estimate(record, &mut outputs, workers, watch)?;
     for end in [End::First, End::Last] {
         let mut check_cancelled = || check_cancelled(watch, total, total);
-        let at_end = boundary::estimate(record, end, pair, &at_ends, &mut check_cancelled)?;
+        let at_end = boundary::estimate(survey, end, pair, &at_ends, &mut check_cancelled)?;
         for (place, (&value, &error)) in at_end.values.iter().zip(&at_end.errors).enumerate() {
             let sample = if end == End::First { place } else { samples - 1 - place };
             // Places that the windows at the end do not reach may still be reached by shorter ones inside.

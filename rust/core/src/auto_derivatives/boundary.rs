@@ -13,7 +13,7 @@
 //! they are uncorrelated in windows of a signal that looks the same forwards and backwards. All derivatives at all
 //! places of the window follow from `ĉ`.
 //!
-//! The risk at each place is measured: the same is done in all these windows, forwards and backwards, and compared there with a
+//! The risk is measured at a dozen places: the same is done in all these windows, forwards and backwards, and compared there with a
 //! reference from the centre of a window half as long as the record's best. In a record of few windows the best one is
 //! uncertain and may smooth too much; the reference shows that, and its larger noise is subtracted. The estimates from
 //! windows of several lengths are averaged with weights that fall with the square of the measured risk.
@@ -25,17 +25,19 @@ use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_uppe
 use faer::{Mat, Par, Side};
 
 use crate::auto_derivatives::candidate_weights::Reference;
-use crate::auto_derivatives::candidates::{Target, correlated, product};
-use crate::auto_derivatives::global_choice::{CheckCancelled, Pair, rounded};
+use crate::auto_derivatives::candidates::{Target, correlated};
+use crate::auto_derivatives::global_choice::{CLOSELY, CheckCancelled, Pair, Survey, rounded};
+use crate::auto_derivatives::slopes::Slopes;
 use crate::error::Error;
-use crate::local_polynomials::basis::Basis;
+use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
 use crate::local_polynomials::boundary::End;
-use crate::local_polynomials::coefficients::{Coefficients, Projected};
+use crate::local_polynomials::coefficients::Projected;
+use crate::local_polynomials::single_window::Window;
 use crate::noise::correlated::CorrelatedNoise;
-use crate::record::samples::Samples;
 
-/// The windows over the record's best, in half steps of a doubling.
+/// The windows over the record's best, in half steps of a doubling, and every how many are tried in records that are not short.
 const LADDER: Range<i32> = -4..5;
+const EVERY: usize = 2;
 
 /// The reference has a window so much shorter than the record's best.
 const REFERENCE: f64 = 2.0;
@@ -45,11 +47,15 @@ const SHORTEST: usize = 8;
 
 /// Samples near an end that are used, in half-widths of the record's best window, and at least.
 const NEAR: usize = 64;
-const LEAST_NEAR: usize = 4096;
+const LEAST_NEAR: usize = 1024;
 
-/// The most windows that are used, and the fewest that give a risk.
-const MOST_WINDOWS: usize = 1024;
+/// The most windows that are used in short records and in others, and the fewest that give a risk.
+const CLOSE_WINDOWS: usize = 1024;
+const MOST_WINDOWS: usize = 256;
 const FEWEST_WINDOWS: usize = 20;
+
+/// Places at which risks are measured in records that are not short, the closer to each other the nearer to the end; between them risks are interpolated.
+const PLACES: usize = 12;
 
 /// Estimates near an end, from the outermost sample inwards.
 #[derive(Debug)]
@@ -68,7 +74,7 @@ struct Shrunk {
 
 /// Samples near an end.
 struct Near<'a> {
-    record: &'a dyn Samples,
+    survey: &'a Survey<'a>,
     end: End,
     samples: Range<usize>,
     /// The reference at every one of them, NaN where there is none.
@@ -84,25 +90,27 @@ struct Near<'a> {
 /// # Errors
 /// Those of `check_cancelled`, at once.
 pub(crate) fn estimate(
-    record: &dyn Samples,
+    survey: &Survey<'_>,
     end: End,
     pair: Pair,
     target: &Target<'_>,
     check_cancelled: &mut CheckCancelled<'_>,
 ) -> Result<AtEnd, Error> {
-    let samples = record.len();
+    let samples = survey.record().len();
     let Some(reference) = Reference::new(pair, REFERENCE, target) else { return Ok(average(&[], pair.half)) };
     let length = (NEAR * pair.half).max(LEAST_NEAR).min(samples);
     let near = match end {
         End::First => 0..length,
         End::Last => samples - length..samples,
     };
-    let near = Near::new(record, end, near, &reference);
+    let near = Near::new(survey, end, near, &reference);
     let mut found = Vec::new();
-    for step in LADDER {
+    let closely = samples <= CLOSELY;
+    for step in LADDER.step_by(if closely { 1 } else { EVERY }) {
         let half = rounded(pair.half as f64 * (0.5 * f64::from(step)).exp2());
+        let half = if closely { half } else { survey.nearest_known(half) };
         if (SHORTEST..samples.div_ceil(4)).contains(&half) && 2 * half < samples / 2 {
-            found.extend(near.shrink(half, pair.half, target));
+            found.extend(near.shrink(half, pair.half, target, closely));
         }
         check_cancelled()?;
     }
@@ -135,8 +143,9 @@ fn average(found: &[Shrunk], count: usize) -> AtEnd {
 }
 
 impl<'a> Near<'a> {
-    fn new(record: &'a dyn Samples, end: End, samples: Range<usize>, reference: &Reference) -> Self {
+    fn new(survey: &'a Survey<'a>, end: End, samples: Range<usize>, reference: &Reference) -> Self {
         let Reference { bank, candidate } = reference;
+        let record = survey.record();
         let all = bank.centres(record.len());
         let centres = samples.start.max(all.start)..samples.end.min(all.end);
         let mut compare = vec![f64::NAN; samples.len()];
@@ -145,79 +154,120 @@ impl<'a> Near<'a> {
             let estimates = bank.estimates(record, centres.clone(), 1, &mut scratch);
             compare[centres.start - samples.start..centres.end - samples.start].copy_from_slice(&estimates[*candidate]);
         }
-        Self { record, end, samples, compare, kernel: bank.kernel(*candidate), gain: bank.gains[*candidate] }
+        Self { survey, end, samples, compare, kernel: bank.kernel(*candidate), gain: bank.gains[*candidate] }
     }
 
     /// The estimates of windows of one length at the first `count` places, or `None` if the outermost window cannot be used.
-    fn shrink(&self, half: usize, count: usize, target: &Target<'_>) -> Option<Shrunk> {
+    fn shrink(&self, half: usize, count: usize, target: &Target<'_>, closely: bool) -> Option<Shrunk> {
         let variance = target.noise.variance();
-        let length = 2 * half + 1;
+        let (length, derivative) = (2 * half + 1, target.derivative);
         let (highest, count) = (target.highest(half), count.min(length));
-        let windows = self.samples.start..(self.samples.end + 1).checked_sub(length)?;
-        if highest < target.derivative || windows.is_empty() {
+        if highest < derivative || length > self.samples.len() {
             return None;
         }
-        let basis = Basis::new(length, highest + 1);
-        let degrees: Vec<usize> = (0..=highest).collect();
-        let rows: Vec<Vec<f64>> =
-            degrees.iter().map(|&degree| (0..length).map(|index| basis.value(degree, index)).collect()).collect();
-        let plan = Coefficients::new(&basis, &degrees, false, target.instructions);
-        let (mut scratch, mut projected) = (plan.scratch(), Projected::default());
-        // The outermost window is one of them, whichever end this is.
-        let step = windows.len().div_ceil(MOST_WINDOWS);
-        let first = match self.end {
-            End::First => windows.start,
-            End::Last => windows.start + (windows.len() - 1) % step,
-        };
-        plan.project(self.record, first..windows.end, step, &mut projected, &mut scratch);
-        let outermost = match self.end {
-            End::First => 0,
-            End::Last => projected.level.len() - 1,
-        };
-        if projected.level[outermost].is_nan() {
-            return None;
+        let last = self.end == End::Last;
+        let most = if closely { CLOSE_WINDOWS } else { MOST_WINDOWS };
+        let tables = self.survey.tables(half);
+        let basis = &tables.basis;
+        let mut samples = vec![0.0; length];
+        self.survey.record().read(if last { self.samples.end - length } else { self.samples.start }, &mut samples);
+        if last {
+            samples.reverse();
         }
-        let correlations = correlations(&rows, target.noise);
+        // In reversed time odd derivatives change their sign.
+        let sign = if last && derivative % 2 == 1 { -1.0 } else { 1.0 };
+        let outermost = Window::project(basis, &samples, 0.0)?;
+        let (starts, mut projected) = self.survey.windows(half, &self.samples, most, last);
+        projected.coefficients.truncate(highest + 1);
+        let correlations = correlations(basis, highest, target.noise);
         let shrinkage = shrinkage(&projected, variance, &correlations);
         let scale = target.scale();
-        let constant = f64::from(u8::from(target.derivative == 0));
-        let mut shrunk = Shrunk { values: Vec::with_capacity(count), risks: Vec::with_capacity(count), order: highest };
-        for place in 0..count {
-            let at_place = basis.evaluate(basis.position(place), target.derivative);
+        let slopes = Slopes::new(basis);
+        let at_place = |place: usize| slopes.at(basis, place, derivative);
+        let shrunk_coefficients: Vec<f64> = (0..=highest)
+            .map(|j| shrinkage.iter().zip(&outermost.coefficients).map(|(row, c)| row[j] * c).sum::<f64>())
+            .collect();
+        let constant = f64::from(u8::from(derivative == 0));
+        let value = |place: usize| {
+            let sum: f64 = at_place(place).iter().zip(&shrunk_coefficients).map(|(q, c)| q * c).sum();
+            sign * (scale * sum + constant * outermost.reference)
+        };
+        let values = (0..count).map(value).collect();
+        let risk = |place: usize| {
+            let at_place = at_place(place);
             let weights: Vec<f64> = shrinkage
                 .iter()
                 .map(|row| scale * row.iter().zip(&at_place).map(|(a, q)| a * q).sum::<f64>())
                 .collect();
-            let estimates = BoundaryEstimates::new(&projected, &weights, constant, target.derivative);
-            shrunk.values.push(match self.end {
-                End::First => estimates.forwards[outermost],
-                End::Last => estimates.backwards[outermost],
-            });
+            let estimates = BoundaryEstimates::new(&projected, &weights, constant, derivative);
             let difference = |window: usize| {
-                let start = first + window * step - self.samples.start;
+                let start = starts[window] - self.samples.start;
                 [
                     estimates.forwards[window] - self.compare[start + place],
                     estimates.backwards[window] - self.compare[start + length - 1 - place],
                 ]
             };
-            let differences = (0..projected.level.len()).flat_map(difference).filter(|difference| !difference.is_nan());
+            let differences = (0..starts.len()).flat_map(difference).filter(|difference| !difference.is_nan());
             let (sum, compared) =
                 differences.fold((0.0, 0_usize), |(sum, count), difference| (sum + difference * difference, count + 1));
             let own = quadratic(&weights, &correlations);
-            // The kernel, where it meets that of the reference.
-            let reference = correlated(self.kernel.clone(), place.max(length - place), target.noise);
-            let reach = reference.len() / 2;
-            let meeting = place.saturating_sub(reach)..length.min(place + reach + 1);
-            let mut kernel = vec![0.0; meeting.len()];
-            for (row, weight) in rows.iter().zip(&weights) {
-                kernel.iter_mut().zip(&row[meeting.clone()]).for_each(|(sum, value)| *sum += weight * value);
-            }
-            let shared = product(&kernel, &reference, place - meeting.start);
+            let shared = self.shared(basis, &weights, place, target.noise);
             let risk = sum / compared as f64 + variance * (2.0 * shared - self.gain);
-            shrunk.risks.push(if compared < FEWEST_WINDOWS { f64::INFINITY } else { risk.max(variance * own) });
-        }
-        Some(shrunk)
+            if compared < FEWEST_WINDOWS { f64::INFINITY } else { risk.max(variance * own) }
+        };
+        Some(Shrunk {
+            values,
+            risks: if closely { (0..count).map(risk).collect() } else { interpolated(count, risk) },
+            order: highest,
+        })
     }
+
+    /// The product of the kernel at a place of a window, given by the weights of its coefficients, with that of the reference.
+    fn shared(&self, basis: &Basis, weights: &[f64], place: usize, noise: &CorrelatedNoise) -> f64 {
+        let length = basis.length();
+        let reference = correlated(self.kernel.clone(), place.max(length - place), noise);
+        let reach = reference.len() / 2;
+        let meeting = place.saturating_sub(reach)..length.min(place + reach + 1);
+        // Of even and of odd degrees.
+        let mut sums = [0.0; MOST_DEGREES];
+        for (index, value) in meeting.clone().zip(&reference[reach + meeting.start - place..]) {
+            let mirrored = index < length / 2;
+            let outward = if mirrored { length / 2 - index } else { index - length / 2 };
+            let row = basis.rows().nth(outward).unwrap_or_default();
+            let signs = if mirrored { [*value, -*value] } else { [*value; 2] };
+            for (pair, q) in sums.chunks_exact_mut(2).zip(row.chunks(2)) {
+                for ((sum, q), sign) in pair.iter_mut().zip(q).zip(signs) {
+                    *sum += q * sign;
+                }
+            }
+        }
+        sums.iter().zip(weights).map(|(sum, weight)| sum * weight).sum()
+    }
+}
+
+/// A function of places at all of some, computed at a few of them.
+fn interpolated(count: usize, of: impl Fn(usize) -> f64) -> Vec<f64> {
+    if count <= PLACES {
+        return (0..count).map(of).collect();
+    }
+    let knot = |index: usize| {
+        let share = index as f64 / (PLACES - 1) as f64;
+        rounded((count - 1) as f64 * share * share)
+    };
+    let mut knots: Vec<usize> = (0..PLACES).map(knot).collect();
+    knots.dedup();
+    let at: Vec<f64> = knots.iter().map(|&place| of(place)).collect();
+    let mut values = Vec::with_capacity(count);
+    for (knots, at) in knots.windows(2).zip(at.windows(2)) {
+        let span = (knots[1] - knots[0]) as f64;
+        for place in knots[0]..knots[1] {
+            let distance = (place - knots[0]) as f64 / span;
+            // Where one is infinite so is what lies between.
+            values.push(at[0] * (1.0 - distance) + if distance > 0.0 { at[1] * distance } else { 0.0 });
+        }
+    }
+    values.extend(at.last());
+    values
 }
 
 /// Estimates at one place of every window, and at its mirror image.
@@ -244,11 +294,13 @@ impl BoundaryEstimates {
     }
 }
 
-/// The correlations `QᵀRQ` that the noise gives to coefficients, of which the rows of `Q` are given by degree.
-fn correlations(rows: &[Vec<f64>], noise: &CorrelatedNoise) -> Mat<f64> {
+/// The correlations `QᵀRQ` that the noise gives to the coefficients of a window.
+fn correlations(basis: &Basis, highest: usize, noise: &CorrelatedNoise) -> Mat<f64> {
     if noise.is_white() {
-        return Mat::identity(rows.len(), rows.len());
+        return Mat::identity(highest + 1, highest + 1);
     }
+    let row = |degree: usize| (0..basis.length()).map(|index| basis.value(degree, index)).collect();
+    let rows: Vec<Vec<f64>> = (0..=highest).map(row).collect();
     let correlated: Vec<Vec<f64>> = rows.iter().map(|row| noise.correlate(row)).collect();
     // Even and odd degrees are uncorrelated; sums of what cancels would leave rounding.
     let product = |i: usize, j: usize| rows[i].iter().zip(&correlated[j]).map(|(a, b)| a * b).sum();

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use crate::auto_derivatives::candidates::{self, Bank, Target, correlated, product};
-use crate::auto_derivatives::global_choice::{OPTIMISM, Pair, rounded};
+use crate::auto_derivatives::candidates::{self, Bank, Target, correlated};
+use crate::auto_derivatives::global_choice::{CLOSELY, OPTIMISM, Pair, rounded, squared_distance};
 use crate::auto_derivatives::symmetric_grid::Blocks;
 use crate::record::samples::Samples;
 
@@ -16,6 +16,9 @@ const REFERENCE: f64 = 1.189_207_115_002_721;
 /// Half-widths of the best window in half a neighbourhood, and blocks in a half-width.
 const NEIGHBOURHOOD: f64 = 5.0;
 const BLOCKS: usize = 4;
+
+/// Samples in a block of records that are not short, at least: sums over more blocks cost more than the estimates in them.
+const SHORTEST_BLOCK: usize = 4;
 
 /// Samples in a piece of work, about.
 const PIECE: usize = 1 << 13;
@@ -87,8 +90,8 @@ impl Refinement {
         let (mut variances, mut orders) = (Vec::new(), Vec::new());
         for bank in &banks {
             let compared = correlated(reference.bank.kernel(reference.candidate), bank.half, target.noise);
-            for (candidate, (gain, leverage)) in bank.gains.iter().zip(&bank.leverages).enumerate() {
-                let shared = product(&bank.kernel(candidate), &compared, bank.half);
+            let shared = bank.products(&compared);
+            for ((gain, leverage), shared) in bank.gains.iter().zip(&bank.leverages).zip(shared) {
                 offsets.push(variance * (2.0 * shared + (OPTIMISM - 1.0) * gain));
                 differences.push(variance * (gain + reference_gain - 2.0 * shared));
                 temperatures.push((3.0 * variance * gain / leverage).max(f64::MIN_POSITIVE));
@@ -96,7 +99,8 @@ impl Refinement {
             }
             orders.extend(bank.orders.iter().map(|&order| u8::try_from(order).unwrap_or(u8::MAX)));
         }
-        let blocks = Blocks::new(samples, (pair.half / BLOCKS).max(1));
+        let shortest = if samples > CLOSELY { SHORTEST_BLOCK } else { 1 };
+        let blocks = Blocks::new(samples, (pair.half / BLOCKS).max(shortest));
         let reach = NEIGHBOURHOOD * half;
         Some(Self { banks, reference, blocks, reach, offsets, differences, temperatures, variances, orders })
     }
@@ -152,10 +156,7 @@ impl Refinement {
                     let index = block - blocks.start;
                     for (candidate, row) in rows.iter().enumerate() {
                         let row = &row[part.start - centres.start..part.end - centres.start];
-                        let squares = row.iter().zip(compare).map(|(a, b)| (a - b) * (a - b));
-                        let (sum, count) = squares
-                            .filter(|square| !square.is_nan())
-                            .fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0));
+                        let (sum, count) = squared_differences(row, compare);
                         sums[index * candidates + column + candidate] = sum;
                         counts[index * self.banks.len() + place] = count;
                     }
@@ -212,6 +213,16 @@ impl Refinement {
         }
         Weighed { logarithms: weights, biases }
     }
+}
+
+/// The sum of the squared differences of two rows where both have a number, and how many these are. NaN of a bank is NaN of all its rows.
+fn squared_differences(row: &[f64], compare: &[f64]) -> (f64, f64) {
+    let sum = squared_distance(row, compare);
+    if !sum.is_nan() {
+        return (sum, row.len() as f64);
+    }
+    let squares = row.iter().zip(compare).map(|(a, b)| (a - b) * (a - b)).filter(|square| !square.is_nan());
+    squares.fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0))
 }
 
 /// The intersection of two ranges.

@@ -8,9 +8,10 @@
 //! ```
 
 use std::ops::Range;
+use std::sync::Arc;
 
-use crate::local_polynomials::basis::Basis;
-use crate::local_polynomials::coefficients::{self, Coefficients, Projected};
+use crate::auto_derivatives::tables::{TablesWanted, WindowTables, tables};
+use crate::local_polynomials::coefficients::{self, Projected};
 use crate::noise::correlated::CorrelatedNoise;
 use crate::record::samples::Samples;
 use crate::simd::instructions::Instructions;
@@ -59,11 +60,11 @@ pub(crate) struct Bank {
     pub(crate) orders: Vec<usize>,
     pub(crate) gains: Vec<f64>,
     pub(crate) leverages: Vec<f64>,
-    basis: Basis,
-    coefficients: Coefficients,
+    tables: Arc<WindowTables>,
     /// `w_l`, and how many coefficients the first candidate has.
     weights: Vec<f64>,
     first: usize,
+    derivative: usize,
     /// What a constant signal of one gives.
     constant: f64,
 }
@@ -80,7 +81,9 @@ impl Bank {
     pub(crate) fn new(half: usize, target: &Target<'_>) -> Option<Self> {
         let orders = target.orders(half);
         let (derivative, highest) = (target.derivative, *orders.last()?);
-        let basis = Basis::new(2 * half + 1, highest + 1);
+        let wanted = TablesWanted { half, highest, first: derivative, step: 2, instructions: target.instructions };
+        let tables = tables(wanted);
+        let basis = &tables.basis;
         let degrees: Vec<usize> = (derivative..=highest).step_by(2).collect();
         let first = degrees.len() - orders.len();
         let (at_centre, scale) = (basis.evaluate(0.0, derivative), target.scale());
@@ -89,9 +92,8 @@ impl Bank {
         let values = basis.evaluate(0.0, 0);
         let leverages: Vec<f64> = running_sums(values.iter().map(|value| value * value)).collect();
         let leverages = orders.iter().map(|&order| leverages[order]).collect();
-        let coefficients = Coefficients::new(&basis, &degrees, false, target.instructions);
         let constant = f64::from(u8::from(derivative == 0));
-        let mut bank = Self { half, orders, gains, leverages, basis, coefficients, weights, first, constant };
+        let mut bank = Self { half, orders, gains, leverages, tables, weights, first, derivative, constant };
         if !target.noise.is_white() {
             let gain = |candidate| {
                 let kernel = bank.kernel(candidate);
@@ -103,7 +105,7 @@ impl Bank {
     }
 
     pub(crate) fn scratch(&self) -> CandidateScratch {
-        CandidateScratch { coefficients: self.coefficients.scratch(), projected: Projected::default() }
+        CandidateScratch { coefficients: self.tables.coefficients.scratch(), projected: Projected::default() }
     }
 
     /// The samples of a record that can be centres of windows.
@@ -121,7 +123,7 @@ impl Bank {
     ) -> &'a [Vec<f64>] {
         let CandidateScratch { coefficients, projected } = scratch;
         let windows = centres.start - self.half..centres.end - self.half;
-        self.coefficients.project(record, windows, step, projected, coefficients);
+        self.tables.coefficients.project(record, windows, step, projected, coefficients);
         let Projected { level: sums, coefficients: rows, .. } = projected;
         for sum in sums.iter_mut() {
             // NaN stays NaN.
@@ -136,13 +138,47 @@ impl Bank {
         &rows[self.first..]
     }
 
+    /// The same from the coefficients of all degrees.
+    pub(crate) fn combine(&self, projected: &Projected) -> Vec<Vec<f64>> {
+        let mut sums: Vec<f64> = projected.level.iter().map(|level| level * self.constant).collect();
+        let mut rows = Vec::with_capacity(self.orders.len());
+        for (l, weight) in self.weights.iter().enumerate() {
+            let coefficients = &projected.coefficients[self.derivative + 2 * l];
+            for (sum, value) in sums.iter_mut().zip(coefficients) {
+                *sum += weight * *value;
+            }
+            if l >= self.first {
+                rows.push(sums.clone());
+            }
+        }
+        rows
+    }
+
+    /// The products of every candidate's kernel and a sequence around its centre that is even or odd as the kernels are.
+    pub(crate) fn products(&self, sequence: &[f64]) -> Vec<f64> {
+        let middle = sequence.len() / 2;
+        let mut sums = vec![0.0; self.weights.len()];
+        for (row, value) in self.tables.basis.rows().zip(&sequence[middle..]).skip(1) {
+            for (sum, q) in sums.iter_mut().zip(row[self.derivative..].iter().step_by(2)) {
+                *sum += q * value;
+            }
+        }
+        let centre = self.tables.basis.rows().next().unwrap_or_default();
+        let products = sums.iter().enumerate().map(|(l, sum)| {
+            let at_centre = centre.get(self.derivative + 2 * l).map_or(0.0, |q| q * sequence[middle]);
+            self.weights[l] * (2.0 * sum + at_centre)
+        });
+        running_sums(products).skip(self.first).collect()
+    }
+
     /// The weights of a window's samples in a candidate.
     pub(crate) fn kernel(&self, candidate: usize) -> Vec<f64> {
-        let degree = |l: usize| self.basis.degrees() - 1 - 2 * (self.weights.len() - 1 - l);
+        let degree = |l: usize| self.tables.basis.degrees() - 1 - 2 * (self.weights.len() - 1 - l);
         let weights = &self.weights[..=self.first + candidate];
-        let weight =
-            |index| weights.iter().enumerate().map(|(l, weight)| weight * self.basis.value(degree(l), index)).sum();
-        (0..self.basis.length()).map(weight).collect()
+        let weight = |index| {
+            weights.iter().enumerate().map(|(l, weight)| weight * self.tables.basis.value(degree(l), index)).sum()
+        };
+        (0..self.tables.basis.length()).map(weight).collect()
     }
 }
 
@@ -165,11 +201,4 @@ fn running_sums(numbers: impl Iterator<Item = f64>) -> impl Iterator<Item = f64>
         *sum += number;
         Some(*sum)
     })
-}
-
-/// The product of two kernels of which the second is centred at a sample of the first.
-pub(crate) fn product(kernel: &[f64], other: &[f64], centre: usize) -> f64 {
-    let half = other.len() / 2;
-    let (skipped, first) = (half.saturating_sub(centre), centre.saturating_sub(half));
-    kernel[first.min(kernel.len())..].iter().zip(&other[skipped.min(other.len())..]).map(|(a, b)| a * b).sum()
 }

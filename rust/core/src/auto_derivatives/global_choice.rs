@@ -21,12 +21,19 @@
 //!
 //! Long records are subsampled in sixteen stretches.
 
+use std::cell::RefCell;
+use std::f64::consts::LN_2;
 use std::ops::Range;
+use std::rc::Rc;
+use std::sync::Arc;
 
-use crate::auto_derivatives::candidates::{Bank, Target, correlated, product};
+use crate::auto_derivatives::candidates::{Bank, Target, correlated};
+use crate::auto_derivatives::tables::{TablesWanted, WindowTables, tables};
 use crate::error::Error;
+use crate::local_polynomials::coefficients::Projected;
 use crate::noise::correlated::CorrelatedNoise;
 use crate::record::samples::Samples;
+use crate::simd::instructions::Instructions;
 
 /// Half-width of the shortest window.
 pub(crate) const SHORTEST: usize = 4;
@@ -39,7 +46,7 @@ const WHOLE: usize = 1 << 16;
 const STRETCHES: usize = 16;
 
 /// Places at which candidates are compared, at most, and at least.
-const MOST_PLACES: usize = 1 << 14;
+const MOST_PLACES: usize = 1 << 13;
 const FEWEST_PLACES: usize = 16;
 
 /// A reference judges candidates whose variance is at least its own over this.
@@ -51,14 +58,21 @@ pub(crate) const OPTIMISM: f64 = 1.3;
 /// The steps, in halvings and doublings, with which the best window is refined.
 const REFINEMENTS: [f64; 4] = [0.25, 0.125, 0.0625, 0.031_25];
 
+/// Records that are looked at more closely: there it costs little, and a few windows decide.
+pub(crate) const CLOSELY: usize = 1 << 11;
+
 /// Called repeatedly; an error ends the work.
 pub(crate) type CheckCancelled<'a> = dyn FnMut() -> Result<(), Error> + 'a;
 
-/// Where candidates are compared.
+/// Where candidates are compared, and what is known there: the coefficients of windows serve all derivatives.
 pub(crate) struct Survey<'a> {
     record: &'a dyn Samples,
+    highest: usize,
+    instructions: Instructions,
     stretches: Vec<Range<usize>>,
     step: usize,
+    /// By half-width, the coefficients at all places; NaN where there is no window.
+    known: RefCell<Vec<(usize, Rc<Projected>)>>,
 }
 
 /// The candidates of one window at all places, a row each; NaN where there is none.
@@ -84,12 +98,23 @@ pub(crate) struct Pair {
 }
 
 impl<'a> Survey<'a> {
-    pub(crate) fn new(record: &'a dyn Samples) -> Self {
+    pub(crate) fn new(record: &'a dyn Samples, highest: usize, instructions: Instructions) -> Self {
         let samples = record.len();
-        let (count, length) = if samples <= WHOLE { (1, samples) } else { (STRETCHES, WHOLE / STRETCHES) };
-        let first = |index: usize| (samples - length) * index / (count - 1).max(1);
-        let stretches = (0..count).map(|index| first(index)..first(index) + length).collect();
-        Self { record, stretches, step: (count * length).div_ceil(MOST_PLACES) }
+        let known = RefCell::new(Vec::new());
+        if samples <= WHOLE {
+            // The same places from both ends: what is left over is even.
+            let least = samples.div_ceil(MOST_PLACES).max(1);
+            let step =
+                (least..=samples.max(least)).find(|step| samples.saturating_sub(1) % step % 2 == 0).unwrap_or(least);
+            let margin = samples.saturating_sub(1) % step / 2;
+            let stretches = std::iter::once(margin..samples - margin).collect();
+            return Self { record, highest, instructions, stretches, step, known };
+        }
+        let length = WHOLE / STRETCHES;
+        let first = |index: usize| (samples - length) * index / (STRETCHES - 1);
+        let stretches = (0..STRETCHES).map(|index| first(index)..first(index) + length).collect();
+        let step = WHOLE.div_ceil(MOST_PLACES);
+        Self { record, highest, instructions, stretches, step, known: RefCell::new(Vec::new()) }
     }
 
     /// The pair of least risk, or `None` if no window is free of unusable samples. `check_cancelled` is called repeatedly.
@@ -127,7 +152,7 @@ impl<'a> Survey<'a> {
         let best_of = |half: usize, best: Option<&(Surveyed, usize, f64)>| {
             let looked = self.look(Bank::new(half, target)?);
             let best = best.map(|&(ref looked, candidate, risk)| JudgedWindow { looked, candidate, risk });
-            let risks = risks(reference, &looked, best, target.noise);
+            let risks = risks(reference, &looked, best, 0.0, target.noise);
             let (candidate, risk) = risks.into_iter().enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
             Some((looked, candidate, risk))
         };
@@ -151,16 +176,77 @@ impl<'a> Survey<'a> {
     }
 
     fn look(&self, bank: Bank) -> Surveyed {
-        let mut scratch = bank.scratch();
-        let mut rows = vec![Vec::new(); bank.orders.len()];
+        let rows = bank.combine(&self.coefficients(bank.half));
+        Surveyed { bank, rows }
+    }
+
+    /// The record that is surveyed.
+    pub(crate) fn record(&self) -> &'a dyn Samples {
+        self.record
+    }
+
+    /// The half-width of a window of about the same length whose coefficients are known, if there is one.
+    pub(crate) fn nearest_known(&self, half: usize) -> usize {
+        let distance = |one: usize| (one as f64 / half as f64).ln().abs();
+        let known = self.known.borrow();
+        let nearest = known.iter().map(|(one, _)| *one).min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
+        nearest.filter(|&one| distance(one) < LN_2 / 4.0).unwrap_or(half)
+    }
+
+    /// Tables of windows with all degrees.
+    pub(crate) fn tables(&self, half: usize) -> Arc<WindowTables> {
+        let highest = self.highest.min(2 * half - 2);
+        tables(TablesWanted { half, highest, first: 0, step: 1, instructions: self.instructions })
+    }
+
+    /// The first samples and the coefficients of windows in a part of the record, about so many, at equal distances from one of its ends.
+    pub(crate) fn windows(&self, half: usize, part: &Range<usize>, most: usize, last: bool) -> (Vec<usize>, Projected) {
+        let (samples, length) = (self.record.len(), 2 * half + 1);
+        let room = (part.end + 1).saturating_sub(part.start + length);
+        if samples > WHOLE {
+            let step = room.div_ceil(most).max(1);
+            let first = part.start + if last { room.saturating_sub(1) % step } else { 0 };
+            let tables = self.tables(half);
+            let (mut scratch, mut projected) = (tables.coefficients.scratch(), Projected::default());
+            let windows = first..part.start + room;
+            tables.coefficients.project(self.record, windows.clone(), step, &mut projected, &mut scratch);
+            return (windows.step_by(step).collect(), projected);
+        }
+        let known = self.coefficients(half);
+        let start = |place: &usize| (self.stretches[0].start + place * self.step).checked_sub(half);
+        let fits = |place: &usize| start(place).is_some_and(|first| part.start <= first && first + length <= part.end);
+        let mut places: Vec<usize> = (0..known.level.len()).filter(fits).collect();
+        let every = places.len().div_ceil(most).max(1);
+        if last {
+            places.reverse();
+        }
+        let places: Vec<usize> = places.into_iter().step_by(every).collect();
+        let pick = |row: &Vec<f64>| places.iter().map(|&place| row[place]).collect();
+        let projected = Projected {
+            level: pick(&known.level),
+            coefficients: known.coefficients.iter().map(pick).collect(),
+            residual: Vec::new(),
+        };
+        (places.iter().filter_map(start).collect(), projected)
+    }
+
+    /// The coefficients of all windows of a length at all places.
+    fn coefficients(&self, half: usize) -> Rc<Projected> {
+        if let Some((_, known)) = self.known.borrow().iter().find(|(one, _)| *one == half) {
+            return Rc::clone(known);
+        }
+        let tables = self.tables(half);
+        let mut scratch = tables.coefficients.scratch();
+        let (mut all, mut part) = (Projected::default(), Projected::default());
+        all.coefficients.resize_with(tables.basis.degrees(), Vec::new);
         for stretch in &self.stretches {
             let places = stretch.len().div_ceil(self.step);
-            let centres = bank.centres(self.record.len());
+            let centres = half..self.record.len().saturating_sub(half).max(half);
             // The places of this stretch that are centres.
             let place = |sample: usize| sample.saturating_sub(stretch.start).div_ceil(self.step).min(places);
             let wanted = place(centres.start)..place(centres.end).max(place(centres.start));
-            let before = rows[0].len();
-            for row in &mut rows {
+            let before = all.level.len();
+            for row in all.coefficients.iter_mut().chain([&mut all.level]) {
                 row.resize(before + places, f64::NAN);
             }
             if wanted.is_empty() {
@@ -168,12 +254,16 @@ impl<'a> Survey<'a> {
             }
             let first = stretch.start + wanted.start * self.step;
             let end = centres.end.min(stretch.end);
-            let estimates = bank.estimates(self.record, first..end, self.step, &mut scratch);
-            for (row, estimates) in rows.iter_mut().zip(estimates) {
-                row[before + wanted.start..before + wanted.end].copy_from_slice(estimates);
+            tables.coefficients.project(self.record, first - half..end - half, self.step, &mut part, &mut scratch);
+            let own = before + wanted.start..before + wanted.end;
+            all.level[own.clone()].copy_from_slice(&part.level);
+            for (row, found) in all.coefficients.iter_mut().zip(&part.coefficients) {
+                row[own.clone()].copy_from_slice(found);
             }
         }
-        Surveyed { bank, rows }
+        let all = Rc::new(all);
+        self.known.borrow_mut().push((half, Rc::clone(&all)));
+        all
     }
 }
 
@@ -188,9 +278,8 @@ fn best_of(ladder: &[Surveyed], noise: &CorrelatedNoise) -> Option<(Pair, (usize
         let compared = JudgedWindow { looked: &ladder[reference.0], candidate: reference.1, risk: f64::NAN };
         let (mut shorter_best, mut least): (_, Option<(f64, usize, usize)>) = (None, None);
         for (window, looked) in ladder.iter().enumerate() {
-            let risks = risks(compared, looked, shorter_best, noise).into_iter().enumerate();
-            let judged =
-                risks.filter(|&(candidate, risk)| looked.bank.gains[candidate] >= least_gain && risk.is_finite());
+            let risks = risks(compared, looked, shorter_best, least_gain, noise).into_iter().enumerate();
+            let judged = risks.filter(|&(_, risk)| risk.is_finite());
             let Some((candidate, risk)) = judged.min_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
             shorter_best = Some(JudgedWindow { looked, candidate, risk });
             if least.is_none_or(|(least, ..)| risk < least) {
@@ -205,14 +294,19 @@ fn best_of(ladder: &[Surveyed], noise: &CorrelatedNoise) -> Option<(Pair, (usize
     best.map(|best| (best, reference))
 }
 
-/// The risk of every candidate of a window, by comparison with a reference; infinite where they cannot be compared. Given another
+/// The risk of every candidate of a window of at least some gain, by comparison with a reference; infinite where they cannot be compared. Given another
 /// candidate whose risk is known, it is that risk plus the difference where both windows fit.
 fn risks(
     reference: JudgedWindow<'_>,
     looked: &Surveyed,
     beside: Option<JudgedWindow<'_>>,
+    least_gain: f64,
     noise: &CorrelatedNoise,
 ) -> Vec<f64> {
+    let nothing = || vec![f64::INFINITY; looked.rows.len()];
+    if !looked.bank.gains.iter().any(|&gain| gain >= least_gain) {
+        return nothing();
+    }
     let variance = noise.variance();
     let longest = looked.bank.half.max(beside.map_or(0, |other| other.looked.bank.half));
     let kernel = correlated(reference.looked.bank.kernel(reference.candidate), longest, noise);
@@ -222,17 +316,44 @@ fn risks(
         !(looked.rows[0][place] + compare[place] + other).is_nan()
     };
     let places: Vec<usize> = (0..compare.len()).filter(|&place| fits(place)).collect();
+    let (Some(&first), Some(&last)) = (places.first(), places.last()) else { return nothing() };
     if places.len() < FEWEST_PLACES {
-        return vec![f64::INFINITY; looked.rows.len()];
+        return nothing();
     }
-    let risk = |looked: &Surveyed, candidate: usize| {
-        let row = &looked.rows[candidate];
-        let sum: f64 = places.iter().map(|&place| (row[place] - compare[place]).powi(2)).sum();
-        let shared = product(&looked.bank.kernel(candidate), &kernel, looked.bank.half);
-        sum / places.len() as f64 + variance * (2.0 * shared + (OPTIMISM - 1.0) * looked.bank.gains[candidate])
+    let whole = last - first + 1 == places.len();
+    let distance = |row: &[f64]| {
+        let sum = if whole {
+            squared_distance(&row[first..=last], &compare[first..=last])
+        } else {
+            places.iter().map(|&place| (row[place] - compare[place]).powi(2)).sum()
+        };
+        sum / places.len() as f64
     };
-    let shift = beside.map_or(0.0, |other| other.risk - risk(other.looked, other.candidate));
-    (0..looked.rows.len()).map(|candidate| risk(looked, candidate) + shift).collect()
+    let risk = |looked: &Surveyed, candidate: usize, shared: f64| {
+        distance(&looked.rows[candidate]) + variance * (2.0 * shared + (OPTIMISM - 1.0) * looked.bank.gains[candidate])
+    };
+    let shift = beside.map_or(0.0, |other| {
+        let shared = other.looked.bank.products(&kernel)[other.candidate];
+        other.risk - risk(other.looked, other.candidate, shared)
+    });
+    let shared = looked.bank.products(&kernel);
+    let judged = |(candidate, shared): (usize, f64)| {
+        if looked.bank.gains[candidate] >= least_gain { risk(looked, candidate, shared) + shift } else { f64::INFINITY }
+    };
+    shared.into_iter().enumerate().map(judged).collect()
+}
+
+/// `Σ (a - b)²`, in eight sums side by side.
+pub(crate) fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a, b) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| (a - b) * (a - b)).sum();
+    for (a, b) in a.zip(b) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += (a - b) * (a - b);
+        }
+    }
+    sums.iter().sum::<f64>() + rest
 }
 
 /// The window nearest to one √2 times shorter, and the candidate of an order in it.
@@ -261,7 +382,6 @@ pub(crate) fn rounded(number: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::instructions::Instructions;
 
     #[test]
     fn a_window_is_judged_where_it_and_what_it_is_compared_with_fit() {
@@ -285,13 +405,13 @@ mod tests {
         let (reference, short, long) = (surveyed(4, 9.0, 0.0), surveyed(8, 0.0, 0.1), surveyed(30, f64::NAN, 0.3));
         let judged = |looked, candidate, risk| JudgedWindow { looked, candidate, risk };
         let reference = judged(&reference, 0, f64::NAN);
-        let of_short = risks(reference, &short, None, &noise)[0];
-        let of_long = risks(reference, &long, Some(judged(&short, 0, of_short)), &noise)[0];
+        let of_short = risks(reference, &short, None, 0.0, &noise)[0];
+        let of_long = risks(reference, &long, Some(judged(&short, 0, of_short)), 0.0, &noise)[0];
         assert!((of_short - 0.6 * 81.0 - 0.4 * 0.01).abs() < 1e-12);
         assert!((of_long - of_short - (0.09 - 0.01)).abs() < 1e-12);
         // The other way round as well.
-        let alone = risks(reference, &long, None, &noise)[0];
-        let beside = risks(reference, &short, Some(judged(&long, 0, alone)), &noise)[0];
+        let alone = risks(reference, &long, None, 0.0, &noise)[0];
+        let beside = risks(reference, &short, Some(judged(&long, 0, alone)), 0.0, &noise)[0];
         assert!((alone - beside - (0.09 - 0.01)).abs() < 1e-12);
     }
 }

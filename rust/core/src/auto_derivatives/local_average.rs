@@ -115,14 +115,27 @@ impl Refinement {
         let used: Vec<bool> = (0..candidates).map(weighed).collect();
         self.fill(record, &samples, &used, scratch);
         let mut missing = Vec::new();
+        let (mut between, mut active) = ((usize::MAX, usize::MAX), Vec::new());
         for (place, sample) in samples.clone().enumerate() {
             let (low, high, distance) = self.blocks.between(sample);
-            let between = |numbers: &[f64], candidate: usize| {
-                let of = |block: usize| numbers[(block - around.start) * candidates + candidate];
-                of(low) + distance * (of(high) - of(low))
-            };
-            let (weight, bias) = (|one: usize| between(&weights, one), |one: usize| between(biases, one));
-            if !self.mix(weight, bias, &used, place, outputs, scratch) {
+            if between != (low, high) {
+                between = (low, high);
+                active.clear();
+                let of = |numbers: &[f64], one: usize| {
+                    let of = |block: usize| numbers[(block - around.start) * candidates + one];
+                    (of(low), of(high) - of(low))
+                };
+                let candidates = (0..candidates).filter(|&one| used[one]);
+                let candidates = candidates.map(|one| (one, of(&weights, one), of(biases, one)));
+                active.extend(candidates.filter(|(_, weight, _)| *weight != (0.0, 0.0)));
+            }
+            let line = |(start, growth): (f64, f64)| start + distance * growth;
+            let shares = active.iter().map(|&(candidate, weight, bias)| Share {
+                candidate,
+                weight: line(weight),
+                bias: line(bias),
+            });
+            if !self.mix(&shares, place, outputs, scratch) {
                 missing.push((place, self.blocks.of(sample)));
             }
         }
@@ -132,15 +145,14 @@ impl Refinement {
         // Near the ends and near unusable samples the best windows do not fit: take the best of those that do.
         let rest: Vec<bool> = used.iter().map(|used| !used).collect();
         self.fill(record, &samples, &rest, scratch);
-        let all = vec![true; candidates];
         for (place, block) in missing {
             let own = (block - around.start) * candidates..(block - around.start + 1) * candidates;
             let (row, biases) = (&logarithms[own.clone()], &biases[own]);
             let fits =
                 (0..candidates).filter(|&one| !scratch.rows[one][place].is_nan() && row[one] > f64::NEG_INFINITY);
             let best = fits.max_by(|&a, &b| row[a].total_cmp(&row[b]));
-            let chosen = |candidate| f64::from(u8::from(Some(candidate) == best));
-            self.mix(chosen, |candidate| biases[candidate], &all, place, outputs, scratch);
+            let share = best.into_iter().map(|candidate| Share { candidate, weight: 1.0, bias: biases[candidate] });
+            self.mix(&share, place, outputs, scratch);
         }
     }
 
@@ -171,22 +183,17 @@ impl Refinement {
     /// Writes the average of some candidates at one place, or NaN. Returns whether there is one.
     fn mix(
         &self,
-        weight: impl Fn(usize) -> f64,
-        bias: impl Fn(usize) -> f64,
-        used: &[bool],
+        shares: &(impl Iterator<Item = Share> + Clone),
         place: usize,
         outputs: &mut DerivativeOutputs<'_>,
         scratch: &AverageScratch,
     ) -> bool {
-        let known = || {
-            let weighed =
-                (0..used.len()).filter(|&candidate| used[candidate]).map(|candidate| (candidate, weight(candidate)));
-            weighed.filter(|&(candidate, weight)| weight > 0.0 && !scratch.rows[candidate][place].is_nan())
-        };
+        let estimate = |candidate: usize| scratch.rows[candidate][place];
+        let known = || shares.clone().filter(|share| share.weight > 0.0 && !estimate(share.candidate).is_nan());
         let (mut total, mut sum, mut largest, mut best) = (0.0, 0.0, 0.0, None);
-        for (candidate, weight) in known() {
+        for Share { candidate, weight, .. } in known() {
             total += weight;
-            sum += weight * scratch.rows[candidate][place];
+            sum += weight * estimate(candidate);
             if weight > largest {
                 (largest, best) = (weight, Some(candidate));
             }
@@ -197,12 +204,20 @@ impl Refinement {
             *slot = self.orders[best];
         }
         if let Some(error) = outputs.errors.get_mut(place) {
-            let square = |(candidate, weight): (usize, f64)| {
-                weight
-                    * (bias(candidate) + self.variances[candidate] + (scratch.rows[candidate][place] - value).powi(2))
+            let square = |Share { candidate, weight, bias }: Share| {
+                weight * (bias + self.variances[candidate] + (estimate(candidate) - value).powi(2))
             };
             *error = (known().map(square).sum::<f64>() / total).sqrt();
         }
         best.is_some()
     }
+}
+
+/// What a candidate contributes to one sample.
+#[derive(Clone, Copy)]
+struct Share {
+    candidate: usize,
+    weight: f64,
+    /// Its squared bias there.
+    bias: f64,
 }

@@ -6,7 +6,11 @@ pub(crate) mod candidate_weights;
 pub(crate) mod candidates;
 pub(crate) mod global_choice;
 pub(crate) mod local_average;
+pub(crate) mod slopes;
 pub(crate) mod symmetric_grid;
+pub(crate) mod tables;
 pub(crate) mod trend;
 
-pub use automatic::{AutomaticChoice, AutomaticEstimates, AutomaticOptions, FEWEST_SAMPLES, estimate_automatically};
+pub use automatic::{
+    AutomaticChoice, AutomaticEstimates, AutomaticOptions, AutomaticRecord, FEWEST_SAMPLES, estimate_automatically,
+};
