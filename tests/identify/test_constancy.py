@@ -72,3 +72,21 @@ def test_what_cannot_be_tested_is_said() -> None:
     angle[SAMPLES // 10 :] = np.nan
     result = tvident.identify(angle, torque, sample_rate=RATE, stiffness="constant")
     assert "inertia, damping, stiffness and offset constant: not tested" in " ".join(result.reasons)
+
+
+def test_a_jump_of_inertia_is_one_of_inertia() -> None:
+    truth = np.where(TIME < 9.3, INERTIA, INERTIA * 1.2)
+    result = tvident.identify(*recording(1, inertia=truth), sample_rate=RATE)
+    said = " ".join(result.reasons)
+    assert "values of inertia jump at 9." in said
+    for name, expected in (("inertia", truth), ("stiffness", STIFFNESS)):
+        assert np.sqrt(np.mean((getattr(result, name) / expected - 1) ** 2)) < 0.01, name
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_small_jump_of_inertia_is_followed(seed: int) -> None:
+    truth = np.where(TIME < 9.3, INERTIA, INERTIA * 1.05)
+    result = tvident.identify(*recording(seed, inertia=truth), sample_rate=RATE)
+    assert result.settings["kinds"]["inertia"] == "varying"
+    assert np.sqrt(np.mean((result.inertia / truth - 1) ** 2)) < 0.01
+    assert "values of stiffness jump" not in " ".join(result.reasons)

@@ -17,6 +17,9 @@ from tvident._status import Status
 _SHOWN = 6
 """Jumps that are listed at most."""
 
+_BEYOND_CHANCE = 4.0
+"""A parameter jumps where it differs by more than so many standard errors of the difference: one of 16 000 does so by chance."""
+
 _TAKES_PART = 0.3
 """A constant that has at least this share in the worst determined combination is named."""
 
@@ -43,6 +46,8 @@ class Explained:
         Unknowns that the record was to decide upon.
     period : float
         Seconds from one sample to the next.
+    step : int
+        Samples from one number to the next.
     coherence : float, optional
         Of the noise of both channels, above the motion.
     """
@@ -52,6 +57,7 @@ class Explained:
     chosen: Collection[str]
     tested: Collection[str]
     period: float
+    step: int
     coherence: float | None = None
 
     def words(self, *, method_chosen: bool = False) -> Words:
@@ -131,7 +137,20 @@ class Explained:
             " …" if len(jumps) > _SHOWN else ""
         )
         many = f"{len(jumps)} times, at" if len(jumps) > 1 else "at"
-        return [f"windowed parameters jump {many} {shown} s: windows end there"]
+        jumping = [name for name in self._changing() if any(self._is_other_after(name, jump) for jump in jumps)]
+        which = f"values of {listed(jumping)}" if jumping else "windowed parameters"
+        return [f"{which} jump {many} {shown} s: windows end there"]
+
+    def _is_other_after(self, name: str, jump: int) -> bool:
+        """Return whether a parameter differs by more than its errors between a test function before a jump and one after it."""
+        unknown = self.found.unknowns[list(self.names).index(name)]
+        last = unknown.values.size - 1
+        sides = [min(max(sample // self.step, 0), last) for sample in (jump - self._reach(), jump + self._reach())]
+        before, after = unknown.values[sides]
+        return bool(abs(after - before) > _BEYOND_CHANCE * unknown.factor * math.hypot(*unknown.stderr[sides]))
+
+    def _reach(self) -> int:
+        return self.found.window_length // 2
 
     def _feedback(self) -> list[str]:
         if self.coherence is None or self.coherence < _core.CORRELATED_NOISE:

@@ -308,9 +308,9 @@ class Task:
         variances = [one.noise[0] if one.noise else 0.0 for one in found]
         coherences = _core.noise_coherence(self._data.angles, self._data.torques, variances)
         each = [
-            Explained(one, self._names, settings["chosen"], tested, self._data.period, coherence).words(
-                method_chosen=self._request.chosen
-            )
+            Explained(
+                one, self._names, settings["chosen"], tested, self._data.period, self._data.step, coherence
+            ).words(method_chosen=self._request.chosen)
             for one, coherence in zip(found, coherences, strict=True)
         ]
         if not self._data.batch:

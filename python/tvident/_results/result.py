@@ -77,8 +77,8 @@ class Identification(Simulated):
     record_status : Status, or ndarray of uint16 in the shape of the batch
         Flags that hold for the whole record.
     jumps : tuple of float
-        Times in seconds at which windowed parameters jump, found if windows of all lengths are averaged; one such tuple per record in a
-        batch.
+        Times in seconds at which parameters jump (``reasons`` says which), found if windows of all lengths are averaged; one such
+        tuple per record in a batch.
     reasons : tuple of str
         What was chosen, and why.
     advice : tuple of str

@@ -3,9 +3,10 @@
 /// Slowly varying coefficients over time.
 #[derive(Clone, Debug)]
 pub(crate) struct Varying {
-    /// Row of the first point, and rows from one to the next.
-    pub(crate) first: f64,
+    /// Rows from one point to the next.
     pub(crate) spacing: f64,
+    /// Stretches between which they may jump: the row of the first point of each, and its place among the points.
+    pub(crate) stretches: Vec<(f64, usize)>,
     /// By coefficient, by point.
     pub(crate) values: Vec<Vec<f64>>,
     /// Their variances over that of a row's noise, as if all equations were independent.
@@ -17,12 +18,22 @@ pub(crate) struct Varying {
 impl Varying {
     /// A coefficient at a row and its growth per row.
     pub(crate) fn at(&self, coefficient: usize, row: f64) -> (f64, f64) {
-        interpolate(&self.values[coefficient], (row - self.first) / self.spacing, self.spacing)
+        let (points, first) = self.stretch(&self.values[coefficient], row);
+        interpolate(points, (row - first) / self.spacing, self.spacing)
+    }
+
+    /// The points of the stretch that a row belongs to, and the row of the first of them.
+    fn stretch<'a>(&self, points: &'a [f64], row: f64) -> (&'a [f64], f64) {
+        let next = self.stretches.partition_point(|(first, _)| *first <= row).max(1);
+        let (first, place) = self.stretches[next - 1];
+        let end = self.stretches.get(next).map_or(points.len(), |(_, place)| *place);
+        (&points[place..end], first)
     }
 
     /// Its variance over that of a row's noise.
     pub(crate) fn variance(&self, coefficient: usize, row: f64) -> f64 {
-        let (points, place) = (&self.variances[coefficient], (row - self.first) / self.spacing);
+        let (points, first) = self.stretch(&self.variances[coefficient], row);
+        let place = (row - first) / self.spacing;
         let last = points.len() - 1;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the points")]
         let index = (place.clamp(0.0, last as f64).floor() as usize).min(last.saturating_sub(1));
@@ -56,7 +67,8 @@ mod tests {
     fn curve(values: impl Fn(f64) -> f64) -> Varying {
         let values = (0..9).map(|point| values(f64::from(point) * 4.0)).collect();
         let variances = vec![9.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 9.0];
-        Varying { first: 0.0, spacing: 4.0, values: vec![values], variances: vec![variances], constants: Vec::new() }
+        let stretches = vec![(0.0, 0)];
+        Varying { spacing: 4.0, stretches, values: vec![values], variances: vec![variances], constants: Vec::new() }
     }
 
     #[test]
@@ -75,6 +87,16 @@ mod tests {
         let curve = curve(|row| 1.0 + row);
         assert_eq!(curve.at(0, -7.0), (1.0, 0.0));
         assert_eq!(curve.at(0, 40.0), (33.0, 0.0));
+    }
+
+    #[test]
+    fn stretches_know_nothing_of_each_other() {
+        let mut curve = curve(|row| if row < 18.0 { 1.0 } else { 5.0 });
+        curve.stretches = vec![(0.0, 0), (18.0, 5)];
+        assert!((0..72).all(|quarter| curve.at(0, f64::from(quarter) / 4.0) == (1.0, 0.0)));
+        assert!((72..160).all(|quarter| curve.at(0, f64::from(quarter) / 4.0) == (5.0, 0.0)));
+        assert_eq!(curve.at(0, -3.0), (1.0, 0.0));
+        assert_eq!([0.0, 18.0, 30.0].map(|row| curve.variance(0, row)), [9.0, 1.0, 9.0]);
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! Equations for slowly varying coefficients, left by windows whose own unknowns are eliminated, and local polynomials
 //! in time fitted to them.
 
+use std::ops::Range;
+
 use crate::inference::slow_curve::Varying;
 use crate::regression::constants::{Expected, pool};
 use crate::regression::fit::Fit;
@@ -16,7 +18,7 @@ use crate::simd::instructions::Instructions;
 use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
 /// Coefficients of the polynomials in time.
-const TERMS: usize = 3;
+pub(crate) const QUADRATIC: usize = 3;
 
 /// Points within one bandwidth.
 const DENSITY: usize = 8;
@@ -34,17 +36,29 @@ pub(crate) struct Slow<'a> {
     pub(crate) weights: &'a [f64],
     /// Rows of the record.
     pub(crate) rows: usize,
+    /// The first rows of stretches between which the slow coefficients may jump, but for the first stretch.
+    pub(crate) breaks: &'a [usize],
 }
 
 impl Slow<'_> {
-    /// Fits the slow coefficients to equations up to `reach` rows away, leaving out those nearer than `hole` rows. Returns `None` if they
+    /// Fits the slow coefficients, polynomials in time of so many terms, to equations up to `reach` rows away, leaving out those nearer than `hole` rows. Returns `None` if they
     /// are not determined.
-    pub(crate) fn fit(&self, reach: f64, hole: f64, instructions: Instructions) -> Option<Varying> {
+    pub(crate) fn fit(&self, terms: usize, reach: f64, hole: f64, instructions: Instructions) -> Option<Varying> {
         let spacing = reach / DENSITY as f64;
-        let last = self.rows as f64 - 1.0;
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "points of a record")]
-        let points = (last / spacing).ceil() as usize + 1;
-        let solved = dispatch(instructions, Points { slow: self, reach, hole, spacing, count: points });
+        let ends = self.breaks.iter().copied().chain([self.rows]);
+        let stretches: Vec<Range<usize>> =
+            std::iter::once(0).chain(self.breaks.iter().copied()).zip(ends).map(|(a, b)| a..b).collect();
+        let solve = |rows: &Range<usize>| {
+            let last = rows.len() as f64 - 1.0;
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "points of a record")]
+            let count = (last.max(0.0) / spacing).ceil() as usize + 1;
+            dispatch(instructions, Points { slow: self, terms, rows: rows.clone(), reach, hole, spacing, count })
+        };
+        let solved: Vec<Solved> = stretches.iter().map(solve).collect();
+        let starts = solved.iter().scan(0, |next, solved| Some(std::mem::replace(next, *next + solved.len())));
+        let starts = stretches.iter().map(|rows| rows.start as f64).zip(starts).collect();
+        let solved = Solved::join(&solved.iter().collect::<Vec<_>>());
+        let points = solved.len();
         let fields = solved.fields;
         let constants = if fields.layout.constant == 0 {
             Vec::new()
@@ -58,12 +72,12 @@ impl Slow<'_> {
         let mut values = Vec::new();
         let mut variances = Vec::new();
         for coefficient in 0..self.coefficients {
-            values.push(fill(&(0..points).map(|point| value(coefficient * TERMS, point)).collect::<Vec<_>>())?);
-            let variance = solved.field(fields.covariance(coefficient * TERMS, coefficient * TERMS));
+            values.push(fill(&(0..points).map(|point| value(coefficient * terms, point)).collect::<Vec<_>>())?);
+            let variance = solved.field(fields.covariance(coefficient * terms, coefficient * terms));
             let variance = (0..points).map(|point| is_determined(&solved, point).then(|| variance[point]));
             variances.push(fill(&variance.collect::<Vec<_>>())?);
         }
-        Some(Varying { first: 0.0, spacing, values, variances, constants })
+        Some(Varying { spacing, stretches: starts, values, variances, constants })
     }
 
     /// The right-hand side of an equation of a window, with what the slow coefficients of the previous round took from it.
@@ -89,6 +103,10 @@ fn fill(values: &[Option<f64>]) -> Option<Vec<f64>> {
 /// The kernel: eight points at a time.
 pub(crate) struct Points<'a, 'b> {
     slow: &'a Slow<'b>,
+    /// Coefficients of the polynomials in time.
+    terms: usize,
+    /// The stretch that they lie in.
+    rows: Range<usize>,
     reach: f64,
     hole: f64,
     spacing: f64,
@@ -100,11 +118,12 @@ impl Kernel for Points<'_, '_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, _simd: S) -> Solved {
-        let Self { slow, reach, hole, spacing, count: points } = self;
+        let Self { slow, terms, rows: stretch, reach, hole, spacing, count: points } = self;
+        let within = stretch.start as f64 - 0.5..stretch.end as f64 - 0.5;
         let full = &slow.fit.full;
         let from = full.fields;
         let (all, slow_ones) = (from.layout.constant, slow.coefficients);
-        let layout = Layout { windowed: TERMS * slow_ones, linear: false, constant: all - slow_ones };
+        let layout = Layout { windowed: terms * slow_ones, linear: false, constant: all - slow_ones };
         let columns = layout.columns();
         let noise = RowNoise::new(&vec![[].as_slice(); 2 * layout.windowed + layout.constant + 1], 0.0);
         let mut solved = Solved::new(layout, 0, points);
@@ -115,13 +134,14 @@ impl Kernel for Points<'_, '_> {
         let usable: Vec<(usize, f64)> = (0..full.len())
             .filter(|&window| is_determined(full, window))
             .map(|window| (window, slow.fit.centre(window)))
+            .filter(|(_, row)| within.contains(row))
             .collect();
         // Every window is near many points, but the curve of the previous round at its centre is the same for all of them.
         let rhs: Vec<f64> =
             usable.iter().flat_map(|&(window, row)| (0..all).map(move |i| slow.rhs(window, row, i))).collect();
         for first in (0..points).step_by(WIDTH) {
             summary.fill(Packet::ZERO);
-            let point = |lane: usize| (first + lane) as f64 * spacing;
+            let point = |lane: usize| stretch.start as f64 + (first + lane) as f64 * spacing;
             let near = usable.partition_point(|(_, row)| *row < point(0) - reach)
                 ..usable.partition_point(|(_, row)| *row <= point(WIDTH - 1) + reach);
             for (&(window, row), rhs) in usable[near.clone()].iter().zip(rhs[near.start * all..].chunks(all.max(1))) {
@@ -139,8 +159,8 @@ impl Kernel for Points<'_, '_> {
                         let entry = full.field(from.left(i, j))[window];
                         if j < slow_ones {
                             let mut value = root * Packet::splat(entry);
-                            for term in 0..TERMS {
-                                row_of[j * TERMS + term] = value;
+                            for term in 0..terms {
+                                row_of[j * terms + term] = value;
                                 value = value * distance;
                             }
                         } else {
@@ -248,8 +268,9 @@ mod tests {
         let fit = fit.expect("constants");
         let ones = vec![1.0; fit.full.len()];
         let companions = vec![rows.regressors[1].companion.as_slice()];
-        let slow = Slow { fit: &fit, coefficients: 1, companions, current: None, weights: &ones, rows: ROWS };
-        slow.fit(reach, hole, Instructions::Scalar).expect("a curve")
+        let slow =
+            Slow { fit: &fit, coefficients: 1, companions, current: None, weights: &ones, rows: ROWS, breaks: &[] };
+        slow.fit(QUADRATIC, reach, hole, Instructions::Scalar).expect("a curve")
     }
 
     /// The largest distance between two curves, the ends left out, where points reach over half of what they see.

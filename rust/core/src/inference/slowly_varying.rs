@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::exec::stages::Stages;
 use crate::inference::cross_validation::validate;
 use crate::inference::slow_curve::Varying;
-use crate::inference::slow_equations::Slow;
+use crate::inference::slow_equations::{QUADRATIC, Slow};
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
@@ -19,6 +19,9 @@ use crate::simd::instructions::Instructions;
 
 /// Bandwidths tried, as multiples of the neighbourhood that a prediction leaves out.
 const REACHES: [f64; 10] = [1.6, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 23.0, 32.0];
+
+/// The part of the shortest stretch between jumps that windows span at most.
+const STRETCH: usize = 8;
 
 /// Rounds of estimating the slow coefficients, each starting from the last one's result.
 const ROUNDS: usize = 3;
@@ -48,6 +51,8 @@ pub(crate) struct SlowSearch<'a> {
     pub(crate) expected: Expected,
     /// Lengths of windows for the windowed coefficients.
     pub(crate) scales: &'a [Scale],
+    /// The first rows after places where they may jump.
+    pub(crate) breaks: &'a [usize],
     pub(crate) instructions: Instructions,
 }
 
@@ -57,10 +62,19 @@ pub(crate) fn find(
     first: Scale,
     stages: &mut Stages<'_, '_>,
 ) -> Result<Option<SlowCoefficients>, Error> {
-    let &SlowSearch { rows, model, coefficients, noise, expected, scales, instructions } = search;
+    let &SlowSearch { rows, model, coefficients, noise, expected, scales, breaks, instructions } = search;
     let slow = &model.constant[..coefficients];
     let rest = Model { constant: model.constant[coefficients..].to_vec(), ..model.clone() };
-    let mut scale = first;
+    let whole = rows.len() as f64;
+    let ends = breaks.iter().copied().chain([rows.len()]);
+    let shortest = std::iter::once(0).chain(breaks.iter().copied()).zip(ends).map(|(start, end)| end - start).min();
+    // Between jumps there must be windows to leave out and others to predict with.
+    let most = shortest.filter(|_| !breaks.is_empty()).map_or(usize::MAX, |shortest| shortest / STRETCH);
+    let shortened = |scale: Scale| {
+        let short = scales.iter().rev().find(|one| one.span() <= most);
+        if scale.span() <= most { scale } else { short.or(scales.first()).copied().unwrap_or(scale) }
+    };
+    let mut scale = shortened(first);
     let mut found: Option<SlowCoefficients> = None;
     for _ in 0..ROUNDS {
         let current = found.as_ref().map(|found| &found.varying);
@@ -72,15 +86,16 @@ pub(crate) fn find(
         let ones = vec![1.0; fit.full.len()];
         let weights = if current.is_some() { &fit.pooled.weights } else { &ones };
         let companions = slow.iter().map(|&one| rows.regressors[one].companion.as_slice()).collect();
-        let equations = Slow { fit: &fit, coefficients, companions, current, weights, rows: rows.len() };
+        let equations = Slow { fit: &fit, coefficients, companions, current, weights, rows: rows.len(), breaks };
         let hole = (scale.span() / 2 + scale.reach) as f64;
         let mut best: Option<(f64, Varying, f64)> = None;
-        for reach in REACHES.map(|multiple| multiple * hole) {
-            if 2.0 * reach > rows.len() as f64 {
-                break;
-            }
-            let Some(leave_gap_out) = equations.fit(reach, hole, instructions) else { continue };
-            let Some(full) = equations.fit(reach, 0.0, instructions) else { continue };
+        let reaches = REACHES.map(|multiple| multiple * hole).into_iter();
+        let quadratics = reaches.take_while(|reach| 2.0 * reach <= whole).map(|reach| (QUADRATIC, reach));
+        // Between jumps a coefficient may be constant.
+        let constants = (!breaks.is_empty()).then_some((1, 2.0 * whole));
+        for (terms, reach) in quadratics.chain(constants) {
+            let Some(leave_gap_out) = equations.fit(terms, reach, hole, instructions) else { continue };
+            let Some(full) = equations.fit(terms, reach, 0.0, instructions) else { continue };
             let error = equations.error(&problem, &leave_gap_out, &full, scale, expected.variance);
             if best.as_ref().is_none_or(|best| error < best.0) {
                 best = Some((error, full, reach));
@@ -92,8 +107,9 @@ pub(crate) fn find(
         let validated = validate(&problem, scales, expected, instructions, stages)?;
         let Some(next) = validated.iter().min_by(|a, b| a.error.total_cmp(&b.error)) else { return Ok(None) };
         let error = next.error;
-        scale = next.fit.scale.unwrap_or(scale);
-        found = Some(SlowCoefficients { varying, rhs, scale, error, reach });
+        let best = next.fit.scale.unwrap_or(scale);
+        scale = shortened(best);
+        found = Some(SlowCoefficients { varying, rhs, scale: best, error, reach: reach.min(whole / 2.0) });
     }
     Ok(found)
 }
@@ -144,6 +160,7 @@ mod tests {
             noise: 0.0,
             expected: white(DEVIATION * DEVIATION),
             scales: &scales,
+            breaks: &[],
             instructions: Instructions::Scalar,
         };
         let found = staged(|stages| find(&search, scales[2], stages)).expect("a curve");
@@ -173,7 +190,8 @@ mod tests {
         }
         let points: Vec<f64> = (-2..152).map(|point| line(f64::from(point) * 8.0)).collect();
         let variances = vec![vec![1.0; points.len()]];
-        let varying = Varying { first: -16.0, spacing: 8.0, values: vec![points], variances, constants: Vec::new() };
+        let stretches = vec![(-16.0, 0)];
+        let varying = Varying { spacing: 8.0, stretches, values: vec![points], variances, constants: Vec::new() };
         assert!(without(&rows, &[1], &varying).iter().all(|left| left.abs() < 1e-10));
     }
 }

@@ -154,9 +154,19 @@ impl Session<'_, '_, '_> {
             noise: self.noise[0],
             expected: decided.expected,
             scales: &decided.scales,
+            breaks: &[],
             instructions,
         };
-        decided.found = slowly_varying::find(&search, first, &mut self.stages)?;
+        let mut found = slowly_varying::find(&search, first, &mut self.stages)?;
+        if !rows.jumps.is_empty() {
+            // What jumps may be the inertia as well as the stiffness.
+            let jumping = slowly_varying::SlowSearch { breaks: &rows.jumps, ..search };
+            let jumping = slowly_varying::find(&jumping, first, &mut self.stages)?;
+            let error =
+                |one: &Option<slowly_varying::SlowCoefficients>| one.as_ref().map_or(f64::INFINITY, |one| one.error);
+            found = if error(&jumping) < error(&found) { jumping } else { found };
+        }
+        decided.found = found;
         decided.fit = None;
         if let Some(found) = &decided.found {
             let problem = decided.problem(rows, self.noise[0]);
