@@ -5,7 +5,7 @@ from tvident._derivatives import LocalPolynomialFit, fit_local_polynomials, savg
 from tvident._equation import Term
 from tvident._identify import StrongForm, WeakForm, identify
 from tvident._regression import RollingRegression, rolling_least_squares
-from tvident._results import Identification
+from tvident._results import Identification, Scan
 from tvident._simulate import Recording, simulate_torsional_rig
 from tvident._status import Status
 
@@ -15,6 +15,7 @@ __all__ = [
     "ModelComparison",
     "Recording",
     "RollingRegression",
+    "Scan",
     "Status",
     "StrongForm",
     "Term",

@@ -34,7 +34,7 @@ def recording(seed: int, inertia: Any = INERTIA, damping: Any = DAMPING) -> tupl
 
 
 def grown(value: float, by: float) -> Array:
-    return value * (1 + by * TIME / TIME[-1])
+    return np.asarray(value * (1 + by * TIME / TIME[-1]))
 
 
 @pytest.mark.parametrize("kinds", [{}, {"stiffness": "constant"}])

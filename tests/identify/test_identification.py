@@ -301,7 +301,11 @@ def test_the_sample_period_may_come_from_times() -> None:
             r"known stiffness must have one value for every sample; got shape \(5,\)",
         ),
         ({"inertia": 1, "damping": 1, "stiffness": 1}, ValueError, "at least one parameter must be unknown"),
-        ({"terms": ["viscous"]}, ValueError, "a term must be 'offset', 'coulomb', 'cubic' or 'gravity'; got 'viscous'"),
+        (
+            {"terms": ["viscous"]},
+            ValueError,
+            "a term must be 'offset', 'coulomb', 'cubic', 'gravity' or 'viscous_asymmetric'; got 'viscous'",
+        ),
         ({"terms": "offset"}, TypeError, r"terms must be a sequence.*write \('offset',\)"),
         ({"terms": ["offset", "offset"]}, ValueError, "'offset' comes twice"),
         ({"terms": [tvident.Term("x", lambda t, a, v: 1.0)]}, ValueError, r"term 'x' must return an array of shape"),  # noqa: ARG005

@@ -101,7 +101,10 @@ def multisine(seed: int) -> tuple[Array, Array, Array]:
     t, phases = np.arange(SAMPLES) / RATE, np.random.default_rng(seed).uniform(0, 6, 30)
     waves = [0.01 * np.exp(1j * (2 * np.pi * f * t + p)) for f, p in zip(np.linspace(0.5, 12, 30), phases, strict=True)]
     rates = [2 * np.pi * f for f in np.linspace(0.5, 12, 30)]
-    return tuple(np.real(sum((1j * r) ** k * wave for r, wave in zip(rates, waves, strict=True))) for k in range(3))  # type: ignore[return-value]
+    parts = [
+        np.asarray(np.real(sum((1j * r) ** k * wave for r, wave in zip(rates, waves, strict=True)))) for k in range(3)
+    ]
+    return parts[0], parts[1], parts[2]
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ FUNCTIONS = {
     "coulomb": lambda _t, _angle, velocity: np.sign(velocity),
     "cubic": lambda _t, angle, _velocity: angle**3,
     "gravity": lambda _t, angle, _velocity: np.sin(angle),
+    "viscous_asymmetric": lambda _t, _angle, velocity: np.abs(velocity),
 }
 INERTIA, DAMPING, GRAVITY, OFFSET = 0.02, 0.05, 1.5, 0.3
 

@@ -236,6 +236,18 @@ CASES: list[tuple[Status, str, Callable[[], Shown], Callable[[], Shown]]] = [
         lambda: late(2, lag=2 / RATE),
     ),
     (
+        Status.SCALES_DISAGREE,
+        "an angle that holds its values",
+        lambda: identified(np.repeat(rig().angle[::5], 5), rig().torque),
+        of_rig,
+    ),
+    (
+        Status.CHANNEL_SUSPECTED,
+        "a clipped angle",
+        lambda: identified(np.clip(rig().angle, *np.quantile(rig().angle, [0.02, 0.98])), rig().torque),
+        of_rig,
+    ),
+    (
         Status.TERM_SUSPECTED,
         "dry friction",
         lambda: of_rig(pattern="constant", more=friction(0.05)),

@@ -68,24 +68,33 @@ class Explained:
     def _words(self) -> Words:
         flags = Status(self.found.record_status)
         if self.found.unexplained and Status.RANK_DEFICIENT in flags:
-            return Words((self._noise(),), (self._unexplained(),))
+            return Words((self._noise(),), (*self._defects(), self._unexplained()))
         if Status.RANK_DEFICIENT in flags:
             undetermined = (
                 f"the record does not determine {listed(list(self.names))}: nothing moves, or a single frequency does not separate "
                 "inertia from stiffness: check that angle and torque are the right channels, excite two or more frequencies, leave a "
                 "term out, or give what is known"
             )
-            return Words((self._noise(),), (undetermined,))
+            return Words((self._noise(),), (*self._defects(), undetermined))
         reasons = (
             self._noise(),
             self._test_function(),
+            *self._scales(),
+            *self._rest(),
             *self._lag(),
             *self._windows(),
             *self._weights(),
             *self._kinds(),
             *self._jumps(),
         )
-        advice = (*self._feedback(), *self._misfit(flags), *self._outside(), *self._suspects(), *self._contradictions())
+        advice = (
+            *self._feedback(),
+            *self._defects(),
+            *self._disagreement(flags),
+            *self._misfit(flags),
+            *self._outside(),
+        )
+        advice = (*advice, *self._suspects(), *self._contradictions())
         advice = (*advice, *self._told_apart(flags))
         return Words(reasons, (*advice, *self._limits(flags)))
 
@@ -115,7 +124,65 @@ class Explained:
         words = f"test function of {self.found.window_length} samples, exponent {self.found.exponent}"
         if not {"window_length", "exponent"} & set(self.chosen):
             return f"{words}: as given"
+        if self.found.scan is not None and self.found.scan.moved:
+            return f"{words}: the one that the spectra suggest finds other parameters, or leaves what the noise does not explain"
         return f"{words}: smallest expected errors, given the angle's spectrum and this noise"
+
+    def _scales(self) -> list[str]:
+        """Return over which widths of the test function the estimates agree."""
+        scan = self.found.scan
+        if scan is None:
+            return []
+        if scan.plateau is None:
+            return [
+                "the record is too short to compare test functions of different widths: nothing confirms these numbers"
+            ]
+        narrowest, widest = scan.plateau
+        agree = f"estimates are the same from {scan.window_length[narrowest]} to {scan.window_length[widest]} samples of the test function"
+        if narrowest == 0 or not scan.moved:
+            return [agree]
+        return [
+            f"{agree}: above {scan.band[narrowest]:.2g} Hz the recording does not obey the equation; only slower motion was used"
+        ]
+
+    def _rest(self) -> list[str]:
+        if not self.found.resting:
+            return []
+        words = (
+            f"the machine rests in {self.found.resting:.0%} of the record: friction is unknown there, so equations with such "
+            "samples do not count"
+        )
+        return [words]
+
+    def _defects(self) -> list[str]:
+        words = []
+        for channel, defect, amount in self.found.defects:
+            name = ("angle", "torque")[channel]
+            if defect == "clipped":
+                cure = (
+                    f"is clipped: {amount:.1%} of its samples lie at its largest or smallest value: make these NaN, or record with a "
+                    "larger range"
+                )
+            elif defect == "held":
+                late = (amount - 1) / 2 * (-1 if name == "angle" else 1) * self.period
+                cure = (
+                    f"holds every value for {amount:.0f} samples, which makes it late by half of that: keep every {amount:.0f}th sample of "
+                    f"both channels, or give lag={late:.3g} (seconds)"
+                )
+            else:
+                cure = f"jumps by {amount:.4g} rad: it is wrapped, give numpy.unwrap(angle, period={amount:.4g})"
+            words.append(f"the {name} {cure}")
+        return words
+
+    def _disagreement(self, flags: Status) -> list[str]:
+        if Status.SCALES_DISAGREE not in flags:
+            return []
+        words = (
+            "test functions of different widths find different parameters, and none can be believed: is a channel filtered, clipped, "
+            "held or wrapped (give lag=, or make clipped samples NaN), is a term missing, or does a controller feed noise back into the "
+            "torque? result.scan().plot() shows where they part; do not trust these numbers"
+        )
+        return [words]
 
     def _lag(self) -> list[str]:
         if "lag" not in self.chosen:

@@ -39,6 +39,12 @@ BUILT_IN = {
             "the spring seems to harden or soften, by {amount}",
         ),
         BuiltIn("gravity", "N m", "the sine of the angle: a pendulum", "gravity of {amount} seems to act"),
+        BuiltIn(
+            "viscous_asymmetric",
+            "N m s/rad",
+            "the magnitude of the velocity: viscous friction that differs between the directions",
+            "viscous friction seems to differ between the directions, by {amount}",
+        ),
     )
 }
 """Built-in terms by name."""

@@ -11,6 +11,7 @@ from tvident._figures.derivatives import plot_derivatives
 from tvident._figures.models import plot_models
 from tvident._figures.parameters import plot_identification
 from tvident._figures.recording import plot_recording
+from tvident._figures.scan import plot_scan
 from tvident._figures.window import plot_window
 
-__all__ = ["plot_derivatives", "plot_identification", "plot_models", "plot_recording", "plot_window"]
+__all__ = ["plot_derivatives", "plot_identification", "plot_models", "plot_recording", "plot_scan", "plot_window"]

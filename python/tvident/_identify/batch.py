@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._equation import COEFFICIENTS
-from tvident._results import Estimates
+from tvident._results import Estimates, Scan
 from tvident._status import Status
 
 _Numbers: TypeAlias = npt.NDArray[np.float64]
@@ -92,7 +92,26 @@ def estimates(
         residual_std=joined([one.residual_std for one in found]),
         order=joined([one.order for one in found]) if has_orders else np.zeros((*shape, count), np.uint8),
         status=status,
+        scans=tuple(_scan_of(one.scan, names) for one in found if one.scan is not None),
         record_status=flags.reshape(shape) if shape else Status(int(flags[0])),
+    )
+
+
+def _scan_of(found: _core.Scan, names: Sequence[str]) -> Scan:
+    """Return estimates by the width of the test function, by name."""
+    shape = (len(found.window_length), len(found.unknowns))
+    values, errors = np.array(found.values).reshape(shape), np.array(found.stderr).reshape(shape)
+    called = [names[place] for place in found.unknowns]
+    length = np.array(found.window_length, dtype=np.int64)
+    plateau = None if found.plateau is None else (int(length[found.plateau[0]]), int(length[found.plateau[1]]))
+    return Scan(
+        window_length=length,
+        band=np.array(found.band),
+        estimates={name: values[:, place] for place, name in enumerate(called)},
+        stderr={name: errors[:, place] for place, name in enumerate(called)},
+        plateau=plateau,
+        corrected=found.corrected,
+        moved=found.moved,
     )
 
 

@@ -74,8 +74,9 @@ def identify(
         form). A number or an array of the angle's shape: known; 0 leaves it out.
     terms : sequence, optional
         Further terms of the left-hand side, each with an unknown factor: ``"offset"``, ``"coulomb"`` (the sign of the velocity),
-        ``"cubic"`` (the cube of the angle), ``"gravity"`` (the sine of the angle) or a :class:`Term` of your own; or a pair of one of
-        these and its kind. Without a kind a term is windowed if all unknown parameters are, and constant otherwise.
+        ``"cubic"`` (the cube of the angle), ``"gravity"`` (the sine of the angle), ``"viscous_asymmetric"`` (the magnitude of the
+        velocity) or a :class:`Term` of your own; or a pair of one of these and its kind. Without a kind a term is windowed if all unknown
+        parameters are, and constant otherwise. Beside ``"coulomb"`` equations that touch samples at rest do not count.
     instrument : array_like, the angle's shape, optional
         A channel that no noise of angle or torque reaches, but that moves the system: the reference of a controller, or excitation that was
         added. Under feedback noise of the angle is part of the torque, and estimates without an instrument are biased. All unknowns are

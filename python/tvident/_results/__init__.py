@@ -3,6 +3,7 @@
 from tvident._results.estimates import Estimates
 from tvident._results.recorded import Recorded
 from tvident._results.result import Identification
+from tvident._results.scan import Scan
 from tvident._results.words import Words
 
-__all__ = ["Estimates", "Identification", "Recorded", "Words"]
+__all__ = ["Estimates", "Identification", "Recorded", "Scan", "Words"]

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from tvident._results.scan import Scan
 from tvident._status import Status
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -32,6 +33,8 @@ class Estimates:
     order : ndarray of uint8, shape (\*, n)
     status : ndarray of uint16, shape (\*, n)
     record_status : Status or ndarray of uint16, shape (\*)
+    scans : tuple of Scan
+        One a record, in weak form.
     """
 
     values: Mapping[str, Array]
@@ -44,3 +47,4 @@ class Estimates:
     order: npt.NDArray[np.uint8]
     status: npt.NDArray[np.uint16]
     record_status: Status | npt.NDArray[np.uint16]
+    scans: tuple[Scan, ...] = ()

@@ -15,6 +15,7 @@ from tvident._files import aligned, write_table
 from tvident._results.estimates import Estimates
 from tvident._results.oscillator import Oscillator
 from tvident._results.recorded import Recorded
+from tvident._results.scan import Scan
 from tvident._results.simulated import Simulated
 from tvident._results.standard_errors import StandardErrors
 from tvident._results.words import Words
@@ -135,6 +136,7 @@ class Identification(Simulated):
         self.reasons = words.reasons
         self.advice = words.advice
         self.settings = settings
+        self._scans = found.scans
         known = {name: error for name, error in found.errors.items() if name not in found.factors}
         computed: dict[str, Callable[[], Array]] = {
             name: partial(_product, factor, found.errors[name]) for name, factor in found.factors.items()
@@ -152,7 +154,7 @@ class Identification(Simulated):
         r"""Where values can be trusted, shape (\*, n): the mask for plotting and averaging.
 
         True where every parameter is a finite number, where the sample's status has none of INVALID, RANK_DEFICIENT, ILL_CONDITIONED and
-        NOISE_MODEL, and where that of the record has neither RANK_DEFICIENT nor ILL_CONDITIONED.
+        NOISE_MODEL, and where that of the record has none of RANK_DEFICIENT, ILL_CONDITIONED and SCALES_DISAGREE.
         """
         records = np.asarray(self.record_status)[..., np.newaxis]
         trusted = (self.status & DOUBTFUL == 0) & (records & DOUBTFUL_RECORD == 0)
@@ -169,6 +171,35 @@ class Identification(Simulated):
     def damping_ratio(self) -> Array:
         r"""Damping ratio C/(2√(KI)), shape (\*, n), without unit; NaN where KI is negative."""
         return self._oscillator.damping_ratio
+
+    def scan(self, record: int = 0) -> Scan:
+        """Return estimates by the width of the test function, which tell whether equations of every scale agree.
+
+        Parameters
+        ----------
+        record : int, optional
+            Which record of a batch, counted along its flattened axes.
+
+        Returns
+        -------
+        Scan
+            Estimates, errors and the band in Hz of every width; ``summary()`` and ``plot()`` show them.
+
+        Raises
+        ------
+        ValueError
+            If the result is of the strong form, which has no test function.
+        IndexError
+            If there is no such record.
+        """
+        if not self._scans:
+            raise ValueError(
+                "only the weak form compares test functions of different widths; got a result of the strong form; "
+                "identify with method='auto' or a WeakForm"
+            )
+        if not -len(self._scans) <= record < len(self._scans):
+            raise IndexError(f"record must be below {len(self._scans)}, the number of records; got {record}")
+        return self._scans[record]
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """Return everything that has one value a sample, by name: what :meth:`save` writes.

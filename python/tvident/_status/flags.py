@@ -14,9 +14,9 @@ class Status(enum.IntFlag):
     There are two groups. Flags of a sample are in ``result.status`` and say what holds at that sample only: INVALID, EDGE, GAP,
     LOWEST_ORDER, HIGHEST_ORDER, EXACT, RANK_DEFICIENT, ILL_CONDITIONED, NOISE_MODEL. Flags of a record are in ``result.record_status``
     and say what holds for the whole record: NOISE_MODEL, COLOURED, KIND_CONTRADICTED, WINDOW_LIMIT, LAG_SUSPECTED, TERM_SUSPECTED,
-    RANK_DEFICIENT, ILL_CONDITIONED. Three are in both groups: RANK_DEFICIENT and ILL_CONDITIONED are flags of the record where they
-    concern its constants, and of a sample where they concern the window around it; NOISE_MODEL is a flag of a sample where it holds
-    outside a mask only.
+    SCALES_DISAGREE, CHANNEL_SUSPECTED, RANK_DEFICIENT, ILL_CONDITIONED. Three are in both groups: RANK_DEFICIENT and ILL_CONDITIONED are
+    flags of the record where they concern its constants, and of a sample where they concern the window around it; NOISE_MODEL is a flag
+    of a sample where it holds outside a mask only.
 
     See Also
     --------
@@ -83,6 +83,13 @@ class Status(enum.IntFlag):
     TERM_SUSPECTED = 8192
     """Friction, an offset or a hardening spring seems to be missing. Add the term that the summary names."""
 
+    SCALES_DISAGREE = 16384
+    """Test functions of different widths find different parameters, and no range of widths agrees: the recording does not obey the
+    equation of motion. Look at ``result.scan()``, and at what the summary advises."""
+
+    CHANNEL_SUSPECTED = 32768
+    """A channel seems to be clipped, held or wrapped. The summary says which, and what to do."""
+
     @property
     def advice(self) -> str:
         """What the flags mean and what to do, in words."""
@@ -115,6 +122,10 @@ _ADVICE = {
     ),
     Status.LAG_SUSPECTED: "the torque seems to be delayed: give lag= as the summary suggests",
     Status.TERM_SUSPECTED: "a term seems to be missing: add the one that the summary names",
+    Status.SCALES_DISAGREE: (
+        "test functions of different widths find different parameters: the recording does not obey this equation, do not trust the numbers"
+    ),
+    Status.CHANNEL_SUSPECTED: "a channel seems to be clipped, held or wrapped: do as the summary says",
     Status.ILL_CONDITIONED: "the regressors are nearly collinear: look at the standard errors first",
 }
 
@@ -127,11 +138,13 @@ RECORD_FLAGS = (
     | Status.WINDOW_LIMIT
     | Status.LAG_SUSPECTED
     | Status.TERM_SUSPECTED
+    | Status.SCALES_DISAGREE
+    | Status.CHANNEL_SUSPECTED
 )
 """Flags that concern a whole record."""
 
 DOUBTFUL = Status.INVALID | Status.RANK_DEFICIENT | Status.ILL_CONDITIONED | Status.NOISE_MODEL
 """Flags of a sample whose value is not to be trusted."""
 
-DOUBTFUL_RECORD = Status.RANK_DEFICIENT | Status.ILL_CONDITIONED
+DOUBTFUL_RECORD = Status.RANK_DEFICIENT | Status.ILL_CONDITIONED | Status.SCALES_DISAGREE
 """Flags of a record none of whose values is to be trusted."""

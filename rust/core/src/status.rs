@@ -40,8 +40,14 @@ impl Status {
     /// A term seems to be missing: friction, an offset or a hardening spring.
     pub const TERM_SUSPECTED: Self = Self(1 << 13);
 
+    /// Test functions of different widths find different parameters, and no range of widths agrees: the record does not obey the equation.
+    pub const SCALES_DISAGREE: Self = Self(1 << 14);
+
+    /// A channel seems to be clipped, held or wrapped.
+    pub const CHANNEL_SUSPECTED: Self = Self(1 << 15);
+
     /// Every flag that exists, with its name.
-    pub const NAMED: [(&'static str, Self); 14] = [
+    pub const NAMED: [(&'static str, Self); 16] = [
         ("INVALID", Self::INVALID),
         ("EDGE", Self::EDGE),
         ("GAP", Self::GAP),
@@ -56,6 +62,8 @@ impl Status {
         ("WINDOW_LIMIT", Self::WINDOW_LIMIT),
         ("LAG_SUSPECTED", Self::LAG_SUSPECTED),
         ("TERM_SUSPECTED", Self::TERM_SUSPECTED),
+        ("SCALES_DISAGREE", Self::SCALES_DISAGREE),
+        ("CHANNEL_SUSPECTED", Self::CHANNEL_SUSPECTED),
     ];
 
     /// The flags as a number, as they are stored in arrays.

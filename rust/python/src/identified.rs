@@ -4,8 +4,11 @@ use std::collections::HashMap;
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use tvident::identify::{Identification as Found, InstrumentTest, Kind, Outside, Unknown as FoundUnknown};
+use tvident::identify::{
+    Identification as Found, InstrumentTest, Kind, Outside, Scan as FoundScan, Unknown as FoundUnknown, WeakDetails,
+};
 use tvident::inference::Suspect as FoundSuspect;
+use tvident::noise::Defect;
 
 /// One unknown: what it turned out to be, its values and their standard errors, and what a test of its constancy said.
 #[pyclass(frozen, get_all, module = "tvident._core")]
@@ -34,6 +37,40 @@ pub(crate) struct OutsideMask {
     residual_ratio: Option<f64>,
 }
 
+/// Estimates by the width of the test function, from narrow to wide.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+pub(crate) struct Scan {
+    unknowns: Vec<usize>,
+    window_length: Vec<usize>,
+    band: Vec<f64>,
+    values: Vec<Vec<f64>>,
+    stderr: Vec<Vec<f64>>,
+    corrected: bool,
+    plateau: Option<(usize, usize)>,
+    moved: bool,
+    tried: usize,
+}
+
+impl Scan {
+    fn new(py: Python<'_>, found: &FoundScan) -> PyResult<Py<Self>> {
+        let scales = || found.scales.iter();
+        Py::new(
+            py,
+            Self {
+                unknowns: found.unknowns.clone(),
+                window_length: scales().map(|one| 2 * one.half_width + 1).collect(),
+                band: scales().map(|one| one.band).collect(),
+                values: scales().map(|one| one.values.clone()).collect(),
+                stderr: scales().map(|one| one.errors.clone()).collect(),
+                corrected: found.corrected,
+                plateau: found.plateau.map(|plateau| (plateau.first, plateau.last)),
+                moved: found.moved,
+                tried: found.tried,
+            },
+        )
+    }
+}
+
 /// What was found in one record. What only the weak form says is None or empty in strong form.
 #[pyclass(frozen, get_all, module = "tvident._core")]
 pub(crate) struct Identification {
@@ -59,6 +96,9 @@ pub(crate) struct Identification {
     unexplained: bool,
     lag: Option<(f64, f64)>,
     suspects: Vec<Py<Suspect>>,
+    defects: Vec<(usize, &'static str, f64)>,
+    resting: f64,
+    scan: Option<Py<Scan>>,
     outside_mask: Option<Py<OutsideMask>>,
     /// With an instrument: the probability of the test of exogeneity, and the smallest F statistic of the first stage.
     instrument: Option<(f64, f64)>,
@@ -118,6 +158,9 @@ impl Identification {
             unexplained: weak.is_some_and(|weak| weak.unexplained),
             lag: weak.and_then(|weak| weak.lag).map(|lag| (lag.value, lag.error)),
             suspects: weak.map_or(Ok(Vec::new()), |weak| weak.suspects.iter().map(suspect).collect::<PyResult<_>>())?,
+            defects: weak.map(defects).unwrap_or_default(),
+            resting: weak.map_or(0.0, |weak| weak.resting),
+            scan: weak.map(|weak| Scan::new(py, &weak.scan)).transpose()?,
             outside_mask: found
                 .weak
                 .and_then(|weak| weak.outside_mask)
@@ -147,4 +190,12 @@ pub(crate) fn kind(name: &str) -> Option<Kind> {
         "varying" => Some(Kind::Varying),
         _ => None,
     }
+}
+
+/// What was done to each channel, by what it is called, and how much of it there is.
+fn defects(weak: &WeakDetails) -> Vec<(usize, &'static str, f64)> {
+    let of = |(channel, defects): (usize, &Vec<Defect>)| {
+        defects.iter().map(move |defect| (channel, defect.name(), defect.amount())).collect::<Vec<_>>()
+    };
+    weak.defects.iter().enumerate().flat_map(of).collect()
 }

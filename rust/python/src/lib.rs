@@ -33,7 +33,7 @@ mod _core {
     #[pymodule_export]
     use crate::automatic::{AutomaticEstimates, estimate_automatically};
     #[pymodule_export]
-    use crate::identified::{Identification, OutsideMask, Suspect, Unknown};
+    use crate::identified::{Identification, OutsideMask, Scan, Suspect, Unknown};
     #[pymodule_export]
     use crate::identify::{StrongForm, WeakForm, identify};
     #[pymodule_export]

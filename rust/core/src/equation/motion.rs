@@ -2,7 +2,7 @@
 //!
 //! Unknown coefficients have a column of regressors; known terms move to the right-hand side.
 
-use crate::equation::terms::{BuiltInTerm, TermFunction};
+use crate::equation::terms::{BuiltInTerm, TermFunction, signs};
 use crate::record::samples::Samples;
 
 /// What is known of inertia, damping or stiffness beforehand.
@@ -89,6 +89,10 @@ impl Motion<'_> {
                 Term::BuiltIn(BuiltInTerm { function: TermFunction::OfVelocity(function), .. }) => {
                     column.copy_from_slice(velocity);
                     function(column);
+                }
+                Term::BuiltIn(BuiltInTerm { function: TermFunction::Direction, .. }) => {
+                    column.copy_from_slice(velocity);
+                    signs(column);
                 }
                 Term::Record(record) => record.read(first, column),
             }

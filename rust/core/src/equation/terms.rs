@@ -12,6 +12,8 @@ pub(crate) enum TermFunction {
     OfAngle(fn(&mut [f64])),
     /// A function of the velocity, applied to samples of it in place.
     OfVelocity(fn(&mut [f64])),
+    /// The direction of motion: the sign of the velocity, or what is known of it.
+    Direction,
 }
 
 impl TermFunction {
@@ -21,6 +23,7 @@ impl TermFunction {
             Self::One => None,
             Self::OfAngle(function) => Some(Mapped { channel: angle, function }),
             Self::OfVelocity(function) => Some(Mapped { channel: velocity, function }),
+            Self::Direction => Some(Mapped { channel: velocity, function: signs }),
         }
     }
 }
@@ -36,15 +39,16 @@ pub struct BuiltInTerm {
 }
 
 /// Every built-in term. A new one is a row here and nothing else in the core.
-pub static BUILT_IN_TERMS: [BuiltInTerm; 4] = [
+pub static BUILT_IN_TERMS: [BuiltInTerm; 5] = [
     BuiltInTerm { name: "offset", function: TermFunction::One, looked_for: true },
-    BuiltInTerm {
-        name: "coulomb",
-        function: TermFunction::OfVelocity(|velocity| each(velocity, sign)),
-        looked_for: true,
-    },
+    BuiltInTerm { name: "coulomb", function: TermFunction::Direction, looked_for: true },
     BuiltInTerm { name: "cubic", function: TermFunction::OfAngle(|angle| each(angle, cube)), looked_for: true },
     BuiltInTerm { name: "gravity", function: TermFunction::OfAngle(|angle| each(angle, f64::sin)), looked_for: false },
+    BuiltInTerm {
+        name: "viscous_asymmetric",
+        function: TermFunction::OfVelocity(|velocity| each(velocity, f64::abs)),
+        looked_for: false,
+    },
 ];
 
 impl BuiltInTerm {
@@ -68,6 +72,11 @@ fn cube(value: f64) -> f64 {
     value * value * value
 }
 
+/// The sign of every velocity.
+pub(crate) fn signs(velocity: &mut [f64]) {
+    each(velocity, sign);
+}
+
 /// Applies a function to every value.
 fn each(values: &mut [f64], function: impl Fn(f64) -> f64) {
     for value in values {
@@ -84,6 +93,7 @@ mod tests {
         match BuiltInTerm::named(name).unwrap().function {
             TermFunction::One => values = [1.0],
             TermFunction::OfAngle(function) | TermFunction::OfVelocity(function) => function(&mut values),
+            TermFunction::Direction => signs(&mut values),
         }
         values[0]
     }
@@ -93,6 +103,7 @@ mod tests {
         assert_eq!(at("offset", -3.0), 1.0);
         assert_eq!([at("coulomb", -3.0), at("coulomb", 0.0), at("coulomb", 0.1)], [-1.0, 0.0, 1.0]);
         assert_eq!(at("cubic", -3.0), -27.0);
+        assert_eq!([at("viscous_asymmetric", -3.0), at("viscous_asymmetric", 2.0)], [3.0, 2.0]);
         assert!((at("gravity", std::f64::consts::FRAC_PI_6) - 0.5).abs() < f64::EPSILON);
     }
 

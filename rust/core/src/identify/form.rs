@@ -14,6 +14,7 @@ use crate::identify::strong::general::{StrongOptions, identify_strong};
 use crate::identify::weak::form::identify_weak;
 use crate::identify::weak::options::WeakOptions;
 use crate::identify::weak::outside_mask::Outside;
+use crate::identify::weak::scanned::Scan;
 use crate::inference::missing_terms::Missing;
 
 /// What was found of the unknowns of one record, by the numbers of their regressors.
@@ -113,6 +114,9 @@ pub(crate) fn weak(
         unexplained: found.unexplained,
         lag: found.lag,
         suspects: found.suspects,
+        defects: found.defects,
+        resting: found.resting,
+        scan: Scan { unknowns: found.scan.unknowns.iter().map(|&one| place(one)).collect(), ..found.scan },
         outside_mask,
     };
     let mut unknowns = Found {

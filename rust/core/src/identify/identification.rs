@@ -3,8 +3,10 @@
 use crate::identify::kinds::Kind;
 use crate::identify::weak::lag::Lag;
 use crate::identify::weak::outside_mask::Outside;
+use crate::identify::weak::scanned::Scan;
 use crate::inference::constancy::Test;
 use crate::inference::missing_terms::Suspect;
+use crate::noise::defects::Defect;
 use crate::status::Status;
 
 /// What was found of one unknown. Places of unknowns count coefficients that are not known, then terms.
@@ -86,6 +88,12 @@ pub struct WeakDetails {
     pub lag: Option<Lag>,
     /// What may have been left out.
     pub suspects: Vec<Suspect>,
+    /// What was done to angle and torque: clipped, held or wrapped samples.
+    pub defects: [Vec<Defect>; 2],
+    /// The part of the record that rests, where a term of friction asks for it: equations there say nothing of friction and are left out.
+    pub resting: f64,
+    /// Estimates by the width of the test function.
+    pub scan: Scan,
     /// What the rows say that the mask keeps out; `None` without a mask.
     pub outside_mask: Option<Outside>,
 }

@@ -20,3 +20,4 @@ pub use options::{Method, Options, StrongForm, Task, WeakForm};
 pub use route::identify_all;
 pub use weak::lag::Lag;
 pub use weak::outside_mask::Outside;
+pub use weak::scanned::Scan;

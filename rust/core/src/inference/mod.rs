@@ -6,6 +6,7 @@ pub(crate) mod explained;
 pub(crate) mod identifiability;
 pub(crate) mod jumps;
 pub(crate) mod missing_terms;
+pub(crate) mod scales;
 pub(crate) mod slow_curve;
 pub(crate) mod slow_equations;
 pub(crate) mod slowly_varying;
@@ -14,3 +15,4 @@ pub(crate) mod windows_around;
 
 pub use constancy::{NO_CHANCE, Test};
 pub use missing_terms::{Missing, Suspect};
+pub use scales::{AtScale, Plateau};

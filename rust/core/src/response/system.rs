@@ -1,6 +1,6 @@
 //! The system that is simulated: coefficients and terms with their factors, each constant or known at every sample.
 
-use crate::equation::terms::{BuiltInTerm, TermFunction};
+use crate::equation::terms::{BuiltInTerm, TermFunction, signs};
 use crate::record::samples::{Samples, read_around};
 use crate::response::gaps::bridge;
 
@@ -88,6 +88,7 @@ impl KnownSystem {
                 }
                 TermFunction::OfAngle(function) => columns.of_angle.push((function, factor)),
                 TermFunction::OfVelocity(function) => columns.of_velocity.push((function, factor)),
+                TermFunction::Direction => columns.of_velocity.push((signs, factor)),
             }
         }
         columns

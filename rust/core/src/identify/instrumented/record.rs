@@ -134,9 +134,10 @@ fn weak(
     let mut built = Vec::new();
     for motion in [&task.motion, explained] {
         let how = (options.delta, options.instructions);
-        built.push(with_record(motion, (task.mask, lag), how, (workers, &mut *watch), |record, watch| {
+        let (rows, _) = with_record(motion, (task.mask, lag), how, (workers, &mut *watch), |record, watch| {
             WeakRows::build(&record, function, options.delta, None, workers, watch)
-        })?);
+        })?;
+        built.push(rows);
     }
     let reach = built[0].reach();
     let mut rows = built.into_iter().map(|built| built.rows);

@@ -2,7 +2,7 @@
 
 use crate::equation::motion::{Coefficient, Motion, Term};
 use crate::equation::rows::{Regressor, Rows};
-use crate::equation::terms::{BuiltInTerm, TermFunction};
+use crate::equation::terms::{BuiltInTerm, TermFunction, signs};
 use crate::error::Error;
 use crate::exec::stages::Stages;
 use crate::lanes::output::Elements;
@@ -104,6 +104,7 @@ pub(crate) fn rows(
             Term::BuiltIn(BuiltInTerm { function: TermFunction::OfVelocity(function), .. }) => {
                 applied(*function, velocity)
             }
+            Term::BuiltIn(BuiltInTerm { function: TermFunction::Direction, .. }) => applied(signs, velocity),
             Term::Record(record) => whole(record),
         });
     }

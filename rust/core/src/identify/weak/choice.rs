@@ -2,6 +2,7 @@
 
 use crate::equation::motion::Coefficient;
 use crate::error::Error;
+use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
 use crate::noise::spectrum::power_in_pieces;
 use crate::regression::constants::Expected;
@@ -30,11 +31,13 @@ pub(crate) struct Chosen {
     pub(crate) parameters: [f64; 3],
     /// Whether the narrowest or widest was chosen of all that were tried.
     pub(crate) at_end: bool,
+    /// The fit that everything unknown but the windowed is constant in, once it was made.
+    pub(crate) fitted: Option<Decided>,
 }
 
 impl Session<'_, '_, '_> {
     /// A first estimate, in windows of a few test functions.
-    fn pilot(&mut self, weak: &WeakRows, model: &Model) -> Result<[f64; 3], Error> {
+    pub(crate) fn pilot(&mut self, weak: &WeakRows, model: &Model) -> Result<[f64; 3], Error> {
         let problem = model.problem(&weak.rows, &weak.rows.rhs, self.noise[0], None);
         let scales = Scale::all(weak.rows.len(), weak.reach());
         let wanted = PILOT_WINDOW * weak.function.half_width() / weak.stride;
@@ -62,7 +65,7 @@ impl Session<'_, '_, '_> {
     }
 
     /// What the choice of a test function is made from, with spectra of some length.
-    fn evidence(&mut self, length: usize) -> Result<Evidence, Error> {
+    pub(crate) fn evidence(&mut self, length: usize) -> Result<Evidence, Error> {
         Ok(Evidence {
             power: power_in_pieces(self.record.angle, length, &mut self.stages)?,
             samples: self.record.angle.len(),
@@ -79,7 +82,7 @@ impl Session<'_, '_, '_> {
         if let (Some(width), Some(exponent)) = (width, exponent) {
             let weak = self.rows(TestFunction::new(width, exponent, delta)?)?;
             let parameters = self.pilot(&weak, model)?;
-            return Ok(Chosen { weak, parameters, at_end: false });
+            return Ok(Chosen { weak, parameters, at_end: false, fitted: None });
         }
         // So many rows are left that windows of several test functions fit in.
         let widest = samples / if model.windowed.is_empty() { 8 } else { 16 };
@@ -111,7 +114,7 @@ impl Session<'_, '_, '_> {
                     let end = [widths.first(), widths.last()].contains(&Some(&current.half_width()));
                     let weak =
                         if weak.rows.len() < WeakRows::count(current, samples) { self.rows(current)? } else { weak };
-                    return Ok(Chosen { weak, parameters, at_end: width.is_none() && end });
+                    return Ok(Chosen { weak, parameters, at_end: width.is_none() && end, fitted: None });
                 }
             }
         }

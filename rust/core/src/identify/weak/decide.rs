@@ -49,8 +49,8 @@ impl Session<'_, '_, '_> {
         }
     }
 
-    /// Chooses the length of windows where it is not given, and tests what is constant.
-    fn decide_kinds(&mut self, chosen: &Chosen, model: &Model) -> Result<Decided, Error> {
+    /// Fits everything that is not windowed as constant, in windows of the length that predicts best where it is not given.
+    pub(crate) fn fit_first(&mut self, chosen: &Chosen, model: &Model) -> Result<Decided, Error> {
         let rows = &chosen.weak.rows;
         let (covariance, expected) = self.covariance(&chosen.weak, chosen.parameters);
         let mut decided = Decided {
@@ -74,6 +74,16 @@ impl Session<'_, '_, '_> {
             decided.scales = Scale::all(rows.len(), chosen.weak.reach());
         }
         self.fit_constants(&chosen.weak, &mut decided)?;
+        Ok(decided)
+    }
+
+    /// Chooses the length of windows where it is not given, and tests what is constant.
+    fn decide_kinds(&mut self, chosen: &mut Chosen, model: &Model) -> Result<Decided, Error> {
+        let mut decided = match chosen.fitted.take() {
+            Some(fitted) => fitted,
+            None => self.fit_first(chosen, model)?,
+        };
+        let rows = &chosen.weak.rows;
         decided.slow = self.of_kind(Kind::Varying);
         let mut model = Cow::Borrowed(model);
         loop {

@@ -3,7 +3,9 @@
 use crate::identify::results::{Constant, SampleResults};
 use crate::identify::weak::lag::Lag;
 use crate::identify::weak::outside_mask::Outside;
+use crate::identify::weak::scanned::Scan;
 use crate::inference::missing_terms::Suspect;
+use crate::noise::defects::Defect;
 use crate::status::Status;
 use crate::weak_form::test_function::TestFunction;
 
@@ -50,6 +52,12 @@ pub(crate) struct WeakIdentified {
     pub(crate) pairs: Vec<(usize, usize)>,
     /// Samples before which what changes jumps.
     pub(crate) jumps: Vec<usize>,
+    /// Estimates by the width of the test function.
+    pub(crate) scan: Scan,
+    /// What was done to angle and torque.
+    pub(crate) defects: [Vec<Defect>; 2],
+    /// The part of the record that rests, where a term of friction asks for it.
+    pub(crate) resting: f64,
     /// What holds for the whole record.
     pub(crate) record_status: Status,
     /// Numbers at the samples.

@@ -48,7 +48,8 @@ impl Session<'_, '_, '_> {
     pub(crate) fn choose_and_decide(&mut self, model: &Model) -> Result<(Chosen, Decided, Option<Lag>), Error> {
         let mut lag = None;
         for choice in 1..=CHOICES {
-            let mut chosen = self.choose_test_function(model)?;
+            let chosen = self.choose_test_function(model)?;
+            let mut chosen = self.onto_plateau(chosen, model)?;
             let decided = self.decide(&mut chosen, model)?;
             if self.options.lag.is_some() {
                 return Ok((chosen, decided, None));
@@ -65,7 +66,8 @@ impl Session<'_, '_, '_> {
             self.record.lag = found.value;
         }
         self.record.lag = 0.0;
-        let mut chosen = self.choose_test_function(model)?;
+        let chosen = self.choose_test_function(model)?;
+        let mut chosen = self.onto_plateau(chosen, model)?;
         let decided = self.decide(&mut chosen, model)?;
         Ok((chosen, decided, lag))
     }

@@ -48,6 +48,10 @@ impl Session<'_, '_, '_> {
         let squares: f64 = used().map(|rhs| rhs * rhs).sum();
         let count = used().count() as f64;
         let still = self.still(&decided.model);
+        if still == decided.model {
+            // What moves is known: the torque that it takes is no unknown's to explain.
+            return Ok(Explained::Plainly);
+        }
         // A constant offset leaves no less of rows than there is about their mean.
         if still.windowed.is_empty() && decided.white.is_none() {
             let mean = used().sum::<f64>() / count;

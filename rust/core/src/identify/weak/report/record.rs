@@ -12,6 +12,7 @@ use crate::identify::weak::outside_mask::Inside;
 use crate::identify::weak::report::at_rows::Fitted;
 use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::report::explained::Explained;
+use crate::identify::weak::scanned::Scan;
 use crate::identify::weak::session::Session;
 use crate::inference::constancy::NO_CHANCE;
 use crate::inference::identifiability::is_mostly_noise;
@@ -128,6 +129,9 @@ impl Session<'_, '_, '_> {
             constant_pairs: Vec::new(),
             pairs: Vec::new(),
             jumps: decided.jumps.iter().map(|jump| jump.sample).collect(),
+            scan: Scan::default(),
+            resting: 0.0,
+            defects: Default::default(),
             record_status: Status::GOOD,
             results: SampleResults::default(),
         }

@@ -1,0 +1,111 @@
+"""A picture of estimates by the width of the test function."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
+
+from tvident._figures.style import FAINT, FOUND, style, unit_of
+
+Array = npt.NDArray[np.float64]
+
+
+class Scanned(Protocol):
+    """What is drawn of a scan: see :class:`tvident.Scan`."""
+
+    @property
+    def window_length(self) -> npt.NDArray[np.int64]:
+        """Samples of each test function."""
+
+    @property
+    def band(self) -> Array:
+        """Where half the power passes, in Hz."""
+
+    @property
+    def estimates(self) -> dict[str, Array]:
+        """Unknowns by name."""
+
+    @property
+    def stderr(self) -> dict[str, Array]:
+        """Their standard errors."""
+
+    @property
+    def plateau(self) -> tuple[int, int] | None:
+        """The narrowest and the widest test function that agree."""
+
+
+def plot_scan(scan: Scanned) -> Figure:
+    """Draw every unknown over the band in which the equation is asked to hold, with bars of two standard errors.
+
+    Parameters
+    ----------
+    scan : Scan
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    ValueError
+        If the record was too short to compare widths.
+
+    See Also
+    --------
+    Scan.plot : the same as a method.
+
+    Examples
+    --------
+    >>> import tvident
+    >>> from tvident import figures
+    >>> rig = tvident.simulate_torsional_rig(duration=4.0)
+    >>> result = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
+    >>> figures.plot_scan(result.scan()).savefig("scan.png")
+    """
+    if not scan.window_length.size:
+        raise ValueError(
+            "there is nothing to draw: got a record too short to compare test functions of different widths; record 20 cycles or more"
+        )
+    agree = np.zeros(scan.window_length.size, bool)
+    if scan.plateau is not None:
+        agree = (scan.plateau[0] <= scan.window_length) & (scan.window_length <= scan.plateau[1])
+    with style():
+        figure, axes = plt.subplots(
+            len(scan.estimates),
+            1,
+            sharex=True,
+            squeeze=False,
+            figsize=(8.4, 1.2 + 1.6 * len(scan.estimates)),
+            layout="constrained",
+        )
+        for ax, (name, values) in zip(axes[:, 0], scan.estimates.items(), strict=True):
+            error = scan.stderr[name]
+            bars: Any = {"fmt": "o", "markersize": 3.5, "elinewidth": 1.2}
+            if agree.any():
+                ax.axvspan(
+                    scan.band[agree].min(),
+                    scan.band[agree].max(),
+                    color=FAINT,
+                    alpha=0.35,
+                    linewidth=0,
+                    label="plateau",
+                )
+            for chosen, colour, label in ((agree, FOUND, "these agree"), (~agree, "#9aa7b2", "others")):
+                if chosen.any():
+                    ax.errorbar(scan.band[chosen], values[chosen], 2 * error[chosen], color=colour, label=label, **bars)
+            shown = agree if agree.any() else np.ones(agree.size, bool)
+            low, high = (values - 3 * error)[shown].min(), (values + 3 * error)[shown].max()
+            reach = 1.5 * (high - low)
+            if np.isfinite(reach) and reach > 0:
+                ax.set_ylim(low - reach, high + reach)
+            ax.set_title(name.replace("_", " ").capitalize())
+            ax.set_ylabel(unit_of(name))
+        axes[0, 0].set_xscale("log")
+        axes[0, 0].legend(ncols=3, loc="lower right", bbox_to_anchor=(1, 0.97), borderaxespad=0.2)
+        axes[-1, 0].set_xlabel("the equation is asked to hold up to (Hz)")
+        figure.align_ylabels()
+        return figure

@@ -1,0 +1,104 @@
+"""Estimates by the width of the test function, which tell whether equations of every scale agree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._equation import UNITS
+from tvident._files import aligned
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Scan:
+    r"""What :meth:`tvident.Identification.scan` returns: the same unknowns from test functions of ``w`` widths, from narrow to wide.
+
+    A wide test function asks the equation of motion to hold for slow motion only, a narrow one for fast motion as well. Where the
+    recording obeys the equation, all widths agree; the range that does is the plateau.
+
+    Parameters
+    ----------
+    window_length : ndarray of int64, shape (w,)
+        Samples of each test function.
+    band : ndarray, shape (w,)
+        Where half the power of the motion passes it, in Hz.
+    estimates : dict of str to ndarray, shape (w,)
+        Unknowns that are constant over the record; means of windowed ones where none is.
+    stderr : dict of str to ndarray, shape (w,)
+        Their standard errors, from how blocks of the record scatter: they assume nothing of the noise.
+    plateau : (int, int) or None
+        Samples of the narrowest and of the widest test function that agree; None where too few widths could be compared.
+    corrected : bool
+        Whether estimates are corrected for white noise of the angle.
+    moved : bool
+        Whether the test function was moved because of the scan.
+
+    References
+    ----------
+    O. V. Lepski: On a problem of adaptive estimation in Gaussian white noise, Theory of Probability and its Applications 35 (1990): scales
+    are compared within their errors. P. J. Huber, The behavior of maximum likelihood estimates under nonstandard conditions (1967):
+    errors from blocks.
+
+    Examples
+    --------
+    >>> import tvident
+    >>> rig = tvident.simulate_torsional_rig(duration=6.0)
+    >>> result = tvident.identify(rig.angle, rig.torque, sample_rate=rig.sample_rate)
+    >>> scan = result.scan()
+    >>> sorted(scan.estimates)
+    ['damping', 'inertia', 'offset']
+    >>> first, last = scan.plateau
+    >>> first <= result.settings["window_length"] <= last
+    True
+    """
+
+    window_length: npt.NDArray[np.int64]
+    band: Array
+    estimates: dict[str, Array]
+    stderr: dict[str, Array]
+    plateau: tuple[int, int] | None
+    corrected: bool
+    moved: bool
+
+    def summary(self) -> str:
+        """Return a table with a row for every width; a star marks the plateau.
+
+        Returns
+        -------
+        str
+        """
+        if not self.window_length.size:
+            return "the record is too short to compare test functions of different widths"
+        units = [f"{name} ({UNITS[name]})" if UNITS.get(name) else name for name in self.estimates]
+        cells = [("", "samples", "band (Hz)", *units)]
+        for place, length in enumerate(self.window_length):
+            inside = self.plateau is not None and self.plateau[0] <= length <= self.plateau[1]
+            values = [f"{value[place]:.4g} ± {self.stderr[name][place]:.1g}" for name, value in self.estimates.items()]
+            cells.append(("*" if inside else "", str(length), f"{self.band[place]:.3g}", *values))
+        return "\n".join(aligned(cells))
+
+    def plot(self) -> Figure:
+        """Draw every unknown over the band, with bars of two standard errors and the plateau shaded.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is missing: install ``tvident[plot]``.
+        ValueError
+            If the record was too short to compare widths.
+        """
+        from tvident import _figures  # noqa: PLC0415 - matplotlib is optional
+
+        return _figures.plot_scan(self)

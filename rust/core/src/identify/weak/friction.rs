@@ -1,0 +1,193 @@
+//! The direction of motion as friction feels it: what is known of the sign of the velocity, and where the machine rests.
+//!
+//! Near zero the sign of a noisy velocity is chance. Its expectation under the noise, `erf(v / √2 σ)`, is what least squares needs. At
+//! rest friction is whatever holds the machine, anything between `-F` and `F`: equations that touch such samples say nothing of it.
+
+use std::num::NonZeroUsize;
+
+use statrs::function::erf::erf;
+
+use crate::equation::motion::{Motion, Term};
+use crate::equation::terms::TermFunction;
+use crate::error::Error;
+use crate::exec::pool::Watch;
+use crate::lanes::output::Elements;
+use crate::local_polynomials::criterion::Criterion;
+use crate::local_polynomials::estimates::Estimates;
+use crate::local_polynomials::options::{Order, PolynomialOptions, Selection};
+use crate::local_polynomials::plan::LocalPolynomials;
+use crate::noise::channel::channel_variance;
+use crate::noise::spectrum::power;
+use crate::record::samples::Samples;
+use crate::simd::instructions::Instructions;
+use crate::weak_form::test_function_choice::{Evidence, spectrum_length};
+
+/// A velocity within so many standard errors of zero, or this part of its root mean square, may be rest.
+const WITHIN_NOISE: f64 = 3.0;
+const SLOW: f64 = 0.01;
+
+/// A machine that turns round passes such velocities in a time that its acceleration tells; one that stays there so many times longer rests.
+const LONGER_THAN_PASSING: f64 = 10.0;
+
+/// Where less than this part of the record moves, rest is what the record is about.
+const LEAST_MOTION: f64 = 0.05;
+
+/// What friction feels of a record.
+pub(crate) struct FrictionDirection {
+    /// The velocity at every sample; empty where no term needs it.
+    pub(crate) velocity: Vec<f64>,
+    /// The expected sign of the velocity; NaN at rest.
+    pub(crate) direction: Vec<f64>,
+    /// The part of the record at rest.
+    pub(crate) resting: f64,
+}
+
+impl FrictionDirection {
+    /// The direction of a motion with terms of the velocity; nothing for any other.
+    pub(crate) fn of(
+        motion: &Motion<'_>,
+        (delta, instructions): (f64, Instructions),
+        workers: NonZeroUsize,
+        watch: &mut Watch<'_>,
+    ) -> Result<Self, Error> {
+        let of_velocity = |term: &Term<'_>| match term {
+            Term::BuiltIn(term) => matches!(term.function, TermFunction::OfVelocity(_) | TermFunction::Direction),
+            Term::Record(_) => false,
+        };
+        if !motion.terms.iter().any(of_velocity) {
+            return Ok(Self { velocity: Vec::new(), direction: Vec::new(), resting: 0.0 });
+        }
+        let [velocity, errors] = velocity(motion.angle, (delta, instructions), workers, watch)?;
+        let window = half_window(motion.angle, (delta, instructions)) * 2 + 1;
+        let rests = resting(&velocity, &errors, window, delta);
+        let direction = velocity
+            .iter()
+            .zip(&errors)
+            .zip(&rests)
+            .map(|((&velocity, &error), &rests)| if rests { f64::NAN } else { expected_sign(velocity, error) });
+        let direction = direction.collect();
+        let resting = rests.iter().filter(|rests| **rests).count() as f64 / rests.len().max(1) as f64;
+        Ok(Self { velocity, direction, resting })
+    }
+}
+
+/// What the sign of a velocity is on average, where its error is normal.
+fn expected_sign(velocity: f64, error: f64) -> f64 {
+    if velocity == 0.0 || velocity.is_nan() {
+        return velocity;
+    }
+    if error > 0.0 { erf(velocity / (error * std::f64::consts::SQRT_2)) } else { velocity.signum() }
+}
+
+/// Where a machine rests: its velocity is within its noise, or next to nothing, for much longer than it takes to turn round.
+fn resting(velocity: &[f64], errors: &[f64], window: usize, delta: f64) -> Vec<bool> {
+    let usable: Vec<f64> = velocity.iter().copied().filter(|velocity| velocity.is_finite()).collect();
+    let mean_square = |squares: &mut dyn Iterator<Item = f64>| {
+        let (sum, count) = squares.fold((0.0, 0.0_f64), |(sum, count), square| (sum + square, count + 1.0));
+        sum / count.max(1.0)
+    };
+    let slow = SLOW * mean_square(&mut usable.iter().map(|velocity| velocity * velocity)).sqrt();
+    let limit = |sample: usize| (WITHIN_NOISE * errors[sample]).max(slow);
+    let near = |sample: usize| velocity[sample].abs() <= limit(sample);
+    let moving = (1..velocity.len()).filter(|&sample| !near(sample) && velocity[sample].is_finite());
+    let mut changes = moving.map(|sample| velocity[sample] - velocity[sample - 1]).filter(|change| change.is_finite());
+    let acceleration = mean_square(&mut changes.by_ref().map(|change| change * change)).sqrt() / delta;
+    let mut rests = vec![false; velocity.len()];
+    let mut first = 0;
+    while first < velocity.len() {
+        if !near(first) {
+            first += 1;
+            continue;
+        }
+        let end = (first..velocity.len()).find(|&sample| !near(sample)).unwrap_or(velocity.len());
+        let widest = (first..end).map(limit).fold(slow, f64::max);
+        let passing = 2.0 * widest / (acceleration * delta);
+        if (end - first) as f64 > (LONGER_THAN_PASSING * passing).max(window as f64) {
+            rests[first..end].fill(true);
+        }
+        first = end;
+    }
+    let moves = rests.iter().filter(|rests| !**rests).count() as f64;
+    if moves < LEAST_MOTION * rests.len() as f64 {
+        rests.fill(false);
+    }
+    rests
+}
+
+/// Samples on either side of a polynomial's centre: an eighth of a typical cycle.
+fn half_window(angle: &dyn Samples, (delta, instructions): (f64, Instructions)) -> usize {
+    let samples = angle.len();
+    let evidence = Evidence {
+        power: power(angle, spectrum_length(samples, 200)),
+        samples,
+        noise: [channel_variance(angle, None, instructions), 0.0],
+        delta,
+        unknown: [true; 3],
+    };
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a few samples")]
+    let half = (evidence.period() / 8.0).clamp(8.0, 100.0) as usize;
+    half.min((samples.max(1) - 1) / 2)
+}
+
+/// The velocity at every sample and its standard error, from local polynomials.
+fn velocity(
+    angle: &dyn Samples,
+    (delta, instructions): (f64, Instructions),
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<[Vec<f64>; 2], Error> {
+    let samples = angle.len();
+    let plan = LocalPolynomials::new(PolynomialOptions {
+        window_length: 2 * half_window(angle, (delta, instructions)) + 1,
+        order: Order::Chosen { criterion: Criterion::Aicc, highest: 15 },
+        derivatives: vec![1],
+        delta,
+        noise: true,
+        selection: Selection::Window,
+        quantisation: 0.0,
+        instructions,
+    })?;
+    let mut both = [vec![0.0; samples], vec![0.0; samples]];
+    let [velocity, errors] = &mut both;
+    let mut columns = (vec![0_u8; samples], vec![0_u16; samples], vec![0.0; samples]);
+    for (column, wants_errors) in [(velocity, false), (errors, true)] {
+        let estimates = Estimates {
+            elements: Elements { first: 0, step: 1 },
+            derivatives: vec![column],
+            order: &mut columns.0,
+            status: &mut columns.1,
+            sigma: &mut columns.2,
+        };
+        let record = vec![(angle, estimates)];
+        if wants_errors { plan.errors(record, workers, watch)? } else { plan.run(record, true, workers, watch)? }
+    }
+    Ok(both)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sign_of_a_velocity_is_known_as_far_as_its_error_lets_it() {
+        assert_eq!([expected_sign(2.0, 0.0), expected_sign(-2.0, 0.0), expected_sign(0.0, 0.0)], [1.0, -1.0, 0.0]);
+        assert!((expected_sign(1.0, 1.0) - 0.682_689_492).abs() < 1e-9);
+        assert!((expected_sign(-4.0, 1.0) + 1.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_machine_that_stays_rests_and_one_that_turns_round_does_not() {
+        let delta = 0.001;
+        let moves = |sample: usize| (sample as f64 * 0.01).sin();
+        let velocity: Vec<f64> = (0..4000).map(|n| if (1000..2000).contains(&n) { 0.0 } else { moves(n) }).collect();
+        let rests = resting(&velocity, &vec![1e-4; 4000], 21, delta);
+        assert!(rests[1000..2000].iter().all(|rests| *rests));
+        assert_eq!(rests.iter().filter(|rests| **rests).count(), 1000);
+    }
+
+    #[test]
+    fn a_record_that_hardly_moves_is_not_all_rest() {
+        let rests = resting(&[0.0; 500], &[0.0; 500], 21, 0.001);
+        assert!(rests.iter().all(|rests| !rests));
+    }
+}

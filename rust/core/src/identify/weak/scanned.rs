@@ -1,0 +1,78 @@
+//! What a scan of the test function's width found, and what it says of a result.
+
+use crate::identify::results::Constant;
+use crate::inference::scales::{AtScale, LEAST_PLATEAU, Plateau};
+use crate::status::Status;
+
+/// How much wider than its narrowest a test function on the plateau is, at most.
+const MARGIN: f64 = 1.5;
+/// A constant is another one than the plateau's beyond so many standard errors of both.
+const OTHER: f64 = 4.0;
+/// From so many widths on there has to be a plateau.
+const ENOUGH_WIDTHS: usize = 6;
+
+/// Estimates by the width of the test function.
+#[derive(Clone, Debug, Default)]
+pub struct Scan {
+    /// The unknowns that were compared: 0 inertia, 1 damping, 2 stiffness, then terms.
+    pub unknowns: Vec<usize>,
+    /// How many widths were tried; at some the rows may not determine the constants.
+    pub tried: usize,
+    /// From the narrowest to the widest test function.
+    pub scales: Vec<AtScale>,
+    /// Whether estimates are corrected for the angle's noise.
+    pub corrected: bool,
+    /// The widths that agree; `None` where too few could be compared.
+    pub plateau: Option<Plateau>,
+    /// Whether the test function that is used contradicts the plateau.
+    pub contradicted: bool,
+    /// Whether the test function was moved to the plateau.
+    pub moved: bool,
+}
+
+impl Scan {
+    /// By what factor widths that agree differ.
+    pub(crate) fn factor(&self) -> f64 {
+        self.plateau.map_or(1.0, |plateau| plateau.factor(&self.scales))
+    }
+
+    /// The narrowest scale of the plateau.
+    pub(crate) fn narrowest(&self) -> Option<&AtScale> {
+        self.plateau.map(|plateau| &self.scales[plateau.first])
+    }
+
+    /// Whether there were widths enough to show a plateau, and they do not.
+    pub(crate) fn has_no_plateau(&self) -> bool {
+        self.tried >= ENOUGH_WIDTHS && self.factor() < LEAST_PLATEAU
+    }
+
+    /// The half-width that is wider than the plateau's narrowest by a margin.
+    pub(crate) fn inside(&self) -> Option<usize> {
+        let plateau = self.plateau?;
+        let narrowest = self.scales[plateau.first].half_width as f64;
+        let wanted = narrowest * MARGIN.min(self.factor().sqrt());
+        let on = &self.scales[plateau.first..=plateau.last];
+        on.iter().map(|one| one.half_width).min_by(|a, b| {
+            let off = |half_width: usize| (half_width as f64 / wanted).ln().abs();
+            off(*a).total_cmp(&off(*b))
+        })
+    }
+
+    /// What the scan says of the whole record and of the constants that were found in it.
+    pub(crate) fn status(&self, constants: &[Constant]) -> Status {
+        let other = self.narrowest().is_some_and(|one| constants.iter().any(|found| self.differs(one, found)));
+        let disagree = self.has_no_plateau() || self.contradicted || other;
+        if disagree { Status::SCALES_DISAGREE } else { Status::GOOD }
+    }
+
+    /// Whether a constant is not what the plateau says, by more than chance.
+    fn differs(&self, scale: &AtScale, constant: &Constant) -> bool {
+        let Some(place) = self.unknowns.iter().position(|&one| one == constant.unknown) else { return false };
+        let error = scale.errors[place].hypot(constant.error);
+        (scale.values[place] - constant.value).abs() > OTHER * error
+    }
+
+    pub(crate) fn nearest(&self, half_width: usize) -> Option<(usize, &AtScale)> {
+        self.scales.iter().enumerate().min_by_key(|(_, one)| one.half_width.abs_diff(half_width))
+    }
+}

@@ -1,0 +1,108 @@
+//! Whether equations of every scale agree: the plateau.
+//!
+//! With the width of the test function the band moves in which the equation of motion is asked to hold. Where it holds, all widths give
+//! the same constants; narrow ones are more precise if noise is what it is taken for, and wrong if it is not. So a result is believed
+//! where a range of widths agrees, each within the errors that blocks of the record show (after Lepski's comparison of scales, 1990,
+//! but only along a range: the widest test functions may be wrong for other reasons).
+
+use crate::regression::block_fit::BlockFit;
+
+/// Estimates agree that differ by no more than so many standard errors, the smaller of the two.
+const AGREE: f64 = 2.0;
+
+/// Widths that agree span at least this factor, or they agree by chance.
+pub(crate) const LEAST_PLATEAU: f64 = 2.0;
+
+/// Constants by one test function.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AtScale {
+    /// Samples on either side of the test function's centre.
+    pub half_width: usize,
+    /// Where half the power of the motion passes, in hertz: the equation is asked to hold below.
+    pub band: f64,
+    /// The constants, in the order of the unknowns.
+    pub values: Vec<f64>,
+    /// Their standard errors, from blocks of the record.
+    pub errors: Vec<f64>,
+}
+
+impl AtScale {
+    pub(crate) fn new(half_width: usize, band: f64, fit: BlockFit) -> Self {
+        Self { half_width, band, values: fit.values, errors: fit.errors }
+    }
+
+    fn window_length(&self) -> f64 {
+        (2 * self.half_width + 1) as f64
+    }
+
+    /// Whether every constant of another scale is the same, but for so many standard errors.
+    fn agrees(&self, other: &Self) -> bool {
+        let pairs = self.values.iter().zip(&other.values).zip(self.errors.iter().zip(&other.errors));
+        pairs.into_iter().all(|((one, other), (error, other_error))| {
+            // NaN agrees with nothing.
+            (one - other).abs() <= AGREE * error.min(*other_error)
+        })
+    }
+}
+
+/// A range of scales that agree.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plateau {
+    /// Places of the narrowest and of the widest.
+    pub first: usize,
+    /// The widest.
+    pub last: usize,
+}
+
+impl Plateau {
+    /// By what factor the widths differ.
+    pub(crate) fn factor(&self, scales: &[AtScale]) -> f64 {
+        scales[self.last].window_length() / scales[self.first].window_length()
+    }
+}
+
+/// The longest range of scales of which every one agrees with the narrowest, the narrower of equals. Scales go from narrow to wide.
+pub(crate) fn plateau(scales: &[AtScale]) -> Option<Plateau> {
+    let from = |first: usize| {
+        let beyond = scales[first + 1..].iter().position(|one| !scales[first].agrees(one));
+        Plateau { first, last: beyond.map_or(scales.len() - 1, |beyond| first + beyond) }
+    };
+    let mut best: Option<Plateau> = None;
+    for found in (0..scales.len()).map(from) {
+        if best.is_none_or(|best| found.factor(scales) > best.factor(scales) * (1.0 + 1e-9)) {
+            best = Some(found);
+        }
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scales(estimates: &[(f64, f64)]) -> Vec<AtScale> {
+        let at = |(place, &(value, error)): (usize, &(f64, f64))| AtScale {
+            half_width: 4 << place,
+            band: 100.0 / f64::from(1 << place),
+            values: vec![value, 1.0],
+            errors: vec![error, 1.0],
+        };
+        estimates.iter().enumerate().map(at).collect()
+    }
+
+    #[test]
+    fn the_longest_range_of_widths_that_agree_is_the_plateau() {
+        let scales = scales(&[(0.1, 0.01), (0.12, 0.01), (0.5, 0.05), (1.0, 0.1), (1.1, 0.1), (0.95, 0.2), (3.0, 0.2)]);
+        let found = plateau(&scales).unwrap();
+        assert_eq!(found, Plateau { first: 3, last: 5 });
+        assert!((found.factor(&scales) - 257.0 / 65.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn of_ranges_as_long_the_narrower_counts_and_nan_agrees_with_nothing() {
+        assert_eq!(plateau(&scales(&[(1.0, 0.1), (2.0, 0.1)])), Some(Plateau { first: 0, last: 0 }));
+        let found = plateau(&scales(&[(1.0, f64::NAN), (f64::NAN, 0.1), (1.0, 0.1), (1.0, 0.1)]));
+        assert_eq!(found, Some(Plateau { first: 2, last: 3 }));
+        assert_eq!(plateau(&[]), None);
+    }
+}

@@ -1,0 +1,185 @@
+//! What a recorder did to a channel: clipped, held or wrapped samples, recognised by their repeats and extremes.
+
+use crate::record::samples::{Samples, is_usable};
+use crate::record::subsample::stretches;
+
+/// Samples of a long record that are looked at, in so many stretches.
+const MOST_SAMPLES: usize = 1 << 20;
+const STRETCHES: usize = 8;
+
+/// Samples in a row at an extreme, such runs, and samples in them, from which on a channel may be clipped.
+const RUN: usize = 3;
+const FEWEST_RUNS: usize = 3;
+const FEWEST_CLIPPED: usize = 20;
+
+/// A motion that turns round or comes to rest slows down before; one that is clipped arrives with at least this part of its typical speed.
+const ARRIVES: f64 = 0.2;
+
+/// Steps finer than the typical change by this factor let that be seen.
+const FINE: f64 = 2.0;
+
+/// The longest hold that is looked for, the part of the changes that must come in its beat, and how many changes and how often there must be.
+const LONGEST_HOLD: usize = 50;
+const IN_BEAT: f64 = 0.99;
+const FEWEST_CHANGES: usize = 50;
+const CHANGES_OF_HOLDS: f64 = 0.5;
+
+/// A wrapped angle jumps by nearly its whole range, and changes by less than this part of it elsewhere.
+const WHOLE: f64 = 0.8;
+const STEADY: f64 = 0.1;
+const FEWEST_JUMPS: usize = 2;
+
+/// What was done to a channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Defect {
+    /// This part of the samples lies at the largest or smallest value.
+    Clipped(f64),
+    /// Every value stands for so many samples.
+    Held(usize),
+    /// The angle jumps by so much.
+    Wrapped(f64),
+}
+
+impl Defect {
+    /// What it is called.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Clipped(_) => "clipped",
+            Self::Held(_) => "held",
+            Self::Wrapped(_) => "wrapped",
+        }
+    }
+
+    /// How much of it there is: a part of the samples, samples or the angle's unit.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss, reason = "a few samples")]
+    pub fn amount(&self) -> f64 {
+        match *self {
+            Self::Clipped(amount) | Self::Wrapped(amount) => amount,
+            Self::Held(samples) => samples as f64,
+        }
+    }
+}
+
+/// What was done to a channel, as far as its samples tell. Costs one look at up to a million samples.
+pub(crate) fn defects(channel: &dyn Samples) -> Vec<Defect> {
+    let part = |range: std::ops::Range<usize>| {
+        let mut values = vec![0.0; range.len()];
+        channel.read(range.start, &mut values);
+        values
+    };
+    let parts: Vec<Vec<f64>> = stretches(channel.len(), MOST_SAMPLES, STRETCHES).map(part).collect();
+    let usable = || parts.iter().flatten().copied().filter(|&value| is_usable(value));
+    let [least, most] = [usable().fold(f64::INFINITY, f64::min), usable().fold(f64::NEG_INFINITY, f64::max)];
+    if most <= least || most.is_nan() || least.is_nan() || most == f64::NEG_INFINITY {
+        return Vec::new();
+    }
+    let parts: Vec<&[f64]> = parts.iter().map(Vec::as_slice).collect();
+    [wrapped(&parts, most - least), held(&parts), clipped(&parts, [least, most])].into_iter().flatten().collect()
+}
+
+/// The changes from sample to sample, of usable ones.
+fn changes<'a>(parts: &'a [&'a [f64]]) -> impl Iterator<Item = f64> + 'a {
+    let pairs = parts.iter().flat_map(|part| part.windows(2));
+    pairs.map(|pair| pair[1] - pair[0]).filter(|change| change.is_finite())
+}
+
+fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0_f64), |(sum, count), value| (sum + value * value, count + 1.0));
+    (sum / count.max(1.0)).sqrt()
+}
+
+fn clipped(parts: &[&[f64]], extremes: [f64; 2]) -> Option<Defect> {
+    let finest = changes(parts).map(f64::abs).filter(|&change| change > 0.0).fold(f64::INFINITY, f64::min);
+    let typical = root_mean_square(changes(parts));
+    if typical < FINE * finest {
+        return None;
+    }
+    let (mut count, mut arrivals) = (0, Vec::new());
+    for part in parts {
+        for extreme in extremes {
+            let mut place = 0;
+            while let Some(first) = part[place..].iter().position(|&value| value == extreme).map(|next| place + next) {
+                let end =
+                    part[first..].iter().position(|&value| value != extreme).map_or(part.len(), |run| first + run);
+                if end - first >= RUN {
+                    count += end - first;
+                    if first >= 2 {
+                        arrivals.push((part[first - 1] - part[first - 2]).abs());
+                    }
+                }
+                place = end;
+            }
+        }
+    }
+    arrivals.sort_by(f64::total_cmp);
+    let arrival = arrivals.get(arrivals.len() / 2).copied().unwrap_or(0.0);
+    let samples = parts.iter().fold(0, |samples, part| samples + part.len());
+    let is_clipped = arrivals.len() >= FEWEST_RUNS && count >= FEWEST_CLIPPED && arrival > ARRIVES * typical;
+    is_clipped.then(|| Defect::Clipped(count as f64 / samples as f64))
+}
+
+fn held(parts: &[&[f64]]) -> Option<Defect> {
+    let samples = parts.iter().fold(0, |samples, part| samples + part.len());
+    let still = changes(parts).filter(|&change| change == 0.0).count();
+    if 3 * still < samples {
+        return None;
+    }
+    (2..=LONGEST_HOLD).rev().find_map(|hold| {
+        let (mut all, mut in_beat) = (0, 0);
+        for part in parts {
+            let mut beats = vec![0; hold];
+            for (place, pair) in part.windows(2).enumerate().filter(|(_, pair)| pair[0] != pair[1]) {
+                let _ = pair;
+                beats[place % hold] += 1;
+            }
+            all += beats.iter().sum::<usize>();
+            in_beat += beats.into_iter().max().unwrap_or(0);
+        }
+        let often = all as f64 >= CHANGES_OF_HOLDS * samples as f64 / hold as f64;
+        (all >= FEWEST_CHANGES && often && in_beat as f64 >= IN_BEAT * all as f64).then_some(Defect::Held(hold))
+    })
+}
+
+fn wrapped(parts: &[&[f64]], range: f64) -> Option<Defect> {
+    let jumps: Vec<f64> = changes(parts).map(f64::abs).filter(|&change| change >= WHOLE * range).collect();
+    let elsewhere = changes(parts).filter(|change| change.abs() < WHOLE * range);
+    let steady = root_mean_square(elsewhere) < STEADY * range;
+    let mean = jumps.iter().sum::<f64>() / jumps.len().max(1) as f64;
+    (jumps.len() >= FEWEST_JUMPS && steady).then_some(Defect::Wrapped(mean))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wave(sample: usize) -> f64 {
+        (sample as f64 * 0.02).sin() + 0.3 * (sample as f64 * 0.053).sin()
+    }
+
+    fn of(value: impl Fn(usize) -> f64) -> Vec<Defect> {
+        let values: Vec<f64> = (0..5000).map(value).collect();
+        defects(&values.as_slice())
+    }
+
+    #[test]
+    fn a_good_channel_has_no_defects() {
+        assert_eq!(of(wave), []);
+        // An encoder dwells at turning points, a machine at rest.
+        assert_eq!(of(|sample| (wave(sample) * 1000.0).round() / 1000.0), []);
+        assert_eq!(of(|sample| (wave(sample) * 5.0).round() / 5.0), []);
+        assert_eq!(of(|sample| wave(sample.clamp(400, 2500))), []);
+        assert_eq!(of(|_| 1.0), []);
+        assert_eq!(of(|_| f64::NAN), []);
+    }
+
+    #[test]
+    fn what_was_done_to_a_channel_is_recognised() {
+        let found = of(|sample| wave(sample).clamp(-1.0, 1.0));
+        assert!(matches!(found[..], [Defect::Clipped(part)] if part > 0.05 && part < 0.5), "{found:?}");
+        assert_eq!(of(|sample| wave(sample / 5 * 5)), [Defect::Held(5)]);
+        let found = of(|sample| (sample as f64 * 0.01).rem_euclid(1.0));
+        assert!(matches!(found[..], [Defect::Wrapped(jump)] if (jump - 0.99).abs() < 0.01), "{found:?}");
+    }
+}

@@ -1,0 +1,208 @@
+"""Equations of every scale agree, or the result says so; rest says nothing of friction; what a recorder did is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+import pytest
+from matplotlib import pyplot as plt
+
+import tvident
+from tvident import Status, recordings
+
+mpl.use("agg")
+Array = npt.NDArray[np.float64]
+RATE = 1000.0
+DOUBT = Status.NOISE_MODEL | Status.COLOURED | Status.SCALES_DISAGREE | Status.WINDOW_LIMIT
+
+
+def rig(seed: int = 0, seconds: float = 20.0, angle_noise: float = 1e-3) -> tvident.Recording:
+    return tvident.simulate_torsional_rig(seconds, seed=seed, pattern="slider", angle_noise=angle_noise)
+
+
+def identified(recorded: tvident.Recording, angle: Array | None = None, **call: Any) -> tvident.Identification:
+    angle = recorded.angle if angle is None else angle
+    return tvident.identify(angle, recorded.torque, sample_rate=RATE, **call)
+
+
+def hum(recorded: tvident.Recording, part: float = 0.01) -> Array:
+    """Add a hum of 50 Hz, whose amplitude is a part of the angle's deviation."""
+    wave = np.sin(2 * np.pi * 50 * np.arange(recorded.angle.size) / RATE)
+    return np.asarray(recorded.angle + part * recorded.angle.std() * wave)
+
+
+@pytest.mark.parametrize(("seed", "angle_noise"), [(0, 1e-3), (1, 1e-2), (2, 1e-1)])
+def test_under_white_noise_the_test_function_of_the_spectra_lies_on_the_plateau(seed: int, angle_noise: float) -> None:
+    recorded = rig(seed, angle_noise=angle_noise)
+    result = identified(recorded)
+    scan = result.scan()
+    assert scan.plateau is not None
+    assert not scan.moved
+    first, last = scan.plateau
+    # It is one of those between the widths that are compared.
+    assert first / 1.25 <= result.settings["window_length"] <= 1.25 * last
+    assert last >= 2 * first
+    on = (first <= scan.window_length) & (scan.window_length <= last)
+    # Four standard errors of the widest that agree.
+    assert np.all(np.abs(scan.estimates["inertia"][on] - recorded.inertia[0]) < 4 * scan.stderr["inertia"][on].max())
+    assert np.all(np.diff(scan.window_length) > 0)
+    assert np.all(np.diff(scan.band) < 0)
+    assert int(result.record_status) == 0
+    assert "estimates are the same from" in result.summary()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_hum_is_left_to_wider_test_functions(seed: int) -> None:
+    recorded = rig(seed)
+    result = identified(recorded, hum(recorded))
+    # A hundred per cent of it was missing while the spectra alone decided.
+    assert float(result.inertia[0]) == pytest.approx(float(recorded.inertia[0]), rel=0.01)
+    assert result.scan().moved
+    assert "only slower motion was used" in result.summary()
+    value, error = result.constants["inertia"]
+    assert abs(value - recorded.inertia[0]) < 4 * error
+
+
+def test_what_was_moved_is_repeated_by_its_settings() -> None:
+    recorded = rig(3)
+    first = identified(recorded, hum(recorded))
+    again = identified(recorded, hum(recorded), settings=first.settings)
+    assert first.scan().moved
+    assert again.settings["window_length"] == first.settings["window_length"]
+    np.testing.assert_array_equal(again.stiffness, first.stiffness)
+    np.testing.assert_array_equal(again.stderr["inertia"], first.stderr["inertia"])
+
+
+def test_a_low_passed_angle_is_not_believed() -> None:
+    recorded = rig(4)
+    smooth = np.convolve(recorded.angle, np.hanning(41) / np.hanning(41).sum(), mode="full")[: recorded.angle.size]
+    result = identified(recorded, smooth)
+    wrong = abs(float(np.nanmedian(result.inertia)) / recorded.inertia[0] - 1)
+    assert wrong < 0.01 or result.record_status & (DOUBT | Status.LAG_SUSPECTED)
+
+
+def test_the_scan_is_shown_and_drawn() -> None:
+    scan = identified(rig(5, 6.0)).scan()
+    lines = scan.summary().splitlines()
+    assert len(lines) == scan.window_length.size + 1
+    assert any(line.lstrip().startswith("*") for line in lines)
+    figure = scan.plot()
+    assert [ax.get_title(loc="left") for ax in figure.axes] == ["Inertia", "Damping", "Offset"]
+    plt.close(figure)
+
+
+def test_a_record_that_is_too_short_to_compare_says_so() -> None:
+    recorded = rig(6, 1.0)
+    result = identified(recorded.select(0.0, 0.12) if hasattr(recorded, "select") else recorded, stiffness="constant")
+    if result.scan().plateau is None:
+        assert "nothing confirms these numbers" in result.summary()
+
+
+def test_the_strong_form_has_no_scan_and_a_batch_has_one_a_record() -> None:
+    recorded = rig(7, 4.0)
+    with pytest.raises(ValueError, match="only the weak form compares test functions"):
+        identified(recorded, method="paper").scan()
+    both = tvident.identify(np.tile(recorded.angle, (2, 1)), np.tile(recorded.torque, (2, 1)), sample_rate=RATE)
+    np.testing.assert_array_equal(both.scan(0).band, both.scan(1).band)
+    with pytest.raises(IndexError, match="record must be below 2"):
+        both.scan(2)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda angle: np.clip(angle, *np.quantile(angle, [0.02, 0.98])), "the angle is clipped"),
+        (lambda angle: np.repeat(angle[::5], 5), "the angle holds every value for 5 samples"),
+        (lambda angle: np.mod(angle, 0.7 * np.ptp(angle)), "the angle jumps by"),
+    ],
+)
+def test_what_a_recorder_did_is_named_with_its_cure(spoil: Any, words: str) -> None:
+    recorded = rig(8, 10.0)
+    angle = np.asarray(spoil(recorded.angle))
+    if words.startswith("the angle jumps"):
+        angle = np.mod(recorded.angle + np.linspace(0, 5, recorded.angle.size), 1.0)
+    result = identified(recorded, angle)
+    assert result.record_status & Status.CHANNEL_SUSPECTED
+    assert any(words in advice for advice in result.advice)
+    assert not identified(recorded).record_status & Status.CHANNEL_SUSPECTED
+
+
+def friction_with_rests(seed: int) -> tuple[Array, Array]:
+    """Simulate a joint that moves to and fro and stands still between: friction holds whatever torque there is."""
+    generator = np.random.default_rng(seed)
+    t = np.arange(12000) / RATE
+    velocity = np.sin(2 * np.pi * 0.5 * t) * np.sin(2 * np.pi * 1.3 * t + seed)
+    cycle = (t % 4.0) < 2.6
+    edges = np.minimum(1.0, np.minimum(t % 4.0, np.maximum(0.0, 2.6 - t % 4.0)) / 0.3)
+    velocity = np.where(cycle, velocity * edges**2, 0.0)
+    angle = np.cumsum(velocity) / RATE
+    acceleration = np.gradient(velocity, 1 / RATE)
+    moving = 0.3 * acceleration + 3.0 * velocity + 2.4 * np.sign(velocity)
+    # At rest a drive holds some torque within the friction's reach.
+    torque = np.where(velocity == 0, 0.9 * np.sin(2 * np.pi * 0.11 * t), moving)
+    return angle + 1e-5 * generator.standard_normal(t.size), torque + 0.05 * generator.standard_normal(t.size)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_rest_says_nothing_of_friction(seed: int) -> None:
+    angle, torque = friction_with_rests(seed)
+    call: dict[str, Any] = {
+        "inertia": "constant",
+        "damping": "constant",
+        "stiffness": 0,
+        "terms": ["coulomb", "offset"],
+    }
+    result = tvident.identify(angle, torque, sample_rate=RATE, **call)
+    assert result.constants["coulomb"][0] == pytest.approx(2.4, rel=0.05)
+    assert result.constants["damping"][0] == pytest.approx(3.0, rel=0.05)
+    assert any("the machine rests in" in reason for reason in result.reasons)
+
+
+def constants(angle: Array, torque: Array, rate: float, **call: Any) -> tvident.Identification:
+    return tvident.identify(
+        angle, torque, sample_rate=rate, inertia="constant", damping="constant", stiffness=0, **call
+    )
+
+
+def recording(folder: Path, name: str) -> dict[str, Array]:
+    path = folder / name
+    if not path.exists():
+        pytest.skip(f"the recording {name} is missing from {folder}")
+    return {one: np.asarray(values) for one, values in recordings.read(path).items()}
+
+
+def test_a_pendulum_under_feedback(folder_of_recordings: Path) -> None:
+    channels = recording(folder_of_recordings, "pendulum.csv")
+    rate = 1 / float(np.diff(channels["time"]).mean())
+    result = constants(channels["position"], channels["torque"], rate, terms=["gravity", "coulomb", "offset"])
+    assert result.constants["inertia"][0] == pytest.approx(0.155, rel=0.1)
+    assert result.constants["gravity"][0] == pytest.approx(3.1, rel=0.1)
+    assert "do not trust" not in result.summary()
+
+
+def test_a_servo_with_ripple(folder_of_recordings: Path) -> None:
+    io = pytest.importorskip("scipy.io")
+    path = folder_of_recordings / "servo.mat"
+    if not path.exists():
+        pytest.skip(f"the recording servo.mat is missing from {folder_of_recordings}")
+    data = io.loadmat(path, squeeze_me=True)["data"]
+    result = constants(data[:, 2], data[:, 5], RATE, terms=["offset"])
+    assert 0.95e-4 <= result.constants["inertia"][0] <= 1.2e-4
+    assert 6.6e-5 <= result.constants["damping"][0] <= 7.4e-5
+
+
+def test_a_robot_joint_that_rests(folder_of_recordings: Path) -> None:
+    path = folder_of_recordings / "robot_joint.csv"
+    if not path.exists():
+        pytest.skip(f"the recording robot_joint.csv is missing from {folder_of_recordings}")
+    time, angle, current = np.genfromtxt(path, delimiter=",", skip_header=1).T[:3]
+    uniform = np.arange(time[0], time[-1], 0.01)
+    # The drive's 10.1232 N m for each ampere.
+    torque = 10.1232 * np.interp(uniform, time, current)
+    result = constants(np.interp(uniform, time, angle), torque, 100.0, terms=["coulomb", "offset"])
+    assert 3.0 <= result.constants["damping"][0] <= 3.3
+    assert 2.3 <= result.constants["coulomb"][0] <= 2.6
