@@ -53,14 +53,7 @@ impl Samples for StridedSamples {
 
     fn read(&self, first: usize, into: &mut [f64]) {
         match self.number {
-            Number::F64 if self.stride == 8 && self.first.cast::<f64>().is_aligned() => {
-                assert!(first + into.len() <= self.len, "a record must hold what is read of it");
-                unsafe {
-                    std::ptr::copy_nonoverlapping(self.first.cast::<f64>().add(first), into.as_mut_ptr(), into.len())
-                };
-                std::hint::black_box(into);
-            }
-            Number::F64 if self.is_contiguous::<f64>() => self.copy_contiguous(first, into),
+            Number::F64 if self.stride == size_of::<f64>().cast_signed() => self.copy_contiguous(first, into),
             Number::F64 => self.copy::<u64>(first, into, f64::from_bits),
             Number::F32 => self.copy::<u32>(first, into, |bits| f32::from_bits(bits).into()),
             Number::I64 => self.copy::<u64>(first, into, |bits| bits.cast_signed() as f64),
@@ -77,18 +70,13 @@ impl Samples for StridedSamples {
 }
 
 impl StridedSamples {
-    fn is_contiguous<T>(&self) -> bool {
-        self.stride == size_of::<T>().cast_signed() && self.first.cast::<T>().is_aligned()
-    }
-
     #[inline]
     fn copy_contiguous(&self, first: usize, into: &mut [f64]) {
         assert!(first + into.len() <= self.len, "a record must hold what is read of it");
-        // SAFETY: samples before the end lie in the array, of which shape and strides were asked; they are aligned, and `into` is memory of
-        // its own. Whoever writes to the array meanwhile breaks the promise of DESIGN.md.
-        unsafe {
-            std::ptr::copy_nonoverlapping(self.first.cast::<f64>().wrapping_add(first), into.as_mut_ptr(), into.len())
-        };
+        let from = self.first.wrapping_add(first * size_of::<f64>());
+        // SAFETY: samples before the end lie in the array, of which shape and strides were asked, and `into` is memory of its own; bytes need
+        // no alignment. Whoever writes to the array meanwhile breaks the promise of DESIGN.md.
+        unsafe { std::ptr::copy_nonoverlapping(from, into.as_mut_ptr().cast(), size_of_val(into)) };
         // From here on the copy counts: the compiler may not read the array again in its place.
         std::hint::black_box(into);
     }
