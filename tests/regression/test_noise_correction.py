@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from reference.noise_correction import Column, Rows, fit, row_covariance, window
@@ -200,6 +200,8 @@ def test_the_noise_of_the_angle_is_taken_off_every_window(drawn: dict[str, Any])
     # The torque's noise is said to be so large that every window is as good as it should be, and all count alike.
     case = case_of(drawn, torque_noise=100.0)
     result = identified(case)
+    # A torque that so much noise makes by chance determines nothing: tests/identify/test_noise_determines_nothing.py.
+    assume(not result.record_status & Status.RANK_DEFICIENT)
     rows, _, first = fitted(case, np.zeros(3))
     parameters = parameters_of(case, rows, first)
     rows, gamma, found = fitted(case, parameters)

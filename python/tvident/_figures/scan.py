@@ -58,6 +58,10 @@ def plot_scan(scan: Scanned) -> Figure:
     --------
     Scan.plot : the same as a method.
 
+    References
+    ----------
+    O. V. Lepski: On a problem of adaptive estimation in Gaussian white noise, Theory of Probability and its Applications 35 (1990).
+
     Examples
     --------
     >>> import tvident

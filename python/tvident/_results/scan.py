@@ -41,6 +41,11 @@ class Scan:
     moved : bool
         Whether the test function was moved because of the scan.
 
+    See Also
+    --------
+    Identification.scan : makes one.
+    figures.plot_scan : draws it.
+
     References
     ----------
     O. V. Lepski: On a problem of adaptive estimation in Gaussian white noise, Theory of Probability and its Applications 35 (1990): scales

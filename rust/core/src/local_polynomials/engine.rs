@@ -25,6 +25,9 @@ use crate::simd::instructions::Instructions;
 use crate::simd::vectors::{MOST_LANES, dispatch};
 use crate::status::Status;
 
+/// No record has so many samples.
+const FARTHEST: usize = 1 << 40;
+
 /// Samples copied out of a record at a time, about: several runs of short windows.
 const STRETCH: usize = 1 << 13;
 
@@ -105,7 +108,8 @@ impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
     }
 
     fn stride(&self, step: usize) -> usize {
-        self.instructions.lanes() * if self.apart(step) { step } else { self.block() }
+        // A step beyond every record may be any number.
+        self.instructions.lanes() * if self.apart(step) { step.min(FARTHEST) } else { self.block() }
     }
 
     fn functionals(&self) -> &[Functional] {

@@ -96,7 +96,7 @@ fn identify(
     };
     let levels = stages.map(pieces.into(), || (), level)?;
     let levels = [levels[0], levels[1]];
-    let mut session = Session { record, options, levels, noise: levels, scan: Scan::default(), stages };
+    let mut session = Session { record, options, noise: levels, scan: Scan::default(), stages };
     let model = session.model();
     let (chosen, decided, lag) = session.choose_and_decide(&model)?;
     let (mut found, at_rows) = session.report(chosen, &decided)?;

@@ -78,7 +78,6 @@ impl Session<'_, '_, '_> {
     /// Scans the widths, moves to the plateau where the test function that the spectra suggest is off it, and on to wider ones where
     /// windows follow noise.
     pub(crate) fn onto_plateau(&mut self, chosen: Chosen, model: &Model) -> Result<Chosen, Error> {
-        self.noise = self.levels;
         let given = self.options.half_width.is_some();
         // Without a coefficient of the motion among the unknowns there is nothing that widths could tell apart.
         let moves = self.unknowns().iter().any(|&unknown| unknown < 3);
@@ -89,10 +88,6 @@ impl Session<'_, '_, '_> {
         let before = chosen.weak.function.half_width();
         let moved = if given { None } else { scans.believed(before) };
         let half_width = moved.unwrap_or(before);
-        if scans.contradict(half_width) && !scans.best.corrected {
-            // Without the correction for noise the widths agree, with it this one does not.
-            self.noise[0] = 0.0;
-        }
         self.scan = scans.best.clone();
         let mut chosen = if half_width == before { chosen } else { self.chosen_with(half_width, model)? };
         if !given && self.options.averaging {
@@ -100,7 +95,7 @@ impl Session<'_, '_, '_> {
         }
         let used = chosen.weak.function.half_width();
         self.scan.moved = used != before;
-        self.scan.contradicted = scans.contradict(used) && self.noise[0] > 0.0;
+        self.scan.contradicted = scans.contradict(used);
         Ok(chosen)
     }
 

@@ -24,8 +24,6 @@ const NUMBERS_OF_A_PAIR: usize = 12;
 pub(crate) struct Session<'a, 'b, 'c> {
     pub(crate) record: Record<'a>,
     pub(crate) options: &'a WeakOptions,
-    /// Variances of the noise of angle and torque, as the channels show them and as equations are corrected for them.
-    pub(crate) levels: [f64; 2],
     pub(crate) noise: [f64; 2],
     /// Estimates by the width of the test function.
     pub(crate) scan: Scan,
