@@ -12,7 +12,7 @@ from tvident import recordings
 from tvident._command_line.channels import channel_of, mask_of, scaled, source_of
 from tvident._command_line.equation import lag_of, parameter_of, terms_of
 from tvident._command_line.group import main
-from tvident._command_line.options import PICTURE, RECORDING, RESULTS, TIME, check_outputs, check_time, given
+from tvident._command_line.options import CHANNELS, PICTURE, RECORDING, RESULTS, TIME, check_outputs, check_time, given
 from tvident._command_line.output import give, save_figure
 from tvident._equation import COEFFICIENTS, TERM_NAMES
 
@@ -20,10 +20,7 @@ from tvident._equation import COEFFICIENTS, TERM_NAMES
 # Every option is a parameter: so click passes them.
 @main.command(epilog="Example: tvident compare rig.csv --angle angle --torque torque --time time")
 @click.argument("file", type=click.Path(), required=False)
-@click.option("--angle", required=True, metavar="NAME", help="Channel of the angle, or a file that holds it alone.")
-@click.option("--torque", required=True, metavar="NAME", help="Channel of the torque, or a file that holds it alone.")
-@click.option("--angle-scale", metavar="SCALE", help="Number or variable to multiply the angle by.")
-@click.option("--torque-scale", metavar="SCALE", help="Number or variable to multiply the torque by.")
+@CHANNELS
 @TIME
 @click.option(
     "--inertia", metavar="KIND", help="For all models: auto, constant, windowed, varying, a number, a channel."

@@ -17,6 +17,7 @@ from tvident._command_line.equation import lag_of, parameter_of, terms_of
 from tvident._command_line.group import main
 from tvident._command_line.method import METHOD, NAMES, method_of
 from tvident._command_line.options import (
+    CHANNELS,
     PICTURE,
     RECORDING,
     RESULTS,
@@ -39,10 +40,7 @@ _MOST_BYTES = 100_000_000
 # Every option is a parameter: so click passes them.
 @main.command(epilog="Example: tvident identify rig.csv --angle angle --torque torque --time time -o result.csv")
 @click.argument("file", type=click.Path(), required=False)
-@click.option("--angle", required=True, metavar="NAME", help="Channel of the angle, or a file that holds it alone.")
-@click.option("--torque", required=True, metavar="NAME", help="Channel of the torque, or a file that holds it alone.")
-@click.option("--angle-scale", metavar="SCALE", help="Number or variable to multiply the angle by.")
-@click.option("--torque-scale", metavar="SCALE", help="Number or variable to multiply the torque by.")
+@CHANNELS
 @TIME
 @METHOD
 @click.option("--inertia", metavar="KIND", help="auto, constant, windowed, varying, a known number, or a channel.")

@@ -26,6 +26,15 @@ def options_of(*options: Callable[[Decorated], Decorated]) -> Callable[[Decorate
     return decorate
 
 
+CHANNELS = options_of(
+    click.option("--angle", required=True, metavar="NAME", help="Channel of the angle, or a file that holds it alone."),
+    click.option(
+        "--torque", required=True, metavar="NAME", help="Channel of the torque, or a file that holds it alone."
+    ),
+    click.option("--angle-scale", metavar="SCALE", help="Number or variable to multiply the angle by."),
+    click.option("--torque-scale", metavar="SCALE", help="Number or variable to multiply the torque by."),
+)
+
 TIME = options_of(
     click.option("--sample-rate", type=float, help="Samples per second."),
     click.option("--delta", type=float, help="Sample period in seconds."),

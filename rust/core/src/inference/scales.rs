@@ -35,12 +35,12 @@ impl AtScale {
         (2 * self.half_width + 1) as f64
     }
 
-    /// Whether every constant of another scale is the same, but for so many standard errors.
-    fn agrees(&self, other: &Self) -> bool {
+    /// Whether every constant of another scale is the same, but for so many standard errors, the smaller of the two.
+    pub(crate) fn agrees(&self, other: &Self, errors: f64) -> bool {
         let pairs = self.values.iter().zip(&other.values).zip(self.errors.iter().zip(&other.errors));
         pairs.into_iter().all(|((one, other), (error, other_error))| {
             // NaN agrees with nothing.
-            (one - other).abs() <= AGREE * error.min(*other_error)
+            (one - other).abs() <= errors * error.min(*other_error)
         })
     }
 }
@@ -55,6 +55,11 @@ pub struct Plateau {
 }
 
 impl Plateau {
+    /// Whether the scale at a place belongs to it.
+    pub(crate) fn holds(&self, place: usize) -> bool {
+        (self.first..=self.last).contains(&place)
+    }
+
     /// By what factor the widths differ.
     pub(crate) fn factor(&self, scales: &[AtScale]) -> f64 {
         scales[self.last].window_length() / scales[self.first].window_length()
@@ -64,7 +69,7 @@ impl Plateau {
 /// The longest range of scales of which every one agrees with the narrowest, the narrower of equals. Scales go from narrow to wide.
 pub(crate) fn plateau(scales: &[AtScale]) -> Option<Plateau> {
     let from = |first: usize| {
-        let beyond = scales[first + 1..].iter().position(|one| !scales[first].agrees(one));
+        let beyond = scales[first + 1..].iter().position(|one| !scales[first].agrees(one, AGREE));
         Plateau { first, last: beyond.map_or(scales.len() - 1, |beyond| first + beyond) }
     };
     let mut best: Option<Plateau> = None;

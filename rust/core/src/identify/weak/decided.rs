@@ -53,6 +53,12 @@ pub(crate) fn rows_of(samples: usize, stride: usize) -> usize {
 }
 
 impl Decided {
+    /// Whether its windows are the shortest of those that were tried.
+    pub(crate) fn has_shortest_windows(&self) -> bool {
+        let scale = self.fit.as_ref().and_then(|fit| fit.scale);
+        self.scales.len() > 1 && scale.is_some() && self.scales.first().copied() == scale
+    }
+
     /// The rows that the fit was made with.
     pub(crate) fn rows<'a>(&'a self, rows: &'a Rows) -> &'a Rows {
         self.white.as_ref().map_or(rows, |(white, _)| white)

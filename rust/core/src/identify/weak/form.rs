@@ -95,8 +95,7 @@ fn identify(
         given.unwrap_or_else(|| channel_variance(channel, step, options.instructions))
     };
     let levels = stages.map(pieces.into(), || (), level)?;
-    let levels = [levels[0], levels[1]];
-    let mut session = Session { record, options, noise: levels, scan: Scan::default(), stages };
+    let mut session = Session { record, options, noise: [levels[0], levels[1]], scan: Scan::default(), stages };
     let model = session.model();
     let (chosen, decided, lag) = session.choose_and_decide(&model)?;
     let (mut found, at_rows) = session.report(chosen, &decided)?;

@@ -57,8 +57,8 @@ impl FrictionDirection {
         if !motion.terms.iter().any(of_velocity) {
             return Ok(Self { velocity: Vec::new(), direction: Vec::new(), resting: 0.0 });
         }
-        let [velocity, errors] = velocity(motion.angle, (delta, instructions), workers, watch)?;
-        let window = half_window(motion.angle, (delta, instructions)) * 2 + 1;
+        let window = 2 * half_window(motion.angle, (delta, instructions)) + 1;
+        let [velocity, errors] = velocity(motion.angle, window, (delta, instructions), (workers, watch))?;
         let rests = resting(&velocity, &errors, window, delta);
         let direction = velocity
             .iter()
@@ -129,16 +129,16 @@ fn half_window(angle: &dyn Samples, (delta, instructions): (f64, Instructions)) 
     half.min((samples.max(1) - 1) / 2)
 }
 
-/// The velocity at every sample and its standard error, from local polynomials.
+/// The velocity at every sample and its standard error, from local polynomials in windows of some length.
 fn velocity(
     angle: &dyn Samples,
+    window_length: usize,
     (delta, instructions): (f64, Instructions),
-    workers: NonZeroUsize,
-    watch: &mut Watch<'_>,
+    (workers, watch): (NonZeroUsize, &mut Watch<'_>),
 ) -> Result<[Vec<f64>; 2], Error> {
     let samples = angle.len();
     let plan = LocalPolynomials::new(PolynomialOptions {
-        window_length: 2 * half_window(angle, (delta, instructions)) + 1,
+        window_length,
         order: Order::Chosen { criterion: Criterion::Aicc, highest: 15 },
         derivatives: vec![1],
         delta,

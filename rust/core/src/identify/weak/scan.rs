@@ -7,7 +7,7 @@ use crate::exec::pool::Piece;
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::scanned::Scan;
 use crate::identify::weak::session::Session;
-use crate::inference::scales::{AtScale, Plateau, plateau};
+use crate::inference::scales::{AtScale, plateau};
 use crate::regression::block_fit::fit_in_blocks;
 use crate::regression::model::Model;
 use crate::regression::subsample::stretches_of_blocks;
@@ -45,10 +45,9 @@ impl Scans {
     /// The half-width to believe where another one lies off the plateau: a little wider than its narrowest, which is the first that its
     /// errors cannot tell from the others. A wider one that agrees may stay.
     fn believed(&self, half_width: usize) -> Option<usize> {
-        let plateau = self.best.plateau.filter(|_| !self.best.has_no_plateau())?;
+        let plateau = self.best.believable()?;
         let (place, _) = self.corrected.nearest(half_width)?;
-        let own = self.corrected.plateau.filter(|_| !self.corrected.has_no_plateau());
-        let on_its_own = own.is_some_and(|own| (own.first..=own.last).contains(&place));
+        let on_its_own = self.corrected.believable().is_some_and(|own| own.holds(place));
         if on_its_own || place > plateau.last && !self.contradict(half_width) {
             return None;
         }
@@ -61,16 +60,8 @@ impl Scans {
         else {
             return false;
         };
-        let on_plateau = |plateau: Plateau| (plateau.first..=plateau.last).contains(&place);
-        if self.corrected.plateau.filter(|_| !self.corrected.has_no_plateau()).is_some_and(on_plateau) {
-            return false;
-        }
-        let both = believed.values.iter().zip(&chosen.values).zip(believed.errors.iter().zip(&chosen.errors));
-        // NaN contradicts.
-        let within = |((one, other), (error, other_error)): ((&f64, &f64), (&f64, &f64))| {
-            (one - other).abs() <= CONTRADICTS * error.min(*other_error)
-        };
-        !both.into_iter().all(within)
+        let on_its_own = self.corrected.believable().is_some_and(|own| own.holds(place));
+        !on_its_own && !believed.agrees(chosen, CONTRADICTS)
     }
 }
 
@@ -118,8 +109,7 @@ impl Session<'_, '_, '_> {
         let mut tried = first;
         loop {
             let fitted = self.fit_first(&tried, model)?;
-            let scale = fitted.fit.as_ref().and_then(|fit| fit.scale);
-            let shortest = fitted.scales.len() > 1 && fitted.scales.first().copied() == scale;
+            let shortest = fitted.has_shortest_windows();
             tried.fitted = Some(fitted);
             width *= 2;
             if !shortest || self.scan.has_no_plateau() || width > widest {

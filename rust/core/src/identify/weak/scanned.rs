@@ -46,6 +46,11 @@ impl Scan {
         self.tried >= ENOUGH_WIDTHS && self.factor() < LEAST_PLATEAU
     }
 
+    /// The plateau, if it is wide enough to be believed or widths were too few for that.
+    pub(crate) fn believable(&self) -> Option<Plateau> {
+        self.plateau.filter(|_| !self.has_no_plateau())
+    }
+
     /// The half-width that is wider than the plateau's narrowest by a margin.
     pub(crate) fn inside(&self) -> Option<usize> {
         let plateau = self.plateau?;

@@ -101,7 +101,7 @@ impl Session<'_, '_, '_> {
         found.pairs = pairs;
         let rhs = decided.rhs(&weak.rows).to_vec();
         found.suspects = self.suspects(&mut weak, decided, fit, &rhs, &errors)?;
-        found.record_status = errors.status | record_status(&found, decided, fit, at_end);
+        found.record_status = errors.status | record_status(&found, decided, at_end);
         Ok((found, Some(results)))
     }
 
@@ -177,13 +177,13 @@ fn constants(decided: &Decided, values: &[f64], covariance: &[f64]) -> Vec<Const
 }
 
 /// Flags of the whole record, beside those of its noise.
-fn record_status(found: &WeakIdentified, decided: &Decided, fit: &Fit, at_end: bool) -> Status {
+fn record_status(found: &WeakIdentified, decided: &Decided, at_end: bool) -> Status {
     let mut status = Status::GOOD;
     let contradicted = |one: &Constant| one.test.as_ref().is_some_and(|test| test.probability < NO_CHANCE);
     if found.constants.iter().any(contradicted) {
         status |= Status::KIND_CONTRADICTED;
     }
-    if at_end || decided.scales.first().is_some_and(|first| Some(*first) == fit.scale) && decided.scales.len() > 1 {
+    if at_end || decided.has_shortest_windows() {
         status |= Status::WINDOW_LIMIT;
     }
     if found.condition > HARDLY_TOLD_APART || found.mostly_noise || found.unexplained {
