@@ -71,6 +71,7 @@ class ExplainedStrong:
         records = np.asarray(self.found.record_status, dtype=np.uint16)
         return self.found.status | records[..., np.newaxis] if records.any() else self.found.status
 
+    @np.errstate(all="ignore")  # what has left the range of doubles is NaN, whatever NumPy is told to do about it
     def words(self) -> Words:
         """Return what there is to say."""
         if not self.status.size:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any
@@ -320,7 +320,7 @@ class Task:
 
     def _words_of_strong_form(
         self, found: Sequence[_core.Identification], batch: Estimates, settings: dict[str, Any]
-    ) -> Words:
+    ) -> Callable[[], Words]:
         mask, step = self._data.mask, self._data.step
         return ExplainedStrong(
             found=batch,
@@ -328,4 +328,4 @@ class Task:
             untested=[name for place, name in enumerate(self._names) if found[0].unknowns[place].untested],
             settings=settings,
             mask=None if mask is None else mask[..., ::step],
-        ).words()
+        ).words

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -80,10 +80,6 @@ class Identification(Simulated):
     jumps : tuple of float
         Times in seconds at which parameters jump (``reasons`` says which), found if windows of all lengths are averaged; one such
         tuple per record in a batch.
-    reasons : tuple of str
-        What was chosen, and why.
-    advice : tuple of str
-        What to do about what looks wrong.
     settings : dict
         Settings that were given and chosen, as plain JSON. ``identify(…, settings=result.settings)`` repeats it.
 
@@ -116,7 +112,7 @@ class Identification(Simulated):
         time: Array,
         terms: Sequence[str],
         jumps: tuple[Any, ...],
-        words: Words,
+        words: Words | Callable[[], Words],
         settings: dict[str, Any],
         recorded: Recorded | None = None,
     ) -> None:
@@ -133,8 +129,7 @@ class Identification(Simulated):
         self.status = found.status
         self.record_status = found.record_status
         self.jumps = jumps
-        self.reasons = words.reasons
-        self.advice = words.advice
+        self._words = words
         self.settings = settings
         self._scans = found.scans
         known = {name: error for name, error in found.errors.items() if name not in found.factors}
@@ -171,6 +166,21 @@ class Identification(Simulated):
     def damping_ratio(self) -> Array:
         r"""Damping ratio C/(2√(KI)), shape (\*, n), without unit; NaN where KI is negative."""
         return self._oscillator.damping_ratio
+
+    # What to say is found when it is asked for: a short record is identified in less time than that takes.
+    @cached_property
+    def _told(self) -> Words:
+        return self._words if isinstance(self._words, Words) else self._words()
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """What was chosen, and why."""
+        return self._told.reasons
+
+    @property
+    def advice(self) -> tuple[str, ...]:
+        """What to do about what looks wrong."""
+        return self._told.advice
 
     def scan(self, record: int = 0) -> Scan:
         """Return estimates by the width of the test function, which tell whether equations of every scale agree.
