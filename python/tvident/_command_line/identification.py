@@ -1,0 +1,131 @@
+"""Options of ``tvident identify`` and of ``tvident report``, and the identification that they stand for."""
+
+from __future__ import annotations
+
+import json
+import stat
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, get_args
+
+import click
+
+import tvident
+from tvident import _arguments as arguments
+from tvident import recordings
+from tvident._command_line.channels import channel_of, mask_of, scaled, source_of
+from tvident._command_line.equation import lag_of, parameter_of, terms_of
+from tvident._command_line.method import METHOD, NAMES, method_of
+from tvident._command_line.options import CHANNELS, RECORDING, TIME, check_time, given, options_of, wanted_progress
+from tvident._equation import COEFFICIENTS, TERM_NAMES
+from tvident._files import printable
+
+_MOST_BYTES = 100_000_000
+"""Of settings, which are some lines for every record of a batch."""
+
+IDENTIFICATION = options_of(
+    CHANNELS,
+    TIME,
+    METHOD,
+    click.option("--inertia", metavar="KIND", help="auto, constant, windowed, varying, a known number, or a channel."),
+    click.option("--damping", metavar="KIND", help="The same for damping; 0 leaves it out."),
+    click.option("--stiffness", metavar="KIND", help="The same for stiffness."),
+    click.option(
+        "--term",
+        "terms",
+        multiple=True,
+        metavar="TERM[:KIND]",
+        help=f"{', '.join(TERM_NAMES)}; may be repeated; none removes the default offset.",
+    ),
+    click.option(
+        "--instrument",
+        metavar="NAME",
+        help="Channel, or file, that moves the system and that no noise of the others reaches.",
+    ),
+    click.option("--lag", metavar="TIME", help="Delay of the torque: seconds, '2 ms', or auto."),
+    click.option(
+        "--quantisation", type=float, help="Step to which the angle was rounded; estimated if not given; 0: none."
+    ),
+    click.option("--mask", metavar="NAME", help="Channel, or file, that is not zero where a sample may be used."),
+    click.option(
+        "--settings", type=click.Path(), help="Settings of an earlier run: a JSON file that --settings-output wrote."
+    ),
+    click.option(
+        "--nan-policy",
+        type=click.Choice(get_args(arguments.RowPolicy)),
+        default="omit",
+        show_default=True,
+        help="Missing values: omit their equations, propagate to all windows that contain one, or raise.",
+    ),
+)
+"""Everything that decides what is identified; the file comes before it."""
+
+
+def inputs(file: str | None, options: Mapping[str, Any]) -> dict[str, str | None]:
+    """Return the files that are read, by what messages call them."""
+    named = {"the mask": "mask", "the instrument": "instrument", "earlier settings": "settings"}
+    return {
+        RECORDING: file,
+        "the angle": options["angle"],
+        "the torque": options["torque"],
+        **{words: options[name] for words, name in named.items()},
+    }
+
+
+# Options that need work before they are passed on are parameters of their own.
+def identified(
+    channels: recordings.Channels,
+    file: str | None,
+    *,
+    angle: str,
+    torque: str,
+    angle_scale: str | None,
+    torque_scale: str | None,
+    time_channel: str | None,
+    method: str | None,
+    terms: tuple[str, ...],
+    instrument: str | None,
+    lag: str | None,
+    mask: str | None,
+    settings: str | None,
+    progress: bool | None,
+    **options: Any,
+) -> tvident.Identification:
+    """Return what is identified from the channels of a file with these options."""
+    if not check_time(options["sample_rate"], options["delta"], time_channel):
+        raise click.UsageError(
+            "an identification needs the sample period; got none; give --sample-rate, --delta or --time"
+        )
+    of_method = {name: value for name, value in given(options).items() if name in NAMES}
+    return tvident.identify(
+        scaled(source_of(channels, angle, file), angle_scale, channels, file),
+        scaled(source_of(channels, torque, file), torque_scale, channels, file),
+        method=method_of(method, of_method, has_settings=settings is not None),
+        t=None if time_channel is None else channel_of(channels, time_channel, file),
+        instrument=None if instrument is None else source_of(channels, instrument, file),
+        lag=None if lag is None else lag_of(lag),
+        mask=None if mask is None else mask_of(source_of(channels, mask, file)),
+        settings=None if settings is None else _read_settings(settings),
+        terms=terms_of(terms),
+        progress=wanted_progress(progress),
+        **{
+            name: parameter_of(value, channels, file) if name in COEFFICIENTS else value
+            for name, value in given(options).items()
+            if name not in NAMES
+        },
+    )
+
+
+def _read_settings(path: str) -> dict[str, Any]:
+    """Return what an earlier run chose."""
+    place, cure = printable(path), "give a file that --settings-output wrote"
+    kind = Path(path).stat()
+    if not stat.S_ISREG(kind.st_mode) or kind.st_size > _MOST_BYTES:
+        raise recordings.FileError(f"{place}: settings must be a file of at most {_MOST_BYTES} bytes; {cure}")
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise recordings.FileError(f"{place}: holds no settings ({error}); {cure}") from None
+    if not isinstance(content, dict):
+        raise recordings.FileError(f"{place}: holds no settings; {cure}")
+    return content
