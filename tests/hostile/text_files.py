@@ -34,10 +34,10 @@ TOKENS: dict[str, float | None] = {
     "-0,25": -0.25,
     '"1,5"': 1.5,
     "1,234": 1.234,
-    "1.234,5": None,
-    "1,234,567": None,
-    "1'000": None,
-    "1 000": None,
+    "1.234,5": 1234.5,
+    "1,234,567": 1234567.0,
+    "1'000": 1000.0,
+    "1 000": 1000.0,
     "1_000": None,
     "0x10": None,
     "1e999": None,
@@ -107,6 +107,8 @@ def _one_odd_cell(generator: np.random.Generator, path: Path) -> None:
     if found is None:
         return
     meant = TOKENS[token]
+    if meant == TOKENS["1,234"] and decimal == "." and not (np.abs(table) >= 1000).any():
+        meant = 1234.0  # the points of the others are decimal signs, so a comma separates thousands
     if token in {"٣", "\u22121"} and encoding == "latin-1":
         meant = None
     assert meant is not None, f"{token!r} was read: {list(found.values())[column]}"

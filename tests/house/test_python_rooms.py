@@ -16,6 +16,7 @@ CORE = "tvident._core"
 
 ROOMS = (
     "_arguments",
+    "_units",
     "_equation",
     "_status",
     "_files",

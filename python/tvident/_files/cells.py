@@ -11,6 +11,16 @@ Separator = str | None
 
 _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
+_GROUPS = re.compile(
+    r"[+-]?[1-9]\d{0,2}(?:(?P<blank>[ '\u2019\u00a0\u2009\u202f])\d{3}(?:(?P=blank)\d{3})*(?P<behind>[.,]\d*)?"
+    r"|(?:,\d{3})+(?P<point>\.\d*)|(?:\.\d{3})+(?P<comma>,\d*)|(?:,\d{3}){2,}|(?:\.\d{3}){2,})",
+    re.ASCII,
+)
+"""Thousands are separated in groups of three; a single comma or point alone may be a decimal sign."""
+
+_BLANKS = re.compile("[ '\u2019\u00a0\u2009\u202f]")
+
+_ONE_GROUP = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)
 _INFINITE = re.compile(r"([+-]?)(inf|infinity|1\.#inf)", re.IGNORECASE)
 _MISSING = re.compile(r"([+-]?nan|n/?a|#n/a|null|none|[+-]?1\.#(qnan|snan|ind))?", re.IGNORECASE)
 _NOT_A_COMMENT = re.compile(r"#(?=(n/a|div/0|ref!|value!|num!|name\?|null!|qnan|snan|ind|inf)\b)", re.IGNORECASE)
@@ -46,21 +56,62 @@ def hides_numbers(text: str) -> bool:
     return "#" in text and _NOT_A_COMMENT.search(text) is not None
 
 
-def number(cell: str, *, comma: bool) -> float | None:
+def number(cell: str, *, comma: bool, decimal: str | None = None) -> float | None:
     """Return the number in a cell, NaN where it says that there is none, None where it says anything else.
 
-    ``comma`` allows a comma as the decimal sign. A number too large for 64 bits is none.
+    ``comma`` allows a comma as the decimal sign; ``decimal`` says which sign it is, where that is known. A number too large for 64 bits is
+    none.
     """
-    if _POINT.fullmatch(cell):
-        value = float(cell)
-        return value if math.isfinite(value) else None
-    if comma and _COMMA.fullmatch(cell):
-        value = float(cell.replace(",", "."))
+    if not cell:
+        return math.nan
+    plain = _plain(cell, comma=comma, decimal=decimal)
+    if plain is not None:
+        value = float(plain)
         return value if math.isfinite(value) else None
     if _MISSING.fullmatch(cell):
         return math.nan
     infinite = _INFINITE.fullmatch(cell)
     return float(f"{infinite[1]}inf") if infinite else None
+
+
+def _plain(cell: str, *, comma: bool, decimal: str | None) -> str | None:
+    """Return a number with a point and nothing between its digits."""
+    if decimal is not None and decimal not in cell and _ONE_GROUP.fullmatch(cell):
+        return cell.replace(",", "").replace(".", "")
+    if _POINT.fullmatch(cell):
+        return None if decimal == "," and "." in cell else cell
+    if comma and _COMMA.fullmatch(cell):
+        return None if decimal == "." else cell.replace(",", ".")
+    return _grouped(cell, decimal)
+
+
+def _grouped(cell: str, decimal: str | None) -> str | None:
+    """Return a number whose thousands are separated without what separates them, unless its decimal sign is another."""
+    if not _GROUPS.fullmatch(cell):
+        return None
+    sign = decimal_sign(cell)
+    if sign is not None and decimal not in {None, sign}:
+        return None
+    if sign is not None:
+        cell = cell.replace("," if sign == "." else ".", "").replace(",", ".")
+    return _BLANKS.sub("", cell)
+
+
+def decimal_sign(cell: str) -> str | None:
+    """Return the decimal sign that a number shows, "?" where it may as well separate thousands, None where nothing shows one."""
+    if not ("." in cell or "," in cell):
+        return None
+    if _ONE_GROUP.fullmatch(cell):
+        return "?"
+    groups = _GROUPS.fullmatch(cell)
+    if groups is None:
+        return "," if "," in cell else "."
+    behind = groups["behind"]
+    if behind or groups["point"] or groups["comma"]:
+        return behind[0] if behind else "." if groups["point"] else ","
+    if groups["blank"]:
+        return None
+    return "." if "," in cell else ","
 
 
 def is_present(cell: str, *, comma: bool) -> bool:

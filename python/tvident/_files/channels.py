@@ -28,15 +28,15 @@ class FileWarning(UserWarning):
     """Part of a file that is not read, or not as it stands there."""
 
 
-_MOST = 10_000
+MOST_CHANNELS = 10_000
 """Channels of a file. More are samples."""
 
 
 def check_count(channels: int) -> None:
     """Refuse more channels than a recording has."""
-    if channels > _MOST:
+    if channels > MOST_CHANNELS:
         raise FileError(
-            f"a file must have at most {_MOST} channels; this one has {channels}; write one line, or one row, for every sample"
+            f"a file must have at most {MOST_CHANNELS} channels; this one has {channels}; write one line, or one row, for every sample"
         )
 
 

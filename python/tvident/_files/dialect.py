@@ -1,40 +1,31 @@
-"""How a text of columns is written: what separates its cells, where its numbers begin, what its columns are called."""
+"""How a text of columns is written: what separates its cells, where its numbers begin, what its columns hold."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from tvident._files.cells import Separator, is_present, number, split, without_comment
-from tvident._files.channels import FileError, Say, check_count
-from tvident._files.names import listed, printable
+from tvident._files.channels import MOST_CHANNELS, Say, check_count
+from tvident._files.headers import Line, Names
+from tvident._files.names import printable
+from tvident._files.times import instant
 
 _COMPARED = 20
-"""Rows that are looked at to tell one separator from another."""
+"""Rows that are looked at to tell one separator from another, and what columns hold."""
 
 _SEPARATORS: tuple[Separator, ...] = (",", ";", "\t", None)
 """The earlier one where numbers are the same for several."""
 
-_SEARCHED = 100
-"""Lines that are looked at for what makes them odd."""
+_SEARCHED, _SEARCHED_FOR_WORDS = 100, 2000
+"""Lines that are looked at for what makes them odd, and for the first of a table with columns of words."""
 
 _BEGINS_AS_NUMBER = re.compile(r"[+-]?[.,]?[0-9]")
 
-_UNITS = re.compile(
-    r"-|1|%|[\[(].*[\])]|"
-    r"([numkMGµμ]?(s|sec|m|g|N|V|A|Hz|rad|Pa|J|W|bar|N[ ·*.]?m)|deg|degrees|°|°C|K|min|h|rpm|counts|in|ft|lb|cm)"
-    r"([/·*. ]?(s|rad|deg|m|kg|min)([\^²³]?-?\d?))?([\^²³]\d?)?"
-)
-_NAME = re.compile(r"[0-9]+")
-"""A number that may be a name. Others are of a line of numbers in which something is wrong."""
-
-_FRACTION = re.compile(r"0\d+")
-
-_HINT = re.compile(r'"?sep=.?"?', re.IGNORECASE)
-"""What a spreadsheet takes for the separator of what follows."""
-
-CURE = "export the channels as columns of numbers with a point as the decimal sign"
+Kind = Literal["number", "time", "words", "nothing"]
+"""What a column holds in the first lines."""
 
 
 @dataclass(frozen=True)
@@ -50,11 +41,22 @@ class Dialect:
     """In the first line of numbers: more than names where separators end its lines."""
     named: bool
     """Whether the names are from the file."""
+    kinds: tuple[Kind, ...]
+    """Of the columns."""
+    times: dict[int, list[str]]
+    """First cells of the columns that hold times."""
+    decimal: str | None = None
+    """The decimal sign, where it is known."""
 
     @property
     def comma(self) -> bool:
         """Whether a comma may be a decimal sign, since other signs separate cells."""
         return self.separator != "," and self.cells > 1
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether all columns hold numbers."""
+        return not {"time", "words"}.intersection(self.kinds)
 
 
 @dataclass(frozen=True)
@@ -68,13 +70,20 @@ class _Start:
 def dialect_of(lines: Sequence[str], say: Say) -> Dialect | None:
     """Return how the first lines of a text are written, or None where there is no line of numbers."""
     starts = _starts(lines)
-    if not starts:
-        return None
     # Single numbers are lines of numbers only where nothing separates any; of equals the first.
     several = [one for one in starts if len(one.cells) > 1]
-    start = max(several or starts, key=lambda one: one.agree)
-    above = [_Line(index, lines[index], start.separator) for index in range(start.first)]
-    return _Names(start, [line for line in above if line.says_something], say).dialect(lines)
+    start = max(several or starts, key=lambda one: one.agree, default=None) or _with_words(lines)
+    if start is None:
+        return None
+    above = [Line(index, lines[index], start.separator) for index in range(start.first)]
+    found = Names(start.separator, start.cells, [line for line in above if line.says_something], say)
+    check_count(found.least)
+    rows = _rows(lines, start)
+    names = found.found(list(enumerate(lines[start.first :], start.first + 1))[:_SEARCHED])
+    is_named, names = names is not None, names or [str(index) for index in range(len(start.cells))]
+    kinds = tuple(_kind([row[column] for row in rows]) for column in range(len(names)))
+    times = {column: [row[column] for row in rows] for column, kind in enumerate(kinds) if kind == "time"}
+    return Dialect(start.separator, start.first, names, len(start.cells), is_named, kinds, times)
 
 
 def mixed_line(lines: Sequence[str]) -> str:
@@ -82,31 +91,55 @@ def mixed_line(lines: Sequence[str]) -> str:
     for index, line in enumerate(lines[:_SEARCHED]):
         for separator in _SEPARATORS:
             cells = split(line, separator)
-            words = [cell for cell in cells if number(cell, comma=separator != ",") is None]
+            words = [cell for cell in cells if not _is_number(cell)]
             if words and all(_BEGINS_AS_NUMBER.match(cell) for cell in cells if cell):
                 return f"'{printable(words[0], 40)}' in line {index + 1} is no number; "
     return ""
 
 
+def _is_number(cell: str) -> bool:
+    """Return whether a cell holds a number, a time or nothing."""
+    return number(cell, comma=True) is not None or instant(cell) is not None
+
+
 def _starts(lines: Sequence[str]) -> list[_Start]:
-    """Return the first line of numbers for every separator, unless it is far below that for another."""
+    """Return the first line of numbers for every separator, unless it is far below that for another.
+
+    A line that none below agrees with may be a date or a number above the table: the search goes on.
+    """
     found: dict[Separator, _Start] = {}
     last = len(lines)
     for index, line in enumerate(lines):
         if index > last:
             break
         for separator in _SEPARATORS:
-            cells = [] if separator in found else _numbers(line, separator)
-            if cells and not _counts(cells):
-                found[separator] = _start(lines, index, cells, separator)
+            if separator in found and found[separator].agree > 1:
+                continue
+            cells = _numbers(line, separator)
+            if not cells or _counts(cells):
+                continue
+            start = _start(lines, index, cells, separator)
+            if separator not in found or start.agree > found[separator].agree:
+                found[separator] = start
+            if start.agree > 1:
                 last = min(last, index + _COMPARED)
     return [found[separator] for separator in _SEPARATORS if separator in found]
 
 
 def _start(lines: Sequence[str], index: int, cells: list[str], separator: Separator) -> _Start:
     following = [one for one in lines[index : index + 2 * _COMPARED] if without_comment(one).strip()]
-    agree = sum(len(_numbers(one, separator)) == len(cells) for one in following[:_COMPARED])
+    here = [instant(cell) is not None for cell in cells]
+    rows = [_numbers(one, separator) for one in following[:_COMPARED]]
+    agree = sum(len(row) == len(cells) and _are_alike(here, cells, row) for row in rows)
     return _Start(separator, _back(lines, index, separator), cells, agree)
+
+
+def _are_alike(are_times: Sequence[bool], cells: Sequence[str], row: Sequence[str]) -> bool:
+    """Return whether a row has times where other cells have times."""
+    return all(
+        (instant(cell) is not None) == is_time or not (cell and other)
+        for is_time, other, cell in zip(are_times, cells, row, strict=True)
+    )
 
 
 def _counts(cells: list[str]) -> bool:
@@ -120,148 +153,108 @@ def _numbers(line: str, separator: Separator) -> list[str]:
     if not line.strip() or (separator is not None and separator not in line):
         return []
     cells = split(line, separator)
-    # A single number with a comma may be two.
-    comma = separator != "," and len(cells) > 1
-    if any(number(cell, comma=comma) is None for cell in cells):
+    # A single number with a comma may be two, and words of several blanks no thousands.
+    comma = (separator != "," or '"' in line) and len(cells) > 1
+    if any(number(cell, comma=comma) is None and instant(cell) is None for cell in cells):
         return []
-    return cells if any(is_present(cell, comma=comma) for cell in cells) else []
+    return cells if any(_is_present(cell, comma=comma) for cell in cells) else []
+
+
+def _is_present(cell: str, *, comma: bool) -> bool:
+    return is_present(cell, comma=comma) or instant(cell) is not None
 
 
 def _back(lines: Sequence[str], index: int, separator: Separator) -> int:
-    """Return the first of the lines directly above the numbers in which all values are missing."""
-    while index > 0 and separator is not None and separator in lines[index - 1]:
+    """Return the first of the lines directly above the numbers that belong to them.
+
+    In these all values are missing, or words stand in columns that are empty below: remarks about the first rows.
+    """
+    if separator is None:
+        return index
+    width = len(split(lines[index], separator))
+    below = [
+        cells for cells in (split(line, separator) for line in lines[index : index + _COMPARED]) if len(cells) == width
+    ]
+    kinds = [_kind([row[column] for row in below]) for column in range(width)]
+    while index > 0 and separator in lines[index - 1] and not lines[index - 1].lstrip().startswith("#"):
         cells = split(lines[index - 1], separator)
-        if any(number(cell, comma=True) is None or is_present(cell, comma=True) for cell in cells):
+        are_missing = all(number(cell, comma=True) is not None and not is_present(cell, comma=True) for cell in cells)
+        if not are_missing and not _has_remark(cells, kinds):
             break
         index -= 1
     return index
 
 
-class _Line:
-    """A line above the numbers."""
-
-    def __init__(self, index: int, text: str, separator: Separator) -> None:
-        self.place = index + 1
-        self.is_comment = not without_comment(text).strip()
-        bare = text.lstrip("# ") if self.is_comment else text
-        self.says_something = any(one.isalnum() for one in bare) and not _HINT.fullmatch(bare.strip())
-        self.cells = split(bare, separator)
-        while self.cells and not self.cells[-1]:
-            self.cells.pop()
-
-    def names(self, most: int, least: int) -> list[str]:
-        """Return its cells if they are as many as columns: with, or without empty ones."""
-        every = self.cells
-        present = [cell for cell in every if cell]
-        if least <= len(every) <= most:
-            return every
-        return present if least <= len(present) <= most else []
-
-
-class _Names:
-    """Finds the names of columns in the lines above the numbers."""
-
-    def __init__(self, start: _Start, above: Sequence[_Line], say: Say) -> None:
-        self.start = start
-        self.above = above
-        self.say = say
-        self.most = len(start.cells)
-        self.least = max(index for index, cell in enumerate(start.cells) if cell) + 1
-
-    def dialect(self, lines: Sequence[str]) -> Dialect:
-        check_count(self.least)
-        start = self.start
-        names = self._found()
-        if names is None:
-            self._check_no_fractions(lines)
-            return Dialect(start.separator, start.first, [str(i) for i in range(self.most)], self.most, named=False)
-        return Dialect(start.separator, start.first, self._different(names), self.most, named=True)
-
-    def _found(self) -> list[str] | None:
-        """Return the names that stand nearest above the numbers, with units where these have a line of their own."""
-        said = False
-        for index in reversed(range(len(self.above))):
-            line = self.above[index]
-            names = line.names(self.most, self.least)
-            if names:
-                return self._with_units(self.above[index - 1] if index else None, line, names)
-            if not line.is_comment and not said:
-                self._check_no_numbers(line)
-                said = True
-        return None
-
-    def _check_no_numbers(self, nearest: _Line) -> None:
-        """Refuse a line that is no names: too few numbers, or too few names where a comma may be what makes numbers more."""
-        words, comma = len(nearest.cells), self.start.separator != ","
-        if all(number(cell, comma=comma) is not None for cell in nearest.cells):
-            raise FileError(
-                f"every line must have {self.most} cells; line {nearest.place} has {words}; repair it, or begin it with #"
-            )
-        if self.start.separator == ",":
-            raise FileError(
-                f"the line above the numbers must name every column; line {nearest.place} has {words}, and there are "
-                f"{self.most}; {CURE} and one name for each, and begin lines that are not read with #"
-            )
-        self.say(
-            f"line {nearest.place} is not read as names: it has {words} cells, and the lines of numbers {self.most}"
-        )
-
-    def _check_no_fractions(self, lines: Sequence[str]) -> None:
-        """Refuse numbers without names that are as likely one number with a decimal comma."""
-        if self.start.separator != ",":
-            return
-        rows = [split(line, ",") for line in lines[self.start.first : self.start.first + _SEARCHED] if line.strip()]
-        if all(cell.isdecimal() for row in rows for cell in row):
-            self.say("every comma separates two numbers; where it is the decimal sign, write points")
-        for place, line in enumerate(lines[self.start.first : self.start.first + _SEARCHED], self.start.first + 1):
-            suspect = next((cell for cell in split(line, ",")[1::2] if _FRACTION.fullmatch(cell)), None)
-            if suspect is not None and self.most % 2 == 0:
-                raise FileError(
-                    f"without names of columns no number may begin with 0 as '{printable(suspect, 40)}' in line {place}, "
-                    f"which may follow a decimal comma; {CURE}, and a first line that names them"
-                )
-
-    def _with_units(self, above: _Line | None, line: _Line, names: list[str]) -> list[str]:
-        """Return names from the lines nearest to the numbers: the lower one may hold units, and no numbers."""
-        upper = [] if above is None else above.names(self.most, self.least)
-        comma = self.start.separator != ","
-        if len(upper) == len(names) and all(_UNITS.fullmatch(cell) for cell in names if cell):
-            bare = [cell.strip("[]()") for cell in names]
-            return [f"{name} [{unit}]" if unit else name for name, unit in zip(upper, bare, strict=True)]
-        if any(is_present(cell, comma=comma) for cell in names):
-            if len(upper) == len(names) or not all(
-                _NAME.fullmatch(one) for one in names if is_present(one, comma=comma)
-            ):
-                words = [one for one in names if number(one, comma=comma) is None]
-                raise FileError(not_a_number(line.place, None, (words or names)[0]))
-            self.say(f"line {line.place} is read as names of columns: {listed(names)}")
-        elif above is not None and len(upper) == len(names) and above.place == line.place - 1:
-            self.say(
-                f"line {above.place} is not read as names: they are in line {line.place}, and it holds no known units"
-            )
-        return names
-
-    def _different(self, names: Sequence[str]) -> list[str]:
-        """Return names that differ: without one the number of the column, of equal ones the later with a number."""
-        given, found, again = set(names), dict[str, None](), []
-        for index, name in enumerate(names):
-            bare = name or (f"column_{index}" if str(index) in given else str(index))
-            unique, count = bare, 1
-            while unique in found or (count > 1 and unique in given):
-                count += 1
-                unique = f"{bare}_{count}"
-            if count > 1:
-                again.append(f"column {index} is called {printable(unique, 40)}")
-            found[unique] = None
-        if again:
-            self.say(f"several columns have one name: {listed(again)}")
-        return list(found)
-
-
-def not_a_number(place: int, name: str | None, cell: str) -> str:
-    """Return the message about a cell that holds no number."""
-    column = "" if name is None else f" in column '{printable(name, 40)}'"
+def _has_remark(cells: Sequence[str], kinds: Sequence[Kind]) -> bool:
+    """Return whether cells are a row below which some columns are empty that hold words here."""
+    if len(cells) != len(kinds):
+        return False
+    here = [_kind([cell]) for cell in cells]
+    fits = all(one in {"nothing", kind} or kind == "nothing" for one, kind in zip(here, kinds, strict=True))
+    counts = [one for one in here if one != "nothing"]
     return (
-        f"line {place} must hold numbers; it has '{printable(cell, 40)}'{column}; write 1234.5 without separators of "
-        f"thousands, leave the cell empty where a value is missing, and begin comments with #"
+        fits
+        and any(one in {"number", "time"} and kind == one for one, kind in zip(here, kinds, strict=True))
+        and "words" in counts
     )
+
+
+def _with_words(lines: Sequence[str]) -> _Start | None:
+    """Return the first line of a table in which some columns hold words: remarks, states, names."""
+    best: _Start | None = None
+    for separator in _SEPARATORS:
+        # Words of a sentence are separated by blanks, too.
+        least = 2 if separator is not None else 3
+        for index in range(min(len(lines), _SEARCHED_FOR_WORDS)):
+            if separator is not None and separator not in lines[index]:
+                continue
+            start = _start_with_words(lines, index, separator)
+            if start is not None and start.agree >= least and start.agree > (0 if best is None else best.agree):
+                best = start
+            if best is not None and best.agree >= _COMPARED:
+                return best
+    return best
+
+
+def _start_with_words(lines: Sequence[str], index: int, separator: Separator) -> _Start | None:
+    cells = split(without_comment(lines[index]), separator)
+    if not 1 < len(cells) <= MOST_CHANNELS or not any(map(_is_number, cells)):
+        return None
+    start = _Start(separator, index, cells, 0)
+    rows = _rows(lines, start)
+    kinds = [_kind([row[column] for row in rows]) for column in range(len(cells))]
+    if not {"number", "time"}.intersection(kinds):
+        return None
+    for column, kind in enumerate(kinds):
+        present = [row[column] for row in rows if row[column]]
+        if kind == "words" and (any(map(_is_number, present)) or all(map(_BEGINS_AS_NUMBER.match, present))):
+            return None
+    return _Start(separator, index, cells, len(rows))
+
+
+def _rows(lines: Sequence[str], start: _Start) -> list[list[str]]:
+    """Return the cells of the first rows of a table, up to one of another length."""
+    rows: list[list[str]] = []
+    for line in lines[start.first : start.first + 2 * _COMPARED]:
+        bare = without_comment(line)
+        if not bare.strip():
+            continue
+        cells = split(bare, start.separator)
+        if len(cells) != len(start.cells) or len(rows) == _COMPARED:
+            break
+        rows.append(cells)
+    return rows or [start.cells]
+
+
+def _kind(cells: Sequence[str]) -> Kind:
+    """Return what the cells of a column are: by the first that holds something, words if any are."""
+    kinds: list[Kind] = []
+    for cell in cells:
+        if is_present(cell, comma=True):
+            kinds.append("number")
+        elif number(cell, comma=True) is None:
+            kinds.append("time" if instant(cell) else "words")
+    if not kinds:
+        return "nothing"
+    # One odd cell among numbers is an error of that line.
+    return "words" if all(kind == "words" for kind in kinds) else next(kind for kind in kinds if kind != "words")

@@ -9,12 +9,13 @@ from pathlib import Path
 
 from tvident._files.arrays import read_npy, read_npz
 from tvident._files.channels import Channels, FileError, FileWarning
-from tvident._files.dialect import CURE
+from tvident._files.headers import CURE
+from tvident._files.instrument_text import read_labview, read_opensim
 from tvident._files.matlab import read_matlab
 from tvident._files.names import printable
 from tvident._files.text import read_text
 
-TEXT, NUMPY, MATLAB = (".csv", ".txt", ".tsv", ".dat"), (".npy", ".npz"), (".mat",)
+TEXT, NUMPY, MATLAB = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm", ".mot", ".sto"), (".npy", ".npz"), (".mat",)
 """Endings of files that can be read."""
 
 
@@ -72,9 +73,12 @@ def read(path: str | Path) -> Channels:
     the name where the file has them there. Text costs some 0.2 µs a number, NPY and NPZ next to nothing, MATLAB files half a second for a
     process of their own, since a damaged one can crash its reader.
 
-    In text the line above the numbers names every column; a line of units may follow it. Numbers may be in quotes. A comma is a decimal
-    sign where semicolons, tabs or blanks separate cells. An empty cell, ``nan``, ``NA`` or ``null`` is a missing value. Comments begin
-    with #.
+    In text the line above the numbers names every column; a line of units may stand beside it. Numbers may be in quotes. A comma is a
+    decimal sign where semicolons, tabs or blanks separate cells, or numbers are in quotes. Thousands may be separated (``1,234.5``,
+    ``1 234``); where a sign may be either, the other numbers of the file decide, or it is refused. Times (``12:30:00.5``,
+    ``2024-12-31T12:30:00``) become seconds: of the day, or since the first where there are dates. Columns of words are not read, which is
+    said. An empty cell, ``nan``, ``NA`` or ``null`` is a missing value. Comments begin with #. Files of LabVIEW (``.lvm``) and OpenSim
+    (``.mot``, ``.sto``) have the units of their headers.
 
     See Also
     --------
@@ -90,7 +94,14 @@ def read(path: str | Path) -> Channels:
     """
     path = Path(path)
     place = printable(path)
-    readers = dict.fromkeys(TEXT, read_text) | {".npy": read_npy, ".npz": read_npz, ".mat": read_matlab}
+    readers = dict.fromkeys(TEXT, read_text) | {
+        ".npy": read_npy,
+        ".npz": read_npz,
+        ".mat": read_matlab,
+        ".lvm": read_labview,
+        ".mot": read_opensim,
+        ".sto": read_opensim,
+    }
     check_readable(path, readers)
     said: list[str] = []
     try:

@@ -5,14 +5,18 @@ from __future__ import annotations
 import io
 import math
 import re
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tvident._files.cells import hides_numbers, is_present, number, split, without_comment
+from tvident._files.cells import decimal_sign, hides_numbers, is_present, number, split, without_comment
 from tvident._files.channels import FileError, Say
-from tvident._files.dialect import CURE, Dialect, not_a_number
+from tvident._files.dialect import Dialect
+from tvident._files.headers import CURE, not_a_number
 from tvident._files.names import printable
+from tvident._files.times import TimeColumn, instant
 
 Numbers = npt.NDArray[np.float64]
 
@@ -25,7 +29,22 @@ _CLEARLY_POINTS = re.compile(r"(?<!\d)0?\.\d|\d{4}\.|\.\d{0,2}(?!\d)|\.\d{4}")
 _MOST_WORDS = 20
 """Lines of words that may stand below the numbers."""
 
+_STATISTICS = re.compile(
+    r"(min|max|mean|average|avg|median|std|stddev|sd|rms|sum|total|count|n)[. ]*[:=]?", re.IGNORECASE
+)
+"""What spreadsheets write before numbers below the others."""
+
+_TIMES = re.compile(r"\d+[-./:]\d+[-./:][\d.,:]+")
+
 _BLANK_LINE = re.compile(r"(^|\n)[ \t]*\n")
+
+
+class OtherDecimalSignError(Exception):
+    """What separates thousands was read as the decimal sign: the text is to be read again, with this one."""
+
+    def __init__(self, sign: str) -> None:
+        super().__init__(sign)
+        self.sign = sign
 
 
 class Rows:
@@ -42,12 +61,15 @@ class Rows:
         self._words: tuple[int, str] | None = None
         """First line of words below the numbers: the end of the table, if no numbers follow."""
         self._words_end = 0
-        self._points = self._commas = 0
+        self._signs = {".": 0, ",": 0}
         """First line that has a number with this decimal sign."""
-        self._is_decimal = False
-        self._may_be_thousands = False
-        """A point was found, and all of them may separate thousands."""
-        self._are_points = dialect.separator != ";"
+        self._doubtful = {".": 0, ",": 0}
+        """First line that has a number in which this sign may as well separate thousands."""
+        self._remarks = {column: "" for column, kind in enumerate(dialect.kinds) if kind == "words"}
+        """Where columns of words have their first, and the word."""
+        self._numbers: set[int] = set()
+        """Columns without anything in the first lines that have numbers further below."""
+        self.times = {column: TimeColumn(cells) for column, cells in dialect.times.items()}
 
     def skip(self, lines: int) -> None:
         self._line += lines
@@ -62,21 +84,27 @@ class Rows:
         lines = text.count("\n")
         if found is None:
             found = self._line_by_line(text.split("\n")[: lines + 1])
-        if not self._are_points and "." in text:
-            self._are_points = _CLEARLY_POINTS.search(text) is not None
-            self._may_be_thousands = True
         self._line += lines
         return found
 
+    @property
+    def dropped(self) -> set[int]:
+        """Columns that hold words."""
+        return set(self._remarks)
+
     def finish(self) -> None:
         """Check what only the whole text shows, and say what was not read."""
-        if self._commas and not self._is_decimal:
-            raise FileError(
-                f"a comma in line {self._commas} may be a decimal sign or separate thousands, as all others in this file; {CURE}"
-            )
-        if self._may_be_thousands and not self._are_points:
+        if self._dialect.decimal is None:
+            self._check_signs()
+        for column, times in self.times.items():
+            if times.is_doubtful:
+                raise FileError(
+                    f"dates must say what is the day and what the month; those of column '{printable(self._dialect.names[column], 40)}' do "
+                    f"not, as '{times.first}'; write 2024-12-31"
+                )
+        for column, remark in sorted(self._remarks.items()):
             self._say(
-                "every point has three digits behind it; it is read as the decimal sign, not as a separator of thousands"
+                f"column '{printable(self._dialect.names[column], 40)}': not read, it holds words{remark and ': ' + remark}"
             )
         if self._words is not None:
             first, words = self._words
@@ -85,20 +113,25 @@ class Rows:
 
     def _in_bulk(self, text: str) -> Numbers | None:
         """Return the rows of a text that holds nothing but numbers, None where something else may be in it."""
-        has_points, has_commas = "." in text, self._dialect.comma and "," in text
-        if (has_points or self._points) and (has_commas or self._commas):
+        d = self._dialect
+        has = {".": "." in text, ",": d.comma and "," in text}
+        was = {sign: bool(self._signs[sign] or self._doubtful[sign]) for sign in ".,"}
+        if any((has[one] or was[one]) and (has[other] or d.decimal == other) for one, other in (".,", ",.")):
             return None  # to find the lines
-        if has_commas:
-            self._is_decimal |= _CLEARLY_DECIMAL.search(text) is not None
-            text = text.replace(",", ".")
-        found = self._without_empty_cells(text)
+        bare = text if d.is_plain else _TIMES.sub("", text)
+        found = self._without_empty_cells(text.replace(",", ".") if has[","] else text)
         # A number too large for 64 bits becomes infinite there.
         if found is None or np.isinf(found).any():
             return None
-        if has_commas:
-            self._commas = self._commas or self._line + 1
-        elif has_points and self._dialect.comma:
-            self._points = self._points or self._line + 1
+        for sign, is_clear in ((".", _CLEARLY_POINTS), (",", _CLEARLY_DECIMAL)):
+            if has[sign] and d.comma:
+                known = self._signs if is_clear.search(bare) else self._doubtful
+                known[sign] = known[sign] or self._line + 1
+        for column, kind in enumerate(d.kinds):
+            if kind == "nothing" and np.isfinite(found[:, column]).any():
+                if column in self._remarks:
+                    return None  # to find the line
+                self._numbers.add(column)
         return found
 
     def _without_empty_cells(self, text: str) -> Numbers | None:
@@ -124,10 +157,18 @@ class Rows:
                 delimiter=self._dialect.separator,
                 comments="#" if "#" in text else None,
                 quotechar='"' if '"' in text else None,
+                converters=self._converters(),
                 ndmin=2,
             )
         except (ValueError, UserWarning):
             return None
+
+    def _converters(self) -> dict[int | str, Callable[[str], Any]] | None:
+        """Return what turns cells of times and words into numbers."""
+        if self._dialect.is_plain:
+            return None
+        found: dict[int | str, Callable[[str], Any]] = {column: times.seconds for column, times in self.times.items()}
+        return found | dict.fromkeys(self._remarks, _no_number)
 
     def _line_by_line(self, lines: list[str]) -> Numbers:
         rows = []
@@ -163,7 +204,17 @@ class Rows:
 
     def _plain(self, line: str, cells: list[str]) -> list[float] | None:
         """Return the numbers of a line without anything unusual in it."""
-        if len(cells) != self._width or "_" in line or not line.isascii() or (self._dialect.comma and "," in line):
+        d = self._dialect
+        if (
+            len(cells) != self._width
+            or "_" in line
+            or not line.isascii()
+            or not d.is_plain
+            or d.decimal
+            or "nothing" in d.kinds
+        ):
+            return None
+        if d.comma and ("," in line or "." in line):
             return None
         try:
             values = [float(cell) if cell else math.nan for cell in cells]
@@ -171,16 +222,17 @@ class Rows:
             return None
         if any(map(math.isinf, values)):
             return None
-        if self._dialect.comma and "." in line:
-            return None if self._commas or not self._points else values
         return values
 
     def _is_end(self, cells: list[str]) -> bool:
         """Return whether a line may stand below the numbers: words first, and not a row in which one number is wrong."""
-        comma = self._dialect.comma
-        if not cells or number(cells[0], comma=comma) is not None:
+        if not cells or number(cells[0], comma=True) is not None or instant(cells[0]) is not None:
             return False
-        return len(cells) != self._width or not any(is_present(cell, comma=comma) for cell in cells)
+        if _STATISTICS.fullmatch(cells[0]):
+            return True
+        if len(cells) != self._width:
+            return True
+        return 0 not in self._remarks and not any(is_present(cell, comma=True) for cell in cells)
 
     def _check_width(self, place: int, line: str, cells: list[str]) -> None:
         if len(cells) == self._width:
@@ -201,27 +253,79 @@ class Rows:
             )
 
     def _cell_by_cell(self, place: int, cells: list[str]) -> list[float]:
-        values = []
-        for name, cell in zip(self._dialect.names, cells, strict=True):
-            value = number(cell, comma=self._dialect.comma)
-            if value is None:
-                raise FileError(not_a_number(place, name, cell))
-            if self._dialect.comma and math.isfinite(value):
-                self._note_sign(place, cell)
-            values.append(value)
-        return values
+        return [self._cell(place, column, cell) for column, cell in enumerate(cells)]
+
+    def _cell(self, place: int, column: int, cell: str) -> float:
+        d = self._dialect
+        if column in self.times:
+            try:
+                return self.times[column].seconds(cell)
+            except ValueError:
+                raise FileError(not_a_time(place, d.names[column], cell)) from None
+        value = number(cell, comma=d.cells > 1, decimal=d.decimal)
+        if d.kinds[column] == "nothing":
+            self._note_remark(place, column, value)
+        if column in self._remarks:
+            if cell and not self._remarks[column]:
+                self._remarks[column] = f"'{printable(cell, 40)}' in line {place}"
+            return math.nan
+        if value is None:
+            raise FileError(not_a_number(place, d.names[column], cell))
+        if math.isfinite(value):
+            self._note_sign(place, cell)
+        return value
+
+    def _note_remark(self, place: int, column: int, value: float | None) -> None:
+        """Keep what a column that began empty holds: words or numbers, not both."""
+        if value is not None and math.isnan(value):
+            return
+        if value is None and column not in self._numbers:
+            self._remarks.setdefault(column, "")
+        elif value is not None and column in self._remarks:
+            raise FileError(not_a_number(place, self._dialect.names[column], self._remarks[column]))
+        elif value is not None:
+            self._numbers.add(column)
 
     def _note_sign(self, place: int, cell: str) -> None:
         """Keep which decimal sign numbers have; both in one file may be separators of thousands."""
-        if "," in cell:
-            self._commas = self._commas or place
-            self._is_decimal |= _CLEARLY_DECIMAL.search(cell) is not None
-        elif "." in cell:
-            self._points = self._points or place
-        if self._commas and self._points:
+        sign = decimal_sign(cell)
+        if sign is None:
+            return
+        if sign == "?":
+            sign = "," if "," in cell else "."
+            self._doubtful[sign] = self._doubtful[sign] or place
+        else:
+            self._signs[sign] = self._signs[sign] or place
+        if self._signs["."] and self._signs[","]:
             raise FileError(
-                f"numbers must have one decimal sign; line {self._commas} has a comma and line {self._points} a point; {CURE}"
+                f"numbers must have one decimal sign; line {self._signs[',']} has a comma and line {self._signs['.']} a point; {CURE}"
             )
+
+    def _check_signs(self) -> None:
+        """Find the decimal sign of numbers in which it may separate thousands, from the others."""
+        for sign, other in (".,", ",."):
+            if self._signs[sign] and self._doubtful[other]:
+                raise OtherDecimalSignError(sign)
+        if self._doubtful[","] and not self._signs[","]:
+            raise FileError(
+                f"a comma in line {self._doubtful[',']} may be a decimal sign or separate thousands, as all others in this file; {CURE}"
+            )
+        if self._dialect.separator == ";" and self._doubtful["."] and not self._signs["."]:
+            self._say(
+                "every point has three digits behind it; it is read as the decimal sign, not as a separator of thousands"
+            )
+
+
+def not_a_time(place: int, name: str, cell: str) -> str:
+    """Return the message about a cell of a column of times."""
+    return (
+        f"line {place} must hold a time in column '{printable(name, 40)}', as the lines above; it has '{printable(cell, 40)}'; write "
+        f"12:30:00.5 or 2024-12-31T12:30:00.5"
+    )
+
+
+def _no_number(_: str) -> float:
+    return math.nan
 
 
 def check_text(text: str, lines: int) -> None:

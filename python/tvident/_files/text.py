@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import TextIO
+from typing import TextIO, TypeVar
 
 import numpy as np
 
 from tvident._files.channels import Channels, FileError, Say
-from tvident._files.dialect import CURE, Dialect, dialect_of, mixed_line
-from tvident._files.rows import Numbers, Rows, check_text
+from tvident._files.dialect import Dialect, dialect_of, mixed_line
+from tvident._files.headers import CURE
+from tvident._files.names import printable
+from tvident._files.rows import Numbers, OtherDecimalSignError, Rows, check_text
+from tvident._units import named_unit, with_unit
+
+Content = TypeVar("Content")
 
 _HEAD, _PIECE = 1 << 20, 1 << 22
 """Characters in which the numbers must begin; characters that are read at once: an interrupt is heard between."""
@@ -29,6 +35,16 @@ _COMPRESSED = {
 
 def read_text(path: Path, say: Say) -> Channels:
     """Read columns of numbers, with or without names, separated by commas, semicolons, tabs or blanks."""
+    return _decoded(path, lambda encoding: _with_decimal_sign(path, encoding, say))
+
+
+def read_whole(path: Path) -> str:
+    """Return a text of which all must be known before it can be read."""
+    return _decoded(path, lambda encoding: path.read_text(encoding=encoding))
+
+
+def _decoded(path: Path, read: Callable[[str], Content]) -> Content:
+    """Read a text in the alphabet that it is written in."""
     with path.open("rb") as file:
         start = file.read(8)
     for magic, kind in _COMPRESSED.items():
@@ -41,38 +57,57 @@ def read_text(path: Path, say: Say) -> Channels:
             encodings = (encoding, encoding)
             break
     try:
-        return _read(path, encodings[0], say)
+        return read(encodings[0])
     except UnicodeError:
         if encodings[0] == encodings[1]:
             raise FileError(
                 f"a text that begins as {encodings[0]} must end so; it does not; save it as UTF-8"
             ) from None
-        return _read(path, encodings[1], say)
+        return read(encodings[1])
 
 
-def _read(path: Path, encoding: str, say: Say) -> Channels:
+def _with_decimal_sign(path: Path, encoding: str, say: Say) -> Channels:
     with path.open(encoding=encoding) as file:
-        head = file.read(_HEAD)
-        rest = file.readline(_LONGEST_LINE) if head and not head.endswith("\n") else ""
-        if len(rest) >= _LONGEST_LINE:
-            _refuse_long_line(head.count("\n") + 1)
-        head += rest
-        check_text(head, 0)
-        lines = head.split("\n")
-        longest = max(range(len(lines)), key=lambda index: len(lines[index]))
-        if len(lines[longest]) > _LONGEST_LINE:
-            _refuse_long_line(longest + 1)
-        dialect = dialect_of(lines, say)
-        if dialect is None:
-            if head.strip():
-                raise FileError(f"holds no numbers; {mixed_line(lines)}{CURE}")
-            return {}
-        rows = Rows(dialect, say)
-        rows.skip(dialect.first)
-        parts = [rows.read("\n".join(lines[dialect.first :]))]
-        parts += [rows.read(piece) for piece in _pieces(file, head.count("\n"))]
-        rows.finish()
-    return _columns(dialect, parts)
+        return read_columns(file, say)
+
+
+def read_columns(file: TextIO, say: Say) -> Channels:
+    """Read a text, and again where only its end shows which sign separates thousands."""
+    said: list[str] = []
+    try:
+        channels = _read(file, None, said.append)
+    except OtherDecimalSignError as found:
+        said = []
+        file.seek(0)
+        channels = _read(file, found.sign, said.append)
+    for message in said:
+        say(message)
+    return channels
+
+
+def _read(file: TextIO, decimal: str | None, say: Say) -> Channels:
+    head = file.read(_HEAD)
+    rest = file.readline(_LONGEST_LINE) if head and not head.endswith("\n") else ""
+    if len(rest) >= _LONGEST_LINE:
+        _refuse_long_line(head.count("\n") + 1)
+    head += rest
+    check_text(head, 0)
+    lines = head.split("\n")
+    longest = max(range(len(lines)), key=lambda index: len(lines[index]))
+    if len(lines[longest]) > _LONGEST_LINE:
+        _refuse_long_line(longest + 1)
+    dialect = dialect_of(lines, say)
+    if dialect is None:
+        if head.strip():
+            raise FileError(f"holds no numbers; {mixed_line(lines)}{CURE}")
+        return {}
+    dialect = replace(dialect, decimal=decimal)
+    rows = Rows(dialect, say)
+    rows.skip(dialect.first)
+    parts = [rows.read("\n".join(lines[dialect.first :]))]
+    parts += [rows.read(piece) for piece in _pieces(file, head.count("\n"))]
+    rows.finish()
+    return _columns(dialect, parts, rows, say)
 
 
 def _refuse_long_line(place: int) -> None:
@@ -96,11 +131,10 @@ def _pieces(file: TextIO, lines: int) -> Iterator[str]:
         yield carried
 
 
-def _columns(dialect: Dialect, parts: list[Numbers]) -> Channels:
+def _columns(dialect: Dialect, parts: list[Numbers], rows: Rows, say: Say) -> Channels:
     """Return rows as columns, each in one piece of memory."""
-    rows = sum(part.shape[0] for part in parts)
     width = len(dialect.names)
-    columns = np.empty((width, rows))
+    columns = np.empty((width, sum(part.shape[0] for part in parts)))
     start = 0
     while parts:
         part = parts.pop(0)
@@ -110,4 +144,11 @@ def _columns(dialect: Dialect, parts: list[Numbers]) -> Channels:
         # A separator at the end of every line makes no column.
         while width > 1 and np.isnan(columns[width - 1]).all():
             width -= 1
-    return dict(zip(dialect.names[:width], columns, strict=False))
+    names = list(dialect.names)
+    for column, times in rows.times.items():
+        columns[column], turns = times.unwrapped(columns[column])
+        since = f"since {times.first}" if times.is_dated else "of a clock"
+        again = f", which began again {turns} times and goes on here" if turns else ""
+        say(f"column '{printable(names[column], 40)}' holds times: read as seconds {since}{again}")
+        names[column] = with_unit(named_unit(names[column])[0], "s")
+    return {names[column]: columns[column] for column in range(width) if column not in rows.dropped}

@@ -1,0 +1,184 @@
+"""What columns of numbers are called: the lines above the numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from tvident._files.cells import Separator, is_present, number, split, without_comment
+from tvident._files.channels import FileError, Say
+from tvident._files.names import listed, printable
+from tvident._units import is_unit, named_unit, with_unit
+
+CURE = "export the channels as columns of numbers with a point as the decimal sign"
+
+_SEARCHED = 100
+"""Lines that are looked at for what makes them odd."""
+
+_NAME = re.compile(r"[0-9]+")
+"""A number that may be a name. Others are of a line of numbers in which something is wrong."""
+
+_FRACTION = re.compile(r"0\d+")
+
+_HINT = re.compile(r'"?sep=.?"?', re.IGNORECASE)
+"""What a spreadsheet takes for the separator of what follows."""
+
+_TYPE = re.compile(r"(u?int|float|single|double|real|bool|byte|word|string|str|text|number|[iuf])\d*", re.IGNORECASE)
+"""What a column holds, rather than what it is called."""
+
+
+class Line:
+    """A line above the numbers."""
+
+    def __init__(self, index: int, text: str, separator: Separator) -> None:
+        self.place = index + 1
+        self.is_comment = not without_comment(text).strip()
+        bare = text.lstrip("# ") if self.is_comment else text
+        self.says_something = any(one.isalnum() for one in bare) and not _HINT.fullmatch(bare.strip())
+        self.cells = split(bare, separator)
+        while self.cells and not self.cells[-1]:
+            self.cells.pop()
+
+    def names(self, most: int, least: int) -> list[str]:
+        """Return its cells if they are as many as columns: with, or without empty ones."""
+        every = self.cells
+        present = [cell for cell in every if cell]
+        if least <= len(every) <= most:
+            return every
+        return present if least <= len(present) <= most else []
+
+
+class Names:
+    """Finds the names of columns in the lines above the numbers."""
+
+    def __init__(self, separator: Separator, cells: Sequence[str], above: Sequence[Line], say: Say) -> None:
+        """Take the cells of the first line of numbers, and the lines above it that say something."""
+        self.separator = separator
+        self.above = above
+        self.say = say
+        self.most = len(cells)
+        self.least = max(index for index, cell in enumerate(cells) if cell) + 1
+
+    def found(self, numbers: Sequence[tuple[int, str]]) -> list[str] | None:
+        """Return the names of columns, which differ, or None where the file has none; lines of numbers come with their place."""
+        names = self._found()
+        if names is None:
+            self._check_no_fractions(numbers)
+            return None
+        return self._different(names)
+
+    def _found(self) -> list[str] | None:
+        """Return the names that stand nearest above the numbers, with units where these have a line of their own."""
+        said = False
+        for index in reversed(range(len(self.above))):
+            line = self.above[index]
+            names = line.names(self.most, self.least)
+            if names:
+                return self._of_block(index, names)
+            if not line.is_comment and not said:
+                self._check_no_numbers(line)
+                said = True
+        return None
+
+    def _of_block(self, last: int, nearest: list[str]) -> list[str]:
+        """Return names from the lines that have a cell for every column: names, units, types, and what is neither."""
+        self._check_nearest(last, nearest)
+        block = [(self.above[last], nearest)]
+        for line in reversed(self.above[:last]):
+            cells = line.names(self.most, self.least)
+            if not cells or any(is_present(one, comma=self.separator != ",") for one in cells):
+                break
+            block.append((line, cells))
+        width = max(len(cells) for _, cells in block)
+        block = [(line, cells + [""] * (width - len(cells))) for line, cells in block]
+        units = next((one for one in block if _are_units(one[1])), None) if len(block) > 1 else None
+        rest = [one for one in block if one is not units]
+        named = [one for one in rest if not all(_TYPE.fullmatch(cell) for cell in one[1] if cell)] or rest
+        differing = [one for one in named if len({cell for cell in one[1] if cell}) == sum(map(bool, one[1]))]
+        line, names = (differing or named)[0]
+        for other, cells in rest:
+            if other is not line and abs(other.place - line.place) <= len(block):
+                why = "" if units else ", and it holds no known units"
+                self.say(
+                    f"line {other.place} is not read as names: they are in line {line.place}{why}: '{printable(', '.join(cells), 60)}'"
+                )
+        if units is None:
+            return names
+        return [_with_unit(name, unit) for name, unit in zip(names, units[1], strict=True)]
+
+    def _check_nearest(self, last: int, names: list[str]) -> None:
+        """Refuse a line of numbers in which something is wrong."""
+        line, comma = self.above[last], self.separator != ","
+        above = self.above[last - 1].names(self.most, self.least) if last else []
+        if not any(is_present(cell, comma=comma) for cell in names):
+            return
+        if above or not all(_NAME.fullmatch(one) for one in names if is_present(one, comma=comma)):
+            words = [one for one in names if number(one, comma=comma) is None]
+            raise FileError(not_a_number(line.place, None, (words or names)[0]))
+        self.say(f"line {line.place} is read as names of columns: {listed(names)}")
+
+    def _check_no_numbers(self, nearest: Line) -> None:
+        """Refuse a line that is no names: too few numbers, or too few names where a comma may be what makes numbers more."""
+        words, comma = len(nearest.cells), self.separator != ","
+        if all(number(cell, comma=comma) is not None for cell in nearest.cells):
+            raise FileError(
+                f"every line must have {self.most} cells; line {nearest.place} has {words}; repair it, or begin it with #"
+            )
+        if self.separator == ",":
+            raise FileError(
+                f"the line above the numbers must name every column; line {nearest.place} has {words}, and there are "
+                f"{self.most}; {CURE} and one name for each, and begin lines that are not read with #"
+            )
+        self.say(
+            f"line {nearest.place} is not read as names: it has {words} cells, and the lines of numbers {self.most}"
+        )
+
+    def _check_no_fractions(self, lines: Sequence[tuple[int, str]]) -> None:
+        """Refuse numbers without names that are as likely one number with a decimal comma."""
+        if self.separator != ",":
+            return
+        rows = [split(line, ",") for _, line in lines[:_SEARCHED] if line.strip()]
+        if all(cell.isdecimal() for row in rows for cell in row):
+            self.say("every comma separates two numbers; where it is the decimal sign, write points")
+        for place, line in lines[:_SEARCHED]:
+            suspect = next((cell for cell in split(line, ",")[1::2] if _FRACTION.fullmatch(cell)), None)
+            if suspect is not None and self.most % 2 == 0:
+                raise FileError(
+                    f"without names of columns no number may begin with 0 as '{printable(suspect, 40)}' in line {place}, "
+                    f"which may follow a decimal comma; {CURE}, and a first line that names them"
+                )
+
+    def _different(self, names: Sequence[str]) -> list[str]:
+        """Return names that differ: without one the number of the column, of equal ones the later with a number."""
+        given, found, again = set(names), dict[str, None](), []
+        for index, name in enumerate(names):
+            bare = name or (f"column_{index}" if str(index) in given else str(index))
+            unique, count = bare, 1
+            while unique in found or (count > 1 and unique in given):
+                count += 1
+                unique = f"{bare}_{count}"
+            if count > 1:
+                again.append(f"column {index} is called {printable(unique, 40)}")
+            found[unique] = None
+        if again:
+            self.say(f"several columns have one name: {listed(again)}")
+        return list(found)
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    return all(map(is_unit, cells)) and any(one.isalpha() or one in "°%" for cell in cells for one in cell)
+
+
+def _with_unit(name: str, unit: str) -> str:
+    """Return a name with the unit of another line, unless it has one itself."""
+    bare = unit.strip("[](){}<>").strip()
+    return name if named_unit(name)[1] else with_unit(name, bare)
+
+
+def not_a_number(place: int, name: str | None, cell: str) -> str:
+    """Return the message about a cell that holds no number."""
+    column = "" if name is None else f" in column '{printable(name, 40)}'"
+    return (
+        f"line {place} must hold numbers; it has '{printable(cell, 40)}'{column}; write 1234.5 without separators of "
+        f"thousands, leave the cell empty where a value is missing, and begin comments with #"
+    )

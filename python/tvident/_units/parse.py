@@ -1,0 +1,90 @@
+"""A unit as a header writes it: ``N·m``, ``Nmm``, ``in-lb``, ``deg/s``, ``kg m^2``."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+
+from tvident._units.symbols import LONGEST, NONE, SYMBOLS, Dimension
+
+_LONGEST_TEXT = 60
+
+_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+_RAISED = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+")
+_SAME = str.maketrans(
+    {"µ": "u", "μ": "u", "·": " ", "⋅": " ", "∙": " ", "•": " ", "\u00d7": " ", "*": " ", "º": "°", "˚": "°"}
+)
+
+_FACTOR = re.compile(r"([A-Za-z°%]+)(?:\^?\(?([+-]?[1-9])\)?)?")
+_BETWEEN = re.compile(r"\s*([/.]|-(?=[A-Za-z]))?\s*")
+
+_NO_UNIT = frozenset(("", "-", "--", "1", "none", "n/a", "a.u.", "[]", "()"))
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit: its factor to kg, m, s and rad, and the powers of these."""
+
+    factor: float
+    dimension: Dimension
+
+
+def is_unit(text: str) -> bool:
+    """Return whether a cell of a header can be a unit, or says that there is none."""
+    bare = text.strip().strip("[](){}<>").strip()
+    return bare.lower() in _NO_UNIT or unit_of(bare) is not None
+
+
+@lru_cache(maxsize=256)
+def unit_of(text: str) -> Unit | None:
+    """Return the unit that a text stands for, or None where it is none that is known."""
+    if len(text) > _LONGEST_TEXT:
+        return None
+    raised = _RAISED.sub(lambda found: "^" + found[0].translate(_SUPERSCRIPTS), text)
+    plain = raised.replace("**", "^").translate(_SAME).strip().strip("[]{}<>").strip()
+    if plain.startswith("(") and plain.endswith(")"):
+        plain = plain[1:-1].strip()
+    return _product(plain)
+
+
+def _product(text: str) -> Unit | None:
+    """Read factors from left to right; what stands in brackets behind a slash divides as a whole."""
+    factor, dimension, place, sign = 1.0, NONE, 0, 1
+    if text.startswith("1/"):
+        place, sign = 2, -1
+    while place < len(text):
+        if text[place] == "(":
+            end = text.find(")", place)
+            inner = _product(text[place + 1 : end]) if end > 0 else None
+            if inner is None:
+                return None
+            place = end + 1
+        else:
+            found = _FACTOR.match(text, place)
+            inner = None if found is None else _symbols(found[1], int(found[2] or 1))
+            if found is None or inner is None:
+                return None
+            place = found.end()
+        factor *= inner.factor**sign
+        dimension = tuple(a + sign * b for a, b in zip(dimension, inner.dimension, strict=True))
+        between = _BETWEEN.match(text, place)
+        if between is None or (place < len(text) and between.end() == place and text[place] != "("):
+            return None
+        place, sign = between.end(), -1 if between[1] == "/" else 1
+        if between[1] and place == len(text):
+            return None
+    return Unit(factor, dimension) if text else None
+
+
+def _symbols(word: str, power: int) -> Unit | None:
+    """Return one symbol, or several that are written without anything between: Nm, kgm2. The power is of the last."""
+    if word in SYMBOLS:
+        factor, dimension = SYMBOLS[word]
+        return Unit(factor**power, tuple(power * one for one in dimension))
+    for length in range(min(len(word) - 1, LONGEST), 0, -1):
+        rest = _symbols(word[length:], power) if word[:length] in SYMBOLS else None
+        if rest is not None:
+            factor, dimension = SYMBOLS[word[:length]]
+            return Unit(factor * rest.factor, tuple(a + b for a, b in zip(dimension, rest.dimension, strict=True)))
+    return None

@@ -1,0 +1,96 @@
+"""What an angle and a torque may be measured in, and the systems of units that results have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from tvident._units.parse import Unit, unit_of
+from tvident._units.symbols import GRAVITY, NONE, Dimension
+
+
+class UnitError(ValueError):
+    """A unit that cannot be converted."""
+
+
+_ANGLE, _LENGTH, _TIME = (0, 0, 0, 1, *NONE[4:]), (0, 1, *NONE[2:]), (0, 0, 1, *NONE[3:])
+_TORQUE, _FORCE = (1, 2, -2, *NONE[3:]), (1, 1, -2, *NONE[3:])
+_WEIGHT_ON_AN_ARM = (1, 1, *NONE[2:])
+"""kg cm, in-lb: what a mass weighs, on an arm."""
+
+
+@dataclass(frozen=True)
+class System:
+    """Units of a moving axis: of what is recorded, and of what follows."""
+
+    name: str
+    units: Mapping[str, str]
+    """Of position, effort and time."""
+    dimensions: Mapping[str, Dimension] = field(repr=False)
+
+
+ROTARY = System(
+    "rotary", {"angle": "rad", "torque": "N m", "time": "s"}, {"angle": _ANGLE, "torque": _TORQUE, "time": _TIME}
+)
+LINEAR = System(
+    "linear", {"angle": "m", "torque": "N", "time": "s"}, {"angle": _LENGTH, "torque": _FORCE, "time": _TIME}
+)
+
+_EXAMPLES = {
+    "rad": "rad, mrad, deg, rev",
+    "N m": "N m, N mm, kN m, in lbf",
+    "m": "m, mm, in",
+    "N": "N, kN, lbf",
+    "s": "s, ms, min",
+}
+
+
+def system_of(angle: str | None, torque: str | None) -> System:
+    """Return the system that the units of an angle and a torque belong to: linear where either says so, rotary otherwise."""
+    for text, quantity in ((angle, "angle"), (torque, "torque")):
+        unit = None if not text else unit_of(text)
+        if unit is not None and unit.dimension == LINEAR.dimensions[quantity]:
+            return LINEAR
+    return ROTARY
+
+
+def factor_to(system: System, quantity: str, text: str | None, *, name: str) -> float:
+    """Return what a channel is multiplied by to be in the unit of a system.
+
+    Parameters
+    ----------
+    system : System
+        Of the axis.
+    quantity : {"angle", "torque", "time"}
+        What the channel holds.
+    text : str or None
+        Its unit; none: that of the system.
+    name : str
+        What messages call it.
+
+    Raises
+    ------
+    UnitError
+        If the unit is unknown, or of another quantity.
+    """
+    if not text:
+        return 1.0
+    wanted = system.units[quantity]
+    unit = unit_of(text)
+    cure = f"write one of {_EXAMPLES[wanted]}, or give {quantity}_unit='{wanted}' if the numbers are in {wanted}"
+    if unit is None:
+        raise UnitError(f"the unit of {name} must be one that is known; got {text!r}; {cure}")
+    factor = _in(unit, system.dimensions[quantity])
+    if not math.isfinite(factor):
+        raise UnitError(f"{name} must be in a unit that can be converted to {wanted}; got {text!r}; {cure}")
+    return factor
+
+
+def _in(unit: Unit, dimension: Dimension) -> float:
+    """Return the factor to a dimension, NaN where a unit has another."""
+    if unit.dimension == dimension:
+        return unit.factor
+    if dimension == _TORQUE and unit.dimension == _WEIGHT_ON_AN_ARM:
+        return unit.factor * GRAVITY
+    return math.nan

@@ -1,0 +1,88 @@
+"""Units that recordings of mechanical systems are written in: their factors and dimensions."""
+
+from __future__ import annotations
+
+import math
+
+Dimension = tuple[int, ...]
+"""Powers of kg, m, s, rad, V, A, K and counts."""
+
+NONE: Dimension = (0,) * 8
+
+_MASS, _LENGTH, _TIME, _ANGLE, _VOLT, _AMPERE, _KELVIN, _COUNT = (
+    tuple(int(place == base) for place in range(8)) for base in range(8)
+)
+_FORCE, _TORQUE, _POWER = (1, 1, -2, *NONE[3:]), (1, 2, -2, *NONE[3:]), (1, 2, -3, *NONE[3:])
+_PRESSURE, _RATE = (1, -1, -2, *NONE[3:]), (0, 0, -1, *NONE[3:])
+
+GRAVITY = 9.80665
+"""Standard gravity, m/s²: what makes a weight of a mass."""
+
+_POUND, _INCH = 0.45359237, 0.0254
+
+_PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6}
+
+_WITH_PREFIX: dict[str, tuple[float, Dimension]] = {
+    "rad": (1.0, _ANGLE),
+    "m": (1.0, _LENGTH),
+    "s": (1.0, _TIME),
+    "sec": (1.0, _TIME),
+    "g": (1e-3, _MASS),
+    "N": (1.0, _FORCE),
+    "Pa": (1.0, _PRESSURE),
+    "J": (1.0, _TORQUE),
+    "W": (1.0, _POWER),
+    "Hz": (1.0, _RATE),
+    "V": (1.0, _VOLT),
+    "A": (1.0, _AMPERE),
+}
+
+_ALONE: dict[tuple[str, ...], tuple[float, Dimension]] = {
+    ("radian", "radians"): (1.0, _ANGLE),
+    ("deg", "degree", "degrees", "°"): (math.pi / 180, _ANGLE),
+    ("Nms",): (1.0, (1, 2, -1, *NONE[3:])),
+    ("gon",): (math.pi / 200, _ANGLE),
+    ("arcmin",): (math.pi / 10_800, _ANGLE),
+    ("arcsec",): (math.pi / 648_000, _ANGLE),
+    ("rev", "revs", "revolution", "revolutions", "turn", "turns"): (2 * math.pi, _ANGLE),
+    ("rpm",): (math.pi / 30, (0, 0, -1, 1, *NONE[4:])),
+    ("meter", "meters", "metre", "metres"): (1.0, _LENGTH),
+    ("in", "inch", "inches"): (_INCH, _LENGTH),
+    ("ft", "foot", "feet"): (12 * _INCH, _LENGTH),
+    ("second", "seconds", "secs"): (1.0, _TIME),
+    ("millisecond", "milliseconds", "msecs"): (1e-3, _TIME),
+    ("microsecond", "microseconds"): (1e-6, _TIME),
+    ("nanosecond", "nanoseconds"): (1e-9, _TIME),
+    ("min", "minute", "minutes"): (60.0, _TIME),
+    ("h", "hr", "hour", "hours"): (3600.0, _TIME),
+    ("lb", "lbs", "lbm"): (_POUND, _MASS),
+    ("oz",): (_POUND / 16, _MASS),
+    ("newton", "newtons", "Newton", "Newtons"): (1.0, _FORCE),
+    ("lbf",): (_POUND * GRAVITY, _FORCE),
+    ("ozf",): (_POUND / 16 * GRAVITY, _FORCE),
+    ("kgf", "kp"): (GRAVITY, _FORCE),
+    ("gf",): (1e-3 * GRAVITY, _FORCE),
+    ("dyn",): (1e-5, _FORCE),
+    ("bar",): (1e5, _PRESSURE),
+    ("psi",): (_POUND * GRAVITY / _INCH**2, _PRESSURE),
+    ("volt", "volts", "Volt", "Volts"): (1.0, _VOLT),
+    ("ampere", "amperes", "amp", "amps", "Amps"): (1.0, _AMPERE),
+    ("K",): (1.0, _KELVIN),
+    ("°C", "°F", "degC", "degF"): (math.nan, _KELVIN),
+    ("counts", "count", "cts", "ticks", "LSB", "digits"): (1.0, _COUNT),
+    ("%",): (0.01, NONE),
+}
+
+SYMBOLS: dict[str, tuple[float, Dimension]] = {
+    **{symbol: value for symbols, value in _ALONE.items() for symbol in symbols},
+    **{
+        prefix + symbol: (factor * value, dimension)
+        for symbol, (value, dimension) in _WITH_PREFIX.items()
+        for prefix, factor in {"": 1.0, **_PREFIXES}.items()
+    },
+}
+"""Factor to kg, m, s, rad, and powers of these, by symbol. The tests compare every factor with Pint's."""
+for _odd in ("dN", "dA", "cs", "ds", "ks", "Ms", "csec", "dsec", "ksec", "Msec", "Mm", "crad", "drad", "krad", "Mrad"):
+    del SYMBOLS[_odd]  # nobody measures in these, and words would be read as them
+
+LONGEST = max(map(len, SYMBOLS))

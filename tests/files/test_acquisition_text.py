@@ -1,0 +1,181 @@
+"""Text as acquisition software writes it: no name, row or unit is lost, and what is dropped is said."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tvident import recordings
+
+GERMAN = """Messung 1
+Datum: 05.01.2024
+
+Zeit;Winkel;Drehmoment;Bemerkung
+s;°;Nm;
+0,000;1.234,50;-0,5;Start
+0,001;1,5;-0,25;
+0,002;2,5;1,0;
+
+Ende der Messung
+"""
+
+LABVIEW = """LabVIEW Measurement\t
+Separator\tTab
+Decimal_Separator\t.
+X_Columns\tOne
+***End_of_Header***\t
+\t
+Channels\t2\t\t
+Samples\t3\t3\t
+Date\t2024/01/05\t2024/01/05\t
+Y_Unit_Label\tdeg\tN·m\t
+X_Dimension\tTime\tTime\t
+X0\t0.0E+0\t0.0E+0\t
+Delta_X\t0.001000\t0.001000\t
+***End_of_Header***\t\t\t
+X_Value\tAngle\tTorque\tComment
+0.000000\t1.5\t2.0\t
+0.001000\t2.5\t3.0\t
+0.002000\t3.5\t4.0\t
+"""
+
+OPENSIM = """Coordinates
+version=1
+nRows=2
+nColumns=4
+inDegrees=yes
+endheader
+time\tknee_angle_r\tpelvis_tx\tknee_moment
+0.0\t10\t0.5\t1
+0.01\t11\t0.6\t2
+"""
+
+
+def read(path: Path) -> tuple[dict[str, list[float]], str]:
+    """Give the channels, and all that was said."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        found = {name: values.tolist() for name, values in recordings.read(path).items()}
+    return found, "; ".join(str(one.message) for one in said)
+
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("content", "expected", "said"),
+    [
+        (
+            GERMAN,
+            {"Zeit [s]": [0, 0.001, 0.002], "Winkel [°]": [1234.5, 1.5, 2.5], "Drehmoment [Nm]": [-0.5, -0.25, 1]},
+            "'Bemerkung': not read, it holds words: 'Start' in line 6; .*line 10 below the numbers: not read",
+        ),
+        (
+            "Time,A\ns,deg\nfloat,float\n0,1\n1,2\n",
+            {"Time [s]": [0, 1], "A [deg]": [1, 2]},
+            "line 3 is not read as names",
+        ),
+        (
+            "Group,Group\nTime,A\ns,deg\n0,1\n1,2\n",
+            {"Time [s]": [0, 1], "A [deg]": [1, 2]},
+            "line 1 is not read as names",
+        ),
+        ("s,deg\nTime,A\n0,1\n1,2\n", {"Time [s]": [0, 1], "A [deg]": [1, 2]}, "^$"),
+        ("t,note\n0,on\n1,on\n2,off\n", {"t": [0, 1, 2]}, "column 'note': not read, it holds words"),
+        ("t,x,note\n0,1,start\n1,2,\n2,3,\n", {"t": [0, 1, 2], "x": [1, 2, 3]}, "column 'note': not read"),
+        (
+            "t,x,note\n0,1,\n" + "1,2,\n" * 30 + "2,3,end\n",
+            {"t": [0, *[1] * 30, 2], "x": [1, *[2] * 30, 3]},
+            "'end' in line 33",
+        ),
+        ("Rate,1000\nt,x,note\n0,1,ok\n1,2,ok\n", {"t": [0, 1], "x": [1, 2]}, "column 'note': not read"),
+        (
+            "Time,x\n23:59:59.5,1\n00:00:00.25,2\n",
+            {"Time [s]": [86399.5, 86400.25], "x": [1, 2]},
+            "began again 1 times",
+        ),
+        ("Time,x\n59:59.5,1\n00:00.25,2\n", {"Time [s]": [3599.5, 3600.25], "x": [1, 2]}, "began again 1 times"),
+        (
+            "t,x\n2024-01-05T12:00:00.000000Z,1\n2024-01-05T12:00:00.000001Z,\n",
+            {"t [s]": [0, 1e-6], "x": [1, NAN]},
+            "seconds since 2024-01-05T12",
+        ),
+        (
+            "t;x\n05.01.2024 12:00:00,123;1,5\n05.01.2024 12:00:00,124;1,25\n",
+            {"t [s]": [0, 1e-3], "x": [1.5, 1.25]},
+            "since",
+        ),
+        ("t,x\n1/5/2024 11:59:59.5 AM,1\n1/5/2024 12:00:00.5 PM,2\n", {"t [s]": [0, 1], "x": [1, 2]}, "since"),
+        ("t,x\n1/13/2024,1\n1/14/2024,2\n", {"t [s]": [0, 86400], "x": [1, 2]}, "since"),
+        ("2024-01-05 12:00:00\nt x\n0 1\n1 2\n2 3\n", {"t": [0, 1, 2], "x": [1, 2, 3]}, "line 1 is not read as names"),
+        ('a,b\n"1,5","2,5"\n"2,5","3,5"\n', {"a": [1.5, 2.5], "b": [2.5, 3.5]}, "^$"),
+        ('t,x\n0,"1,234.5"\n1,"2,345"\n', {"t": [0, 1], "x": [1234.5, 2345]}, "^$"),
+        ("t;x\n0;1,000,000\n1;2\n", {"t": [0, 1], "x": [1e6, 2]}, "^$"),
+        ("t;x\n0;1\n1;-2.000,5\n", {"t": [0, 1], "x": [1, -2000.5]}, "^$"),
+        ("t;x\n0;1,234\n1;2,5\n", {"t": [0, 1], "x": [1.234, 2.5]}, "^$"),
+        ("t;x\n0;1,234\n1;2.5\n", {"t": [0, 1], "x": [1234, 2.5]}, "^$"),
+        ("t;x\n0;1.234\n1;2,5\n", {"t": [0, 1], "x": [1234, 2.5]}, "^$"),
+        ("a,b\n1,2\n1 000,1'000.5\n", {"a": [1, 1000], "b": [2, 1000.5]}, "^$"),
+        ("t,x\n0,1\n1,3\nMean,0.5,2\n", {"t": [0, 1], "x": [1, 3]}, "line 4 below the numbers: not read"),
+    ],
+)
+def test_nothing_is_lost_and_what_is_dropped_is_said(
+    tmp_path: Path, content: str, expected: dict[str, list[float]], said: str
+) -> None:
+    for encoding in ("utf-8", "utf-16", "latin-1"):
+        (tmp_path / "x.csv").write_bytes(content.encode(encoding))
+        found, messages = read(tmp_path / "x.csv")
+        assert list(found) == list(expected)
+        for name, values in expected.items():
+            np.testing.assert_array_equal(found[name], values)
+        assert re.search(said, messages), messages
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("t,x\n0,1.5 V\n1,1.6 V\n", "'1.5 V' in line 2 is no number"),
+        ("t,x\n01/05/2024,1\n01/06/2024,2\n", "must say what is the day and what the month"),
+        ("t,x\n12:00:00,1\n12,2\n", "line 3 must hold a time in column 't'"),
+        ("t,x\n0,1\n12:00:00,2\n", "line 3 must hold numbers; it has '12:00:00'"),
+        ("t,x,y\n" + "0,1,\n" * 25 + "0,1,2\n0,1,bad\n", "line 28 must hold numbers; it has 'bad' in column 'y'"),
+        ("t;x\n0;1,234\n1;1.234\n", "a comma in line 2 may be a decimal sign"),
+        ("t;x\n0;1.234,5\n1;2.5\n", "one decimal sign; line 2 has a comma and line 3 a point"),
+    ],
+)
+def test_what_may_mean_two_things_is_refused(tmp_path: Path, content: str, message: str) -> None:
+    (tmp_path / "x.csv").write_text(content)
+    with pytest.raises(recordings.FileError, match=message):
+        recordings.read(tmp_path / "x.csv")
+
+
+def test_measurements_of_labview(tmp_path: Path) -> None:
+    path = tmp_path / "x.lvm"
+    path.write_text(LABVIEW)
+    expected = {"X_Value [s]": [0, 0.001, 0.002], "Angle [deg]": [1.5, 2.5, 3.5], "Torque [N·m]": [2, 3, 4]}
+    assert read(path) == (expected, "")
+    numbers = LABVIEW.partition("Comment\n")[2]
+    path.write_text(LABVIEW.replace(numbers, "\t1.5\t2\t\n\t2.5\t3\t\n\t3.5\t4\t\n"))
+    assert read(path)[0] == expected
+    path.write_text(LABVIEW + "\nChannels" + LABVIEW.partition("Channels")[2].replace("X0\t0.0", "X0\t0.003"))
+    found, said = read(path)
+    assert found["Angle [deg]"] == [1.5, 2.5, 3.5] * 2
+    assert "2 segments are read one after the other" in said
+    path.write_text(LABVIEW[: LABVIEW.index("X0")])
+    with pytest.raises(recordings.FileError, match="must have two headers"):
+        recordings.read(path)
+
+
+def test_motions_of_opensim(tmp_path: Path) -> None:
+    path = tmp_path / "x.mot"
+    path.write_text(OPENSIM)
+    found, _ = read(path)
+    assert list(found) == ["time [s]", "knee_angle_r [deg]", "pelvis_tx [m]", "knee_moment [N m]"]
+    assert found["knee_angle_r [deg]"] == [10, 11]
+    path.write_text(OPENSIM.replace("nRows=2", "nRows=3"))
+    with pytest.raises(recordings.FileError, match="it says nrows=3, and there are 2; copy it again"):
+        recordings.read(path)
