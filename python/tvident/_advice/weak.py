@@ -29,6 +29,18 @@ _WEAK = (
 )
 """Why nothing else is chosen; measured as docs/automatic.md says."""
 
+_PERIODS = (2 * math.pi, math.pi, 360.0, 180.0, 1.0, *(2.0**bits for bits in range(8, 25)))
+"""Periods of wrapped angles: a turn or half of one in rad, degrees and turns, and encoders' counts."""
+
+_NEAR = 0.1
+"""A wrapped angle jumps by its period less what it moves in one sample, which is at most this part of the period."""
+
+
+def _period(jump: float) -> float:
+    """Return the period of an angle that jumps so far."""
+    near = [one for one in _PERIODS if (1 - _NEAR) * one <= jump <= (1 + _NEAR / 2) * one]
+    return min(near, key=lambda one: abs(one - jump), default=jump)
+
 
 @dataclass(frozen=True)
 class Explained:
@@ -170,7 +182,7 @@ class Explained:
                     f"both channels, or give lag={late:.3g} (seconds)"
                 )
             else:
-                cure = f"jumps by {amount:.4g} rad: it is wrapped, give numpy.unwrap(angle, period={amount:.4g})"
+                cure = f"jumps by {amount:.4g} rad: it is wrapped, give period={_period(amount):.8g}, or the period that it has"
             words.append(f"the {name} {cure}")
         return words
 

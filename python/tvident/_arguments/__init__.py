@@ -15,12 +15,14 @@ from tvident._arguments.progress import Progress, reporter
 from tvident._arguments.sampling import check_power, check_window, length_given, sample_period, seconds, window_length
 from tvident._arguments.shown import shown
 from tvident._arguments.workers import worker_count
+from tvident._arguments.wrapped import Unwrapped, unwrapped
 
 __all__ = [
     "LARGEST",
     "NanPolicy",
     "Progress",
     "RowPolicy",
+    "Unwrapped",
     "along_axis",
     "any_array",
     "check_nan",
@@ -39,6 +41,7 @@ __all__ = [
     "sample_period",
     "seconds",
     "shown",
+    "unwrapped",
     "whole_number",
     "window_length",
     "worker_count",

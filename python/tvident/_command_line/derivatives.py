@@ -16,6 +16,7 @@ from tvident._command_line.channels import channel_of
 from tvident._command_line.group import main
 from tvident._command_line.options import (
     CRITERION,
+    PERIOD,
     PICTURE,
     RECORDING,
     RESULTS,
@@ -25,6 +26,7 @@ from tvident._command_line.options import (
     check_time,
     given,
     length,
+    period_of,
     wanted_progress,
 )
 from tvident._command_line.output import figures_on_file, give, save_figure
@@ -46,6 +48,7 @@ from tvident._status import describe
 @click.option(
     "--selection", type=click.Choice(get_args(Selection)), help="Whose criterion: the window's, or its neighbours' too."
 )
+@PERIOD
 @click.option("--quantisation", type=float, help="Step that the channel was rounded to; looked for if not given.")
 @click.option("--max-deriv", type=int, default=2, show_default=True, help="Highest derivative.")
 @click.option(
@@ -63,6 +66,7 @@ def derivatives(
     sample_rate: float | None,
     delta: float | None,
     time_channel: str | None,
+    period: str | None,
     output: str | None,
     plot: str | None,
     progress: bool | None,  # noqa: FBT001 - click passes options by name
@@ -80,14 +84,15 @@ def derivatives(
         delta=delta,
         sample_rate=sample_rate,
         t=times,
+        period=period_of(period),
         progress=wanted_progress(progress),
         **given(options),
     )
-    period = arguments.sample_period(samples.size, delta=delta, sample_rate=sample_rate, t=times)
+    seconds = arguments.sample_period(samples.size, delta=delta, sample_rate=sample_rate, t=times)
     start = 0.0 if times is None else float(times[0])
     step = int(options["step"])
     names = ["value", *(f"derivative_{d}" for d in range(1, fit.derivatives.shape[0]))]
-    columns: dict[str, npt.NDArray[Any]] = {"time": start + np.arange(0, samples.size, step) * period}
+    columns: dict[str, npt.NDArray[Any]] = {"time": start + np.arange(0, samples.size, step) * seconds}
     for name, values, errors in zip(names, fit.derivatives, fit.stderr, strict=True):
         columns |= {name: values, f"{name}_stderr": errors}
     columns |= {"sigma": fit.sigma, "order": fit.order, "status": fit.status}
@@ -95,6 +100,11 @@ def derivatives(
     orders = ", ".join(f"{order}: {count / fit.order.size:.0%}" for order, count in enumerate(counts) if count)
     windows = ", ".join(str(length) for length in np.atleast_1d(fit.window_length))
     words = [f"{samples.size} samples, windows of {windows}; orders {orders}", "", *describe(fit.status)]
+    if splits := fit.settings.get("splits"):
+        words.append(
+            f"{len(splits)} gaps do not say how often the angle went round in them, the first before sample {splits[0]}: from there on "
+            "the value may be wrong by whole periods"
+        )
     give(columns, {"time": "s"}, "\n".join(words), output)
     if plot is not None:
         save_figure(figures_on_file().plot_derivatives(columns["time"], fit, channel), Path(plot))

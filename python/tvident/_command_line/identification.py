@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 import click
+import numpy as np
 
 import tvident
 from tvident import _arguments as arguments
@@ -16,7 +17,17 @@ from tvident import recordings
 from tvident._command_line.channels import channel_of, mask_of, scaled, source_of
 from tvident._command_line.equation import lag_of, parameter_of, terms_of
 from tvident._command_line.method import METHOD, NAMES, method_of
-from tvident._command_line.options import CHANNELS, RECORDING, TIME, check_time, given, options_of, wanted_progress
+from tvident._command_line.options import (
+    CHANNELS,
+    PERIOD,
+    RECORDING,
+    TIME,
+    check_time,
+    given,
+    options_of,
+    period_of,
+    wanted_progress,
+)
 from tvident._equation import COEFFICIENTS, TERM_NAMES
 from tvident._files import printable
 
@@ -25,6 +36,7 @@ _MOST_BYTES = 100_000_000
 
 IDENTIFICATION = options_of(
     CHANNELS,
+    PERIOD,
     TIME,
     METHOD,
     click.option("--inertia", metavar="KIND", help="auto, constant, windowed, varying, a known number, or a channel."),
@@ -81,6 +93,7 @@ def identified(
     torque: str,
     angle_scale: str | None,
     torque_scale: str | None,
+    period: str | None,
     time_channel: str | None,
     method: str | None,
     terms: tuple[str, ...],
@@ -97,12 +110,14 @@ def identified(
             "an identification needs the sample period; got none; give --sample-rate, --delta or --time"
         )
     of_method = {name: value for name, value in given(options).items() if name in NAMES}
+    turn = None if period is None else scaled(np.asarray(period_of(period)), angle_scale, channels, file)
     return tvident.identify(
         scaled(source_of(channels, angle, file), angle_scale, channels, file),
         scaled(source_of(channels, torque, file), torque_scale, channels, file),
         method=method_of(method, of_method, has_settings=settings is not None),
         t=None if time_channel is None else channel_of(channels, time_channel, file),
         instrument=None if instrument is None else source_of(channels, instrument, file),
+        period=None if turn is None else abs(float(turn)),
         lag=None if lag is None else lag_of(lag),
         mask=None if mask is None else mask_of(source_of(channels, mask, file)),
         settings=None if settings is None else _read_settings(settings),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
@@ -35,6 +36,12 @@ CHANNELS = options_of(
     click.option("--torque-scale", metavar="SCALE", help="Number or variable to multiply the torque by."),
 )
 
+PERIOD = click.option(
+    "--period",
+    metavar="PERIOD",
+    help="Period of a wrapped angle, in the unit of the file: 360, or 2pi; it is unwrapped.",
+)
+
 TIME = options_of(
     click.option("--sample-rate", type=float, help="Samples per second."),
     click.option("--delta", type=float, help="Sample period in seconds."),
@@ -62,6 +69,22 @@ CRITERION = click.option(
 def length(text: str) -> int | str:
     """Return a number of samples, or a duration as it is."""
     return int(text) if text.strip().lstrip("+-").isdigit() else text
+
+
+def period_of(text: str | None) -> float | None:
+    """Return a period from a number, or from a multiple of π such as ``2pi``."""
+    if text is None:
+        return None
+    number, of_pi, rest = text.strip().lower().replace("π", "pi").partition("pi")
+    try:
+        value = float(number or (of_pi and 1))
+    except ValueError:
+        value = math.nan
+    if rest or not (math.isfinite(value) and value > 0):
+        raise click.UsageError(
+            f"--period must be a number above zero, or a multiple of pi such as 2pi; got {text!r}; repair it"
+        )
+    return value * math.pi if of_pi else value
 
 
 def given(options: dict[str, Any]) -> dict[str, Any]:

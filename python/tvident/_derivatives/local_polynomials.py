@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import get_args
+from typing import Any, get_args
 
 import numpy.typing as npt
 
@@ -29,6 +29,7 @@ def fit_local_polynomials(
     max_deriv: int = 2,
     axis: int = -1,
     step: int = 1,
+    period: float | None = None,
     nan_policy: arguments.NanPolicy = "propagate",
     quantisation: float | None = None,
     workers: int | None = None,
@@ -73,6 +74,11 @@ def fit_local_polynomials(
     step : int, optional
         Every how many samples an estimate is wanted: the same numbers as ``[::step]`` of all of them, to rounding. From a tenth of
         a window on each window is projected by itself and the cost is that of the windows that are wanted; below, the bits are the same.
+    period : float, optional
+        Period of a wrapped angle in the unit of `y`: 2π or 360. Whole periods are added first so that steps are the shortest that are
+        possible. A sample after a step of 0.4 to 0.6 periods, which may go either way, counts as missing. ``settings["splits"]`` lists the
+        samples after gaps that do not say how often the angle went round in them: there the value, not its derivatives, may be
+        wrong by whole periods.
     nan_policy : {"propagate", "raise"}, optional
         ``"propagate"``: windows that contain a value that is not finite are NaN, and no others. ``"raise"``: raise an error.
     quantisation : float, optional
@@ -92,9 +98,9 @@ def fit_local_polynomials(
     Raises
     ------
     ValueError
-        If the window is even, shorter than 5 samples or longer than the record, if an order is too high, if `t` is not uniform, or
-        if a name is unknown. With ``"auto"``, if the record has fewer than 64 samples, if no order reaches `max_deriv`, or if
-        `criterion` or `selection` is given.
+        If the window is even, shorter than 5 samples or longer than the record, if an order is too high, if `t` is not uniform, if
+        `y` spans more than one and a half of `period`, or if a name is unknown. With ``"auto"``, if the record has fewer than 64
+        samples, if no order reaches `max_deriv`, or if `criterion` or `selection` is given.
     TypeError
         If `y` is complex or holds no numbers, or a number is not whole.
 
@@ -154,7 +160,7 @@ def fit_local_polynomials(
     array = arguments.real_array("y", y)
     samples = arguments.along_axis("y", array, axis)
     count = samples.shape[-1]
-    period = arguments.sample_period(count, delta=delta, sample_rate=sample_rate, t=t)
+    seconds = arguments.sample_period(count, delta=delta, sample_rate=sample_rate, t=t)
     arguments.one_of("criterion", criterion, get_args(Criterion))
     arguments.one_of("selection", selection, get_args(Selection))
     arguments.check_nan("y", array, nan_policy)
@@ -162,7 +168,7 @@ def fit_local_polynomials(
     order = None if order is None else arguments.whole_number("order", order, least=0, most=HIGHEST_ORDER)
     # Derivatives above the highest order are zero.
     max_deriv = arguments.whole_number("max_deriv", max_deriv, least=0, most=HIGHEST_ORDER)
-    arguments.check_power("max_deriv", max_deriv, period)
+    arguments.check_power("max_deriv", max_deriv, seconds)
     every = arguments.whole_number("step", step, least=1)
     threads = arguments.worker_count(workers)
     automatic = isinstance(window_length, str) and window_length.strip() == "auto"
@@ -170,9 +176,12 @@ def fit_local_polynomials(
     if automatic:
         _check_left_to_the_rule(criterion, selection)
     else:
-        length = arguments.window_length("window_length", window_length, period, odd=True)
+        length = arguments.window_length("window_length", window_length, seconds, odd=True)
         arguments.check_window("window_length", length, count, least=SHORTEST_WINDOW)
+    # Whole periods need not be multiples of the step.
     step_of_rounding = quantisation_step(samples, quantisation)
+    turned = None if period is None else arguments.unwrapped("y", samples, period)
+    samples = samples if turned is None else turned.values
 
     def plan_of_window(length: int) -> _core.LocalPolynomials:
         return plan(
@@ -182,7 +191,7 @@ def fit_local_polynomials(
             criterion=criterion,
             selection=selection,
             derivatives=tuple(range(max_deriv + 1)),
-            delta=period,
+            delta=seconds,
             noise=True,
             quantisation=step_of_rounding,
         )
@@ -195,12 +204,13 @@ def fit_local_polynomials(
                 max_deriv=max_deriv,
                 max_order=max_order,
                 order=order,
-                delta=period,
-                quantisation=None if quantisation is None else step_of_rounding,
+                delta=seconds,
+                quantisation=None if quantisation is None and turned is None else step_of_rounding,
                 step=every,
                 workers=threads,
                 progress=report,
             )
+            found.settings.update(_of_wrapped(turned, period))
             return LocalPolynomialFit(samples, axis, every, found)
         core_plan = plan_of_window(length)
         estimates = core_plan.estimate(samples, step=every, workers=threads, progress=report)
@@ -217,11 +227,19 @@ def fit_local_polynomials(
             "criterion": criterion,
             "selection": selection,
             "quantisation": step_of_rounding,
+            **_of_wrapped(turned, period),
         },
         errors=lambda: core_plan.errors(samples, step=every, workers=threads),
         plan_of=lambda _: core_plan,
     )
     return LocalPolynomialFit(samples, axis, every, found)
+
+
+def _of_wrapped(turned: arguments.Unwrapped | None, period: float | None) -> dict[str, Any]:
+    """Return what is to be said of a wrapped angle."""
+    if turned is None:
+        return {}
+    return {"period": float(period or 0.0), "splits": turned.splits if len(turned.splits) > 1 else turned.splits[0]}
 
 
 def _check_left_to_the_rule(criterion: str, selection: str) -> None:

@@ -45,6 +45,8 @@ def savgol_filter(
     axis: int = -1,
     mode: Mode = "interp",
     cval: float = 0.0,
+    *,
+    period: float | None = None,
 ) -> npt.NDArray[Any]:
     """Filter with :func:`scipy.signal.savgol_filter`'s call and results.
 
@@ -71,6 +73,8 @@ def savgol_filter(
         What is taken beyond the ends. ``"interp"`` extends nothing but evaluates the first and last full window off its centre.
     cval : float, optional
         Value beyond the ends for ``"constant"``.
+    period : float, optional
+        Period of a wrapped angle in the unit of `x`, which is unwrapped first as in :func:`fit_local_polynomials`.
 
     Returns
     -------
@@ -82,7 +86,8 @@ def savgol_filter(
     ------
     ValueError
         If the window is longer than the record with mode ``"interp"``, or longer than twice the record and than 100 001 samples with
-        another, `polyorder` is not less than `window_length` or above 15, or a mode is unknown.
+        another, `polyorder` is not less than `window_length` or above 15, a mode is unknown, or `x` spans more than one and a half of
+        `period`.
     TypeError
         If `x` is complex or holds no numbers.
 
@@ -132,9 +137,11 @@ def savgol_filter(
         arguments.check_window("window_length", length, samples.shape[-1])
     else:
         _check_padded_window(length, samples.shape[-1])
-    derivative, period = _derivative(deriv, delta, HIGHEST_ORDER if order is None else order)
+    if period is not None:
+        samples = arguments.unwrapped("x", samples, period).values
+    derivative, seconds = _derivative(deriv, delta, HIGHEST_ORDER if order is None else order)
     beyond = arguments.real_number("cval", cval)
-    core_plan = plan(length, order=order, derivatives=(derivative,), delta=period, noise=False)
+    core_plan = plan(length, order=order, derivatives=(derivative,), delta=seconds, noise=False)
     if not ends:
         samples = _padded(samples.astype(np.float64, copy=False), length, mode, beyond)
     derivatives = core_plan.estimate(samples, ends=ends, workers=arguments.worker_count(None)).derivatives

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident._derivatives import quantisation_step
 from tvident._equation import GivenTerm, Parameter
 from tvident._identify.methods import Method
 from tvident._identify.settings import resolve
@@ -33,6 +35,7 @@ def identify(
     lag: float | Literal["auto"] | None = None,
     quantisation: float | None = None,
     mask: npt.ArrayLike | None = None,
+    period: float | None = None,
     nan_policy: arguments.RowPolicy = "omit",
     step: int = 1,
     settings: Mapping[str, Any] | None = None,
@@ -93,6 +96,11 @@ def identify(
         with ``method="paper"``, whose criterion has no such bound. 0 means none.
     mask : array_like of bool, shape (n,) or the angle's, optional
         True where a sample may be the centre of an equation.
+    period : float, optional
+        Period of a wrapped angle in rad, 2π mostly: whole periods are added first so that steps are the shortest that are possible. A
+        sample after a step of 0.4 to 0.6 periods, which may go either way, counts as missing. Across a gap the angle goes the shortest
+        way or on with the velocity, whichever does better elsewhere in the record. Where both may be wrong by half a period the longest
+        part between such gaps is used and the advice says so, unless the equation does not ask how often the angle went round.
     step : int, optional
         Every how many samples a result is wanted.
     nan_policy : {"omit", "propagate", "raise"}, optional
@@ -116,7 +124,8 @@ def identify(
     Raises
     ------
     ValueError
-        If shapes differ, a window does not fit, `t` is not uniform, nothing is unknown, or a name is unknown.
+        If shapes differ, a window does not fit, `t` is not uniform, nothing is unknown, the angle spans more than one and a half of
+        `period`, or a name is unknown.
     TypeError
         If an array is complex or holds no numbers, or there is no sample period.
 
@@ -167,7 +176,7 @@ def identify(
     samples = angles.shape[-1]
     if sample_rate is None and delta is None and t is None:
         raise TypeError("identify needs the sample period; got none; give sample_rate=, delta= or t=")
-    period = arguments.sample_period(samples, delta=delta, sample_rate=sample_rate, t=t)
+    seconds = arguments.sample_period(samples, delta=delta, sample_rate=sample_rate, t=t)
     given = {
         "inertia": inertia,
         "damping": damping,
@@ -175,25 +184,34 @@ def identify(
         "terms": terms,
         "lag": lag,
         "quantisation": quantisation,
+        "period": period,
     }
     instruments = None if instrument is None else arguments.real_array("instrument", instrument)
     if instruments is not None and instruments.shape != angles.shape:
         raise ValueError(
             f"an instrument must have the angle's shape {angles.shape}; got {instruments.shape}; resample it"
         )
-    request = resolve(method, given, settings, 1 / period, has_instrument=instruments is not None)
+    request = resolve(method, given, settings, 1 / seconds, has_instrument=instruments is not None)
     for name, array in (("angle", angles), ("torque", torques)):
         arguments.check_nan(name, array, nan_policy, arguments.RowPolicy)
+    doubts: list[tuple[int, str]] = []
+    turn = request.period
+    if turn is not None:
+        # Whole periods need not be multiples of the step that the angle was rounded to.
+        request = replace(request, quantisation=quantisation_step(angles, request.quantisation))
+        turned = arguments.unwrapped("angle", angles, turn)
+        angles, doubts = turned.longest("angle", split=request.counts_turns)
     start = 0.0 if t is None else float(np.asarray(t)[0])
     data = Data(
         angles=angles,
         torques=torques,
-        time=start + np.arange(samples, dtype=np.float64) * period,
-        period=period,
+        time=start + np.arange(samples, dtype=np.float64) * seconds,
+        period=seconds,
         instruments=instruments,
         mask=arguments.mask("mask", mask, angles.shape),
         propagate=nan_policy == "propagate",
         step=arguments.whole_number("step", step, least=1),
         workers=arguments.worker_count(workers),
+        doubts=doubts,
     )
     return Task(data, request).run(progress)

@@ -20,6 +20,7 @@ _OF_METHOD: dict[str, dict[str, Any]] = {
         "terms": (),
         "lag": 0.0,
         "quantisation": 0.0,
+        "period": None,
     },
     "auto": {
         "inertia": "auto",
@@ -28,6 +29,7 @@ _OF_METHOD: dict[str, dict[str, Any]] = {
         "terms": (("offset", "constant"),),
         "lag": 0.0,
         "quantisation": None,
+        "period": None,
     },
 }
 """What is used beside the form where nothing is given; forms of the user's own take the same as "auto"."""
@@ -56,6 +58,8 @@ class Request:
     lag_samples : sequence of float, optional
         The same in samples, where an earlier result found it: seconds may round to other samples.
     quantisation : float, optional
+    period : float, optional
+        Of a wrapped angle.
     chosen : bool
         Nobody asked for this form.
     """
@@ -68,7 +72,20 @@ class Request:
     lag: Any
     lag_samples: Sequence[float] | None
     quantisation: float | None
+    period: float | None
     chosen: bool
+
+    @property
+    def counts_turns(self) -> bool:
+        """Whether the equation is another one after a whole period of the angle."""
+        turns = (self.period or 0.0) / (2 * math.pi)
+        names = [term[0] if isinstance(term, tuple | list) else term for term in self.terms]
+        periodic = {"offset", "coulomb", "viscous_asymmetric"} | (
+            {"gravity"} if turns and turns.is_integer() else set()
+        )
+        stiffness = self.parameters["stiffness"]
+        free = isinstance(stiffness, int | float) and stiffness == 0
+        return not (free and all(isinstance(name, str) and name in periodic for name in names))
 
     def each(self, name: str, records: int) -> Sequence[Any]:
         """Return a setting of every record: the same for all, or what an earlier result chose for each."""
@@ -134,6 +151,7 @@ def resolve(
         lag=lag,
         lag_samples=earlier.get("lag_samples") if same_lag and earlier is not None else None,
         quantisation=asked["quantisation"],
+        period=None if asked["period"] is None else arguments.positive_number("period", asked["period"]),
         chosen=earlier is None and name == "auto",
     )
 
@@ -201,6 +219,7 @@ def _of_result(earlier: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str
         kinds, known = dict(earlier["kinds"]), dict(earlier["known"])
         terms = [(str(name), str(kind)) for name, kind in earlier["terms"]]
         asked = {name: earlier[name] for name in ("lag", "quantisation")}
+        asked["period"] = earlier.get("period")
         is_whole = _is_whole(earlier, kinds, known)
     except (KeyError, TypeError, ValueError):
         is_whole = False

@@ -19,6 +19,7 @@ from tvident._identify.batch import estimates
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm, exponent_of
 from tvident._identify.settings import Request, plain, resolve
 from tvident._results import Estimates, Identification, Recorded, Words
+from tvident._status import Status
 
 _WINDOW_OF_TERMS = 51
 """Samples of the polynomials that terms of one's own get angle and velocity from in weak form."""
@@ -41,6 +42,8 @@ class Data:
     step : int
         Every how many samples a result is wanted.
     workers : int, optional
+    doubts : sequence of (int, str)
+        What cannot be known of the channels, and of which record.
     """
 
     angles: npt.NDArray[np.number]
@@ -52,6 +55,7 @@ class Data:
     propagate: bool
     step: int
     workers: int | None
+    doubts: Sequence[tuple[int, str]] = ()
 
     @property
     def batch(self) -> tuple[int, ...]:
@@ -132,13 +136,16 @@ class Task:
         settings = self._settings(found)
         explain: Any = self._words_of_strong_form if isinstance(request.form, StrongForm) else self._words_of_weak_form
         explain = self._words_with_instrument if data.instruments is not None else explain
+        words = explain(found, batch, settings)
+        if data.doubts:
+            batch, words = self._doubted(batch, words if isinstance(words, Words) else words())
         jumps = tuple(tuple(data.time[one.jumps].tolist()) for one in found)
         return Identification(
             batch,
             time=data.time[:: data.step],
             terms=[term.name for term in self._terms],
             jumps=jumps if data.batch else jumps[0],
-            words=explain(found, batch, settings),
+            words=words,
             settings=plain(settings),
             recorded=Recorded(
                 data.angles,
@@ -147,6 +154,16 @@ class Task:
                 again=partial(self._again, plain(settings)),
             ),
         )
+
+    def _doubted(self, batch: Estimates, words: Words) -> tuple[Estimates, Words]:
+        """Return estimates that are flagged where a channel leaves something open, and words that say what."""
+        data = self._data
+        flags = np.zeros(data.records, np.uint16)
+        flags[[record for record, _ in data.doubts]] = Status.CHANNEL_SUSPECTED
+        more: Any = flags.reshape(data.batch) if data.batch else Status(int(flags[0]))
+        lines = [f"record {record}: {line}" if data.batch else line for record, line in data.doubts]
+        flagged = replace(batch, record_status=batch.record_status | more)
+        return flagged, Words(words.reasons, (*lines, *words.advice))
 
     def _again(self, settings: dict[str, Any], angles: npt.NDArray[np.number]) -> Identification:
         """Identify another angle with what was chosen; its missing values are left out."""
@@ -281,6 +298,7 @@ class Task:
             **used,
             **lag,
             "quantisation": self._quantisation,
+            "period": request.period,
             "instrument": data.instruments is not None,
             "kinds": kinds,
             "terms": [[term.name, kinds[term.name]] for term in self._terms],

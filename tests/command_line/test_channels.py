@@ -1,0 +1,52 @@
+"""What the options say of channels arrives at the library."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tvident
+from tvident import recordings
+
+TVIDENT = str(Path(sys.executable).with_name("tvident"))
+
+
+def run(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([TVIDENT, *map(str, arguments)], cwd=cwd, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(("degrees", "period"), [(1.0, "2pi"), (180 / math.pi, "360")])
+def test_a_wrapped_angle(tmp_path: Path, degrees: float, period: str) -> None:
+    t = np.arange(2000) / 500
+    angle = 3 * np.sin(9 * t) + 2 * np.sin(23 * t) + 1e-3 * np.random.default_rng(0).standard_normal(t.size)
+    torque = 3 * angle + 0.01 * (-243 * np.sin(9 * t) - 1058 * np.sin(23 * t))
+    wrapped = (angle % (2 * math.pi)) * degrees
+    np.savez(tmp_path / "rig.npz", angle=wrapped, torque=torque)
+    time = ("--sample-rate", 500, "--period", period)
+    scale = ("--angle-scale", 1 / degrees)
+    done = run(
+        "identify", "rig.npz", "--angle", "angle", "--torque", "torque", *time, *scale, "-o", "a.npz", cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    found = recordings.read(tmp_path / "a.npz")["stiffness [N m/rad]"]
+    expected = tvident.identify(wrapped / degrees, torque, sample_rate=500, period=2 * math.pi)
+    np.testing.assert_allclose(found, expected.stiffness, rtol=1e-9)
+
+    call = ("derivatives", "rig.npz", "--channel", "angle", "--window-length", 21, *time, "-o", "d.npz")
+    assert run(*call, cwd=tmp_path).returncode == 0
+    fit = tvident.fit_local_polynomials(wrapped, 21, sample_rate=500, period=2 * math.pi * degrees)
+    rate = recordings.read(tmp_path / "d.npz")["derivative_1"]
+    np.testing.assert_allclose(rate, fit.derivatives[1], rtol=1e-9, atol=1e-9 * degrees)
+
+
+@pytest.mark.parametrize("period", ["0", "nan", "2pie", "-pi", "turn"])
+def test_a_period_that_cannot_be_is_refused(tmp_path: Path, period: str) -> None:
+    np.savez(tmp_path / "rig.npz", angle=np.zeros(100))
+    done = run("derivatives", "rig.npz", "--channel", "angle", "--period", period, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "--period must be a number above zero, or a multiple of pi such as 2pi" in done.stderr
