@@ -24,6 +24,7 @@ ROOMS = (
     "_regression",
     "_simulate",
     "_figures",
+    "_report",
     "_results",
     "_advice",
     "_identify",

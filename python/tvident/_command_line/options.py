@@ -48,10 +48,14 @@ TIME = options_of(
     click.option("--time", "time_channel", metavar="NAME", help="Channel that holds the time in seconds."),
 )
 
-RUN = options_of(
+WORK = options_of(
     click.option("--step", type=int, default=1, show_default=True, help="Every how many samples a result is wanted."),
     click.option("--workers", type=int, help="Threads; by default all processors."),
     click.option("--progress/--no-progress", default=None, help="Show progress; by default on a terminal."),
+)
+
+RUN = options_of(
+    WORK,
     click.option(
         "-o", "--output", type=click.Path(dir_okay=False), help="CSV or NPZ file for the results, or - for CSV here."
     ),
@@ -59,6 +63,7 @@ RUN = options_of(
 )
 
 RESULTS, PICTURE, SETTINGS, RECORDING = "results", "the picture", "the settings of this run", "the recording"
+REPORT = "the report"
 """What messages call files."""
 
 CRITERION = click.option(
@@ -121,7 +126,8 @@ def check_outputs(outputs: Mapping[str, str | None], inputs: Mapping[str, str | 
         if Path(plot).suffix.lower() not in {".png", ".pdf", ".svg"}:
             raise click.UsageError(f"--plot must end in .png, .pdf or .svg; got '{printable(plot)}'; rename it")
         check_folder(Path(plot))
-    if settings is not None:
-        check_folder(Path(settings))
+    for place in (settings, outputs.get(REPORT)):
+        if place is not None:
+            check_folder(Path(place))
     files = {name: path for name, path in outputs.items() if (name, path) != (RESULTS, "-")}
     check_apart(files, inputs)

@@ -1,0 +1,56 @@
+"""The command ``tvident report``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tvident import _report, recordings
+from tvident._command_line.channels import source_of
+from tvident._command_line.group import main
+from tvident._command_line.identification import IDENTIFICATION, identified, inputs
+from tvident._command_line.options import REPORT, WORK, check_outputs
+from tvident._files import printable
+
+_MOST_CHANNELS = 40
+"""Of a file that are shown beside angle and torque: the first ones."""
+
+
+@main.command(epilog="Example: tvident report rig.csv --angle angle --torque torque --time time -o report.html")
+@click.argument("file", type=click.Path(), required=False)
+@IDENTIFICATION
+@WORK
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(dir_okay=False),
+    default="report.html",
+    show_default=True,
+    help="The page: a name that ends in .html.",
+)
+def report(file: str | None, output: str, **options: Any) -> None:
+    """Identify as identify does, and write a page that shows the recording and the result.
+
+    The page opens in any browser without a network: verdict, warnings with their times, settings, and plots of all channels of FILE and
+    of all results that can be zoomed down to the sample.
+    """
+    if Path(output).suffix.lower() not in {".html", ".htm"}:
+        raise click.UsageError(f"-o must end in .html; got '{printable(output)}'; rename it")
+    _report.check_plotly()
+    check_outputs({REPORT: output}, inputs(file, options))
+    channels = {} if file is None else recordings.read(file)
+    result = identified(channels, file, **options)
+    names = [options[name] for name in ("angle", "torque", "time_channel") if options[name] is not None]
+    shown = [source_of(channels, name, file) for name in names]
+    others = {
+        name: values
+        for name, values in channels.items()
+        if values.shape == shown[0].shape and not any(values is one for one in shown)
+    }
+    for name in list(others)[_MOST_CHANNELS:]:
+        del others[name]
+    result.report(output, channels=others, title=None if file is None else Path(file).name)
+    click.echo(result.summary())
+    click.echo(f"\nWritten: {printable(output)}")

@@ -1,0 +1,277 @@
+"""What a report says of a result: numbers, settings and warnings in plain words, and which series its plots show."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._equation import COEFFICIENTS, UNITS
+from tvident._report.packed import Series
+from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
+
+Array: TypeAlias = npt.NDArray[np.float64]
+
+_STRETCHES = 12
+"""Times of a warning that are listed: the longest."""
+
+_FEW = 0.0005
+"""A share of samples below which their number says more."""
+
+_MOST_DIGITS = 8
+"""After the point."""
+
+_SYMBOLS = {"inertia": "Inertia I", "damping": "Damping C", "stiffness": "Stiffness K"}
+
+
+class Reported(Protocol):
+    """What a report shows of an identification: see :class:`tvident.Identification`."""
+
+    time: Array
+    inertia: Array
+    terms: dict[str, Array]
+    constants: dict[str, tuple[Any, Any]]
+    condition: Array
+    residual_std: Array
+    order: npt.NDArray[np.uint8]
+    status: npt.NDArray[np.uint16]
+    record_status: Status | npt.NDArray[np.uint16]
+    jumps: tuple[Any, ...]
+    settings: dict[str, Any]
+
+    @property
+    def stderr(self) -> Mapping[str, Array]:
+        """Standard errors by name."""
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """What was chosen, and why."""
+
+    @property
+    def advice(self) -> tuple[str, ...]:
+        """What to do about what looks wrong."""
+
+    @property
+    def trusted(self) -> npt.NDArray[np.bool_]:
+        """Where values can be trusted."""
+
+    def summary(self) -> str:
+        """Return the result in words."""
+
+
+def unit_of(name: str) -> str:
+    """Return a unit as it is printed."""
+    unit = UNITS.get(name, "")
+    return "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³").replace(" ", "·")
+
+
+def content_of(result: Reported, recorded: list[Series], title: str) -> tuple[dict[str, Any], list[Series]]:
+    """Return what a page says, plain JSON, and the series of its plots; plots name them by number."""
+    series = list(recorded)
+    charts: list[dict[str, Any]] = [
+        {"group": "Recorded", "title": one.name, "unit": one.unit, "line": number}
+        for number, one in enumerate(recorded)
+    ]
+    values = _values(result)
+    period = float(result.settings["step"]) / float(result.settings["sample_rate"])
+    start = float(result.time[0]) if result.time.size else 0.0
+
+    def add(name: str, unit: str, numbers: npt.NDArray[Any]) -> int:
+        series.append(Series(name, unit, numbers, start, period))
+        return len(series) - 1
+
+    flagged = result.status & _worth_a_look(result) != 0
+    shade = add("flagged", "", flagged.view(np.uint8)) if flagged.any() else None
+    changing = [name for name in values if name not in result.constants and _is_unknown(result, name)]
+    if changing:
+        changing += ["natural_frequency", "damping_ratio"]
+    for name in changing:
+        found, error = (
+            (values[name] if name in values else getattr(result, name)),
+            result.stderr[name],
+        )
+        if not np.isfinite(found).any():
+            continue
+        with np.errstate(all="ignore"):
+            reach = [add(name, unit_of(name), found + sign * 2 * error) for sign in (-1, 1)]
+        charts.append(
+            {
+                "group": "Found",
+                "title": title_of(name),
+                "unit": unit_of(name),
+                "line": add(name, unit_of(name), found),
+                "band": reach,
+                "shade": shade,
+                "robust": True,
+            }
+        )
+    quality = {
+        "residual_std": "Residual of the torque, standard deviation",
+        "condition": "Condition number of the equations",
+    }
+    if result.order.any():
+        quality["order"] = "Order of the polynomial"
+    for name, words in quality.items():
+        numbers = np.asarray(getattr(result, name))
+        if np.isfinite(numbers).any() and np.nanmin(numbers) < np.nanmax(numbers):
+            chart = {
+                "group": "How well",
+                "title": words,
+                "unit": unit_of(name),
+                "line": add(name, unit_of(name), numbers),
+            }
+            charts.append(chart | {"shade": shade, "robust": name != "order"})
+    marks = _flags_over_time(result)
+    strips = [
+        {"flag": flag.name, "series": add(str(flag.name), "", mark.view(np.uint8))} for flag, mark in marks.items()
+    ]
+    if strips:
+        charts.append({"group": "How well", "title": "Status over time", "unit": "", "strips": strips})
+    words = result.summary()
+    end = max([one.start + max(0, one.values.size - 1) * one.period for one in series], default=0.0)
+    content = {
+        "title": title,
+        "verdict": words.splitlines()[0],
+        "tone": _tone(result),
+        "span": [min([one.start for one in series], default=0.0), end],
+        "numbers": _numbers(result, values),
+        "advice": list(result.advice),
+        "warnings": _warnings(result, marks),
+        "jumps": [round(float(time), 6) for time in result.jumps],
+        "reasons": list(result.reasons),
+        "settings": _settings(result),
+        "repeat": json.dumps(result.settings, indent=1),
+        "summary": words,
+        "charts": charts,
+        "version": _version(),
+    }
+    return content, series
+
+
+def title_of(name: str) -> str:
+    """Return what a parameter is called over its plot."""
+    return _SYMBOLS.get(name, name.replace("_", " ").capitalize())
+
+
+def with_error(value: float, error: float) -> str:
+    """Return a number with as many digits as its error deserves, and the error with two."""
+    if not (math.isfinite(value) and math.isfinite(error)) or error <= 0:
+        return f"{value:.5g}"
+    digits = 1 - math.floor(math.log10(error))
+    if 0 <= digits <= _MOST_DIGITS:
+        return f"{value:.{digits}f} ± {error:.{digits}f}"
+    return f"{value:.5g} ± {error:.2g}"
+
+
+def _values(result: Reported) -> dict[str, Array]:
+    """Return parameters and terms by name."""
+    return {name: getattr(result, name) for name in COEFFICIENTS} | result.terms
+
+
+def _is_unknown(result: Reported, name: str) -> bool:
+    return str(result.settings["kinds"].get(name)) != "known"
+
+
+def _numbers(result: Reported, values: Mapping[str, Array]) -> list[dict[str, str]]:
+    """Return a line for every parameter: its value and error, or its range."""
+    lines = []
+    for name, found in values.items():
+        kind = str(result.settings["kinds"].get(name, ""))
+        finite, error = found[np.isfinite(found)], result.stderr[name]
+        error = error[np.isfinite(error)]
+        line = {"name": title_of(name), "unit": unit_of(name), "kind": kind, "more": ""}
+        if name in result.constants:
+            line["value"] = with_error(*map(float, result.constants[name]))
+            line["kind"] = "constant over the record"
+        elif not finite.size:
+            line["value"] = "no value"
+        elif kind == "known" and finite.min() == finite.max():
+            line |= {"value": f"{finite[0]:.5g}", "kind": "known: as given"}
+        else:
+            low, middle, high = np.percentile(finite, [5, 50, 95])
+            line["value"] = with_error(float(middle), float(np.median(error)) if error.size else math.nan)
+            line["more"] = f"90 % lie between {low:.4g} and {high:.4g}"
+            line["kind"] = "known: as given" if kind == "known" else f"{kind}: the median of its values"
+        lines.append(line)
+    return lines
+
+
+def _everywhere(result: Reported) -> Status:
+    """Return the flags that all samples have: they are said once, and shade nothing."""
+    return Status(int(np.bitwise_and.reduce(result.status)) if result.status.size else 0)
+
+
+def _worth_a_look(result: Reported) -> int:
+    return int((DOUBTFUL | Status.GAP) & ~(_everywhere(result) | Status(int(result.record_status))))
+
+
+def _flags_over_time(result: Reported) -> dict[Status, npt.NDArray[np.bool_]]:
+    """Return where each flag is set, for flags that are set somewhere."""
+    occurring = int(np.bitwise_or.reduce(result.status)) if result.status.size else 0
+    return {flag: result.status & flag != 0 for flag in Status if occurring & flag}
+
+
+def _warnings(result: Reported, marks: Mapping[Status, npt.NDArray[np.bool_]]) -> list[dict[str, Any]]:
+    """Return what is flagged, in words, with its share and the times of its longest stretches."""
+    warnings: list[dict[str, Any]] = [
+        {"flag": flag.name, "words": flag.advice, "where": "the whole record", "times": [], "more": 0}
+        for flag in Status
+        if int(result.record_status) & flag
+    ]
+    for flag, mark in marks.items():
+        edges = np.flatnonzero(np.diff(mark.view(np.int8), prepend=0, append=0))
+        first, last = edges[::2], edges[1::2] - 1
+        longest = np.sort(np.argsort(first - last, kind="stable")[:_STRETCHES])
+        times = [[float(result.time[first[one]]), float(result.time[last[one]])] for one in longest]
+        share = float(mark.mean())
+        where = f"{share:.1%} of the samples" if share >= _FEW else f"{int(mark.sum())} samples"
+        warnings.append(
+            {"flag": flag.name, "words": flag.advice, "where": where, "times": times, "more": first.size - longest.size}
+        )
+    return warnings
+
+
+def _tone(result: Reported) -> str:
+    """Return whether all is well, something deserves a look, or nothing is to be believed."""
+    if int(result.record_status) & int(DOUBTFUL_RECORD) or not result.trusted.any():
+        return "bad"
+    return "doubtful" if result.advice or int(result.record_status) else "good"
+
+
+def _settings(result: Reported) -> list[list[str]]:
+    """Return settings as an engineer reads them; all of them are in the JSON below."""
+    s = result.settings
+    rate = float(s["sample_rate"])
+
+    def samples(value: Any) -> str:
+        return f"{value} samples ({value / rate:.3g} s)" if isinstance(value, int | float) else str(value)
+
+    weak = s["form"] == "weak"
+    rows = [
+        ["Method", f"{s['method']}: {s['form']} form"],
+        ["Sample rate", f"{rate:.6g} Hz"],
+        ["Test function" if weak else "Window of the polynomials", samples(s["window_length"])],
+        [
+            "Exponent" if weak else "Orders",
+            str(s["exponent"]) if weak else f"up to {s['max_order']} by {s['criterion']}",
+        ],
+        ["Regression windows", samples(s["regression_window"])],
+        *([title_of(name), str(kind)] for name, kind in s["kinds"].items()),
+        ["Delay of the torque", f"{s['lag']} s" if isinstance(s["lag"], int | float) else str(s["lag"])],
+    ]
+    if s["step"] != 1:
+        rows.append(["A result for every", f"{s['step']} samples"])
+    chosen = [name.replace("_", " ") for name in s["chosen"]]
+    return [*rows, ["Chosen from the recording", ", ".join(chosen) or "nothing"]]
+
+
+def _version() -> str:
+    try:
+        return version("tvident")
+    except PackageNotFoundError:  # pragma: no cover - sources that were never installed
+        return ""

@@ -1,0 +1,207 @@
+"""Series packed for a page: the least and greatest sample of every block, and where each sample lies between them.
+
+A page that shows an hour has some 1000 columns, so it begins with the blocks' extremes and needs samples only after zooming in. Levels
+within a block rather than levels of the whole series: beside a spike of a thousand times the signal 65 536 levels of the whole would show
+the signal as steps, and with blocks seven bits a sample are finer than a screen, which an hour of five channels has room for.
+"""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+Array: TypeAlias = npt.NDArray[np.float64]
+
+BLOCK = 128
+"""Samples: fewer make extremes cost more than levels, more make levels coarse where the series changes."""
+
+_FINE, _COARSE = 65534, 126
+"""Highest level of two bytes and of seven bits; the next one says that there is no sample."""
+
+_FINE_VALUES = 6_000_000
+"""So many samples of all series may take two bytes each: 16 MB in a page if nothing compresses."""
+
+_MOST_BYTES = 16_950_000
+"""Of all series, packed. As text that is 22.6 MB, which leaves room for plotly in 25 MB."""
+
+_CHUNK = 4096
+"""Blocks that are worked on together: what they need stays in the cache."""
+
+_LOOKED_AT = 256
+"""Blocks that tell how well a series compresses."""
+
+_HUGE = 1e300
+"""Numbers beyond are missing: their differences would overflow."""
+
+
+@dataclass(frozen=True)
+class Series:
+    """Numbers at equal distances in time.
+
+    Parameters
+    ----------
+    name, unit : str
+    values : ndarray, shape (n,)
+        What is not finite is missing.
+    start, period : float
+        Time of the first number, and from one to the next, in seconds.
+    """
+
+    name: str
+    unit: str
+    values: npt.NDArray[Any]
+    start: float
+    period: float
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A series as a page holds it.
+
+    Parameters
+    ----------
+    about : dict
+        What the page must know to unpack it, plain JSON.
+    extremes, levels : str
+        gzip, as base64.
+    """
+
+    about: dict[str, Any]
+    extremes: str
+    levels: str
+
+
+def packed(series: Sequence[Series], most_bytes: int = _MOST_BYTES) -> list[Packed]:
+    """Return series packed: where samples do not fit, the finest level is of their extremes."""
+    top = _FINE if sum(one.values.size for one in series) <= _FINE_VALUES else _COARSE
+    reduced = list(series)
+    bits = [_bits(one, top) for one in series]
+    sizes = [one.values.size * (cost / 8 + 8 / BLOCK) for one, cost in zip(reduced, bits, strict=True)]
+    merged = [1] * len(sizes)
+    while sum(sizes) > most_bytes:
+        largest = int(np.argmax(sizes))
+        # Two numbers stand for four samples at first, and for twice as many each time.
+        merged[largest] = max(4, 2 * merged[largest])
+        sizes[largest] /= 2
+    return [
+        _packed(one if every == 1 else _of_extremes(one, every), top, every)
+        for one, every in zip(reduced, merged, strict=True)
+    ]
+
+
+def _of_extremes(series: Series, every: int) -> Series:
+    """Return the least and the greatest of every so many samples, in turns."""
+    count = -(-series.values.size // every)
+    whole = np.full(count * every, np.nan)
+    whole[: series.values.size] = series.values
+    rows = whole.reshape(count, every)
+    pairs = np.stack([np.fmin.reduce(rows, axis=1), np.fmax.reduce(rows, axis=1)], axis=1).ravel()
+    return Series(series.name, series.unit, pairs, series.start, series.period * every / 2)
+
+
+def _blocks(series: Series, first: int, last: int) -> Array:
+    """Return some blocks as rows; missing numbers are NaN, and so is what the last block lacks."""
+    samples = series.values[first * BLOCK : last * BLOCK].astype(np.float64)
+    lacking = (last - first) * BLOCK - samples.size
+    if lacking:
+        samples = np.append(samples, np.full(lacking, np.nan))
+    samples[~(np.abs(samples) < _HUGE)] = np.nan
+    return np.asarray(samples.reshape(-1, BLOCK))
+
+
+def _levels(rows: Array, low: Array, high: Array, top: int) -> npt.NDArray[Any]:
+    """Return where samples lie between the extremes of their block."""
+    reach = high - low
+    scale = np.divide(top, reach, out=np.zeros_like(reach), where=reach > 0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        levels = (rows - low[:, np.newaxis]) * scale[:, np.newaxis] + 0.5
+    missing = np.isnan(levels)
+    if missing.any():
+        levels[missing] = top + 1
+    return np.minimum(levels, top + 1, out=levels).astype(_kind(top))
+
+
+def _kind(top: int) -> type[np.unsignedinteger[Any]]:
+    return np.uint16 if top == _FINE else np.uint8
+
+
+def _differences(levels: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return levels less those before, as numbers without sign do."""
+    flat = levels.ravel()
+    return np.concatenate([flat[:1], flat[1:] - flat[:-1]])
+
+
+def _bits(series: Series, top: int) -> float:
+    """Return the bits that a sample takes, from some blocks."""
+    count = -(-series.values.size // BLOCK)
+    rows = [_blocks(series, one, one + 1) for one in range(0, count, max(1, count // _LOOKED_AT))]
+    if not rows:
+        return 0.0
+    levels = _found_levels(np.concatenate(rows), top)[2]
+    return min(_entropy(levels), _entropy(_differences(levels)))
+
+
+def _found_levels(rows: Array, top: int) -> tuple[Array, Array, npt.NDArray[Any]]:
+    low, high = np.min(rows, axis=1), np.max(rows, axis=1)
+    if np.isnan(low).any():
+        low, high = np.fmin.reduce(rows, axis=1), np.fmax.reduce(rows, axis=1)
+    return low, high, _levels(rows, low, high, top)
+
+
+def _entropy(levels: npt.NDArray[Any]) -> float:
+    """Return bits a level, as a code of bytes takes them."""
+    planes = levels.ravel().view(np.uint8).reshape(levels.size, -1)
+    total = 0.0
+    for plane in planes.T:
+        share = np.bincount(plane, minlength=256) / plane.size
+        share = share[share > 0]
+        total -= float((share * np.log2(share)).sum())
+    return total
+
+
+def _packed(series: Series, top: int, merged: int) -> Packed:
+    count = -(-series.values.size // BLOCK)
+    kind = _kind(top)
+    low, high, levels = np.empty(count), np.empty(count), np.empty(count * BLOCK, kind)
+    for first in range(0, count, _CHUNK):
+        last = min(count, first + _CHUNK)
+        least, most, inside = _found_levels(_blocks(series, first, last), top)
+        low[first:last], high[first:last] = least, most
+        levels[first * BLOCK : last * BLOCK] = inside.ravel()
+    # Single precision is enough for a distance from the middle, whatever the offset and the size.
+    there = np.isfinite(low)
+    bottom, ceiling = (float(low[there].min()), float(high[there].max())) if there.any() else (0.0, 0.0)
+    middle, factor = bottom / 2 + ceiling / 2, (ceiling / 2 - bottom / 2) or 1.0
+    extremes = (np.concatenate([low, high]) - middle) / factor
+    some = levels.reshape(-1, BLOCK)[:: max(1, count // _LOOKED_AT)]
+    by_difference = count > 0 and _entropy(_differences(some)) < _entropy(some)
+    if by_difference:
+        levels = _differences(levels)
+    # Low bytes and high bytes apart: the high ones hardly change.
+    planes = np.ascontiguousarray(levels.view(np.uint8).reshape(levels.size, -1).T)
+    about = {
+        "name": series.name,
+        "unit": series.unit,
+        "start": series.start,
+        "period": series.period,
+        "count": series.values.size,
+        "merged": merged,
+        "block": BLOCK,
+        "top": top,
+        "middle": middle,
+        "factor": factor,
+        "differences": by_difference,
+    }
+    return Packed(about, text_of(extremes.astype("<f4").tobytes()), text_of(planes.tobytes()))
+
+
+def text_of(content: bytes, level: int = 1, strategy: int = zlib.Z_RLE) -> str:
+    """Return bytes as gzip in base64; runs and frequencies of bytes are all that a recording offers, and found fast."""
+    packer = zlib.compressobj(level, zlib.DEFLATED, 31, 9, strategy)
+    return base64.b64encode(packer.compress(content) + packer.flush()).decode()

@@ -1,0 +1,54 @@
+"""The report of a result: its channels, and those of the user's own."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident import _report
+from tvident._files import listed
+from tvident._results.recorded import Recorded
+
+_UNIT = re.compile(r"(?P<name>.*\S)\s*[\[(](?P<unit>[^\[\]()]*)[\])]")
+
+
+def report(
+    result: _report.Reported,
+    path: str | Path,
+    *,
+    recorded: Recorded | None,
+    channels: Mapping[str, npt.ArrayLike] | None,
+    title: str | None,
+) -> None:
+    """Write the report of a result with the channels that are there."""
+    if Path(path).suffix.lower() not in {".html", ".htm"}:
+        raise ValueError(f"a report is a page: its name must end in .html; got {arguments.shown(str(path))}; rename it")
+    rate = float(result.settings["sample_rate"])
+    start = float(result.time[0]) if result.time.size else 0.0
+    shown: list[_report.Series] = []
+
+    def show(name: str, unit: str, values: npt.ArrayLike) -> None:
+        numbers = arguments.real_array("channels", values)
+        shown.append(_report.Series(name, unit, numbers, start, 1 / rate))
+
+    if recorded is not None and recorded.is_unchanged and result.inertia.ndim == 1:
+        show("Angle", "rad", recorded.angles)
+        show("Torque", "N·m", recorded.torques)
+    step = int(result.settings["step"])
+    samples = shown[0].values.size if shown else None
+    for name, values in (channels or {}).items():
+        numbers = arguments.real_array("channels", values)
+        count = (result.time.size - 1) * step + 1
+        fits = numbers.shape == (samples,) if samples is not None else count <= numbers.size < count + step
+        if numbers.ndim != 1 or not fits:
+            raise ValueError(
+                f"channels must have one value for every sample of the recording; got {arguments.shown(name)} with shape "
+                f"{numbers.shape}; leave out {listed([name])}, or cut it"
+            )
+        parts = _UNIT.fullmatch(name)
+        show(parts["name"] if parts else name, parts["unit"] if parts else "", numbers)
+    _report.write_report(path, result, shown, title or Path(path).stem)

@@ -1,0 +1,227 @@
+"""The report in a real browser without a network: it opens, it zooms to the sample, and nothing complains."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import tvident
+
+MILLION = 1e6
+
+USABLE = 2.0
+"""Seconds from opening to plots that can be zoomed."""
+
+ALONE = 4.0
+"""On a busy machine: so many times what the browser takes to load the drawing library alone, which is most of the work."""
+
+
+def leave_out(reason: str) -> None:
+    """Skip, unless skipping is forbidden: continuous integration must look."""
+    if os.environ.get("TVIDENT_REQUIRE_CHROMIUM"):
+        pytest.fail(reason)
+    pytest.skip(reason)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if program is None:
+        leave_out("reports cannot be opened without chromium; install it")
+    try:
+        from playwright.sync_api import sync_playwright  # noqa: PLC0415 - not everyone has it
+    except ImportError:
+        leave_out("reports cannot be opened without playwright; install requirements-development.txt")
+    with sync_playwright() as playwright:
+        # A container's only user is root, for whom chromium has no sandbox.
+        opened = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+class Opened:
+    """A page, and all that the browser said of it."""
+
+    def __init__(self, browser: Any, path: Path, **options: Any) -> None:
+        self.context = browser.new_context(offline=True, **({"viewport": {"width": 1280, "height": 900}} | options))
+        self.page = self.context.new_page()
+        self.words: list[str] = []
+        self.requests: list[str] = []
+        self.page.on("console", lambda message: self.words.append(message.text))
+        self.page.on("pageerror", lambda error: self.words.append(str(error)))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.goto(path.as_uri())
+        self.page.wait_for_selector("body[data-usable]")
+        self.usable = float(self.ask("document.body.dataset.usable")) / 1000
+
+    def ask(self, question: str) -> Any:
+        """Give what an expression is in the page: the driver evaluates it, as the page itself forbids that."""
+        return self.page.evaluate(question)
+
+    def drawn(self, title: str) -> dict[str, Any]:
+        """Give what is drawn under a title."""
+        question = """async (title) => {
+            const chart = tvidentReport.charts.find((one) => one.about.title === title);
+            chart.div.scrollIntoView();
+            chart.isNear = true;
+            await chart.draw();
+            const traces = chart.div.data, line = traces[traces.length - 1];
+            const {yaxis, shapes} = chart.div.layout;
+            return {x: line.x, y: line.y, colour: line.line.color, traces: traces.length, range: yaxis.range, shapes: shapes.length};
+        }"""
+        found: dict[str, Any] = self.page.evaluate(question, title)
+        return found
+
+    def show(self, begin: float, end: float) -> None:
+        """Show a stretch of time, in seconds."""
+        self.page.evaluate("([begin, end]) => tvidentReport.show(begin, end)", [begin, end])
+
+    def close(self) -> None:
+        """End, and see that nobody complained and that nothing but the page was asked for."""
+        assert not self.words
+        assert [url.split(":")[0] for url in self.requests] == ["file"]
+        self.context.close()
+
+
+@pytest.fixture(scope="module")
+def alone(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> float:
+    """Give the seconds that the drawing library takes by itself."""
+    from tvident._report import check_plotly  # noqa: PLC0415 - only with a browser
+
+    page = tmp_path_factory.mktemp("alone") / "alone.html"
+    script = check_plotly().read_text(encoding="utf-8")
+    page.write_text(f"<script>{script}</script><script>document.title = performance.now()</script>", encoding="utf-8")
+    opened = browser.new_page()
+    opened.goto(page.as_uri())
+    seconds = float(opened.title()) / 1000
+    opened.close()
+    return seconds
+
+
+@pytest.fixture(scope="module")
+def hour(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, np.ndarray[Any, Any]]]:
+    """Give the report of an hour of five channels at 1 kHz, three of them noise, which nothing compresses."""
+    rig = tvident.simulate_torsional_rig(60.0, pattern="constant")
+    generator = np.random.default_rng(0)
+    channels = {f"noise {number} [V]": generator.standard_normal(3_600_000) for number in range(3)}
+    channels["noise 0 [V]"][1_234_567] = 50.0
+    channels["noise 1 [V]"][2_000_000:2_000_300] = np.nan
+    kinds: Any = dict.fromkeys(("inertia", "damping", "stiffness"), "constant")
+    angle, torque = (np.tile(one, 60) for one in (rig.angle, rig.torque))
+    result = tvident.identify(angle, torque, sample_rate=1000, method=tvident.StrongForm(), **kinds)
+    path = tmp_path_factory.mktemp("hour") / "hour.html"
+    result.report(path, channels=channels)
+    return path, channels
+
+
+def test_an_hour_is_small_opens_at_once_and_shows_every_sample(
+    browser: Any, hour: tuple[Path, dict[str, np.ndarray[Any, Any]]], alone: float
+) -> None:
+    path, channels = hour
+    assert path.stat().st_size < 25 * MILLION
+    opened = Opened(browser, path)
+    assert opened.usable < max(USABLE, ALONE * alone)
+
+    # The one sample that stands out is seen at every zoom, at its place and with its value.
+    before = np.inf
+    for width in (3600.0, 600.0, 60.0, 10.0, 4.0, 0.05):
+        opened.show(max(0.0, 1234.567 - width / 2), min(3600.0, 1234.567 + width / 2))
+        line = opened.drawn("noise 0")
+        top = int(np.argmax([-np.inf if value is None else value for value in line["y"]]))
+        assert line["y"][top] == pytest.approx(50.0, rel=1e-6)  # of 24 bits
+        between = float(np.median(np.diff(line["x"])))
+        # Two points stand for a column, a quarter of it from its ends.
+        assert abs(line["x"][top] - 1234.567) <= 1.5 * between
+        assert between < before
+        before = between
+        assert line["range"][1] > 50
+    assert before == pytest.approx(0.001)
+
+    # Every sample, to half a level of seven bits between the extremes of its block.
+    opened.show(100.0, 100.5)
+    line = opened.drawn("noise 2")
+    first = round(line["x"][0] * 1000)
+    expected = channels["noise 2 [V]"][first : first + len(line["x"])]
+    np.testing.assert_allclose(line["y"], expected, atol=np.ptp(expected) / 2 / 126 + 1e-6)
+    # Where samples are missing there is a gap, from the first to the last.
+    opened.show(1999.9, 2000.4)
+    line = opened.drawn("noise 1")
+    missing = [round(1000 * time) for time, value in zip(line["x"], line["y"], strict=True) if value is None]
+    assert missing == list(range(2_000_000, 2_000_300))
+    opened.close()
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tvident.Identification]:
+    rig = tvident.simulate_torsional_rig(8.0)
+    angle = rig.angle.copy()
+    angle[3000:3400] = np.nan
+    result = tvident.identify(angle, rig.torque, sample_rate=1000)
+    path = tmp_path_factory.mktemp("short") / "short.html"
+    result.report(path, channels={"</script><b>slider</b> [m]": rig.slider_position}, title='a <b>rig</b> & "more"')
+    return path, result
+
+
+def test_dragging_shows_the_same_time_in_all_plots_and_a_double_click_the_whole(
+    browser: Any, short: tuple[Path, tvident.Identification]
+) -> None:
+    path, result = short
+    opened = Opened(browser, path)
+    page = opened.page
+    assert page.inner_text("h1") == 'a <b>rig</b> & "more"'
+    assert page.inner_text(".verdict p") == result.summary().splitlines()[0]
+    assert not page.query_selector("b")
+    assert opened.drawn("</script><b>slider</b>")["y"]
+    band = opened.drawn("Stiffness K")
+    assert band["traces"] == 2
+    assert band["shapes"] >= 1  # the gap is shaded
+    inside = np.percentile(result.stiffness[np.isfinite(result.stiffness)], [1, 99])
+    assert band["range"][0] < inside[0] < inside[1] < band["range"][1]
+
+    plot = page.query_selector(".plot")
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    left, width = box["x"] + 64, box["width"] - 82
+    middle = box["y"] + box["height"] / 2
+    page.mouse.move(left + 0.25 * width, middle)
+    page.mouse.down()
+    page.mouse.move(left + 0.4 * width, middle, steps=4)
+    page.mouse.move(left + 0.5 * width, middle, steps=4)
+    page.mouse.up()
+    page.wait_for_function("() => tvidentReport.shown.to < 5")
+    shown = opened.ask("tvidentReport.shown")
+    assert [shown["from"], shown["to"]] == pytest.approx([2.0, 4.0], abs=0.05)
+    times = opened.drawn("Stiffness K")["x"]
+    assert shown["from"] - 0.01 < times[0] < times[-1] < shown["to"] + 0.01
+    page.mouse.dblclick(left + 0.5 * width, middle)
+    page.wait_for_function("() => tvidentReport.shown.to > 7")
+
+    # A warning's time leads to its place.
+    page.click("text=/^2\\.9.* 3\\.4.* s$/")
+    page.wait_for_function("() => tvidentReport.shown.to < 5")
+    shown = opened.ask("tvidentReport.shown")
+    assert shown["from"] < 3.0
+    assert shown["to"] > 3.4
+    opened.close()
+
+
+def test_a_narrow_screen_needs_no_scrolling_aside_and_night_is_dark(
+    browser: Any, short: tuple[Path, tvident.Identification]
+) -> None:
+    phone = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
+    opened = Opened(browser, short[0], color_scheme="light", **phone)
+    colours = []
+    for scheme in ("light", "dark"):
+        opened.page.emulate_media(color_scheme=scheme)
+        assert opened.ask("document.documentElement.scrollWidth") <= 390
+        ground = opened.ask("getComputedStyle(document.body).backgroundColor")
+        assert (sum(int(part) for part in ground.strip("rgb()").split(",")) > 3 * 128) == (scheme == "light")
+        colours.append(opened.drawn("Stiffness K")["colour"])
+    assert colours[0] != colours[1]
+    opened.close()

@@ -1,0 +1,143 @@
+"""What a report holds: packed series give back what they were made of, and the page needs nothing else."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+import tvident
+from tvident._command_line import main
+from tvident._report.packed import Packed, Series, packed
+
+Array = npt.NDArray[np.float64]
+
+
+def unpacked(one: Packed) -> tuple[Array, Array]:
+    """Give the samples of a series as the page unpacks them, and half of what a level is."""
+    about = one.about
+    top, block = about["top"], about["block"]
+    extremes = np.frombuffer(gzip.decompress(base64.b64decode(one.extremes)), "<f4").reshape(2, -1)
+    low, high = about["middle"] + about["factor"] * extremes.astype(np.float64)
+    planes = np.frombuffer(gzip.decompress(base64.b64decode(one.levels)), np.uint8).reshape(-1, low.size * block)
+    levels = sum(plane.astype(np.int64) << (8 * place) for place, plane in enumerate(planes))
+    if about["differences"]:
+        levels = np.cumsum(levels) % (1 << 8 * len(planes))
+    levels = np.asarray(levels)[: about["count"]]
+    whose = np.arange(about["count"]) // block
+    samples = low[whose] + (high - low)[whose] * levels / top
+    return np.where(levels > top, np.nan, samples), (high - low)[whose] / top / 2
+
+
+@given(
+    values=arrays(
+        np.float64,
+        st.integers(1, 400),
+        elements=st.one_of(st.floats(-1e3, 1e3), st.just(np.nan), st.just(np.inf), st.floats(-1e200, 1e200)),
+    ),
+    offset=st.sampled_from([0.0, 1e6]),
+)
+def test_what_is_packed_comes_back_to_half_a_level(values: Array, offset: float) -> None:
+    values = values + offset
+    (one,) = packed([Series("x", "", values, 0.0, 1e-3)])
+    found, half = unpacked(one)
+    there = np.isfinite(values)
+    np.testing.assert_array_equal(np.isnan(found), ~there)
+    # Extremes are single precision of the distance from the middle: half of 2^-24, twice as much in a difference.
+    rounding = 4 * 2**-24 * np.abs(values[there] - one.about["middle"]).max(initial=0.0) + 1e-15 * abs(offset)
+    assert (np.abs(found - values)[there] <= half[there] * (1 + 1e-6) + rounding).all()
+
+
+def test_a_spike_does_not_cost_what_is_beside_it() -> None:
+    values = np.sin(np.arange(100_000) / 100)
+    values[50_000] = 1e6
+    (one,) = packed([Series("x", "", values, 0.0, 1e-3)])
+    found, _ = unpacked(one)
+    assert found[50_000] == pytest.approx(1e6, rel=1e-6)
+    elsewhere = np.abs(np.arange(values.size) - 50_000) > one.about["block"]
+    # Of single precision beside 1e6.
+    assert np.abs(found - values)[elsewhere].max() < 1e6 * 2**-23
+
+
+def test_what_does_not_fit_keeps_its_extremes() -> None:
+    generator = np.random.default_rng(0)
+    many = [Series(str(number), "", generator.standard_normal(100_000), 0.0, 1e-3) for number in range(4)]
+    many[0].values[70_001] = 9.0
+    parts = packed(many, most_bytes=420_000)
+    # As text three bytes are four; what is estimated from some blocks is known to some percent.
+    assert sum(len(part.extremes) + len(part.levels) for part in parts) < 1.05 * 4 / 3 * 420_000
+    assert {part.about["merged"] for part in parts} == {4}
+    for series, part in zip(many, parts, strict=True):
+        found, half = unpacked(part)
+        pairs = series.values.reshape(-1, 4)
+        expected = np.stack([pairs.min(axis=1), pairs.max(axis=1)], axis=1).ravel()
+        assert (np.abs(found - expected) <= half + 1e-6).all()
+        assert found.max() == pytest.approx(series.values.max(), rel=1e-6)
+        assert part.about["period"] * part.about["count"] == pytest.approx(100)
+
+
+@pytest.fixture(scope="module")
+def result() -> tvident.Identification:
+    rig = tvident.simulate_torsional_rig(3.0)
+    return tvident.identify(rig.angle, rig.torque, sample_rate=1000)
+
+
+def test_a_page_is_whole_and_the_same_each_time(result: tvident.Identification, tmp_path: Path) -> None:
+    result.report(tmp_path / "one.html", title="rig")
+    result.report(tmp_path / "two.html", title="rig")
+    text = (tmp_path / "one.html").read_text(encoding="utf-8")
+    assert text == (tmp_path / "two.html").read_text(encoding="utf-8")
+    assert not re.search(r"""(src|href)=(?!["']?data:)""", text.split('id="plotly"')[0])
+    assert "default-src 'none'" in text
+    for words in (result.summary().splitlines()[0], *result.reasons, *result.advice):
+        assert words.replace("<", "\\u003c") in text.replace('\\"', '"')
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("x.pdf", {}, r"its name must end in \.html; got 'x\.pdf'; rename it"),
+        ("x.html", {"channels": {"position": [1.0, 2.0]}}, r"got 'position' with shape \(2,\); leave out position"),
+    ],
+)
+def test_a_report_that_cannot_be_is_refused(
+    result: tvident.Identification, tmp_path: Path, monkeypatch: Any, name: str, options: Any, message: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ValueError, match=message):
+        result.report(name, **options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_batch_has_no_report(tmp_path: Path) -> None:
+    rig = tvident.simulate_torsional_rig(2.0)
+    angle, torque = (np.tile(one, (2, 1)) for one in (rig.angle, rig.torque))
+    batch = tvident.identify(angle, torque, sample_rate=1000, method="paper")
+    with pytest.raises(ValueError, match="only a single record has a report"):
+        batch.report(tmp_path / "x.html")
+
+
+def test_the_command_shows_every_channel_of_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    tvident.simulate_torsional_rig(3.0).save("rig.csv")
+    call = ["report", "rig.csv", "--angle", "angle", "--torque", "torque", "--time", "time", "--term", "offset"]
+    done = CliRunner().invoke(main, [*call, "-o", "page.html"])
+    assert done.exit_code == 0, done.output
+    assert done.output.endswith("Written: page.html\n")
+    text = Path("page.html").read_text(encoding="utf-8")
+    for name in ("Angle", "Torque", "slider_position", "Stiffness K", "Status over time"):
+        assert f'"title": "{name}"' in text
+    for output, message in (("page.pdf", "-o must end in .html"), ("no/page.html", "there is no such folder")):
+        refused = CliRunner().invoke(main, [*call, "-o", output])
+        assert refused.exit_code in {1, 2}
+        assert message in refused.output
