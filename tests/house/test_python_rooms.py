@@ -17,6 +17,7 @@ CORE = "tvident._core"
 ROOMS = (
     "_arguments",
     "_units",
+    "_tables",
     "_equation",
     "_status",
     "_files",

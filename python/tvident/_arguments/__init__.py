@@ -1,6 +1,9 @@
 """Checks what users pass: every message states the rule, the value that broke it and the cure."""
 
 from tvident._arguments.arrays import NanPolicy, RowPolicy, along_axis, any_array, check_nan, mask, real_array
+from tvident._arguments.channels import as_record, channel, channels
+from tvident._arguments.containers import fields_of, is_table, package_of, plain, time_axis
+from tvident._arguments.labels import Labels, labels_of
 from tvident._arguments.numbers import (
     LARGEST,
     finite_number,
@@ -14,26 +17,38 @@ from tvident._arguments.numbers import (
 from tvident._arguments.progress import Progress, reporter
 from tvident._arguments.sampling import check_power, check_window, length_given, sample_period, seconds, window_length
 from tvident._arguments.shown import shown
+from tvident._arguments.times import begin_of, implied_times, times_of
 from tvident._arguments.workers import worker_count
 from tvident._arguments.wrapped import Unwrapped, unwrapped
 
 __all__ = [
     "LARGEST",
+    "Labels",
     "NanPolicy",
     "Progress",
     "RowPolicy",
     "Unwrapped",
     "along_axis",
     "any_array",
+    "as_record",
+    "begin_of",
+    "channel",
+    "channels",
     "check_nan",
     "check_power",
     "check_window",
+    "fields_of",
     "finite_number",
     "flag",
+    "implied_times",
+    "is_table",
     "is_word",
+    "labels_of",
     "length_given",
     "mask",
     "one_of",
+    "package_of",
+    "plain",
     "positive_number",
     "real_array",
     "real_number",
@@ -41,6 +56,8 @@ __all__ = [
     "sample_period",
     "seconds",
     "shown",
+    "time_axis",
+    "times_of",
     "unwrapped",
     "whole_number",
     "window_length",

@@ -7,6 +7,7 @@ from typing import Any, Literal, TypeAlias, get_args
 import numpy as np
 import numpy.typing as npt
 
+from tvident._arguments.containers import plain, time_last
 from tvident._arguments.numbers import one_of, whole_number
 from tvident._arguments.shown import shown
 
@@ -22,7 +23,6 @@ _OTHER_KINDS = {
     "U": "text; read it with np.asarray(text, dtype=float)",
     "M": "dates; take seconds from the first sample on: (dates - dates[0]) / np.timedelta64(1, 's')",
     "m": "durations; divide them by np.timedelta64(1, 's')",
-    "V": "records with fields; take one field by its name",
 }
 """What arrays hold that are no numbers, and the cure."""
 
@@ -60,6 +60,7 @@ def any_array(name: str, values: npt.ArrayLike) -> npt.NDArray[np.number]:
 
 def _as_array(name: str, values: npt.ArrayLike) -> npt.NDArray[Any]:
     """Return values as an array, a masked one if they are masked."""
+    values = plain(name, values)
     if isinstance(values, list | tuple):
         values = [_filled(value) if isinstance(value, np.ma.MaskedArray) else value for value in values]
     try:
@@ -67,6 +68,11 @@ def _as_array(name: str, values: npt.ArrayLike) -> npt.NDArray[Any]:
     except (ValueError, OverflowError):
         raise ValueError(
             f"{name} must be a regular array of numbers; got {shown(values)}; give all rows the same length"
+        ) from None
+    except (TypeError, RuntimeError) as error:
+        # Arrays of other libraries, which may be on another device, say themselves how they become NumPy's.
+        raise TypeError(
+            f"{name} must be an array that NumPy reads; got {shown(type(values))} ({shown(error)}); convert it first"
         ) from None
 
 
@@ -104,9 +110,11 @@ def mask(name: str, values: npt.ArrayLike | None, shape: tuple[int, ...]) -> npt
     array = _as_array(name, values)
     if array.dtype != np.bool_ and array.size:
         raise TypeError(f"{name} must hold True and False; got {array.dtype}; write {name} = {name} != 0")
-    plain = np.ma.filled(array, False)  # noqa: FBT003 - what is masked is left out
+    cells = time_last(values, np.ma.filled(array, False))  # noqa: FBT003 - what is masked is left out
+    if cells.ndim == len(shape) + 1 and cells.shape[-1] == 1:
+        cells = cells[..., 0]  # a column, as the channels may be
     try:
-        return np.broadcast_to(np.asarray(plain), shape)
+        return np.broadcast_to(np.asarray(cells), shape)
     except ValueError:
         raise ValueError(
             f"{name} must have one value for every sample; got shape {array.shape} for an angle of shape {shape}; check its length"

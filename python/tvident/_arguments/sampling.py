@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 import re
 
-import numpy as np
 import numpy.typing as npt
 
-from tvident._arguments.arrays import real_array
 from tvident._arguments.numbers import positive_number, whole_number
 from tvident._arguments.shown import shown
+from tvident._arguments.times import period_of_times
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0}
 
@@ -23,9 +22,6 @@ _MOST_DIGITS = 100
 
 _COUNTABLE = float(1 << 53)
 """Doubles count samples up to here."""
-
-# How far a time stamp may lie from a uniform grid, as a fraction of the sample period: what printing with a few digits does.
-_JITTER = 1e-3
 
 
 def sample_period(
@@ -43,7 +39,7 @@ def sample_period(
             )
         return 1.0 / rate
     if t is not None:
-        return _possible("the step of t", _period_of_times(t, samples))
+        return _possible("the step of t", period_of_times(t, samples))
     return 1.0 if delta is None else _possible("delta", positive_number("delta", delta))
 
 
@@ -64,38 +60,6 @@ def check_power(name: str, derivative: int, period: float) -> None:
             f"{name} must be at most {most} with a sample period of {period:g} s, or the estimates leave the range of doubles; "
             f"got {derivative}; ask for a lower derivative or take another unit of time"
         )
-
-
-def _period_of_times(t: npt.ArrayLike, samples: int) -> float:
-    """Return the period of times that are uniform within rounding."""
-    times = real_array("t", t)
-    if times.shape != (samples,):
-        raise ValueError(
-            f"t must hold one time for each of the {samples} samples; got shape {times.shape}; check its length"
-        )
-    if samples == 1:
-        return 1.0
-    rounding = 4 * float(np.spacing(np.ones(1, times.dtype if times.dtype.kind == "f" else np.float64))[0])
-    seconds = times.astype(np.float64, copy=False)
-    # Differences of times that are larger by far leave the range of doubles.
-    bad = ~(np.abs(seconds) < _COUNTABLE * _LONGEST)
-    if bad.any():
-        place = int(np.flatnonzero(bad)[0])
-        raise ValueError(f"t must hold finite times; t[{place}] is {seconds[place]}; repair it")
-    period = float(seconds[-1] - seconds[0]) / (samples - 1)
-    if not period > 0:
-        raise ValueError(f"t must increase; it goes from {seconds[0]} to {seconds[-1]}; sort the samples by time")
-    distance = np.abs(seconds - (seconds[0] + period * np.arange(samples)))
-    allowed = max(_JITTER * period, rounding * float(np.max(np.abs(seconds))))
-    if float(distance.max()) > allowed:
-        # The widest step tells where; the farthest sample may be an innocent one.
-        steps = np.abs(np.diff(seconds) - np.median(np.diff(seconds)))
-        place = int(steps.argmax()) + 1
-        raise ValueError(
-            f"t must be uniform; the step to t[{place}] = {seconds[place]:g} is {seconds[place] - seconds[place - 1]:g} s "
-            f"where the others are {float(np.median(np.diff(seconds))):g} s; resample the record onto a uniform grid"
-        )
-    return period
 
 
 def seconds(name: str, value: str) -> float:

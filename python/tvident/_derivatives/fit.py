@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -10,9 +12,30 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._derivatives.found import Found
+from tvident._tables import Table, Tabular
 
 
-class LocalPolynomialFit:
+@dataclass(frozen=True)
+class Sampled:
+    """How a signal was sampled.
+
+    Parameters
+    ----------
+    step : int
+        Every how many samples there is a result.
+    period, start : float
+        Seconds from sample to sample, and of the first.
+    labels : Labels, optional
+        Those of the container that the samples came in.
+    """
+
+    step: int = 1
+    period: float = 1.0
+    start: float = 0.0
+    labels: arguments.Labels | None = None
+
+
+class LocalPolynomialFit(Tabular):
     r"""What :func:`fit_local_polynomials` found.
 
     Attributes
@@ -60,12 +83,12 @@ class LocalPolynomialFit:
         self,
         samples: npt.NDArray[Any],
         axis: int,
-        step: int,
         found: Found,
+        sampled: Sampled,
     ) -> None:
         self._samples = samples
         self._axis = axis % samples.ndim
-        self._step = step
+        self._sampled = sampled
         self._found = found
         self.derivatives: npt.NDArray[np.float64] = self._in_place(found.derivatives)
         self.order: npt.NDArray[np.uint8] = self._in_place(found.order)
@@ -151,6 +174,24 @@ class LocalPolynomialFit:
         for column, values in enumerate(columns):
             scores[: len(values), column] = values
         return scores.reshape(-1, *leading)
+
+    def _table(self) -> Table:
+        sampled = self._sampled
+        last = self._axis - self._samples.ndim
+        values, errors = (np.moveaxis(each, last, -1) for each in (self.derivatives, self.stderr))
+        columns: dict[str, npt.NDArray[Any]] = {}
+        for place, (value, error) in enumerate(zip(values, errors, strict=True)):
+            name = f"derivative_{place}" if place else "value"
+            columns |= {name: value, f"{name}_stderr": error}
+        rest: dict[str, npt.NDArray[Any]] = {"sigma": self.sigma, "order": self.order, "status": self.status}
+        columns |= {name: np.moveaxis(each, last, -1) for name, each in rest.items()}
+        every, labels = sampled.step, sampled.labels
+        return Table(
+            time=sampled.start + np.arange(0, self._samples.shape[-1], every, dtype=np.float64) * sampled.period,
+            columns=columns,
+            settings=json.loads(json.dumps(self.settings, default=np.ndarray.tolist)),
+            labels=None if labels is None else labels.at(slice(None, None, every)),
+        )
 
     def __repr__(self) -> str:
         orders = f"orders {self.order.min()}…{self.order.max()}" if self.order.size else "no samples"

@@ -9,9 +9,10 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident import _core
 from tvident._derivatives.automatic import choose
-from tvident._derivatives.fit import LocalPolynomialFit
+from tvident._derivatives.fit import LocalPolynomialFit, Sampled
 from tvident._derivatives.found import Found
 from tvident._derivatives.plans import HIGHEST_ORDER, SHORTEST_WINDOW, Criterion, Selection, plan, quantisation_step
+from tvident._tables import shaped
 
 
 # All but the data are options, as users call it.
@@ -47,16 +48,19 @@ def fit_local_polynomials(
     Parameters
     ----------
     y : array_like
-        Samples: real numbers of any type, any shape. Masked ones are missing, as NaN is.
+        Samples: real numbers of any type, any shape. Masked ones are missing, as NaN is. A table (pandas, polars, a structured array)
+        has time along its rows.
     window_length : int or str
         Samples in a window, ``M = 2N + 1``: odd, at least 5; or a duration such as ``"0.2 s"``, of which the nearest odd number of
         samples is taken; or ``"auto"``: window and order are chosen together, for every derivative on its own (see Notes).
     delta : float, optional
-        Sample period in seconds, 1 by default. Give at most one of `delta`, `sample_rate` and `t`.
+        Sample period in seconds; by default that of an index of dates if `y` has one, and 1 otherwise. Give at most one of `delta`,
+        `sample_rate` and `t`.
     sample_rate : float, optional
         Samples per second.
     t : array_like, optional
-        Time of every sample in seconds, shape (n,), uniform to a thousandth of the sample period.
+        Time of every sample, shape (n,): seconds, dates or durations, uniform to a thousandth of the sample period or within the digits
+        that they were printed with.
     max_order : int, optional
         Highest candidate order, at most 15. Orders that are too high for a short window are left out.
     order : int, optional
@@ -70,7 +74,7 @@ def fit_local_polynomials(
     max_deriv : int, optional
         Highest derivative wanted, at most 15.
     axis : int, optional
-        Axis of time.
+        Axis of time; where it is left out, the dimension of xarray that is called ``time`` or has dates.
     step : int, optional
         Every how many samples an estimate is wanted: the same numbers as ``[::step]`` of all of them, to rounding. From a tenth of
         a window on each window is projected by itself and the cost is that of the windows that are wanted; below, the bits are the same.
@@ -157,9 +161,12 @@ def fit_local_polynomials(
     >>> bool(np.sqrt(np.mean(error**2)) < 0.001 * (2 * np.pi * 3) ** 2)
     True
     """
-    array = arguments.real_array("y", y)
+    given = shaped("y", y, axis)
+    array, axis = given.array, given.axis
     samples = arguments.along_axis("y", array, axis)
     count = samples.shape[-1]
+    if delta is None and sample_rate is None and t is None:
+        t = arguments.implied_times(y)
     seconds = arguments.sample_period(count, delta=delta, sample_rate=sample_rate, t=t)
     arguments.one_of("criterion", criterion, get_args(Criterion))
     arguments.one_of("selection", selection, get_args(Selection))
@@ -182,6 +189,7 @@ def fit_local_polynomials(
     step_of_rounding = quantisation_step(samples, quantisation)
     turned = None if period is None else arguments.unwrapped("y", samples, period)
     samples = samples if turned is None else turned.values
+    sampled = Sampled(every, seconds, arguments.begin_of(t), arguments.labels_of(y))
 
     def plan_of_window(length: int) -> _core.LocalPolynomials:
         return plan(
@@ -211,7 +219,7 @@ def fit_local_polynomials(
                 progress=report,
             )
             found.settings.update(_of_wrapped(turned, period))
-            return LocalPolynomialFit(samples, axis, every, found)
+            return LocalPolynomialFit(samples, axis, found, sampled)
         core_plan = plan_of_window(length)
         estimates = core_plan.estimate(samples, step=every, workers=threads, progress=report)
     found = Found(
@@ -232,7 +240,7 @@ def fit_local_polynomials(
         errors=lambda: core_plan.errors(samples, step=every, workers=threads),
         plan_of=lambda _: core_plan,
     )
-    return LocalPolynomialFit(samples, axis, every, found)
+    return LocalPolynomialFit(samples, axis, found, sampled)
 
 
 def _of_wrapped(turned: arguments.Unwrapped | None, period: float | None) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._derivatives.plans import HIGHEST_ORDER, plan
+from tvident._tables import shaped
 
 Mode: TypeAlias = Literal["interp", "mirror", "constant", "nearest", "wrap"]
 
@@ -47,7 +48,7 @@ def savgol_filter(
     cval: float = 0.0,
     *,
     period: float | None = None,
-) -> npt.NDArray[Any]:
+) -> Any:
     """Filter with :func:`scipy.signal.savgol_filter`'s call and results.
 
     A drop-in replacement: even windows, all modes, float32 in and out. It is exact where SciPy's coefficients are not (their least
@@ -57,7 +58,7 @@ def savgol_filter(
     ----------
     x : array_like
         Samples, of any shape and unit. Float32 stays float32, any other real type becomes float64. Masked ones
-        are NaN.
+        are NaN. A table (pandas, polars, a structured array) has time along its rows, and every column is filtered.
     window_length : int
         Samples in a window, odd or even. With an even window the result belongs half a sample later, as in SciPy.
     polyorder : int or "aicc"
@@ -68,7 +69,7 @@ def savgol_filter(
     delta : float, optional
         Sample period in seconds.
     axis : int, optional
-        Axis of time.
+        Axis of time; where it is left out, the dimension of xarray that is called ``time`` or has dates.
     mode : {"interp", "mirror", "constant", "nearest", "wrap"}, optional
         What is taken beyond the ends. ``"interp"`` extends nothing but evaluates the first and last full window off its centre.
     cval : float, optional
@@ -78,7 +79,7 @@ def savgol_filter(
 
     Returns
     -------
-    ndarray, same shape as `x`
+    ndarray, same shape as `x`, or the container that `x` is, with its index, coordinates and attributes
         Filtered samples, in the unit of `x` per second to the power of `deriv`. Windows that hold a value that is no finite number are
         NaN, and no others.
 
@@ -114,7 +115,8 @@ def savgol_filter(
     array([1.66, 3.17, 3.54, 2.86, 0.66, 0.17, 1.  , 4.  , 9.  ])
     """
     arguments.one_of("mode", mode, get_args(Mode))
-    array = arguments.real_array("x", x)
+    given = shaped("x", x, axis)
+    array, axis = given.array, given.axis
     samples = arguments.along_axis("x", array, axis)
     length = arguments.whole_number("window_length", window_length, least=1)
     chosen = arguments.is_word(polyorder, "aicc")
@@ -146,10 +148,8 @@ def savgol_filter(
         samples = _padded(samples.astype(np.float64, copy=False), length, mode, beyond)
     derivatives = core_plan.estimate(samples, ends=ends, workers=arguments.worker_count(None)).derivatives
     filtered: npt.NDArray[Any] = np.moveaxis(derivatives[0], -1, axis)
-    if array.dtype != np.float32:
-        return filtered
     with np.errstate(all="ignore"):
-        return filtered.astype(np.float32)
+        return given.again(filtered if array.dtype != np.float32 else filtered.astype(np.float32))
 
 
 def _derivative(deriv: int, delta: float, order: int) -> tuple[int, float]:

@@ -40,7 +40,7 @@ def parameter(name: str, value: object, shape: tuple[int, ...]) -> Kind | float 
             raise ValueError(f"{name} must be finite; got {number}; give a number, or 'windowed' where it is unknown")
         _check_size(name, abs(number))
         return number
-    known = arguments.real_array(name, known)
+    known = arguments.as_record(name, value, shape)  # type: ignore[arg-type] # an array by now
     if not np.isfinite(known).all():
         raise ValueError(
             f"a known {name} must be finite at every sample; got {np.count_nonzero(~np.isfinite(known))} values that are not; "

@@ -55,15 +55,18 @@ def identify(
     Parameters
     ----------
     angle : array_like, shape (\*, n)
-        Angle in rad. Time is the last axis; any others are a batch of records. Masked samples are missing, as NaN is.
+        Angle in rad. Time is the last axis; any others are a batch of records. Masked samples are missing, as NaN is. Tables of pandas
+        and polars have time along their rows, arrays of xarray along ``time``; their labels come back with ``to_pandas()``,
+        ``to_polars()`` and ``to_xarray()`` of the result. A column, shape (n, 1), is one record.
     torque : array_like, same shape
         Torque in N m.
     sample_rate : float
-        Samples per second. Give exactly one of `sample_rate`, `delta` and `t`.
+        Samples per second. Give exactly one of `sample_rate`, `delta` and `t`, or an angle with an index of dates.
     delta : float
         Sample period in seconds.
     t : array_like, shape (n,)
-        Time of every sample in seconds, uniform to a thousandth of the sample period.
+        Time of every sample: seconds, dates or durations, uniform to a thousandth of the sample period or within the digits that they
+        were printed with. Dates, in any time zone, become seconds from the first sample on.
     method : {"auto", "paper"}, WeakForm or StrongForm, optional
         ``"auto"``: weak form, all settings chosen from the record, inertia and damping constant unless a test rejects it, an offset of
         the torque. ``"paper"``: the paper's method: strong form, polynomials in windows of 201 samples, regression windows of 200, all
@@ -167,15 +170,12 @@ def identify(
     >>> bool(abs(paper.stiffness[2000] - 15) < 0.01)
     True
     """
-    angles = arguments.real_array("angle", angle)
-    torques = arguments.real_array("torque", torque)
-    if angles.shape != torques.shape:
-        raise ValueError(
-            f"angle and torque must have the same shape; got {angles.shape} and {torques.shape}; cut or reshape one of them"
-        )
+    angles, torques = arguments.channels(angle=angle, torque=torque)
     samples = angles.shape[-1]
     if sample_rate is None and delta is None and t is None:
-        raise TypeError("identify needs the sample period; got none; give sample_rate=, delta= or t=")
+        t = arguments.implied_times(angle)
+        if t is None:
+            raise TypeError("identify needs the sample period; got none; give sample_rate=, delta= or t=")
     seconds = arguments.sample_period(samples, delta=delta, sample_rate=sample_rate, t=t)
     given = {
         "inertia": inertia,
@@ -186,7 +186,7 @@ def identify(
         "quantisation": quantisation,
         "period": period,
     }
-    instruments = None if instrument is None else arguments.real_array("instrument", instrument)
+    instruments = None if instrument is None else arguments.channel("instrument", instrument)
     if instruments is not None and instruments.shape != angles.shape:
         raise ValueError(
             f"an instrument must have the angle's shape {angles.shape}; got {instruments.shape}; resample it"
@@ -201,11 +201,10 @@ def identify(
         request = replace(request, quantisation=quantisation_step(angles, request.quantisation))
         turned = arguments.unwrapped("angle", angles, turn)
         angles, doubts = turned.longest("angle", split=request.counts_turns)
-    start = 0.0 if t is None else float(np.asarray(t)[0])
     data = Data(
         angles=angles,
         torques=torques,
-        time=start + np.arange(samples, dtype=np.float64) * seconds,
+        time=arguments.begin_of(t) + np.arange(samples, dtype=np.float64) * seconds,
         period=seconds,
         instruments=instruments,
         mask=arguments.mask("mask", mask, angles.shape),
@@ -213,5 +212,6 @@ def identify(
         step=arguments.whole_number("step", step, least=1),
         workers=arguments.worker_count(workers),
         doubts=doubts,
+        labels=arguments.labels_of(angle),
     )
     return Task(data, request).run(progress)

@@ -44,6 +44,8 @@ class Data:
     workers : int, optional
     doubts : sequence of (int, str)
         What cannot be known of the channels, and of which record.
+    labels : Labels, optional
+        What the angle came with: an index, coordinates.
     """
 
     angles: npt.NDArray[np.number]
@@ -56,6 +58,7 @@ class Data:
     step: int
     workers: int | None
     doubts: Sequence[tuple[int, str]] = ()
+    labels: arguments.Labels | None = None
 
     @property
     def batch(self) -> tuple[int, ...]:
@@ -133,6 +136,8 @@ class Task:
             name: value if isinstance(value, float) else value[..., :: data.step] for name, value in self._known.items()
         }
         batch = estimates(data.batch, self._names, found, known)
+        if data.labels is not None:
+            batch = replace(batch, labels=data.labels.at(slice(None, None, data.step)))
         settings = self._settings(found)
         explain: Any = self._words_of_strong_form if isinstance(request.form, StrongForm) else self._words_of_weak_form
         explain = self._words_with_instrument if data.instruments is not None else explain

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _arguments as arguments
 from tvident._results.scan import Scan
 from tvident._status import Status
 
@@ -35,6 +36,8 @@ class Estimates:
     record_status : Status or ndarray of uint16, shape (\*)
     scans : tuple of Scan
         One a record, in weak form.
+    labels : Labels, optional
+        What the samples came with: an index, coordinates.
     """
 
     values: Mapping[str, Array]
@@ -48,3 +51,4 @@ class Estimates:
     status: npt.NDArray[np.uint16]
     record_status: Status | npt.NDArray[np.uint16]
     scans: tuple[Scan, ...] = ()
+    labels: arguments.Labels | None = None

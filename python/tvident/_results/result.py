@@ -21,6 +21,7 @@ from tvident._results.simulated import Simulated
 from tvident._results.standard_errors import StandardErrors
 from tvident._results.words import Words
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status, describe
+from tvident._tables import Table, Tabular
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,7 +49,7 @@ def _product(factor: Array, error: Array) -> Array:
     return np.asarray(factor * error)
 
 
-class Identification(Simulated):
+class Identification(Simulated, Tabular):
     r"""What :func:`tvident.identify` found. ``n`` is the number of samples, or of every ``step``-th of them.
 
     Attributes
@@ -133,6 +134,7 @@ class Identification(Simulated):
         self._words = words
         self.settings = settings
         self._scans = found.scans
+        self._labels = found.labels
         known = {name: error for name, error in found.errors.items() if name not in found.factors}
         computed: dict[str, Callable[[], Array]] = {
             name: partial(_product, factor, found.errors[name]) for name, factor in found.factors.items()
@@ -230,7 +232,10 @@ class Identification(Simulated):
             raise ValueError(
                 f"only a single record has columns; this one has shape {self.inertia.shape}; take one record"
             )
-        columns: dict[str, npt.NDArray[Any]] = {"time": self.time}
+        return {"time": self.time, **self._table().columns}
+
+    def _table(self) -> Table:
+        columns: dict[str, npt.NDArray[Any]] = {}
         values = {"inertia": self.inertia, "damping": self.damping, "stiffness": self.stiffness, **self.terms}
         values |= {"natural_frequency": self.natural_frequency, "damping_ratio": self.damping_ratio}
         for name, value in values.items():
@@ -238,8 +243,10 @@ class Identification(Simulated):
             columns[f"{name}_stderr"] = self.stderr[name]
         columns |= {"condition": self.condition, "residual_std": self.residual_std}
         columns |= {"order": self.order, "status": self.status}
-        columns["record_status"] = np.full(self.time.size, int(self.record_status), np.uint16)
-        return columns | {"trusted": self.trusted.astype(np.uint8)}
+        records = np.asarray(self.record_status, np.uint16)[..., np.newaxis]
+        columns["record_status"] = np.broadcast_to(records, self.status.shape).copy()
+        columns["trusted"] = self.trusted.astype(np.uint8)
+        return Table(self.time, columns, UNITS, self.settings, self._labels)
 
     def save(self, path: str | Path) -> None:
         """Write every column to a CSV or NPZ file, with units in the header.

@@ -77,7 +77,7 @@ class Simulated:
             If shapes do not match, the record is not there to tell the state, or the response leaves the range of numbers, as that of an
             unstable system does.
         """
-        torques = arguments.real_array("torque", torque)
+        torques = arguments.channel("torque", torque)
         model = self._model()
         model.check(torques)
         if initial is not None and angle is not None:
@@ -123,7 +123,7 @@ class Simulated:
         if angle is None or torque is None:
             recorded = self._record("angle= and torque=")
             angle, torque = recorded.angles, recorded.torques
-        torques = arguments.real_array("torque", torque)
+        torques = arguments.channel("torque", torque)
         angles = _like_torque("angle", angle, torques)
         share = accounted_for(angles, self.simulate(torques, angle=angles))
         return share if share.ndim else float(share)
@@ -234,7 +234,7 @@ class Simulated:
 
 def _like_torque(name: str, channel: npt.ArrayLike, torque: npt.NDArray[np.number]) -> npt.NDArray[np.number]:
     """Return a channel that has the shape of the torque."""
-    array = arguments.real_array(name, channel)
+    array = arguments.channel(name, channel)
     if array.shape != torque.shape:
         raise ValueError(
             f"{name} and torque must have the same shape; got {array.shape} and {torque.shape}; cut or reshape one of them"

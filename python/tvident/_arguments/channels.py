@@ -1,0 +1,55 @@
+"""Channels: arrays of records whose last axis is time, however they come."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._arguments.arrays import real_array
+from tvident._arguments.containers import time_axis, time_last
+from tvident._arguments.labels import aligned_with
+
+_NO_RECORD = 32
+"""Samples that no record of a batch is shorter than."""
+
+
+def channel(name: str, values: npt.ArrayLike) -> npt.NDArray[np.number]:
+    """Return a channel with time last: rows of a table and the dimension ``time`` are time, and a column is a record."""
+    array = real_array(name, values)
+    if time_axis(values) is not None:
+        return time_last(values, array)
+    return array[..., 0] if array.ndim > 1 and array.shape[-1] == 1 and array.shape[-2] > 1 else array
+
+
+def channels(**values: npt.ArrayLike) -> list[npt.NDArray[np.number]]:
+    """Return channels of one recording, which have one shape.
+
+    Raises
+    ------
+    ValueError
+        If shapes differ, or the first axis seems to be time.
+    """
+    first = next(iter(values.items()))
+    arrays = {name: channel(name, aligned_with(first, (name, value))) for name, value in values.items()}
+    shapes = {name: array.shape for name, array in arrays.items()}
+    if len(set(shapes.values())) > 1:
+        sizes = {array.size for array in arrays.values()}
+        if len(sizes) == 1 and all(max(shape) in sizes for shape in shapes.values()):
+            # A row beside a column, as MATLAB files have them: one record each.
+            return [array.reshape(-1) for array in arrays.values()]
+        one, *_, other = shapes.values()
+        cure = "transpose one of them" if one == other[::-1] else "cut or reshape one of them"
+        raise ValueError(f"{' and '.join(shapes)} must have the same shape; got {one} and {other}; {cure}")
+    shape = next(iter(shapes.values()))
+    if len(shape) > 1 and shape[-1] < _NO_RECORD <= shape[0]:
+        raise ValueError(
+            f"time must be the last axis; got shape {shape}, records of {shape[-1]} samples: the first axis seems to be time; "
+            f"pass {' and '.join(f'{name}.T' for name in arrays)}"
+        )
+    return list(arrays.values())
+
+
+def as_record(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[np.number]:
+    """Return numbers to be used beside records of this shape, with time last and a column as the record that it is."""
+    array = time_last(values, real_array(name, values))
+    return array[..., 0] if array.ndim == len(shape) + 1 and array.shape[-1] == 1 else array

@@ -1,0 +1,130 @@
+"""Containers of samples as pandas, polars, xarray, dask and MATLAB have them, known by their module: nothing is imported for them."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._arguments.shown import shown
+
+_MOST_NAMES = 6
+"""Fields that a message lists."""
+
+
+def package_of(values: object) -> str:
+    """Return the package that the type of a value, or one that it is derived from, is of: pandas, polars, xarray, dask; or nothing."""
+    for kind in type(values).__mro__:
+        package = kind.__module__.partition(".")[0]
+        if package in {"pandas", "polars", "xarray", "dask", "dask_expr"}:
+            return package.removesuffix("_expr")
+    return ""
+
+
+def is_table(values: object) -> bool:
+    """Return whether a value is a table of pandas or polars, whose rows are samples."""
+    return package_of(values) in {"pandas", "polars"} and hasattr(values, "columns")
+
+
+def plain(name: str, values: Any) -> Any:
+    """Return what NumPy makes an array of, at once and without a loss: missing values are NaN, times are those of UTC."""
+    package = package_of(values)
+    if package == "dask":
+        raise TypeError(_lazy(name, "a dask array" if hasattr(values, "chunks") else "a dask collection", ".compute()"))
+    if package == "pandas" and (hasattr(values, "dtype") or hasattr(values, "dtypes")):
+        return _of_pandas(values)
+    if package == "polars" and not isinstance(values, type):
+        if not hasattr(values, "to_numpy"):
+            raise TypeError(_lazy(name, f"a polars {type(values).__name__}", ".collect()"))
+        return values.to_numpy()
+    if package == "xarray":
+        return _of_xarray(name, values)
+    fields = fields_of(values)
+    if fields:
+        listed = ", ".join(map(str, fields[:_MOST_NAMES])) + (" …" if len(fields) > _MOST_NAMES else "")
+        how = f".{fields[0]}" if hasattr(values, "_fieldnames") else f"[{fields[0]!r}]"
+        raise TypeError(
+            f"{name} must hold numbers; got records with fields {listed}; take one field by its name: {name}{how}"
+        )
+    if isinstance(values, list | tuple):
+        # A loop over plain numbers would take long, and find nothing.
+        return values if not values or isinstance(values[0], int | float) else [plain(name, one) for one in values]
+    return _unwrapped(values)
+
+
+def fields_of(values: Any) -> list[Any]:
+    """Return the names of what a structure holds: of NumPy, of MATLAB, or a dictionary; nothing where it is none."""
+    if isinstance(values, dict):
+        return list(values)
+    if isinstance(values, np.ndarray) and values.dtype.names is not None:
+        return list(values.dtype.names)
+    return list(getattr(values, "_fieldnames", ()))
+
+
+def _unwrapped(values: Any) -> Any:
+    """Return the array that a field of a MATLAB structure is wrapped in: one of objects, of shape (1, 1)."""
+    while isinstance(values, np.ndarray) and values.dtype.kind == "O" and values.size == 1:
+        inner = values.item()
+        if not isinstance(inner, np.ndarray):
+            break
+        values = inner
+    return values
+
+
+def _lazy(name: str, what: str, call: str) -> str:
+    return (
+        f"{name} must be in memory; got {what}, which may be larger than memory and is never computed silently; "
+        f"pass {name}{call}"
+    )
+
+
+def _of_pandas(values: Any) -> npt.NDArray[Any]:
+    kinds = list(values.dtypes) if hasattr(values, "columns") else [getattr(values, "dtype", None)]
+    if kinds and getattr(kinds[0], "tz", None) is not None and not hasattr(values, "columns"):
+        times = values.dt if hasattr(values, "dt") else values
+        return np.asarray(times.tz_convert(None))
+    if any(kind is not None and not isinstance(kind, np.dtype) for kind in kinds):
+        # Types of pandas' own have values that are missing, of which NumPy would make objects.
+        types = sys.modules["pandas"].api.types
+        if all(types.is_bool_dtype(kind) for kind in kinds):
+            return np.asarray(values.to_numpy(dtype=bool, na_value=False))
+        if all(types.is_numeric_dtype(kind) for kind in kinds):
+            return np.asarray(values.to_numpy(dtype=np.float64, na_value=np.nan))
+    return np.asarray(values)
+
+
+def _of_xarray(name: str, values: Any) -> npt.NDArray[Any]:
+    # Even to ask whether there is an attribute `values` computes it.
+    if hasattr(values, "data_vars") or not hasattr(values, "dims"):
+        variables = [str(one) for one in values] if hasattr(values, "data_vars") else []
+        got = f"a Dataset of {', '.join(variables[:_MOST_NAMES])}" if variables else shown(values)
+        one = variables[0] if variables else "angle"
+        raise TypeError(f"{name} must be one channel; got {got}; take one variable: {name}[{one!r}]")
+    if getattr(values, "chunks", None):
+        raise TypeError(_lazy(name, "a dask array", ".load()"))
+    return np.asarray(values.values)
+
+
+def time_axis(values: Any) -> int | None:
+    """Return which axis of a container is time, where the container says so: rows of a table, the dimension of xarray."""
+    if is_table(values):
+        return 0
+    if package_of(values) != "xarray" or not hasattr(values, "dims"):
+        return None
+    named = [place for place, dim in enumerate(values.dims) if str(dim).lower() in {"time", "t"}]
+    dated = [
+        place for place, dim in enumerate(values.dims) if dim in values.coords and values.coords[dim].dtype.kind in "mM"
+    ]
+    found = named or dated
+    return found[0] if len(found) == 1 else None
+
+
+def time_last(values: Any, array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return what was made of a container with time as its last axis, where the container says which it is."""
+    axis = time_axis(values)
+    if axis is None or array.ndim <= axis:
+        return array
+    array = np.moveaxis(array, axis, -1)
+    return array[0] if is_table(values) and array.shape[0] == 1 else array

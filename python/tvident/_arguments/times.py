@@ -1,0 +1,223 @@
+"""Times of samples: dates and durations become seconds, and times that were printed with few digits become uniform again."""
+
+from __future__ import annotations
+
+import datetime as dt
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._arguments.arrays import real_array
+from tvident._arguments.containers import package_of, plain
+
+Seconds = npt.NDArray[np.float64]
+
+_COUNTABLE = float(1 << 53)
+"""Doubles count samples up to here."""
+
+_LONGEST = 1e30
+"""Seconds of a sample period, as in `sampling`."""
+
+# How far a time stamp may lie from a uniform grid, as a fraction of the sample period.
+_JITTER = 1e-3
+
+_DIGITS = 9
+"""Digits behind the point that printed times may have: nanoseconds."""
+
+_BLOCKS = 4096
+"""Parts of a record of whose times the extremes are kept: they bound the period as all times do."""
+
+_HALVINGS = 50
+
+_SEARCHED = 1e-6
+"""How closely the period is found, as a part of what times may be off."""
+
+
+def times_of(t: npt.ArrayLike) -> npt.NDArray[np.number]:
+    """Return times in seconds: numbers as they are, dates and durations from the first on.
+
+    Raises
+    ------
+    TypeError
+        If they are no times.
+    ValueError
+        If one is missing.
+    """
+    values = _dates(plain("t", t))
+    if not isinstance(values, np.ndarray) or values.dtype.kind not in "mM":
+        return real_array("t", values)
+    if np.datetime_data(values.dtype)[0] in {"Y", "M"}:
+        raise ValueError(
+            f"t must have a unit of fixed length; got {values.dtype}, whose months differ; give seconds, or t.astype('datetime64[ns]')"
+        )
+    if np.isnat(values).any():
+        place = int(np.flatnonzero(np.isnat(values))[0])
+        raise ValueError(f"t must hold finite times; t[{place}] is missing (NaT); repair it")
+    since = values - values.flat[0] if values.size else values.astype("m8[s]")
+    return np.asarray(since / np.timedelta64(1, "s"))
+
+
+def _dates(values: Any) -> Any:
+    """Return dates of Python as NumPy has them, in UTC."""
+    first = values[0] if isinstance(values, list | tuple) and values else values
+    if isinstance(values, np.ndarray) and values.dtype.kind == "O" and values.size:
+        first = values.flat[0]
+    if isinstance(first, dt.datetime):
+        utc = [one if one.tzinfo is None else one.astimezone(dt.UTC).replace(tzinfo=None) for one in values]
+        return np.asarray(utc, dtype="M8[us]")
+    if isinstance(first, np.timedelta64 | np.datetime64) and not isinstance(values, np.ndarray):
+        return np.asarray(values)
+    if isinstance(first, dt.timedelta) and not isinstance(first, np.timedelta64):
+        return np.asarray(values, dtype="m8[us]")
+    if isinstance(first, str) or (isinstance(values, np.ndarray) and values.dtype.kind in "SU"):
+        raise TypeError(
+            "t must hold numbers; got text; read it with np.asarray(t, dtype=float), dates with np.asarray(t, dtype='datetime64[us]')"
+        )
+    return values
+
+
+def begin_of(t: npt.ArrayLike | None) -> float:
+    """Return the time of the first sample in seconds: 0 where times are dates, or were not given."""
+    return 0.0 if t is None else float(times_of(t).flat[0])
+
+
+def implied_times(values: Any) -> Any:
+    """Return the times that a container says its samples have: an index of dates or durations; None where it has none.
+
+    Plain numbers are none: nobody says whether they are seconds. With xarray the attribute ``units`` may say so.
+    """
+    if package_of(values) == "pandas" and hasattr(values, "index"):
+        return values.index if getattr(values.index, "dtype", np.dtype(object)).kind in "mM" else None
+    if package_of(values) == "xarray" and hasattr(values, "dims"):
+        for dim in values.dims:
+            coordinate = values.coords.get(dim)
+            if coordinate is not None and (
+                coordinate.dtype.kind in "mM" or coordinate.attrs.get("units") in {"s", "second", "seconds"}
+            ):
+                return coordinate
+    return None
+
+
+def period_of_times(t: npt.ArrayLike, samples: int) -> float:
+    """Return the period of times that are uniform, within rounding or within the digits that they were printed with."""
+    given = times_of(t)
+    if given.ndim > 1 and given.size == max(given.shape):
+        given = given.reshape(-1)
+    if given.shape != (samples,):
+        raise ValueError(
+            f"t must hold one time for each of the {samples} samples; got shape {given.shape}; check its length"
+        )
+    if samples == 1:
+        return 1.0
+    rounding = 4 * float(np.spacing(np.ones(1, given.dtype if given.dtype.kind == "f" else np.float64))[0])
+    seconds = given.astype(np.float64, copy=False)
+    # Differences of times that are larger by far leave the range of doubles.
+    bad = ~(np.abs(seconds) < _COUNTABLE * _LONGEST)
+    if bad.any():
+        place = int(np.flatnonzero(bad)[0])
+        raise ValueError(f"t must hold finite times; t[{place}] is {seconds[place]}; repair it")
+    period = float(seconds[-1] - seconds[0]) / (samples - 1)
+    if not period > 0:
+        raise ValueError(f"t must increase; it goes from {seconds[0]} to {seconds[-1]}; sort the samples by time")
+    distance = np.abs(seconds - (seconds[0] + period * np.arange(samples)))
+    if float(distance.max()) <= max(_JITTER * period, rounding * float(np.max(np.abs(seconds)))):
+        return period
+    kind = given.dtype if given.dtype.kind == "f" else np.dtype(np.float64)
+    slack = float(np.spacing(np.abs(seconds).max().astype(kind)))
+    quantum = _quantum(seconds, slack)
+    bounds = None if quantum is None else _periods(seconds, period, (1 + _SEARCHED) * quantum + 4 * slack)
+    if quantum is None or bounds is None:
+        raise _not_uniform(seconds, distance, period)
+    shortest, longest = bounds
+    rate = _plainest(1 / longest, 1 / shortest)
+    if quantum >= 1 / rate:
+        raise ValueError(
+            f"t must tell samples apart; it was printed in steps of {quantum:g} s, which several samples share; "
+            f"give sample_rate={rate:.9g} instead of t"
+        )
+    if longest / shortest - 1 > _JITTER:
+        raise ValueError(
+            f"t must tell the sample rate to a thousandth; printed in steps of {quantum:g} s it may be {1 / longest:.6g} to "
+            f"{1 / shortest:.6g} Hz; give sample_rate={rate:.9g}, or what the recorder was set to, instead of t"
+        )
+    return 1 / rate
+
+
+def _not_uniform(seconds: Seconds, distance: Seconds, period: float) -> ValueError:
+    """Return what says where times are not uniform, and what to do."""
+    # The widest step tells where; the farthest sample may be an innocent one.
+    usual = float(np.median(np.diff(seconds)))
+    place = int(np.abs(np.diff(seconds) - usual).argmax()) + 1
+    cure = "resample the record onto a uniform grid"
+    if float(distance.max()) < period / 2:
+        count = np.arange(seconds.size) - (seconds.size - 1) / 2
+        rate = float(count @ count / (count @ (seconds - seconds[0])))
+        cure += f", or give sample_rate={rate:.6g} if only the clock was read unevenly"
+    return ValueError(
+        f"t must be uniform; the step to t[{place}] = {seconds[place]:g} is {seconds[place] - seconds[place - 1]:g} s "
+        f"where the others are {usual:g} s; {cure}"
+    )
+
+
+def _quantum(seconds: Seconds, slack: float) -> float | None:
+    """Return the decimal step that all times are multiples of, but for rounding; None where they have too many digits for one."""
+    for digits in range(_DIGITS + 1):
+        allowed = slack * 10.0**digits
+        if allowed > 0.1:  # noqa: PLR2004 - the numbers do not tell such steps
+            return None
+        scaled = seconds * 10.0**digits
+        if float(np.abs(scaled - np.rint(scaled)).max()) <= allowed + float(np.spacing(np.abs(scaled).max())):
+            return 10.0**-digits
+    return None
+
+
+def _periods(seconds: Seconds, period: float, allowed: float) -> tuple[float, float] | None:
+    """Return the shortest and the longest period at which times lie within one step from a grid; None where none does.
+
+    Times that are cut off lie within one step of their digits, as rounded ones do.
+    """
+    count = np.arange(seconds.size, dtype=np.float64)
+    slope = period + float(np.polyfit(count, seconds - seconds[0] - period * count, 1)[0])
+    left = seconds - seconds[0] - slope * count
+    some = np.unique([np.r_[part.argmin(), part.argmax()] + first for first, part in _blocks(left)])
+    at, of = count[some], left[some]
+
+    def spread(change: float) -> float:
+        rest = of - change * at
+        return float(rest.max() - rest.min())
+
+    # The spread is convex: its least comes first, then where it becomes too large on either side.
+    reach = 2 * allowed / max(1.0, float(at[-1]))
+    low, high = -reach, reach
+    for _ in range(_HALVINGS):
+        one, other = low + (high - low) / 3, high - (high - low) / 3
+        low, high = (low, other) if spread(one) < spread(other) else (one, high)
+    best = (low + high) / 2
+    if spread(best) > allowed:
+        return None
+    ends = []
+    for outside in (best - reach, best + reach):
+        near, far = best, outside
+        for _ in range(_HALVINGS):
+            middle = (near + far) / 2
+            near, far = (middle, far) if spread(middle) <= allowed else (near, middle)
+        ends.append(slope + near)
+    return ends[0], ends[1]
+
+
+def _blocks(values: Seconds) -> list[tuple[int, Seconds]]:
+    size = max(1, values.size // _BLOCKS)
+    return [(first, values[first : first + size]) for first in range(0, values.size, size)]
+
+
+def _plainest(least: float, most: float) -> float:
+    """Return the number between two that has the fewest digits: a rate that somebody set."""
+    middle = (least + most) / 2
+    for digits in range(-math.floor(math.log10(middle)), 17):
+        unit = 10.0**-digits
+        rounded = round(middle / unit) * unit if digits <= 0 else round(middle, digits)
+        if least <= rounded <= most:
+            return float(rounded)
+    return middle

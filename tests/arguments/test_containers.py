@@ -1,0 +1,207 @@
+"""Arrays as pandas, polars, xarray, MATLAB and dask have them: understood, or refused with what to type instead."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+import tvident
+
+pd = pytest.importorskip("pandas")
+pl = pytest.importorskip("polars")
+xr = pytest.importorskip("xarray")
+
+RIG = tvident.simulate_torsional_rig(duration=1.0)
+ANGLE, TORQUE, N = RIG.angle, RIG.torque, RIG.angle.size
+GIVEN: dict[str, Any] = {"inertia": 0.0123, "method": tvident.WeakForm(window_length=33, exponent=9)}
+PLAIN = tvident.identify(ANGLE, TORQUE, sample_rate=1000, **GIVEN)
+DATES = pd.date_range(
+    "2024-03-31 01:59:59.5", periods=N, freq="1ms", tz="Europe/Paris", name="when"
+)  # summer time begins
+
+UTC = DATES.tz_convert(None).to_numpy()
+
+
+def identified(angle: Any, torque: Any, **options: Any) -> tvident.Identification:
+    return tvident.identify(angle, torque, **({"sample_rate": 1000} | GIVEN | options))
+
+
+def matlab(values: Any) -> Any:
+    """Give an array as a field of a MATLAB structure has it: a column, in an array of one object."""
+    field = np.empty((1, 1), object)
+    field[0, 0] = values[:, np.newaxis]
+    return field
+
+
+@pytest.mark.parametrize(
+    "pair",
+    [
+        (ANGLE[:, None], TORQUE[:, None]),
+        (ANGLE[:, None], TORQUE),
+        (ANGLE[None], TORQUE[:, None]),
+        (matlab(ANGLE), matlab(TORQUE)),
+        (pd.DataFrame({"a": ANGLE}), pd.Series(TORQUE)),
+        (pd.Series(ANGLE, dtype="Float64"), pd.Series(TORQUE, dtype="Float64")),
+        (pl.Series(ANGLE), pl.DataFrame({"t": TORQUE})),
+        (xr.DataArray(ANGLE, dims="time"), xr.DataArray(TORQUE, dims="time")),
+    ],
+    ids=["columns", "column", "row and column", "MATLAB", "table", "nullable", "polars", "xarray"],
+)
+def test_one_record_in_any_shape(pair: tuple[Any, Any]) -> None:
+    assert_array_equal(identified(*pair).stiffness, PLAIN.stiffness)
+
+
+def test_missing_values_of_tables_are_missing() -> None:
+    missing = ANGLE.copy()
+    missing[300:310] = np.nan
+    expected = identified(missing, TORQUE)
+    none = [None if np.isnan(one) else one for one in missing]
+    for angle in (pd.Series(none, dtype="Float64"), pl.Series(none)):
+        found = identified(angle, TORQUE)
+        assert_array_equal(found.status, expected.status)
+        assert_array_equal(found.stiffness, expected.stiffness)
+
+
+def test_several_records_have_time_where_the_container_says() -> None:
+    angles, torques = np.stack([ANGLE, 2 * ANGLE]), np.stack([TORQUE, 2 * TORQUE])
+    expected = identified(angles, torques)
+    tables = [kind({"one": ANGLE, "two": 2 * ANGLE}) for kind in (pd.DataFrame, pl.DataFrame)]
+    first = xr.DataArray(angles.T, dims=("time", "trial"), coords={"trial": ["one", "two"]})
+    last = xr.DataArray(torques, dims=("trial", "time"), coords={"trial": ["one", "two"]})
+    for angle, torque in ((tables[0], pd.DataFrame(torques.T)), (tables[1], torques), (first, last)):
+        result = identified(angle, torque)
+        assert_array_equal(result.stiffness, expected.stiffness)
+        assert list(result.to_xarray().stiffness.sel({result.to_xarray().stiffness.dims[0]: "two"})[:2]) == list(
+            expected.stiffness[1, :2]
+        )
+        assert result.to_pandas().xs("two")["stiffness"].tolist() == expected.stiffness[1].tolist()
+        assert result.to_polars()["stiffness"].to_list() == expected.stiffness.ravel().tolist()
+
+
+@pytest.mark.parametrize(
+    ("pair", "message"),
+    [
+        ((np.stack([ANGLE] * 3, -1), np.stack([TORQUE] * 3, -1)), r"time must be the last axis; .* pass angle\.T and"),
+        ((np.zeros((5, 80)), np.zeros((80, 5))), "angle and torque must have the same shape; .*; transpose one of"),
+        ((pd.Series(ANGLE, index=DATES), pd.Series(TORQUE, index=DATES[::-1])), r"same samples; .*\.reindex\(angle"),
+        ((pd.Series(ANGLE)[: N // 2], pd.Series(TORQUE)[N // 2 :]), r"same samples; .* sample 0 are 0 and 500; pass"),
+        (
+            (
+                xr.DataArray(ANGLE, {"time": np.arange(N)}, "time"),
+                xr.DataArray(TORQUE, {"time": np.arange(N) + 1.0}, "time"),
+            ),
+            "same samples; along 'time' .* xarray.align",
+        ),
+    ],
+    ids=["time first", "transposed", "dates", "cut elsewhere", "coordinates"],
+)
+def test_what_does_not_belong_together_is_refused(pair: tuple[Any, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        identified(*pair)
+
+
+@pytest.mark.parametrize("place", ["angle", "torque", "mask", "instrument", "stiffness", "t"])
+def test_dask_is_never_computed_silently(place: str) -> None:
+    da = pytest.importorskip("dask.array")
+    computed = []
+
+    def watched(block: Any) -> Any:
+        computed.append(1)
+        return block
+
+    lazy = da.from_array(ANGLE).map_blocks(watched, dtype=float, meta=np.empty(0))
+    computed.clear()  # of what is asked for its type
+    for values in (lazy, xr.DataArray(lazy, dims="time"), [lazy, lazy]):
+        channels: dict[str, Any] = {"angle": ANGLE, "torque": TORQUE, place: values}
+        if place != "t":
+            channels["sample_rate"] = 1000
+        with pytest.raises(
+            TypeError, match=rf"^{place} must be in memory; got a dask array.*; pass {place}\.(compute|load)"
+        ):
+            tvident.identify(**channels)
+    assert not computed
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (xr.Dataset({"angle": ("time", ANGLE)}), r"one channel; got a Dataset of angle; .*angle\['angle'\]"),
+        (pl.LazyFrame({"a": ANGLE}), r"in memory; got a polars LazyFrame.*; pass angle\.collect\(\)"),
+        ({"position": ANGLE}, r"got records with fields position; take one field by its name: angle\['position'\]"),
+        (pd.Series(["a"] * N), "must hold numbers"),
+        (pd.Series(DATES), "must hold numbers; got dates"),
+    ],
+    ids=["Dataset", "lazy", "dictionary", "text", "dates"],
+)
+def test_what_is_no_channel_is_refused(values: Any, message: str) -> None:
+    with pytest.raises(TypeError, match=message):
+        identified(values, TORQUE)
+
+
+def test_an_index_of_dates_is_the_time_and_comes_back() -> None:
+    angle = pd.Series(ANGLE, index=DATES, name="elbow")
+    angle.attrs = {"subject": 7}
+    result = tvident.identify(angle, TORQUE, step=2, **GIVEN)
+    assert_array_equal(result.stiffness, PLAIN.stiffness[::2])
+    assert_array_equal(result.time, PLAIN.time[::2])
+    table = result.to_pandas()
+    assert table.index.equals(DATES[::2])
+    assert table.attrs["subject"] == 7
+    assert table.attrs["units"]["stiffness_stderr"] == "N m/rad"
+    assert json.loads(table.attrs["settings"]) == result.settings
+    assert result.to_polars()["when"][0] == DATES[0].tz_convert(None)
+    with pytest.raises(TypeError, match="identify needs the sample period"):
+        tvident.identify(pd.Series(ANGLE), TORQUE)
+
+
+def test_coordinates_and_attributes_of_xarray_come_back() -> None:
+    angle = xr.DataArray(
+        ANGLE, {"time": ("time", PLAIN.time, {"units": "s"}), "joint": "elbow"}, "time", attrs={"lab": "A"}
+    )
+    made = tvident.identify(angle, TORQUE, **GIVEN).to_xarray()
+    assert made.sizes == {"time": N}
+    assert made.coords["joint"] == "elbow"
+    assert made.attrs["lab"] == "A"
+    assert made.stiffness.attrs["units"] == "N m/rad"
+    assert_array_equal(made.stiffness, PLAIN.stiffness)
+    assert_array_equal(PLAIN.to_xarray().time, PLAIN.time)
+
+
+def test_a_filter_gives_the_container_that_it_got() -> None:
+    expected, axis = tvident.savgol_filter(ANGLE, 31, 3, deriv=1), {"time": UTC}
+    series = pd.Series(ANGLE, DATES, name="elbow")
+    series.attrs = {"subject": 7}
+    found = tvident.savgol_filter(series, 31, 3, deriv=1)
+    pd.testing.assert_series_equal(found, pd.Series(expected, DATES, name="elbow"))
+    assert found.attrs == {"subject": 7}
+    for table in (pd.DataFrame({"a": ANGLE, "b": -ANGLE}, DATES), pl.DataFrame({"a": ANGLE, "b": -ANGLE})):
+        found = tvident.savgol_filter(table, 31, 3, deriv=1)
+        assert type(found) is type(table)
+        assert_array_equal(found["a"], expected)
+        assert_array_equal(found["b"], -expected)
+        with pytest.raises(ValueError, match="time must be the rows of a table; got axis=1 for x"):
+            tvident.savgol_filter(table, 31, 3, axis=1)
+    trials = xr.DataArray(
+        np.stack([ANGLE, -ANGLE], -1), {**axis, "trial": [1, 2]}, ("time", "trial"), attrs={"lab": "A"}
+    )
+    found = tvident.savgol_filter(trials, 31, 3, deriv=1)
+    xr.testing.assert_identical(found, trials.copy(data=np.stack([expected, -expected], -1)))
+    fields = np.array(list(zip(ANGLE, -ANGLE, strict=True)), dtype=[("a", float), ("b", float)])
+    assert_array_equal(tvident.savgol_filter(fields, 31, 3, deriv=1)["b"], -expected)
+
+
+def test_derivatives_know_index_and_coordinates() -> None:
+    expected = tvident.fit_local_polynomials(ANGLE, 31, sample_rate=1000)
+    fit = tvident.fit_local_polynomials(pd.Series(ANGLE, DATES), 31)
+    assert_array_equal(fit.derivatives, expected.derivatives)
+    assert fit.to_pandas().index.equals(DATES)
+    assert_array_equal(fit.to_pandas()["derivative_2"], expected.derivatives[2])
+    trials = xr.DataArray(np.stack([ANGLE, -ANGLE], -1), {"time": UTC}, ("time", "trial"))
+    made = tvident.fit_local_polynomials(trials, 31, step=2).to_xarray()
+    assert made.derivative_1.dims == ("trial", "time")
+    assert_array_equal(made.derivative_1[0], expected.derivatives[1, ::2])
+    assert_array_equal(made.time, UTC[::2])
