@@ -1,5 +1,33 @@
-"""The paper's figures, and those of results. Needs matplotlib: install ``tvident[plot]``."""
+"""Pictures of recordings and results, and the paper's figures. Needs matplotlib: install ``tvident[plot]``."""
 
-from tvident._figures import plot_derivatives, plot_identification, plot_recording, plot_scan, plot_window
+from tvident._figures import (
+    paper_figure_2,
+    paper_figure_4,
+    paper_figure_5,
+    paper_figure_6,
+    plot_derivatives,
+    plot_identification,
+    plot_over_position,
+    plot_poles,
+    plot_recording,
+    plot_scan,
+    plot_status,
+    plot_torque,
+    plot_window,
+)
 
-__all__ = ["plot_derivatives", "plot_identification", "plot_recording", "plot_scan", "plot_window"]
+__all__ = [
+    "paper_figure_2",
+    "paper_figure_4",
+    "paper_figure_5",
+    "paper_figure_6",
+    "plot_derivatives",
+    "plot_identification",
+    "plot_over_position",
+    "plot_poles",
+    "plot_recording",
+    "plot_scan",
+    "plot_status",
+    "plot_torque",
+    "plot_window",
+]

@@ -5,6 +5,7 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+import numpy.typing as npt
 import pytest
 from matplotlib import pyplot as plt
 
@@ -13,6 +14,8 @@ from tvident import figures
 
 mpl.use("agg")
 
+Array = npt.NDArray[np.float64]
+
 
 @pytest.fixture(autouse=True)
 def close_figures() -> Iterator[None]:
@@ -20,23 +23,58 @@ def close_figures() -> Iterator[None]:
     plt.close("all")
 
 
+@pytest.fixture(scope="module")
+def rig() -> tvident.Recording:
+    return tvident.simulate_torsional_rig(8.0)
+
+
+@pytest.fixture(scope="module")
+def result(rig: tvident.Recording) -> tvident.Identification:
+    angle = rig.angle.copy()
+    angle[3000:3400] = np.nan
+    return tvident.identify(angle, rig.torque, sample_rate=1000)
+
+
+@pytest.fixture(scope="module")
+def paper(rig: tvident.Recording) -> tvident.Identification:
+    return tvident.identify(rig.angle, rig.torque, sample_rate=1000, method="paper")
+
+
+def panels(figure: Any) -> Any:
+    """Give the axes of a figure."""
+    return figure.axes
+
+
+def titles(figure: Any) -> list[str]:
+    return [ax.get_title(loc="left") for ax in figure.axes if ax.get_title(loc="left")]
+
+
+def texts(ax: Any) -> str:
+    """Give the words of a panel: those of its title and those beside it."""
+    return " ".join([ax.get_title(loc="left"), *(text.get_text() for text in ax.texts)])
+
+
+def line(ax: Any, label: str) -> tuple[Array, Array]:
+    """Give what is drawn under a name."""
+    (found,) = [one for one in ax.get_lines() if one.get_label() == label]
+    return np.asarray(found.get_xdata(), float), np.asarray(found.get_ydata(), float)
+
+
 def test_the_papers_figures_on_the_default_recording() -> None:
     recording = tvident.simulate_torsional_rig()
-    figure = figures.plot_recording(recording)
-    assert [ax.get_title(loc="left") for ax in figure.axes] == ["Slider position", "Torque", "Angle"]
+    assert titles(figures.paper_figure_2(recording)) == ["Slider position", "Torque", "Angle"]
 
     # Figures 4 and 5: the clean window takes a high order, the noisy one a low one.
-    middle = recording.time.size // 2
-    noise = 0.05 * recording.angle.std() * np.random.default_rng(1).standard_normal(recording.angle.size)
-    for y, low, high in ((recording.angle, 12, 14), (recording.angle + noise, 6, 8)):
-        order = int(tvident.fit_local_polynomials(y, 201, sample_rate=1000).order[middle])
+    for draw, low, high in ((figures.paper_figure_4, 12, 14), (figures.paper_figure_5, 6, 8)):
+        words = [text.get_text() for text in draw(recording).axes[1].texts]
+        (order,) = [int(word.removeprefix("n = ")) for word in words]
         assert low <= order <= high
-        figure = figures.plot_window(y, middle, 201, sample_rate=1000)
-        assert f"n = {order}" in [text.get_text() for text in figure.axes[1].texts]
 
     result = tvident.identify(recording.angle, recording.torque, sample_rate=1000, method="paper")
-    figure = figures.plot_identification(result, recording)
-    assert [ax.get_ylabel() for ax in figure.axes] == ["kg·m²", "N·m·s/rad", "N·m/rad"]
+    figure = figures.paper_figure_6(result, recording)
+    assert titles(figure) == ["Inertia $I$", "Damping $C$", "Stiffness $K$"]
+    units = ["kg·m²", "N·m·s/rad", "N·m/rad"]
+    assert [ax.get_ylabel() for ax in figure.axes] == [name for unit in units for name in (unit, "error")]
     figure.savefig("/dev/null", format="png")
 
 
@@ -45,41 +83,160 @@ def test_known_parameters_are_not_drawn_and_terms_are() -> None:
     result = tvident.identify(
         recording.angle, recording.torque, sample_rate=1000, method="paper", damping=0, terms=["offset"]
     )
-    assert [ax.get_title(loc="left") for ax in result.plot().axes] == ["Inertia $I$", "Stiffness $K$", "Offset"]
+    assert titles(result.plot()) == ["Inertia $I$", "Stiffness $K$", "Offset"]
 
 
-def test_a_batch_cannot_be_drawn() -> None:
-    recording = tvident.simulate_torsional_rig(2.0)
-    angle, torque = np.tile(recording.angle, (2, 1)), np.tile(recording.torque, (2, 1))
+def test_a_batch_cannot_be_drawn(rig: tvident.Recording) -> None:
+    angle, torque = np.tile(rig.angle, (2, 1)), np.tile(rig.torque, (2, 1))
     result = tvident.identify(angle, torque, sample_rate=1000, method="paper")
-    with pytest.raises(ValueError, match="only a single record can be drawn"):
-        result.plot()
+    for what in ("parameters", "torque", "status", "poles"):
+        with pytest.raises(ValueError, match="only a single record"):
+            result.plot(what)
 
 
-def test_constants_are_lines_with_their_value_and_flagged_stretches_are_shaded() -> None:
-    recording = tvident.simulate_torsional_rig(8.0)
-    angle = recording.angle.copy()
-    angle[3000:3400] = np.nan
-    result = tvident.identify(angle, recording.torque, sample_rate=1000)
-    inertia, damping, stiffness, offset = figures.plot_identification(result, recording).axes
-    value, error = result.constants["inertia"]
-    assert inertia.get_title(loc="left") == f"Inertia $I$: {value:.5g} ± {error:.2g} kg·m²"
-    # The band and the truth are both in the frame.
-    low, high = inertia.get_ylim()
-    assert low < min(value - 2 * error, recording.inertia[0])
-    assert high > max(value + 2 * error, recording.inertia[0])
-    assert stiffness.get_title(loc="left") == "Stiffness $K$"
-    for ax in (inertia, damping, stiffness, offset):
-        labels = [str(patch.get_label()) for patch in ax.patches]
-        assert "flagged" in labels
-    legend = inertia.get_legend()
-    assert legend is not None
-    assert "flagged" in [text.get_text() for text in legend.get_texts()]
+def test_constants_are_a_line_of_text_and_what_changes_has_a_panel_and_its_error(
+    rig: tvident.Recording, result: tvident.Identification
+) -> None:
+    (alone,) = result.plot().axes
+    value, _ = result.constants["inertia"]
+    for words in ("Inertia $I$", f"{value:.3g}"[:5], "Damping $C$", "Offset", "Stiffness $K$"):
+        assert words in texts(alone)
+    assert "flagged" in [str(patch.get_label()) for patch in alone.patches]
+
+    stiffness, wrong = result.plot(truth=rig).axes
+    assert f"(truth {rig.inertia[0]:.5g})" in texts(stiffness)
+    time, drawn = line(stiffness, "truth")
+    np.testing.assert_allclose(drawn, np.interp(time, rig.time, rig.stiffness))
+    time, drawn = (np.asarray(one, float) for one in wrong.get_lines()[0].get_data())
+    np.testing.assert_allclose(drawn, (result.stiffness - rig.stiffness)[np.rint(time * 1000).astype(int)], atol=1e-12)
+
+    kinds: Any = dict.fromkeys(("inertia", "damping", "stiffness"), "constant")
+    constant = tvident.identify(rig.angle, rig.torque, sample_rate=1000, method="paper", **kinds)
+    (alone,) = constant.plot().axes
+    assert "Stiffness $K$" in texts(alone)
 
 
-def test_what_holds_for_the_whole_record_is_written_below() -> None:
-    recording = tvident.simulate_torsional_rig(8.0)
-    late = tvident.identify(recording.angle[2:], recording.torque[:-2], sample_rate=1000)
+def test_a_spike_neither_hides_the_band_nor_is_lost(rig: tvident.Recording) -> None:
+    channels = {"time [s]": np.arange(1_000_000) / 1000, "force [N]": np.sin(np.arange(1_000_000) / 5000)}
+    channels["force [N]"][123_457] = 40.0
+    (drawn,) = figures.plot_recording(channels).axes
+    values = np.asarray(drawn.get_lines()[0].get_ydata(), float)
+    assert values.size < 20_000
+    assert values.max() == 40.0
+    assert drawn.get_ylim()[1] > 40
+
+    angle = rig.angle.copy()
+    angle[4000] += 0.5
+    hit = tvident.identify(angle, rig.torque, sample_rate=1000, method="paper")
+    panel = hit.plot().axes[2]
+    low, high = panel.get_ylim()
+    inside = np.isfinite(hit.stiffness) & (np.abs(hit.time - 4) > 0.5)
+    share = np.mean((low < hit.stiffness[inside]) & (hit.stiffness[inside] < high))
+    # A hundredth of the values at each end, and of either edge of the band, may be left out.
+    assert share > 0.98
+    assert high - low < 5 * np.ptp(np.percentile(hit.stiffness[inside], [1, 99]))
+    band = np.asarray(panel.collections[-1].get_paths()[0].vertices)
+    widest = 2 * hit.stderr["stiffness"][2000]
+    there = np.abs(band[:, 0] - 2.0) < 0.01
+    assert np.ptp(band[there, 1]) > widest
+
+
+def test_every_picture_draws_on_axes_of_ones_own(
+    rig: tvident.Recording, result: tvident.Identification, paper: tvident.Identification
+) -> None:
+    fit = tvident.fit_local_polynomials(rig.angle, 201, sample_rate=1000)
+    pictures: list[Any] = [
+        lambda ax: result.plot(ax=ax),
+        lambda ax: result.plot(truth=rig, ax=ax),
+        lambda ax: result.plot("torque", ax=ax),
+        lambda ax: paper.plot("status", ax=ax),
+        lambda ax: result.plot("poles", ax=ax),
+        lambda ax: result.plot("scan", ax=ax),
+        lambda ax: result.plot("over", position=rig.slider_position, ax=ax),
+        lambda ax: figures.plot_recording(rig, ax=ax),
+        lambda ax: figures.plot_derivatives(rig.time, fit, "angle", samples=rig.angle, ax=ax),
+    ]
+    figure, grid = plt.subplots(3, 3, figsize=(18, 16))
+    for draw, ax in zip(pictures, grid.ravel(), strict=True):
+        assert draw(ax) is figure
+    figure.savefig("/dev/null", format="svg")
+    # Axes that stand anywhere are divided too.
+    apart = plt.figure()
+    assert result.plot("torque", ax=apart.add_axes((0.2, 0.3, 0.5, 0.4))) is apart
+    apart.savefig("/dev/null", format="pdf")
+    # As many as there are panels, or one.
+    _, three = plt.subplots(3)
+    assert result.plot("torque", ax=three[:2]).axes == list(three)
+    with pytest.raises(ValueError, match="ax must be one Axes, or 2 of them for this picture; got 3; give 2"):
+        result.plot("torque", ax=three)
+
+
+def test_the_predicted_torque_leaves_the_noise(rig: tvident.Recording, result: tvident.Identification) -> None:
+    time, recorded, predicted = result.predicted_torque()
+    np.testing.assert_allclose(time, rig.time, atol=1e-12)
+    left = (recorded - predicted)[np.isfinite(recorded)]
+    # What is left is what the identification says is left.
+    assert left.std() == pytest.approx(np.nanmedian(result.residual_std), rel=0.1)
+    missing = np.isnan(recorded)
+    half = result.settings["window_length"] // 2
+    np.testing.assert_array_equal(np.flatnonzero(missing[half:-half]) + half, np.arange(3000 - half, 3400 + half))
+    upper, lower = panels(result.plot("torque"))
+    assert {text.get_text() for text in upper.get_legend().get_texts()} >= {"recorded", "predicted from the angle"}
+    assert f"{np.sqrt(np.mean(left**2)):.3g}" in lower.get_title(loc="left")
+
+    # With friction, gravity and a term of one's own, a lag and every tenth result.
+    generator = np.random.default_rng(0)
+    t = np.arange(20_000) / 1000
+    angle, velocity, acceleration = (
+        np.zeros(t.size)
+        + sum(size * speed**d * np.cos(speed * t + d * np.pi / 2) for size, speed in ((1.0, 9.0), (0.3, 31.0)))
+        for d in range(3)
+    )
+    torque = (
+        0.02 * acceleration
+        + 0.1 * velocity
+        + 0.5 * np.sign(velocity)
+        + 3 * np.sin(angle)
+        + 0.3 * np.abs(velocity) * velocity
+    )
+    drag = tvident.Term("drag", lambda _t, _angle, velocity: np.abs(velocity) * velocity)
+    call: Any = {"terms": ["coulomb", "gravity", drag], "stiffness": 0, "lag": 0.003, "step": 10}
+    for method in ("auto", tvident.StrongForm(window_length=41)):
+        found = tvident.identify(
+            angle[3:],
+            torque[:-3] + 0.01 * generator.standard_normal(t.size - 3),
+            sample_rate=1000,
+            method=method,
+            **call,
+        )
+        _, recorded, predicted = found.predicted_torque()
+        assert np.nanstd(recorded - predicted) < 0.1 * np.nanstd(recorded), method
+
+
+def test_poles_are_the_roots_and_positions_the_places(rig: tvident.Recording, result: tvident.Identification) -> None:
+    points = np.concatenate([np.asarray(one.get_offsets()) for one in result.plot("poles").axes[2].collections])
+    i, c, k = (getattr(result, name)[100] for name in ("inertia", "damping", "stiffness"))
+    for root in np.roots([i, c, k]):
+        assert np.hypot(points[:, 0] - root.real, points[:, 1] - root.imag).min() < 0.05
+    with pytest.raises(ValueError, match="position must have a value for each of the result's 8000 samples; got shape"):
+        result.plot("over", position=rig.slider_position[:-1])
+    with pytest.raises(ValueError, match="name must be a parameter of the result; got 'mass'"):
+        result.plot("over", position=rig.slider_position, name="mass")
+
+
+def test_the_status_is_drawn_where_it_is_set(paper: tvident.Identification) -> None:
+    orders, flags = paper.plot("status").axes
+    assert orders.get_title(loc="left") == "Order of the polynomial"
+    names = [label.get_text() for label in flags.get_yticklabels()]
+    assert {"invalid", "edge"} <= set(names)
+    assert f"{np.mean(paper.status == 0):.1%}" in flags.get_title(loc="left")
+    edge = flags.collections[names.index("edge")].get_paths()
+    total = sum(float(np.ptp(np.asarray(path.vertices)[:, 0])) for path in edge)
+    assert total == pytest.approx(np.count_nonzero(paper.status & tvident.Status.EDGE) / 1000, abs=1e-6)
+
+
+def test_what_holds_for_the_whole_record_is_written_below(rig: tvident.Recording) -> None:
+    late = tvident.identify(rig.angle[2:], rig.torque[:-2], sample_rate=1000)
     axes = late.plot().axes
     assert "LAG_SUSPECTED" in axes[-1].get_xlabel()
     assert not axes[0].patches

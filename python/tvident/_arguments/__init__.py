@@ -16,7 +16,7 @@ from tvident._arguments.numbers import (
 )
 from tvident._arguments.progress import Progress, reporter
 from tvident._arguments.sampling import check_power, check_window, length_given, sample_period, seconds, window_length
-from tvident._arguments.shown import shown
+from tvident._arguments.shown import shown, with_error
 from tvident._arguments.times import begin_of, implied_times, times_of
 from tvident._arguments.workers import worker_count
 from tvident._arguments.wrapped import Unwrapped, unwrapped
@@ -61,5 +61,6 @@ __all__ = [
     "unwrapped",
     "whole_number",
     "window_length",
+    "with_error",
     "worker_count",
 ]

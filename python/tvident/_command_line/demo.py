@@ -54,15 +54,13 @@ def demo(folder: Path, seed: int) -> None:
         save(folder / name)
         note_own(folder, name)
     click.echo(f"Written to {printable(folder)}: {', '.join(TABLES)}")
-    noise = 0.05 * recording.angle.std() * np.random.default_rng(seed + 1).standard_normal(recording.angle.size)
-    middle_sample = recording.time.size // 2
     figures = figures_on_file()
     drawn = (
-        figures.plot_recording(recording),
-        figures.plot_window(recording.angle, middle_sample, **call),
-        figures.plot_window(recording.angle + noise, middle_sample, **call),
+        figures.paper_figure_2(recording),
+        figures.paper_figure_4(recording),
+        figures.paper_figure_5(recording, seed=seed + 1),
         figures.plot_identification(result, recording),
-        figures.plot_identification(paper, recording),
+        figures.paper_figure_6(paper, recording),
     )
     for name, picture in zip(PICTURES, drawn, strict=True):
         save_figure(picture, folder / name)

@@ -14,6 +14,7 @@ from tvident._files import aligned, write_table
 from tvident._results import Identification
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -174,8 +175,13 @@ class ModelComparison:
             ) from error
         return pd.DataFrame(self.table).set_index("model")
 
-    def plot(self) -> Figure:
+    def plot(self, *, ax: Axes | None = None) -> Figure:
         """Draw the weight of every model.
+
+        Parameters
+        ----------
+        ax : Axes, optional
+            Where to draw. By default a new figure.
 
         Returns
         -------
@@ -188,7 +194,7 @@ class ModelComparison:
         """
         from tvident import _figures  # noqa: PLC0415 - matplotlib is optional
 
-        return _figures.plot_models(self.table)
+        return _figures.plot_models(self.table, ax)
 
     def __repr__(self) -> str:
         return f"<ModelComparison of {len(self.results)} models: best {self.best!r}>"

@@ -9,9 +9,28 @@ except ImportError as error:  # pragma: no cover - the extra is installed where 
 
 from tvident._figures.derivatives import plot_derivatives
 from tvident._figures.models import plot_models
-from tvident._figures.parameters import plot_identification
+from tvident._figures.paper import paper_figure_2, paper_figure_4, paper_figure_5, paper_figure_6
+from tvident._figures.parameters import plot_identification, plot_over_position
+from tvident._figures.poles import plot_poles
 from tvident._figures.recording import plot_recording
 from tvident._figures.scan import plot_scan
+from tvident._figures.status import plot_status
+from tvident._figures.torque import plot_torque
 from tvident._figures.window import plot_window
 
-__all__ = ["plot_derivatives", "plot_identification", "plot_models", "plot_recording", "plot_scan", "plot_window"]
+__all__ = [
+    "paper_figure_2",
+    "paper_figure_4",
+    "paper_figure_5",
+    "paper_figure_6",
+    "plot_derivatives",
+    "plot_identification",
+    "plot_models",
+    "plot_over_position",
+    "plot_poles",
+    "plot_recording",
+    "plot_scan",
+    "plot_status",
+    "plot_torque",
+    "plot_window",
+]

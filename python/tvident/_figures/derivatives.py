@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
-from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from tvident._derivatives import LocalPolynomialFit
-from tvident._figures.style import INK, draw_parameter, style
+from tvident._figures.style import INK, MUTED, Place, draw_parameter, legend, panels, plain, scale, style
+
+_MOST_DOTS = 20_000
 
 
-def plot_derivatives(time: npt.NDArray[np.float64], fit: LocalPolynomialFit, name: str = "y") -> Figure:
+def plot_derivatives(
+    time: npt.NDArray[np.float64],
+    fit: LocalPolynomialFit,
+    name: str = "y",
+    *,
+    samples: npt.ArrayLike | None = None,
+    ax: Place = None,
+) -> Figure:
     """Draw a channel and its derivatives over time, with bands of two standard errors, and the order chosen.
 
     Parameters
@@ -23,6 +33,10 @@ def plot_derivatives(time: npt.NDArray[np.float64], fit: LocalPolynomialFit, nam
         Of a single record.
     name : str, optional
         What the channel is called.
+    samples : array_like, shape (n,), optional
+        The raw samples, which are drawn as dots below the smoothed channel.
+    ax : Axes or sequence of Axes, optional
+        Where to draw; one Axes is divided into panels. By default a new figure.
 
     Returns
     -------
@@ -31,7 +45,7 @@ def plot_derivatives(time: npt.NDArray[np.float64], fit: LocalPolynomialFit, nam
     Raises
     ------
     ValueError
-        If there are several records.
+        If there are several records, or not as many samples as times.
 
     See Also
     --------
@@ -48,21 +62,33 @@ def plot_derivatives(time: npt.NDArray[np.float64], fit: LocalPolynomialFit, nam
     >>> from tvident import figures
     >>> rig = tvident.simulate_torsional_rig(duration=2.0)
     >>> fit = tvident.fit_local_polynomials(rig.angle, 201, sample_rate=1000)
-    >>> figures.plot_derivatives(rig.time, fit, "angle").savefig("derivatives.png")
+    >>> figures.plot_derivatives(rig.time, fit, "angle", samples=rig.angle).savefig("derivatives.png")
     """
     if fit.order.ndim != 1:
         raise ValueError(f"only a single record can be drawn; this one has shape {fit.order.shape}; take one record")
     count = fit.derivatives.shape[0]
-    name = name.replace("$", r"\$")  # no formula
+    raw = None if samples is None else np.asarray(samples, np.float64)
+    if raw is not None and raw.shape != time.shape:
+        raise ValueError(
+            f"samples must be as many as times; got shape {raw.shape} for {time.size} times; take every step-th"
+        )
+    name = plain(name)
     with style():
-        figure = plt.figure(figsize=(8, 1.4 + 1.6 * count), layout="constrained")
-        axes = figure.subplots(count + 1, 1, sharex=True)
-        for d, ax in enumerate(axes[:-1]):
-            draw_parameter(ax, time, fit.derivatives[d], fit.stderr[d])
-            ax.set_title(name if d == 0 else f"{name}: derivative {d}")
-        axes[-1].plot(time, fit.order, ".", color=INK, markersize=1.5)
+        figure, axes = panels(ax, [1.7] * count + [1.2], width=8.0)
+        for d, panel in enumerate(axes[:-1]):
+            if d == 0 and raw is not None:
+                every = max(1, raw.size // _MOST_DOTS)
+                dots: Any = {"color": MUTED, "markersize": 2.5, "alpha": 0.45, "markeredgewidth": 0, "label": "samples"}
+                panel.plot(time[::every], raw[::every], ".", **dots)
+            draw_parameter(panel, time, fit.derivatives[d], fit.stderr[d], label="fitted")
+            panel.set_title(name if d == 0 else f"{name}: derivative {d}")
+        if raw is not None:
+            scale(axes[0], raw, fit.derivatives[0])
+        legend(axes[0], ax)
+        axes[-1].plot(time, fit.order, ".", color=INK, markersize=1.5, rasterized=True)
         axes[-1].set_title("Order")
-        axes[-1].yaxis.set_major_locator(MaxNLocator(integer=True))
+        axes[-1].yaxis.set_major_locator(MaxNLocator(integer=True, nbins=4))
         axes[-1].set_xlabel("time (s)")
-        figure.align_ylabels()
+        if ax is None:
+            figure.align_ylabels()
         return figure

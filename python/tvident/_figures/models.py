@@ -7,19 +7,20 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
-from tvident._figures.style import ACCENT, FOUND, style
+from tvident._figures.style import ACCENT, FOUND, Place, panels, style
 
 
-def plot_models(table: Mapping[str, npt.NDArray[Any]]) -> Figure:
+def plot_models(table: Mapping[str, npt.NDArray[Any]], ax: Place = None) -> Figure:
     """Draw the weight of every model as a bar, with the difference of its criterion beside it.
 
     Parameters
     ----------
     table : mapping of str to ndarray
         ``ModelComparison.table``: ``"model"``, ``"difference"`` and ``"weight"``, the best first.
+    ax : Axes, optional
+        Where to draw. By default a new figure.
 
     Returns
     -------
@@ -27,15 +28,15 @@ def plot_models(table: Mapping[str, npt.NDArray[Any]]) -> Figure:
     """
     with style():
         count = table["model"].size
-        figure, ax = plt.subplots(figsize=(7, 1.2 + 0.34 * count), layout="constrained")
+        figure, (panel,) = panels(ax, [0.5 + 0.34 * count], width=7.0)
         places = np.arange(count)
-        ax.barh(places, table["weight"], color=[ACCENT] + [FOUND] * (count - 1), height=0.62)
+        panel.barh(places, table["weight"], color=[ACCENT] + [FOUND] * (count - 1), height=0.62)
         for place, weight, difference in zip(places, table["weight"], table["difference"], strict=True):
-            ax.annotate(f" +{difference:.1f}", (weight, place), va="center", fontsize=8.5)
-        ax.set_yticks(places, [str(name) for name in table["model"]])
-        ax.invert_yaxis()
-        ax.set_xlim(0, 1.12)
-        ax.grid(visible=False)
-        ax.set_xlabel("Akaike weight; beside it how much higher the criterion is than the best model's")
-        ax.set_title("Models compared")
+            panel.annotate(f" +{difference:.1f}", (weight, place), va="center", fontsize=8.5)
+        panel.set_yticks(places, [str(name) for name in table["model"]])
+        panel.invert_yaxis()
+        panel.set_xlim(0, 1.12)
+        panel.grid(visible=False)
+        panel.set_xlabel("Akaike weight; beside it how much higher the criterion is than the best model's")
+        panel.set_title("Models compared")
     return figure

@@ -1,4 +1,4 @@
-"""A picture of parameters over time."""
+"""Pictures of parameters over time, and over a position."""
 
 from __future__ import annotations
 
@@ -7,17 +7,36 @@ from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
-from tvident._figures.style import FAINT, TRUTH, draw_parameter, style, unit_of
+from tvident import _arguments as arguments
+from tvident._figures.style import (
+    FAINT,
+    FOUND,
+    MUTED,
+    TIME_MAP,
+    TRUTH,
+    Place,
+    draw_line,
+    draw_parameter,
+    legend,
+    panels,
+    plain,
+    scale,
+    style,
+    unit_of,
+)
 from tvident._simulate import Recording
 from tvident._status import DOUBTFUL, Status
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
 _SYMBOLS = {"inertia": "Inertia $I$", "damping": "Damping $C$", "stiffness": "Stiffness $K$"}
+
+_LETTER = 0.064
+"""Inches of a letter of constants, on average and a little more."""
 
 
 class Identified(Protocol):
@@ -29,6 +48,7 @@ class Identified(Protocol):
     constants: dict[str, tuple[Any, Any]]
     status: npt.NDArray[np.uint16]
     record_status: Status | npt.NDArray[np.uint16]
+    order: npt.NDArray[np.uint8]
     settings: dict[str, Any]
 
     @property
@@ -36,18 +56,28 @@ class Identified(Protocol):
         """Standard errors by name."""
 
 
-def plot_identification(result: Identified, truth: Recording | None = None) -> Figure:
-    """Draw inertia, damping and stiffness over time, with bands of two standard errors: figure 6 of the paper.
+def check_single(result: Identified) -> None:
+    """Refuse several records."""
+    if result.inertia.ndim != 1:
+        raise ValueError(
+            f"only a single record can be drawn; this one has shape {result.inertia.shape}; take one record"
+        )
 
-    What is constant over the record is a line with its value in the title. Grey stretches have flags, as many as their samples'
-    status says; what is flagged over the whole record is named below the last panel instead.
+
+def plot_identification(result: Identified, truth: Recording | None = None, ax: Place = None) -> Figure:
+    """Draw what changes with time, with bands of two standard errors; what is constant is one line of text.
+
+    Scales leave out a hundredth of the values on each side, so that a spike does not hide the rest. Grey stretches have flags, as many
+    as their samples' status says; what is flagged over the whole record is named below the last panel instead.
 
     Parameters
     ----------
     result : Identification
         Of a single record.
     truth : Recording, optional
-        A simulated recording: its true values are drawn too.
+        A simulated recording: its true values are drawn too, and the error of what was found below each.
+    ax : Axes or sequence of Axes, optional
+        Where to draw; one Axes is divided if there are several panels. By default a new figure.
 
     Returns
     -------
@@ -56,11 +86,12 @@ def plot_identification(result: Identified, truth: Recording | None = None) -> F
     Raises
     ------
     ValueError
-        If the result holds several records.
+        If the result holds several records, or there are too many or too few axes.
 
     See Also
     --------
     Identification.plot : the same as a method.
+    paper_figure_6 : all three parameters as the paper shows them.
 
     References
     ----------
@@ -75,49 +106,119 @@ def plot_identification(result: Identified, truth: Recording | None = None) -> F
     >>> result = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
     >>> figures.plot_identification(result, rig).savefig("parameters.png")
     """
-    if result.inertia.ndim != 1:
-        raise ValueError(
-            f"only a single record can be drawn; this one has shape {result.inertia.shape}; take one record"
-        )
-    extra = list(result.terms)
-    shown = [name for name in _SYMBOLS if result.settings["kinds"][name] != "known"] + extra
+    check_single(result)
+    shown = [name for name in unknowns(result) if name not in result.constants]
+    return draw_parameters(result, shown, truth, ax)
+
+
+def unknowns(result: Identified) -> list[str]:
+    """Return the parameters that were not known."""
+    return [name for name in (*_SYMBOLS, *result.terms) if result.settings["kinds"][name] != "known"]
+
+
+def draw_parameters(result: Identified, shown: list[str], truth: Recording | None, ax: Place) -> Figure:
+    """Draw parameters over time in panels of their own, and those that are constant as text above."""
+    of_truth = {name: getattr(truth, name) for name in shown if truth is not None and hasattr(truth, name)}
+    constants = _constants(result, truth)
+    heights = [height for name in shown for height in ([2.1, 0.9] if name in of_truth else [2.1])]
     with style():
-        figure, axes = plt.subplots(
-            len(shown), 1, sharex=True, squeeze=False, figsize=(8.4, 1.2 + 1.8 * len(shown)), layout="constrained"
-        )
-        for ax, name in zip(axes[:, 0], shown, strict=True):
-            values = result.terms[name] if name in result.terms else getattr(result, name)
-            title = _SYMBOLS.get(name, name.capitalize())
-            _draw_flags(ax, result)
-            draw_parameter(ax, result.time, values, result.stderr[name])
-            if truth is not None and hasattr(truth, name):
-                ax.plot(truth.time, getattr(truth, name), color=TRUTH, linewidth=1.2, label="truth")
-            if name in result.constants:
-                value, error = result.constants[name]
-                title += f": {value:.5g} ± {error:.2g} {unit_of(name)}".rstrip()
-                true = getattr(truth, name)[0] if truth is not None and hasattr(truth, name) else value
-                _frame_constant(ax, value, error, true)
-            ax.set_title(title)
-            ax.set_ylabel(unit_of(name))
-        # Beside the first title, where no line runs through it.
-        place: Any = {"loc": "lower right", "bbox_to_anchor": (1, 0.97), "borderaxespad": 0.2}
-        axes[0, 0].legend(ncols=4, handlelength=1.4, columnspacing=1.4, **place)
-        everywhere = ", ".join(flag.name or "" for flag in _everywhere(result))
-        axes[-1, 0].set_xlabel("time (s)" + (f"\nwhole record: {everywhere}" if everywhere else ""))
-        figure.align_ylabels()
+        figure, axes = panels(ax, heights or [1.0 + 0.3 * len(constants)])
+        if not shown:
+            _draw_constants_alone(axes[0], constants)
+            return figure
+        rest = iter(axes)
+        for name in shown:
+            panel = next(rest)
+            values = value_of(result, name)
+            draw_flags(panel, result)
+            draw_parameter(panel, result.time, values, result.stderr[name])
+            panel.set_title(title_of(name))
+            panel.set_ylabel(unit_of(name))
+            if truth is not None and name in of_truth:
+                true = np.interp(result.time, truth.time, of_truth[name])
+                draw_line(panel, result.time, true, color=TRUTH, linewidth=1.1, linestyle=(0, (5, 2)), label="truth")
+                _draw_error(next(rest), result, name, values - true)
+        if constants:
+            first = axes[0].get_title(loc="left")
+            lines = _packed(constants, _letters(figure, axes[0] if ax is not None else None))
+            axes[0].set_title("\n".join(lines), color=MUTED, fontsize=9.5, fontweight="normal", pad=28)
+            axes[0].text(0, 1.03, first, transform=axes[0].transAxes, fontsize=10.5, fontweight="bold", va="bottom")
+        legend(axes[0], ax)
+        everywhere = ", ".join(flag.name or "" for flag in flagged_everywhere(result))
+        axes[-1].set_xlabel("time (s)" + (f"\nwhole record: {everywhere}" if everywhere else ""))
+        if ax is None:
+            figure.align_ylabels()
         return figure
 
 
-def _everywhere(result: Identified) -> list[Status]:
+def value_of(result: Identified, name: str) -> Array:
+    """Return a parameter or the factor of a term."""
+    return result.terms[name] if name in result.terms else np.asarray(getattr(result, name))
+
+
+def title_of(name: str) -> str:
+    """Return what a parameter is called above its panel."""
+    return _SYMBOLS.get(name, plain(name.replace("_", " ").capitalize()))
+
+
+def _constants(result: Identified, truth: Recording | None) -> list[str]:
+    """Return what is constant, in words."""
+    words = []
+    for name, (value, error) in result.constants.items():
+        line = f"{title_of(name)}: {arguments.with_error(value, error)} {unit_of(name)}".rstrip()
+        if truth is not None and hasattr(truth, name):
+            line += f" (truth {np.mean(getattr(truth, name)):.5g})"
+        words.append(line)
+    return words
+
+
+def _letters(figure: Any, ax: Axes | None) -> int:
+    """Return how many letters fit on a line above axes of the user's own, or in a new figure."""
+    inches = figure.get_figure(root=True).get_size_inches()[0] - 0.9 if ax is None else 0.0
+    if ax is not None:
+        root = ax.get_figure(root=True)
+        inches = ax.get_window_extent().width / root.dpi if root is not None else 4.0
+    return int(inches / _LETTER)
+
+
+def _packed(words: list[str], letters: int) -> list[str]:
+    """Return words on as few lines as they fit on."""
+    lines: list[str] = []
+    for one in words:
+        if lines and len(lines[-1]) + len(one) + 3 <= letters:
+            lines[-1] += f"   {one}"
+        else:
+            lines.append(one)
+    return lines
+
+
+def _draw_constants_alone(ax: Axes, constants: list[str]) -> None:
+    """Say what was found where nothing changes."""
+    ax.set_axis_off()
+    ax.set_title("Constant over the record")
+    ax.text(0, 0.96, "\n".join(constants) or "nothing unknown", transform=ax.transAxes, va="top", linespacing=1.8)
+
+
+def _draw_error(ax: Axes, result: Identified, name: str, error: Array) -> None:
+    """Draw the error beside two standard errors, which should hold 95 % of it."""
+    reach = 2 * result.stderr[name]
+    ax.fill_between(result.time, -reach, reach, color=FOUND, alpha=0.25, linewidth=0)
+    draw_line(ax, result.time, error, color=TRUTH, linewidth=0.9)
+    scale(ax, error, reach, -reach)
+    ax.yaxis.set_major_locator(MaxNLocator(3))
+    ax.set_ylabel("error")
+
+
+def flagged_everywhere(result: Identified) -> list[Status]:
     """Return the flags of the record, and those that all samples have."""
     common = int(np.bitwise_and.reduce(result.status)) if result.status.size else 0
     return [flag for flag in Status if (common | int(result.record_status)) & flag]
 
 
-def _draw_flags(ax: Axes, result: Identified) -> None:
+def draw_flags(ax: Axes, result: Identified) -> None:
     """Shade samples whose numbers deserve a second look; what holds at all samples is said elsewhere."""
     time, doubtful = result.time, DOUBTFUL | Status.GAP
-    for flag in _everywhere(result):
+    for flag in flagged_everywhere(result):
         doubtful &= ~flag
     flagged = result.status & doubtful != 0
     if not flagged.any():
@@ -130,8 +231,91 @@ def _draw_flags(ax: Axes, result: Identified) -> None:
         ax.axvspan(first, last, label="flagged" if number == 0 else None, **shade)
 
 
-def _frame_constant(ax: Axes, value: float, error: float, true: float) -> None:
-    """Show a constant from near enough to see its band, and the truth."""
-    reach = 1.3 * max(6 * error, abs(true - value), 0.01 * abs(value))
-    if np.isfinite(reach) and reach > 0:
-        ax.set_ylim(value - reach, value + reach)
+def plot_over_position(
+    result: Identified,
+    position: npt.ArrayLike,
+    *,
+    name: str = "stiffness",
+    label: str = "position",
+    ax: Place = None,
+) -> Figure:
+    """Draw a parameter over a channel, the stiffness over the position of a joint say; colour is time.
+
+    Where a parameter depends on the position alone, all passes lie on one curve. Samples that cannot be trusted are left out.
+
+    Parameters
+    ----------
+    result : Identification
+        Of a single record.
+    position : array_like, shape (n,)
+        A value for each of the result's samples.
+    name : str, optional
+        Parameter or term.
+    label : str, optional
+        What the channel is called, with its unit.
+    ax : Axes, optional
+        Where to draw. By default a new figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    ValueError
+        If the result holds several records, has no such parameter, or the channel has another number of samples.
+
+    See Also
+    --------
+    plot_identification : the same over time.
+
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
+    Section 4: the stiffness follows the position of a slider.
+
+    Examples
+    --------
+    >>> import tvident
+    >>> from tvident import figures
+    >>> rig = tvident.simulate_torsional_rig(duration=8.0)
+    >>> result = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
+    >>> figures.plot_over_position(result, rig.slider_position, label="slider (m)").savefig("over_position.png")
+    """
+    check_single(result)
+    if name not in (*_SYMBOLS, *result.terms):
+        raise ValueError(
+            f"name must be a parameter of the result; got {name!r}; give one of {(*_SYMBOLS, *result.terms)}"
+        )
+    places = np.asarray(position, np.float64)
+    if places.shape != result.time.shape:
+        raise ValueError(
+            f"position must have a value for each of the result's {result.time.size} samples; got shape {places.shape}; cut it, or take "
+            "every step-th sample"
+        )
+    values, error = value_of(result, name), result.stderr[name]
+    with style():
+        figure, (panel,) = panels(ax, [3.6], width=6.4)
+        there = np.flatnonzero(np.isfinite(values) & np.isfinite(places) & (result.status & DOUBTFUL == 0))
+        there = there[:: max(1, there.size // 4000)]
+        panel.errorbar(
+            places[there],
+            values[there],
+            2 * error[there],
+            fmt="none",
+            ecolor=FOUND,
+            elinewidth=0.6,
+            alpha=0.18,
+            zorder=1,
+        )
+        dots = panel.scatter(
+            places[there], values[there], c=result.time[there], s=5, cmap=TIME_MAP, linewidths=0, zorder=2
+        )
+        scale(panel, values[there], values[there] - 2 * error[there], values[there] + 2 * error[there])
+        panel.set_title(f"{title_of(name)} over {plain(label)}")
+        panel.set_xlabel(plain(label))
+        panel.set_ylabel(unit_of(name))
+        bar = figure.colorbar(dots, ax=panel, pad=0.02, aspect=30)
+        bar.set_label("time (s)")
+        bar.outline.set_visible(False)
+    return figure

@@ -2,29 +2,48 @@
 
 from __future__ import annotations
 
-from matplotlib import pyplot as plt
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from tvident._figures.style import ACCENT, FOUND, MUTED, style
+from tvident._figures.style import FOUND, MUTED, Place, draw_line, panels, plain, style
 from tvident._simulate import Recording
 
 
-def plot_recording(recording: Recording) -> Figure:
-    """Draw slider position, torque and angle over time: figure 2 of the paper.
+def plot_recording(
+    recording: Recording | Mapping[str, npt.ArrayLike], *, sample_rate: float | None = None, ax: Place = None
+) -> Figure:
+    """Draw the channels of a recording below each other.
+
+    However long a recording is, the least and greatest sample of every column are drawn: a spike of one sample is seen.
 
     Parameters
     ----------
-    recording : Recording
-        From :func:`tvident.simulate_torsional_rig`.
+    recording : Recording or mapping of str to array_like, shape (n,)
+        From :func:`tvident.simulate_torsional_rig`, or channels by name; a unit may follow the name in brackets, and a channel ``time``
+        gives seconds.
+    sample_rate : float, optional
+        Samples per second of channels without time.
+    ax : Axes or sequence of Axes, optional
+        Where to draw; one Axes is divided into a panel for each channel. By default a new figure.
 
     Returns
     -------
     matplotlib.figure.Figure
 
+    Raises
+    ------
+    ValueError
+        If there is no channel, channels differ in length, or neither a time nor a sample rate is given.
+
     See Also
     --------
     simulate_torsional_rig : simulates a recording.
+    paper_figure_2 : the paper's picture of its recording.
 
     References
     ----------
@@ -38,19 +57,43 @@ def plot_recording(recording: Recording) -> Figure:
     >>> figure = figures.plot_recording(tvident.simulate_torsional_rig(duration=2.0))
     >>> figure.savefig("recording.png")
     """
+    if isinstance(recording, Recording):
+        time = recording.time
+        channels: dict[str, npt.NDArray[Any]] = {
+            "slider position [m]": recording.slider_position,
+            "torque [N·m]": recording.torque,
+            "angle [rad]": recording.angle,
+        }
+    else:
+        channels = {name: np.asarray(values) for name, values in recording.items()}
+        time = _time(channels, sample_rate)
     with style():
-        figure, axes = plt.subplots(3, 1, sharex=True, figsize=(8, 5.4), layout="constrained")
-        channels = (
-            ("Slider position", recording.slider_position, "m", ACCENT),
-            ("Torque", recording.torque, "N·m", MUTED),
-            ("Angle", recording.angle, "rad", FOUND),
-        )
-        for ax, (title, values, unit, colour) in zip(axes, channels, strict=True):
-            ax.plot(recording.time, values, color=colour, linewidth=0.9)
-            ax.set_title(title)
-            ax.set_ylabel(unit)
-            ax.yaxis.set_major_locator(MaxNLocator(4))
-            ax.margins(x=0)
+        figure, axes = panels(ax, [1.6] * len(channels), width=8.0)
+        for number, (panel, (name, values)) in enumerate(zip(axes, channels.items(), strict=True)):
+            title, _, unit = name.partition("[")
+            draw_line(panel, time, values, color=FOUND if number == len(channels) - 1 else MUTED, linewidth=0.9)
+            panel.set_title(plain(title.strip().capitalize()))
+            panel.set_ylabel(plain(unit.rstrip("] ")))
+            panel.yaxis.set_major_locator(MaxNLocator(4))
+            panel.margins(x=0)
         axes[-1].set_xlabel("time (s)")
-        figure.align_ylabels()
+        if ax is None:
+            figure.align_ylabels()
         return figure
+
+
+def _time(channels: dict[str, npt.NDArray[Any]], sample_rate: float | None) -> npt.NDArray[np.float64]:
+    """Take the time out of channels, or make it."""
+    named = [name for name in channels if name.partition("[")[0].strip().lower() == "time"]
+    time = channels.pop(named[0]) if named else None
+    sizes = {values.shape for values in channels.values()}
+    if len(sizes) != 1 or len(next(iter(sizes))) != 1:
+        raise ValueError(f"channels must be single records of one length; got shapes {sorted(sizes)}; cut them")
+    (samples,) = next(iter(sizes))
+    if time is not None and time.shape == (samples,):
+        return time.astype(np.float64)
+    if sample_rate is None or not sample_rate > 0:
+        raise ValueError(
+            f"a recording needs its time; got sample_rate={sample_rate}; give sample_rate= or a channel 'time'"
+        )
+    return np.arange(samples) / sample_rate

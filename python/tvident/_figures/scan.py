@@ -6,10 +6,9 @@ from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
-from tvident._figures.style import FAINT, FOUND, style, unit_of
+from tvident._figures.style import FAINT, FOUND, MUTED, Place, legend, panels, style, unit_of
 
 Array = npt.NDArray[np.float64]
 
@@ -38,12 +37,14 @@ class Scanned(Protocol):
         """The narrowest and the widest test function that agree."""
 
 
-def plot_scan(scan: Scanned) -> Figure:
+def plot_scan(scan: Scanned, ax: Place = None) -> Figure:
     """Draw every unknown over the band in which the equation is asked to hold, with bars of two standard errors.
 
     Parameters
     ----------
     scan : Scan
+    ax : Axes or sequence of Axes, optional
+        Where to draw; one Axes is divided into a panel for each unknown. By default a new figure.
 
     Returns
     -------
@@ -78,19 +79,12 @@ def plot_scan(scan: Scanned) -> Figure:
     if scan.plateau is not None:
         agree = (scan.plateau[0] <= scan.window_length) & (scan.window_length <= scan.plateau[1])
     with style():
-        figure, axes = plt.subplots(
-            len(scan.estimates),
-            1,
-            sharex=True,
-            squeeze=False,
-            figsize=(8.4, 1.2 + 1.6 * len(scan.estimates)),
-            layout="constrained",
-        )
-        for ax, (name, values) in zip(axes[:, 0], scan.estimates.items(), strict=True):
+        figure, axes = panels(ax, [1.6] * len(scan.estimates))
+        for panel, (name, values) in zip(axes, scan.estimates.items(), strict=True):
             error = scan.stderr[name]
             bars: Any = {"fmt": "o", "markersize": 3.5, "elinewidth": 1.2}
             if agree.any():
-                ax.axvspan(
+                panel.axvspan(
                     scan.band[agree].min(),
                     scan.band[agree].max(),
                     color=FAINT,
@@ -98,18 +92,21 @@ def plot_scan(scan: Scanned) -> Figure:
                     linewidth=0,
                     label="plateau",
                 )
-            for chosen, colour, label in ((agree, FOUND, "these agree"), (~agree, "#9aa7b2", "others")):
+            for chosen, colour, label in ((agree, FOUND, "these agree"), (~agree, MUTED, "others")):
                 if chosen.any():
-                    ax.errorbar(scan.band[chosen], values[chosen], 2 * error[chosen], color=colour, label=label, **bars)
+                    panel.errorbar(
+                        scan.band[chosen], values[chosen], 2 * error[chosen], color=colour, label=label, **bars
+                    )
             shown = agree if agree.any() else np.ones(agree.size, bool)
             low, high = (values - 3 * error)[shown].min(), (values + 3 * error)[shown].max()
             reach = 1.5 * (high - low)
             if np.isfinite(reach) and reach > 0:
-                ax.set_ylim(low - reach, high + reach)
-            ax.set_title(name.replace("_", " ").capitalize())
-            ax.set_ylabel(unit_of(name))
-        axes[0, 0].set_xscale("log")
-        axes[0, 0].legend(ncols=3, loc="lower right", bbox_to_anchor=(1, 0.97), borderaxespad=0.2)
-        axes[-1, 0].set_xlabel("the equation is asked to hold up to (Hz)")
-        figure.align_ylabels()
+                panel.set_ylim(low - reach, high + reach)
+            panel.set_title(name.replace("_", " ").capitalize())
+            panel.set_ylabel(unit_of(name))
+        axes[0].set_xscale("log")
+        legend(axes[0], ax)
+        axes[-1].set_xlabel("the equation is asked to hold up to (Hz)")
+        if ax is None:
+            figure.align_ylabels()
         return figure

@@ -2,23 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeAlias
 
 import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
+from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from tvident._equation import UNITS
 
+Array: TypeAlias = npt.NDArray[np.float64]
+
+Place: TypeAlias = Axes | Sequence[Axes] | npt.NDArray[Any] | None
+"""Where to draw: on axes of the user's own, or on new ones."""
+
 INK, MUTED, FAINT = "#22303c", "#5b6b79", "#c3ccd4"
 """Colours of titles, of labels, of frames and recorded samples."""
 
-FOUND, TRUTH, ACCENT = "#2f7fc1", "#d9480f", "#2a9d6f"
-"""Colours of what was found, what is true, what was chosen."""
+FOUND, TRUTH, ACCENT = "#0072b2", "#d55e00", "#009e73"
+"""Colours of what was found, what is true, what was chosen: told apart by colour-blind eyes too (Okabe and Ito)."""
+
+TIME_MAP = "cividis"
+"""Colours of time: even in lightness, and the same to colour-blind eyes."""
+
+_MOST_POINTS = 8000
+"""Of a line: more than a printed page has columns."""
 
 _STYLE: Any = {
     "figure.dpi": 110,
@@ -65,20 +78,114 @@ def unit_of(name: str) -> str:
     return UNITS.get(name, "").replace("^2", "²").replace("^3", "³").replace(" ", "·")
 
 
-def draw_parameter(
-    ax: Axes, time: npt.NDArray[np.float64], values: npt.NDArray[np.float64], errors: npt.NDArray[np.float64]
-) -> None:
-    # More points than a screen has columns only cost time.
-    every = max(1, time.size // 20_000)
-    time, values, errors = time[::every], values[::every], errors[::every]
-    band: Any = {"color": FOUND, "alpha": 0.22, "linewidth": 0, "label": "± 2 standard errors"}
-    ax.fill_between(time, values - 2 * errors, values + 2 * errors, **band)
-    ax.plot(time, values, color=FOUND, linewidth=1.0, label="identified")
-    ax.yaxis.set_major_locator(MaxNLocator(5))
-    finite = values[np.isfinite(values)]
-    if finite.size:
-        low, high = np.percentile(finite, [1, 99])
-        room = 0.35 * (high - low) or 0.1 * abs(high) or 1.0
-        ax.set_ylim(low - room, high + room)
+def panels(
+    ax: Place, heights: Sequence[float], *, width: float = 8.4, apart: bool = False
+) -> tuple[Figure, list[Axes]]:
+    """Return axes below each other that share their time, heights in inches: of a new figure, those given, or in the place of one.
+
+    Where they do not share an axis they are `apart`.
+    """
+    count = len(heights)
+    if ax is None:
+        figure, axes = plt.subplots(
+            count,
+            1,
+            sharex=not apart,
+            squeeze=False,
+            figsize=(width, 0.7 + sum(heights)),
+            height_ratios=list(heights),
+            layout="constrained",
+        )
+        return figure, list(axes[:, 0])
+    if not isinstance(ax, Axes):
+        given = list(np.ravel(np.asarray(ax, dtype=object)))
+        if len(given) != count or not all(isinstance(one, Axes) for one in given):
+            raise ValueError(
+                f"ax must be one Axes, or {count} of them for this picture; got {len(given)}; give {count}"
+            )
+        return _figure_of(given[0]), given
+    if count == 1:
+        return _figure_of(ax), [ax]
+    ax.set_axis_off()
+    total, top, shared = sum(heights), 1.0, None
+    inside = []
+    place = ax.get_subplotspec()
+    if place is not None:
+        grid = place.subgridspec(count, 1, height_ratios=list(heights))
+        for row in range(count):
+            inside.append(_figure_of(ax).add_subplot(grid[row], sharex=shared))
+            shared = None if apart else inside[0]
+    else:
+        for height in heights:
+            share = height / total
+            inside.append(ax.inset_axes((0, top - 0.72 * share, 1, 0.72 * share), sharex=shared))
+            shared, top = None if apart else inside[0], top - share
+    for one in inside[:-1] if not apart else []:
+        one.tick_params(labelbottom=False)
+    return _figure_of(ax), inside
+
+
+def _figure_of(ax: Axes) -> Any:
+    """Return the figure, or the part of one, that axes stand in."""
+    return ax.figure
+
+
+def envelope(time: Array, values: Array) -> tuple[Array, Array, Array]:
+    """Return times with the least and the greatest value around each: no sample is lost, however many there are."""
+    every = -(-time.size // (_MOST_POINTS // 2))
+    if every <= 2:  # noqa: PLR2004 - two points stand for two samples
+        return time, values, values
+    count = time.size // every * every
+    rows = values[:count].reshape(-1, every)
+    return time[:count:every], np.fmin.reduce(rows, axis=1), np.fmax.reduce(rows, axis=1)
+
+
+def draw_line(ax: Axes, time: Array, values: npt.NDArray[Any], **how: Any) -> None:
+    """Draw a line through every sample, or through the least and greatest around each of some thousand times."""
+    at, low, high = envelope(time, np.asarray(values, np.float64))
+    if low is high:
+        ax.plot(at, low, **how)
+    else:
+        ax.plot(np.repeat(at, 2), np.stack([low, high], axis=1).ravel(), **how)
+
+
+def draw_parameter(ax: Axes, time: Array, values: Array, errors: Array, *, label: str = "identified") -> None:
+    """Draw values with a band of two standard errors, on a scale that shows most of both."""
+    at, low, _ = envelope(time, values - 2 * errors)
+    high = envelope(time, values + 2 * errors)[2]
+    band: Any = {"color": FOUND, "alpha": 0.25, "linewidth": 0, "label": "± 2 standard errors"}
+    ax.fill_between(at, low, high, **band)
+    draw_line(ax, time, values, color=FOUND, linewidth=1.0, label=label)
+    scale(ax, values, values - 2 * errors, values + 2 * errors)
     if time.size > 1:
         ax.set_xlim(time[0], time[-1])
+
+
+def scale(ax: Axes, *lines: Array) -> None:
+    """Show all but the last hundredth of lines on each side: a spike does not hide the rest."""
+    ends = []
+    for line in lines:
+        finite = line[np.isfinite(line)]
+        if finite.size:
+            ends += list(np.percentile(finite, [1, 99]))
+    if ends:
+        low, high = min(ends), max(ends)
+        room = 0.2 * (high - low) or 0.1 * abs(high) or 1.0
+        ax.set_ylim(low - room, high + room)
+    ax.yaxis.set_major_locator(MaxNLocator(4))
+
+
+def legend(ax: Axes, place: Place = None) -> None:
+    """Name what is drawn: beside the title of a figure of our own, where no line runs through it, and inside of axes of the user's."""
+    if place is None:
+        beside: Any = {"loc": "lower right", "bbox_to_anchor": (1, 0.97), "borderaxespad": 0.2}
+        ax.legend(ncols=5, handlelength=1.4, columnspacing=1.4, **beside)
+    else:
+        ax.legend(
+            loc="upper right", ncols=2, fontsize=7.5, handlelength=1.2, frameon=True, framealpha=0.8, edgecolor="none"
+        )
+
+
+def plain(name: str) -> str:
+    """Return a name that is no formula."""
+    return name.replace("$", r"\$")

@@ -13,13 +13,19 @@ from matplotlib.ticker import MaxNLocator
 
 from tvident import _arguments as arguments
 from tvident._derivatives import SHORTEST_WINDOW, LocalPolynomialFit, fit_local_polynomials
-from tvident._figures.style import ACCENT, FAINT, FOUND, MUTED, style
+from tvident._figures.style import ACCENT, FAINT, FOUND, MUTED, Place, panels, style
 
 
 def plot_window(
-    y: npt.ArrayLike, i: int, window_length: int = 201, *, sample_rate: float = 1.0, max_order: int = 15
+    y: npt.ArrayLike,
+    i: int,
+    window_length: int = 201,
+    *,
+    sample_rate: float = 1.0,
+    max_order: int = 15,
+    ax: Place = None,
 ) -> Figure:
-    """Draw a window with the polynomial chosen for it and the criterion over the order: figures 4 and 5 of the paper.
+    """Draw a window with the polynomial chosen for it and the criterion over the order.
 
     Parameters
     ----------
@@ -33,6 +39,8 @@ def plot_window(
         Samples per second.
     max_order : int, optional
         Highest candidate order.
+    ax : sequence of two Axes, optional
+        Where to draw. By default a new figure.
 
     Returns
     -------
@@ -48,6 +56,7 @@ def plot_window(
     See Also
     --------
     fit_local_polynomials : chooses an order in every window.
+    paper_figure_4, paper_figure_5 : the paper's windows.
 
     References
     ----------
@@ -73,7 +82,10 @@ def plot_window(
     window = samples[centre - half : centre + half + 1]
     fit = fit_local_polynomials(window, length, sample_rate=sample_rate, max_order=max_order)
     with style():
-        figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
+        if ax is None:
+            figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
+        else:
+            figure, (left, right) = panels(ax, [1.0, 1.0])
         _draw_window(left, fit, window, centre, sample_rate)
         _draw_scores(right, fit.scores(half))
         return figure

@@ -11,6 +11,7 @@ from typing import Any, Protocol, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _arguments as arguments
 from tvident._equation import COEFFICIENTS, UNITS
 from tvident._report.packed import Series
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
@@ -22,9 +23,6 @@ _STRETCHES = 12
 
 _FEW = 0.0005
 """A share of samples below which their number says more."""
-
-_MOST_DIGITS = 8
-"""After the point."""
 
 _SYMBOLS = {"inertia": "Inertia I", "damping": "Damping C", "stiffness": "Stiffness K"}
 
@@ -158,16 +156,6 @@ def title_of(name: str) -> str:
     return _SYMBOLS.get(name, name.replace("_", " ").capitalize())
 
 
-def with_error(value: float, error: float) -> str:
-    """Return a number with as many digits as its error deserves, and the error with two."""
-    if not (math.isfinite(value) and math.isfinite(error)) or error <= 0:
-        return f"{value:.5g}"
-    digits = 1 - math.floor(math.log10(error))
-    if 0 <= digits <= _MOST_DIGITS:
-        return f"{value:.{digits}f} ± {error:.{digits}f}"
-    return f"{value:.5g} ± {error:.2g}"
-
-
 def _values(result: Reported) -> dict[str, Array]:
     """Return parameters and terms by name."""
     return {name: getattr(result, name) for name in COEFFICIENTS} | result.terms
@@ -186,7 +174,7 @@ def _numbers(result: Reported, values: Mapping[str, Array]) -> list[dict[str, st
         error = error[np.isfinite(error)]
         line = {"name": title_of(name), "unit": unit_of(name), "kind": kind, "more": ""}
         if name in result.constants:
-            line["value"] = with_error(*map(float, result.constants[name]))
+            line["value"] = arguments.with_error(*map(float, result.constants[name]))
             line["kind"] = "constant over the record"
         elif not finite.size:
             line["value"] = "no value"
@@ -194,7 +182,7 @@ def _numbers(result: Reported, values: Mapping[str, Array]) -> list[dict[str, st
             line |= {"value": f"{finite[0]:.5g}", "kind": "known: as given"}
         else:
             low, middle, high = np.percentile(finite, [5, 50, 95])
-            line["value"] = with_error(float(middle), float(np.median(error)) if error.size else math.nan)
+            line["value"] = arguments.with_error(float(middle), float(np.median(error)) if error.size else math.nan)
             line["more"] = f"90 % lie between {low:.4g} and {high:.4g}"
             line["kind"] = "known: as given" if kind == "known" else f"{kind}: the median of its values"
         lines.append(line)

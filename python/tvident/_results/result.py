@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _arguments as arguments
 from tvident._equation import UNITS
 from tvident._files import aligned, write_table
 from tvident._results.estimates import Estimates
@@ -24,7 +25,10 @@ from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status, describe
 from tvident._tables import Table, Tabular
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+Picture: TypeAlias = Literal["parameters", "torque", "status", "poles", "scan", "over"]
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -314,8 +318,20 @@ class Identification(Simulated, Tabular):
         lines += ["", *describe(self.status, self.record_status)]
         return "\n".join(lines)
 
-    def plot(self) -> Figure:
-        """Draw inertia, damping and stiffness over time with bands of two standard errors.
+    def plot(self, what: Picture = "parameters", *, ax: Axes | Sequence[Axes] | None = None, **options: Any) -> Figure:
+        """Draw the result, on axes of your own or in a new figure.
+
+        Parameters
+        ----------
+        what : str, optional
+            ``"parameters"``: what changes, with bands of two standard errors, and in a line what is constant (``truth=`` draws a simulated
+            truth and the error). ``"torque"``: recorded, predicted and what is left. ``"status"``: order and flags over time.
+            ``"poles"``: poles, natural frequency and damping ratio. ``"scan"``: estimates by the width of the test function.
+            ``"over"``: a parameter over the channel ``position=`` (``name=``, ``label=``).
+        ax : Axes or sequence of Axes, optional
+            Where to draw; one Axes is divided where a picture has several panels.
+        **options
+            See the functions of :mod:`tvident.figures`.
 
         Returns
         -------
@@ -326,11 +342,21 @@ class Identification(Simulated, Tabular):
         ImportError
             If matplotlib is missing: install ``tvident[plot]``.
         ValueError
-            If there are several records.
+            If there are several records, or no such picture.
         """
         from tvident import _figures  # noqa: PLC0415 - matplotlib is optional
 
-        return _figures.plot_identification(self)
+        arguments.one_of("what", what, get_args(Picture))
+        if what == "scan":
+            return self.scan().plot(ax=ax, **options)
+        draw: dict[str, Callable[..., Figure]] = {
+            "parameters": _figures.plot_identification,
+            "torque": _figures.plot_torque,
+            "status": _figures.plot_status,
+            "poles": _figures.plot_poles,
+            "over": _figures.plot_over_position,
+        }
+        return draw[what](self, ax=ax, **options)
 
     def report(
         self,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from tvident._equation import UNITS
 from tvident._files import aligned
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Array = npt.NDArray[np.float64]
@@ -90,8 +92,13 @@ class Scan:
             cells.append(("*" if inside else "", str(length), f"{self.band[place]:.3g}", *values))
         return "\n".join(aligned(cells))
 
-    def plot(self) -> Figure:
+    def plot(self, *, ax: Axes | Sequence[Axes] | None = None) -> Figure:
         """Draw every unknown over the band, with bars of two standard errors and the plateau shaded.
+
+        Parameters
+        ----------
+        ax : Axes or sequence of Axes, optional
+            Where to draw; one Axes is divided into a panel for each unknown.
 
         Returns
         -------
@@ -106,4 +113,4 @@ class Scan:
         """
         from tvident import _figures  # noqa: PLC0415 - matplotlib is optional
 
-        return _figures.plot_scan(self)
+        return _figures.plot_scan(self, ax)

@@ -12,6 +12,7 @@ from tvident import _arguments as arguments
 from tvident._results.held_back import HeldBack, evaluated, parts_of
 from tvident._results.recorded import Recorded
 from tvident._results.response import Model, accounted_for, every_sample
+from tvident._results.torque import compared
 from tvident._status import Status
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -127,6 +128,31 @@ class Simulated:
         angles = _like_torque("angle", angle, torques)
         share = accounted_for(angles, self.simulate(torques, angle=angles))
         return share if share.ndim else float(share)
+
+    def predicted_torque(self) -> tuple[Array, Array, Array]:
+        """Return the recorded torque, and the one that the identified equation predicts from the recorded angle.
+
+        Both are as the method compares them: in weak form averages over the test function, in which the noise of derivatives is small; in
+        strong form the torque as it is, and derivatives of the local polynomials. Costs about 0.1 µs a sample.
+
+        Returns
+        -------
+        time, recorded, predicted : ndarray, shape (m,)
+            Seconds and N m, for every sample of the record; NaN near its ends and near what is missing.
+
+        Raises
+        ------
+        ValueError
+            If there are several records, or the record is not there any more.
+        """
+        if self.inertia.ndim != 1:
+            raise ValueError(
+                f"only a single record has a predicted torque; this one has shape {self.inertia.shape}; take one record"
+            )
+        recorded = self._record("a result of identify, in the process that identified")
+        found, predicted = compared(self._model(), recorded.angles, recorded.torques, self.settings)
+        start = float(self.time[0]) if self.time.size else 0.0
+        return start + np.arange(found.size) / float(self.settings["sample_rate"]), found, predicted
 
     def held_back(self) -> HeldBack:
         """Return how much the model explains of a part of the record that it is not fitted to: the last tenth of every tenth.

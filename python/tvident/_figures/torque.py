@@ -1,0 +1,82 @@
+"""A picture of the recorded torque beside the predicted one."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tvident._figures.parameters import Array, Identified, check_single, draw_flags
+from tvident._figures.style import ACCENT, FOUND, MUTED, Place, draw_line, legend, panels, scale, style
+
+
+class Predicting(Identified, Protocol):
+    """A result that predicts the torque."""
+
+    def predicted_torque(self) -> tuple[Array, Array, Array]:
+        """Return time, the recorded torque and the predicted one."""
+
+
+def plot_torque(result: Predicting, ax: Place = None) -> Figure:
+    """Draw the recorded torque, the one that the identified equation predicts from the angle, and what is left.
+
+    Both are what the method compares: in weak form averages over its test function, in strong form the torque and the derivatives of the
+    local polynomials. What is left should look like noise: a residual that follows the motion says what the equation lacks.
+
+    Parameters
+    ----------
+    result : Identification
+        Of a single record that is still there.
+    ax : Axes or sequence of Axes, optional
+        Where to draw; one Axes is divided into two panels. By default a new figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    ValueError
+        If the result holds several records, or was stored without its record.
+
+    See Also
+    --------
+    Identification.predicted_torque : the numbers.
+
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
+    Equation (1).
+
+    Examples
+    --------
+    >>> import tvident
+    >>> from tvident import figures
+    >>> rig = tvident.simulate_torsional_rig(duration=2.0)
+    >>> result = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
+    >>> figures.plot_torque(result).savefig("torque.png")
+    """
+    check_single(result)
+    time, recorded, predicted = result.predicted_torque()
+    left = recorded - predicted
+    with style():
+        figure, (above, below) = panels(ax, [2.6, 1.3])
+        draw_flags(above, result)
+        draw_line(above, time, recorded, color=MUTED, linewidth=1.6, alpha=0.55, label="recorded")
+        draw_line(above, time, predicted, color=FOUND, linewidth=0.9, label="predicted from the angle")
+        draw_line(below, time, left, color=ACCENT, linewidth=0.8)
+        weak = result.settings["form"] == "weak"
+        above.set_title("Torque, averaged over the test function" if weak else "Torque")
+        share = float(np.sqrt(np.nanmean(left**2) / np.nanmean(recorded**2)))
+        below.set_title(f"What is left: {np.sqrt(np.nanmean(left**2)):.3g} N·m rms, {share:.2g} of the torque")
+        scale(above, recorded, predicted)
+        scale(below, left)
+        for panel in (above, below):
+            panel.set_ylabel("N·m")
+            panel.margins(x=0)
+        legend(above, ax)
+        below.set_xlabel("time (s)")
+        if ax is None:
+            figure.align_ylabels()
+    return figure

@@ -1,0 +1,113 @@
+"""The torque that the identified equation of motion predicts, beside the one that was recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from numpy.polynomial import Polynomial
+
+from tvident._derivatives import fit_local_polynomials
+from tvident._results.response import Model, every_sample, without_gaps
+
+Array: TypeAlias = npt.NDArray[np.float64]
+
+_BLOCK = 1 << 14
+"""Samples that are transformed together: they stay in the cache."""
+
+_FUNCTIONS: dict[str, Callable[[Array, Array], Array]] = {
+    "coulomb": lambda _, velocity: np.sign(velocity),
+    "cubic": lambda angle, _: angle**3,
+    "gravity": lambda angle, _: np.sin(angle),
+    "viscous_asymmetric": lambda _, velocity: np.abs(velocity),
+}
+"""What the factors of built-in terms multiply."""
+
+
+def compared(
+    model: Model, angle: npt.NDArray[np.number], torque: npt.NDArray[np.number], settings: Mapping[str, Any]
+) -> tuple[Array, Array]:
+    """Return the recorded torque and the predicted one as the form compares them; NaN where samples are missing.
+
+    The weak form compares averages over its test function φ, in which derivatives fall to φ and their noise is small; the strong form
+    takes derivatives of the local polynomials.
+    """
+    late = float(model.lags[0])
+    places = np.arange(angle.size, dtype=np.float64)
+    on_time: Array = np.asarray(torque, np.float64)
+    if late != 0:
+        on_time = np.asarray(np.interp(places + late, places, on_time, right=np.nan), np.float64)
+    if settings["form"] == "strong":
+        names = ("max_order", "criterion", "selection")
+        fit: Any = fit_local_polynomials(
+            without_gaps(angle),
+            settings["window_length"],
+            delta=model.period,
+            **{name: settings[name] for name in names},
+        )
+        smooth, velocity, acceleration = np.asarray(fit.derivatives, np.float64)
+        missing = ~np.isfinite(angle)
+        return on_time, np.where(missing, np.nan, _sum(model, (smooth, velocity, acceleration), lambda values: values))
+    half = settings["window_length"] // 2
+    kernels = _kernels(half, settings["exponent"], model.period)
+    missing = ~(np.isfinite(angle) & np.isfinite(on_time))
+    touched = np.ones(angle.size, bool)
+    if angle.size > 2 * half:
+        count = np.concatenate([[0], np.cumsum(missing)])
+        touched[half : angle.size - half] = count[2 * half + 1 :] - count[: -2 * half - 1] > 0
+    filled = np.where(missing, 0.0, angle)
+    acceleration, velocity, smooth = _correlated(filled, kernels)
+    predicted = _sum(model, (smooth, velocity, acceleration), lambda values: _correlated(values, kernels[2:])[0])
+    (measured,) = _correlated(np.where(missing, 0.0, on_time), kernels[2:])
+    return np.where(touched, np.nan, measured), np.where(touched, np.nan, predicted)
+
+
+def _sum(model: Model, motion: tuple[Array, Array, Array], averaged: Callable[[Array], Array]) -> Array:
+    """Return the left-hand side of the equation of motion."""
+    angle, velocity, acceleration = motion
+    t = model.start + np.arange(angle.size) * model.period
+    known = {"inertia": acceleration, "damping": velocity, "stiffness": angle}
+    total = np.zeros(angle.size)
+    for name, factor in model.values.items():
+        if name == "offset":
+            regressor = np.ones(1)
+        elif name in known:
+            regressor = known[name]
+        elif name in model.own:
+            regressor = averaged(np.asarray(model.own[name].values(t, angle.copy(), velocity.copy()), np.float64))
+        else:
+            regressor = averaged(_FUNCTIONS[name](angle, velocity))
+        total = total + np.broadcast_to(every_sample(factor, angle.size, 1), angle.shape) * regressor
+    return np.asarray(total)
+
+
+def _kernels(half: int, exponent: float, period: float) -> Array:
+    """Return φ″, -φ′ and φ at the samples, of which φ sums to one, and only φ leaves a constant."""
+    u = np.arange(-half, half + 1) / half
+    phi = Polynomial([1, 0, -1]) ** int(exponent)
+    seconds = half * period
+    rows = np.array([phi.deriv(2)(u) / seconds**2, -phi.deriv(1)(u) / seconds, phi(u)]) / phi(u).sum()
+    return np.asarray(rows + np.outer(np.array([0.0, 0.0, 1.0]) - rows.sum(axis=1), rows[2]))
+
+
+def _correlated(values: Array, kernels: Array) -> Array:
+    """Return the sums of samples around each one, weighted by each kernel; zero where they do not fit. By overlap-save."""
+    width = kernels.shape[1]
+    result = np.zeros((len(kernels), values.size))
+    if values.size < width:
+        return result
+    # A mean that is not zero would cost digits, and a kernel makes of a constant its sum.
+    mean = float(values.mean())
+    sums = mean * kernels.sum(axis=1, keepdims=True)
+    length = max(_BLOCK, 1 << (4 * width).bit_length())
+    reach = length - width + 1
+    spectra = np.fft.rfft(kernels[:, ::-1], length)
+    centred = values - mean
+    for first in range(0, values.size - width + 1, reach):
+        piece = centred[first : first + length]
+        found = np.fft.irfft(np.fft.rfft(piece, length) * spectra, length)[:, width - 1 : piece.size]
+        place = first + width // 2
+        result[:, place : place + found.shape[1]] = found + sums
+    return result
