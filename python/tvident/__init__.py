@@ -1,13 +1,19 @@
 """Identification of inertia, damping and stiffness that change while they are measured, and derivatives of noisy recordings."""
 
-from tvident._compare import ModelComparison, compare_models
-from tvident._derivatives import LocalPolynomialFit, fit_local_polynomials, savgol_filter
-from tvident._equation import Term
-from tvident._identify import StrongForm, WeakForm, identify
-from tvident._regression import RollingRegression, rolling_least_squares
-from tvident._results import Identification, Scan
-from tvident._simulate import Recording, simulate_torsional_rig
-from tvident._status import Status
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tvident._compare import ModelComparison, compare_models
+    from tvident._derivatives import LocalPolynomialFit, fit_local_polynomials, savgol_filter
+    from tvident._equation import Term
+    from tvident._identify import StrongForm, WeakForm, identify
+    from tvident._regression import RollingRegression, rolling_least_squares
+    from tvident._results import Identification, Scan, load
+    from tvident._simulate import Recording, simulate_torsional_rig
+    from tvident._status import Status
+
+    __version__: str
 
 __all__ = [
     "Identification",
@@ -23,7 +29,42 @@ __all__ = [
     "compare_models",
     "fit_local_polynomials",
     "identify",
+    "load",
     "rolling_least_squares",
     "savgol_filter",
     "simulate_torsional_rig",
 ]
+
+_ROOMS = {
+    "_compare": ("ModelComparison", "compare_models"),
+    "_derivatives": ("LocalPolynomialFit", "fit_local_polynomials", "savgol_filter"),
+    "_equation": ("Term",),
+    "_identify": ("StrongForm", "WeakForm", "identify"),
+    "_regression": ("RollingRegression", "rolling_least_squares"),
+    "_results": ("Identification", "Scan", "load"),
+    "_simulate": ("Recording", "simulate_torsional_rig"),
+    "_status": ("Status",),
+}
+"""Where each name comes from: a room is entered when a name of it is asked for, so that the command's help need not wait for NumPy."""
+
+_DOORS = ("figures", "recordings")
+"""Modules that users import by their name."""
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version  # noqa: PLC0415 - takes longer than all the rest of this file
+
+        globals()[name] = version("tvident")
+        return globals()[name]
+    if name in _DOORS:
+        return import_module(f"tvident.{name}")
+    for room, names in _ROOMS.items():
+        if name in names:
+            globals()[name] = getattr(import_module(f"tvident.{room}"), name)
+            return globals()[name]
+    raise AttributeError(f"module 'tvident' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, *_DOORS, "__doc__", "__file__", "__name__", "__path__", "__version__"])

@@ -3,7 +3,7 @@
 from tvident._arguments.arrays import NanPolicy, RowPolicy, along_axis, any_array, check_nan, mask, real_array
 from tvident._arguments.channels import as_record, channel, channels
 from tvident._arguments.containers import fields_of, is_table, package_of, plain, time_axis
-from tvident._arguments.labels import Labels, labels_of
+from tvident._arguments.labels import Labels, labels_in, labels_of, labels_out
 from tvident._arguments.numbers import (
     LARGEST,
     finite_number,
@@ -43,7 +43,9 @@ __all__ = [
     "implied_times",
     "is_table",
     "is_word",
+    "labels_in",
     "labels_of",
+    "labels_out",
     "length_given",
     "mask",
     "one_of",

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tvident._arguments.containers import is_table, package_of, time_axis
+from tvident._arguments.containers import is_table, package_of, plain, time_axis
 from tvident._arguments.shown import shown
 
 
@@ -117,3 +120,53 @@ def _differing(one: Any, other: Any) -> str | None:
         return None
     place = int(np.flatnonzero(~same)[0])
     return f"their labels of sample {place} are {shown(one[place])} and {shown(other[place])}"
+
+
+def labels_out(labels: Labels | None) -> tuple[dict[str, npt.NDArray[Any]], dict[str, Any] | None]:
+    """Return labels as arrays and plain JSON; what neither of them can hold is left out."""
+    if labels is None:
+        return {}, None
+    arrays: dict[str, npt.NDArray[Any]] = {}
+    facts: dict[str, Any] = {"dims": [str(dim) for dim in labels.dims], "attributes": _plain(labels.attributes)}
+    if labels.index is not None and labels.index.nlevels == 1:
+        zone = getattr(labels.index.dtype, "tz", None)
+        facts["index"] = {"name": labels.index.name, "zone": None if zone is None else str(zone)}
+        arrays["index"] = _storable(plain("index", labels.index))
+    if labels.records is not None:
+        facts["records"] = [str(one) for one in labels.records]
+    facts["coordinates"] = {}
+    for name, one in labels.coordinates.items():
+        facts["coordinates"][str(name)] = {"dims": [str(dim) for dim in one.dims], "attributes": _plain(one.attrs)}
+        arrays[f"coordinate_{name}"] = _storable(np.asarray(one))
+    return arrays, facts
+
+
+def labels_in(arrays: Mapping[str, npt.NDArray[Any]], facts: Mapping[str, Any]) -> Labels:
+    """Return labels from what `labels_out` made of them; without what their package would be needed for where it is missing."""
+    index, coordinates = None, dict[Any, Any]()
+    if "index" in facts and find_spec("pandas"):
+        pandas = import_module("pandas")
+        index = pandas.Index(arrays["index"], name=facts["index"]["name"])
+        if facts["index"]["zone"]:
+            index = index.tz_localize("UTC").tz_convert(facts["index"]["zone"])
+    has_xarray = find_spec("xarray") is not None
+    for name, one in facts["coordinates"].items() if has_xarray else ():
+        made = import_module("xarray").Variable(one["dims"], arrays[f"coordinate_{name}"], one["attributes"])
+        coordinates[name] = import_module("xarray").DataArray(made, name=name)
+    dims = tuple(facts["dims"]) if has_xarray else ()
+    return Labels(index, facts.get("records"), dims, coordinates, facts["attributes"])
+
+
+def _plain(attributes: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return the attributes that JSON can hold."""
+    kept: dict[str, Any] = {}
+    for name, value in attributes.items():
+        try:
+            kept[str(name)] = json.loads(json.dumps(value))
+        except (TypeError, ValueError):
+            continue
+    return kept
+
+
+def _storable(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    return values.astype(str) if values.dtype.kind == "O" else values

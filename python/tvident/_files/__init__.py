@@ -5,9 +5,12 @@ from tvident._files.names import listed, printable
 from tvident._files.places import check_apart, check_folder, check_place
 from tvident._files.recordings import read
 from tvident._files.replacement import replaced
+from tvident._files.results import ENDINGS as RESULT_ENDINGS
+from tvident._files.results import read_result, write_result
 from tvident._files.table import aligned, write_csv, write_table
 
 __all__ = [
+    "RESULT_ENDINGS",
     "Channels",
     "FileError",
     "FileWarning",
@@ -19,7 +22,9 @@ __all__ = [
     "listed",
     "printable",
     "read",
+    "read_result",
     "replaced",
     "write_csv",
+    "write_result",
     "write_table",
 ]

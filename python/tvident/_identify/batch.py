@@ -93,6 +93,10 @@ def estimates(
         order=joined([one.order for one in found]) if has_orders else np.zeros((*shape, count), np.uint8),
         status=status,
         scans=tuple(_scan_of(one.scan, names) for one in found if one.scan is not None),
+        kinds={
+            name: np.array([one.unknowns[place].kind for one in found]).reshape(shape)
+            for place, name in enumerate(names)
+        },
         record_status=flags.reshape(shape) if shape else Status(int(flags[0])),
     )
 

@@ -18,7 +18,7 @@ from tvident._equation import COEFFICIENTS, Kind, Unknown, all_terms, parameter
 from tvident._identify.batch import estimates
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm, exponent_of
 from tvident._identify.settings import Request, plain, resolve
-from tvident._results import Estimates, Identification, Recorded, Words
+from tvident._results import Estimates, Identification, Recorded, Words, chosen, of_batch, of_records, settings_of
 from tvident._status import Status
 
 _WINDOW_OF_TERMS = 51
@@ -152,12 +152,39 @@ class Task:
             jumps=jumps if data.batch else jumps[0],
             words=words,
             settings=plain(settings),
-            recorded=Recorded(
-                data.angles,
-                data.torques,
-                own={term.name: term.own for term in self._terms if term.own is not None},
-                again=partial(self._again, plain(settings)),
-            ),
+            recorded=self._recorded(plain(settings), batch),
+        )
+
+    def _recorded(self, settings: dict[str, Any], found: Estimates) -> Recorded:
+        """Return the records, which can be identified once more, all or some of them."""
+        data = self._data
+
+        def part(place: Any) -> Recorded:
+            def some(array: Any) -> Any:
+                return None if array is None else array[place]
+
+            some_data = replace(
+                data,
+                angles=data.angles[place],
+                torques=data.torques[place],
+                instruments=some(data.instruments),
+                mask=some(data.mask),
+                doubts=(),
+                labels=None,
+            )
+            kinds = {name: np.asarray(kind)[place] for name, kind in found.kinds.items()}
+            alone = some_data.angles.ndim == 1
+            own = settings_of(settings, chosen(place, data.batch), kinds, alone=alone)
+            known = {name: value if isinstance(value, float) else value[place] for name, value in self._known.items()}
+            request = replace(self._request, by_record={}, parameters={**self._request.parameters, **known}, lag=0.0)
+            return Task(some_data, request)._recorded(own, of_records(found, place))  # noqa: SLF001 - of this class
+
+        return Recorded(
+            data.angles,
+            data.torques,
+            own={term.name: term.own for term in self._terms if term.own is not None},
+            again=partial(self._again, settings),
+            part=part if data.batch else None,
         )
 
     def _doubted(self, batch: Estimates, words: Words) -> tuple[Estimates, Words]:
@@ -168,7 +195,10 @@ class Task:
         more: Any = flags.reshape(data.batch) if data.batch else Status(int(flags[0]))
         lines = [f"record {record}: {line}" if data.batch else line for record, line in data.doubts]
         flagged = replace(batch, record_status=batch.record_status | more)
-        return flagged, Words(words.reasons, (*lines, *words.advice))
+        each = list(words.each)
+        for record, line in data.doubts if each else ():
+            each[record] = replace(each[record], advice=(line, *each[record].advice))
+        return flagged, Words(words.reasons, (*lines, *words.advice), tuple(each))
 
     def _again(self, settings: dict[str, Any], angles: npt.NDArray[np.number]) -> Identification:
         """Identify another angle with what was chosen; its missing values are left out."""
@@ -321,7 +351,7 @@ class Task:
         each = [words_with_instrument(one) for one in found]
         if not self._data.batch:
             return each[0]
-        return Words((), tuple(f"record {place}: {line}" for place, words in enumerate(each) for line in words.advice))
+        return of_batch(each)
 
     def _words_of_weak_form(
         self, found: Sequence[_core.Identification], batch: Estimates, settings: dict[str, Any]
@@ -338,17 +368,17 @@ class Task:
         ]
         if not self._data.batch:
             return each[0]
-        # Reasons differ too much from one record to the next.
-        return Words((), tuple(f"record {place}: {line}" for place, words in enumerate(each) for line in words.advice))
+        return of_batch(each)
 
     def _words_of_strong_form(
         self, found: Sequence[_core.Identification], batch: Estimates, settings: dict[str, Any]
     ) -> Callable[[], Words]:
         mask, step = self._data.mask, self._data.step
-        return ExplainedStrong(
+        explained = ExplainedStrong(
             found=batch,
             kinds={name: settings["kinds"][name] for name in self._names},
             untested=[name for place, name in enumerate(self._names) if found[0].unknowns[place].untested],
             settings=settings,
             mask=None if mask is None else mask[..., ::step],
-        ).words
+        )
+        return explained.words

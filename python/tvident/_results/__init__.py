@@ -1,9 +1,22 @@
 """Holds the result of an identification: parameters by name, standard errors, natural frequency, the summary."""
 
 from tvident._results.estimates import Estimates
+from tvident._results.loaded import load
+from tvident._results.parts import chosen, of_records, settings_of
 from tvident._results.recorded import Recorded
 from tvident._results.result import Identification
 from tvident._results.scan import Scan
-from tvident._results.words import Words
+from tvident._results.words import Words, of_batch
 
-__all__ = ["Estimates", "Identification", "Recorded", "Scan", "Words"]
+__all__ = [
+    "Estimates",
+    "Identification",
+    "Recorded",
+    "Scan",
+    "Words",
+    "chosen",
+    "load",
+    "of_batch",
+    "of_records",
+    "settings_of",
+]

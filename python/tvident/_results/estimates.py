@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -38,6 +38,8 @@ class Estimates:
         One a record, in weak form.
     labels : Labels, optional
         What the samples came with: an index, coordinates.
+    kinds : mapping of str to ndarray of str, shape (\*)
+        How every unknown of every record turned out.
     """
 
     values: Mapping[str, Array]
@@ -52,3 +54,4 @@ class Estimates:
     record_status: Status | npt.NDArray[np.uint16]
     scans: tuple[Scan, ...] = ()
     labels: arguments.Labels | None = None
+    kinds: Mapping[str, npt.NDArray[np.str_]] = field(default_factory=dict)

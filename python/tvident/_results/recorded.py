@@ -28,16 +28,23 @@ class Recorded:
         Terms of the user's own.
     again : callable
         Identifies once more, with the same settings and another angle.
+    part : callable, optional
+        Gives what NumPy's indexing takes of several records.
     """
 
     angles: Numbers
     torques: Numbers
     own: Mapping[str, Term]
     again: Callable[[Numbers], Any]
+    part: Callable[[Any], Recorded] | None = None
     _mark: bytes = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_mark", _mark(self.angles) + _mark(self.torques))
+
+    def of(self, place: Any) -> Recorded | None:
+        """Return some of several records."""
+        return None if self.part is None else self.part(place)
 
     @property
     def is_unchanged(self) -> bool:

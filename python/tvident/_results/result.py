@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
@@ -12,17 +12,23 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._equation import UNITS
-from tvident._files import aligned, write_table
+from tvident._files import RESULT_ENDINGS, write_table
 from tvident._results.estimates import Estimates
+from tvident._results.held_back import HeldBack
 from tvident._results.oscillator import Oscillator
+from tvident._results.parts import chosen, of_records, of_samples, settings_of
 from tvident._results.recorded import Recorded
 from tvident._results.reported import report
 from tvident._results.scan import Scan
+from tvident._results.short import as_html, short
 from tvident._results.simulated import Simulated
 from tvident._results.standard_errors import StandardErrors
-from tvident._results.words import Words
-from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status, describe
-from tvident._tables import Table, Tabular
+from tvident._results.stored import plain_words, store
+from tvident._results.summary import summary_of
+from tvident._results.valued import Valued
+from tvident._results.words import Words, of_batch
+from tvident._status import DOUBTFUL, DOUBTFUL_RECORD
+from tvident._tables import Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,20 +38,6 @@ Picture: TypeAlias = Literal["parameters", "torque", "status", "poles", "scan", 
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
-_MOST_SENTENCES = 20
-"""A summary of many records shows the advice for some."""
-
-
-def _range(value: Any) -> str:
-    """Return one number, or those of several records; words stand where nothing was chosen."""
-    if not isinstance(value, list):
-        return str(value)
-    numbers = [one for one in value if not isinstance(one, str)]
-    if not numbers:
-        return str(value[0]) if value else "0"
-    least, most = min(numbers), max(numbers)
-    return str(least) if least == most else f"{least} to {most}"
-
 
 @np.errstate(all="ignore")
 def _product(factor: Array, error: Array) -> Array:
@@ -53,7 +45,7 @@ def _product(factor: Array, error: Array) -> Array:
     return np.asarray(factor * error)
 
 
-class Identification(Simulated, Tabular):
+class Identification(Simulated, Valued):
     r"""What :func:`tvident.identify` found. ``n`` is the number of samples, or of every ``step``-th of them.
 
     Attributes
@@ -137,8 +129,7 @@ class Identification(Simulated, Tabular):
         self.jumps = jumps
         self._words = words
         self.settings = settings
-        self._scans = found.scans
-        self._labels = found.labels
+        self._found = found
         known = {name: error for name, error in found.errors.items() if name not in found.factors}
         computed: dict[str, Callable[[], Array]] = {
             name: partial(_product, factor, found.errors[name]) for name, factor in found.factors.items()
@@ -209,14 +200,15 @@ class Identification(Simulated, Tabular):
         IndexError
             If there is no such record.
         """
-        if not self._scans:
+        scans = self._found.scans
+        if not scans:
             raise ValueError(
                 "only the weak form compares test functions of different widths; got a result of the strong form; "
                 "identify with method='auto' or a WeakForm"
             )
-        if not -len(self._scans) <= record < len(self._scans):
-            raise IndexError(f"record must be below {len(self._scans)}, the number of records; got {record}")
-        return self._scans[record]
+        if not -len(scans) <= record < len(scans):
+            raise IndexError(f"record must be below {len(scans)}, the number of records; got {record}")
+        return scans[record]
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """Return everything that has one value a sample, by name: what :meth:`save` writes.
@@ -250,26 +242,94 @@ class Identification(Simulated, Tabular):
         records = np.asarray(self.record_status, np.uint16)[..., np.newaxis]
         columns["record_status"] = np.broadcast_to(records, self.status.shape).copy()
         columns["trusted"] = self.trusted.astype(np.uint8)
-        return Table(self.time, columns, UNITS, self.settings, self._labels)
+        return Table(self.time, columns, UNITS, self.settings, self._found.labels)
 
     def save(self, path: str | Path) -> None:
-        """Write every column to a CSV or NPZ file, with units in the header.
+        """Write every column to a file, with units in the header; all that :func:`tvident.load` needs too, if the file can hold it.
 
         Parameters
         ----------
         path : str or Path
-            A name that ends in ``.csv`` or ``.npz``. The file appears whole or not at all.
+            A name that ends in ``.npz`` or ``.parquet`` (needs pyarrow: ``tvident[io]``), from which the result comes back as it is, or
+            in ``.csv``, for columns alone. The file appears whole or not at all.
 
         Raises
         ------
         ValueError
-            If the ending is another one, or there are several records.
+            If the ending is another one, or there are several records and the file is no NPZ.
         OSError
             If there is no such folder, or the file cannot be written.
         """
-        write_table(path, self.columns(), UNITS)
+        if Path(path).suffix in RESULT_ENDINGS:
+            rest = {"terms": list(self.terms), "jumps": self.jumps, "words": plain_words(self._told)}
+            store(Path(path), self._table(), self._found, rest)
+        else:
+            write_table(path, self.columns(), UNITS)
 
-    @np.errstate(all="ignore")
+    def between(self, begin: float | None = None, end: float | None = None) -> Identification:
+        """Return the part of the result from one time to another.
+
+        Parameters
+        ----------
+        begin, end : float, optional
+            Seconds, as in ``time``; both belong to the part. By default the first and the last.
+
+        Returns
+        -------
+        Identification
+            Views, no copies. Constants, settings, words and flags of the record are those of the whole.
+
+        Raises
+        ------
+        ValueError
+            If nothing lies in between.
+        """
+        first, last = (
+            fallback if at is None else arguments.finite_number(name, at)
+            for name, at, fallback in (("begin", begin, -np.inf), ("end", end, np.inf))
+        )
+        samples = slice(int(np.searchsorted(self.time, first)), int(np.searchsorted(self.time, last, side="right")))
+        if samples.start >= samples.stop:
+            ends = f"{self.time[0]:g} to {self.time[-1]:g} s" if self.time.size else "no samples"
+            raise ValueError(f"a part must hold samples; got {begin} to {end} s; the result has {ends}")
+        jumps = [
+            tuple(jump for jump in one if first <= jump <= last)
+            for one in (self.jumps if self.inertia.ndim > 1 else [self.jumps])
+        ]
+        part = Identification(
+            of_samples(self._found, samples),
+            time=self.time[samples],
+            terms=list(self.terms),
+            jumps=tuple(jumps) if self.inertia.ndim > 1 else jumps[0],
+            words=self._words,
+            settings=self.settings,
+        )
+        part._held_back = HeldBack(why_not="this is a part of a result; ask the whole")
+        return part
+
+    def __iter__(self) -> Iterator[Identification]:
+        return (self[record] for record in range(self.inertia.shape[0] if self.inertia.ndim > 1 else 1))
+
+    def __getitem__(self, place: int | slice | tuple[int | slice, ...]) -> Identification:
+        batch = self.inertia.shape[:-1]
+        if not batch:
+            raise TypeError("only a result of several records can be indexed; this has one; use result.between(t0, t1)")
+        records = chosen(place, batch)
+        found = of_records(self._found, place)
+        alone = found.status.ndim == 1
+        words = self._told
+        each = [words.each[record] for record in records] if words.each else []
+        jumps = tuple(self.jumps[record] for record in records)
+        return Identification(
+            found,
+            time=self.time,
+            terms=list(self.terms),
+            jumps=jumps[0] if alone else jumps,
+            words=words if not each else each[0] if alone else of_batch(each),
+            settings=settings_of(self.settings, records, found.kinds, alone=alone),
+            recorded=None if self._recorded is None else self._recorded.of(place),
+        )
+
     def summary(self) -> str:
         """Return a table of the parameters, and in words what was chosen and what to do.
 
@@ -279,44 +339,7 @@ class Identification(Simulated, Tabular):
             How much the model explains of a part of the record that was held back; median, range and median standard error of every
             parameter; what was chosen and why; what to do about what looks wrong; how often each flag of the status occurs.
         """
-        s = self.settings
-        n, seconds = self.time.size, float(self.time[-1] - self.time[0]) if self.time.size else 0.0
-        lines = [
-            self.held_back().words(),
-            f"{n} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz, method {s['method']}",
-        ]
-        length, rows = (_range(s[name]) for name in ("window_length", "regression_window"))
-        if s["form"] == "strong":
-            lines.append(
-                f"strong form: windows of {length} samples, orders up to {s['max_order']} by {s['criterion']}; "
-                f"regression windows of {rows} samples"
-            )
-        else:
-            lines.append(
-                f"weak form: test functions of {length} samples, exponent {_range(s['exponent'])}; "
-                f"regression windows of {rows} samples"
-            )
-        lines.append("")
-        cells = [("parameter", "kind", "median", "5 %", "95 %", "std. error", "unit")]
-        values = {"inertia": self.inertia, "damping": self.damping, "stiffness": self.stiffness, **self.terms}
-        for name, value in values.items():
-            kind = s["kinds"][name]
-            finite, error = value[np.isfinite(value)], self.stderr[name]
-            numbers = np.percentile(finite, [50, 5, 95]) if finite.size else [np.nan] * 3
-            error = error[np.isfinite(error)]
-            shown = [f"{number:.5g}" for number in numbers] + [f"{np.median(error):.2g}" if error.size else "nan"]
-            if kind not in {"windowed", "varying"}:
-                shown[1] = shown[2] = ""
-            cells.append((name, kind, *shown, UNITS.get(name, "")))
-        lines += aligned(cells)
-        for name, title in (("reasons", "what was chosen, and why"), ("advice", "what to do")):
-            sentences = getattr(self, name)
-            if sentences:
-                lines += ["", title, *(f"  {sentence}" for sentence in sentences[:_MOST_SENTENCES])]
-            if len(sentences) > _MOST_SENTENCES:
-                lines.append(f"  and {len(sentences) - _MOST_SENTENCES} more in .{name}")
-        lines += ["", *describe(self.status, self.record_status)]
-        return "\n".join(lines)
+        return summary_of(self)
 
     def plot(self, what: Picture = "parameters", *, ax: Axes | Sequence[Axes] | None = None, **options: Any) -> Figure:
         """Draw the result, on axes of your own or in a new figure.
@@ -393,6 +416,7 @@ class Identification(Simulated, Tabular):
         report(self, path, recorded=self._recorded, channels=channels, title=title)
 
     def __repr__(self) -> str:
-        kinds = ", ".join(f"{name} {kind}" for name, kind in self.settings["kinds"].items())
-        invalid = float(np.mean(self.status & Status.INVALID != 0)) if self.status.size else 0.0
-        return f"<Identification of {self.time.size} samples: {kinds}; {invalid:.1%} invalid>"
+        return short(self)
+
+    def _repr_html_(self) -> str:
+        return as_html(self)

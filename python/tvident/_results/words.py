@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 
@@ -11,3 +12,11 @@ class Words:
 
     reasons: tuple[str, ...] = ()
     advice: tuple[str, ...] = ()
+    each: tuple[Words, ...] = ()
+    """The same of every record of a batch."""
+
+
+def of_batch(each: Sequence[Words]) -> Words:
+    """Return what there is to say of several records: advice alone, since reasons differ too much from one to the next."""
+    advice = tuple(f"record {place}: {line}" for place, words in enumerate(each) for line in words.advice)
+    return Words((), advice, tuple(each))

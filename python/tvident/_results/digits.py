@@ -1,0 +1,46 @@
+"""Numbers as they are read: with the digits that their error leaves, and their error with two."""
+
+from __future__ import annotations
+
+import math
+
+_LARGE, _SMALL = 1e6, 1e-4
+"""Numbers beyond these have a power of ten."""
+
+
+def with_error(value: float, error: float) -> str:
+    """Return a value and its error with digits that go together: 0.012295 ± 0.000011."""
+    if not math.isfinite(value):
+        return "none"
+    if not (math.isfinite(error) and error > 0):
+        return f"{value:.5g}"
+    places = decimals(error)
+    size = max(abs(value), error)
+    if _SMALL <= size < _LARGE:
+        return f"{round(value, places):.{max(0, places)}f} ± {round(error, places):.{max(0, places)}f}"
+    power = math.floor(math.log10(size))
+    digits = max(0, places + power)
+    return f"({value / 10.0**power:.{digits}f} ± {error / 10.0**power:.{digits}f})e{power}"
+
+
+def decimals(error: float) -> int:
+    """Return how many digits behind the point an error has, of which two are told."""
+    return 1 - math.floor(math.log10(float(f"{error:.1e}")))
+
+
+def to_digits_of(value: float, error: float) -> str:
+    """Return a value alone, with the digits that its error leaves."""
+    if not math.isfinite(value):
+        return "none"
+    if not (math.isfinite(error) and error > 0) or not _SMALL <= max(abs(value), error) < _LARGE:
+        return f"{value:.5g}"
+    places = decimals(error)
+    return f"{round(value, places):.{max(0, places)}f}"
+
+
+def percent(share: float) -> str:
+    """Return a share of 1 in percent with two digits of what it leaves: 99.9964 is far from 100."""
+    value = 100 * share
+    left = min(abs(100 - value), abs(value))
+    digits = min(6, max(0, 1 - math.floor(math.log10(left)))) if 0 < left < math.inf else 0
+    return f"{value:.{digits}f} %"

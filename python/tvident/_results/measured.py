@@ -1,0 +1,75 @@
+"""One number for a parameter, with its error, of whatever kind it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._results.digits import to_digits_of, with_error
+
+Array = npt.NDArray[np.float64]
+
+_RANGE = (5, 95)
+"""Percent of the samples below either end of what is called the range."""
+
+
+class Measured(NamedTuple):
+    """A parameter of one record: ``value, error, *_ = result.value("inertia")``.
+
+    Attributes
+    ----------
+    value, stderr : float
+        Of a constant; 0 is the error of what was known. Of a parameter that changes the median of its values and of their errors.
+    unit : str
+    kind : str
+        ``"constant"``, ``"windowed"``, ``"varying"`` or ``"known"``.
+    least, greatest : float
+        Between them are nine tenths of the values.
+    """
+
+    value: float
+    stderr: float
+    unit: str
+    kind: str
+    least: float
+    greatest: float
+
+    @property
+    def changes(self) -> bool:
+        """Whether there is more than one value."""
+        return self.least < self.greatest
+
+    def __str__(self) -> str:
+        words = with_error(self.value, self.stderr)
+        if self.changes:
+            ends = (to_digits_of(end, self.stderr) for end in (self.least, self.greatest))
+            words = f"{' to '.join(ends)}, median {words}"
+        return f"{words} {self.unit}".rstrip()
+
+
+def measured(values: Array, errors: Array, kind: str, unit: str, where: npt.NDArray[np.bool_]) -> Measured:
+    """Return one number for the values of a record, of those that can be trusted if there are some."""
+    there = np.isfinite(values) & np.isfinite(errors)
+    some = there & where if (there & where).any() else there
+    if not some.any():
+        return Measured(np.nan, np.nan, unit, kind, np.nan, np.nan)
+    found: Any = np.median(values[some]), np.median(errors[some])
+    least, greatest = np.percentile(values[some], _RANGE) if kind != "constant" else (found[0], found[0])
+    return Measured(float(found[0]), float(found[1]), unit, kind, float(least), float(greatest))
+
+
+def known_name(name: str, known: Iterable[str]) -> str:
+    """Return a name that there is a value of.
+
+    Raises
+    ------
+    KeyError
+        If there is none.
+    """
+    names = list(known)
+    if name not in names:
+        raise KeyError(f"there is no {name!r}; there are {', '.join(names)}")
+    return name

@@ -1,0 +1,92 @@
+"""Parts of a result: some of its samples, some of its records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._results.estimates import Estimates
+from tvident._status import Status
+
+_BY_RECORD = ("window_length", "exponent", "regression_window", "lag", "lag_stderr", "lag_samples")
+"""Settings that are a list where there are several records."""
+
+
+def of_samples(found: Estimates, samples: slice) -> Estimates:
+    """Return the estimates of some samples."""
+    return replace(
+        found,
+        values={name: values[..., samples] for name, values in found.values.items()},
+        errors={name: errors[..., samples] for name, errors in found.errors.items()},
+        covariances={pair: values[..., samples] for pair, values in found.covariances.items()},
+        condition=found.condition[..., samples],
+        residual_std=found.residual_std[..., samples],
+        order=found.order[..., samples],
+        status=found.status[..., samples],
+        labels=None if found.labels is None else found.labels.at(samples),
+    )
+
+
+def of_records(found: Estimates, place: Any) -> Estimates:
+    """Return the estimates of one record or of some, as NumPy's indexing of the batch has them."""
+    kinds = {name: np.asarray(kind)[place] for name, kind in found.kinds.items()}
+    values, errors = ({name: each[place] for name, each in of.items()} for of in (found.values, found.errors))
+
+    def number(each: Any) -> Any:
+        return float(each) if np.ndim(each) == 0 else np.asarray(each)
+
+    constants = {
+        name: (
+            (number(found.constants[name][0][place]), number(found.constants[name][1][place]))
+            if name in found.constants
+            else (number(values[name][..., 0]), number(errors[name][..., 0]))
+        )
+        for name, kind in kinds.items()
+        if np.all(kind == "constant") and values[name].shape[-1]
+    }
+    batch = found.status.shape[:-1]
+    flags = np.asarray(found.record_status)[place]
+    return replace(
+        found,
+        values=values,
+        errors=errors,
+        factors={name: factor[place] for name, factor in found.factors.items()},
+        covariances={pair: each[place] for pair, each in found.covariances.items()},
+        constants=constants,
+        condition=found.condition[place],
+        residual_std=found.residual_std[place],
+        order=found.order[place],
+        status=found.status[place],
+        record_status=flags if np.ndim(flags) else Status(int(flags)),
+        scans=tuple(found.scans[one] for one in chosen(place, batch)) if found.scans else (),
+        labels=None if found.labels is None else found.labels.of_record(place),
+        kinds=kinds,
+    )
+
+
+def chosen(place: Any, batch: tuple[int, ...]) -> list[int]:
+    """Return the numbers of some records, counted along the flattened axes of the batch."""
+    picked = np.arange(int(np.prod(batch, dtype=int))).reshape(batch)[place]
+    return [int(record) for record in np.ravel(picked)]
+
+
+def settings_of(
+    settings: Mapping[str, Any], records: Sequence[int], kinds: Mapping[str, npt.NDArray[np.str_]], *, alone: bool
+) -> dict[str, Any]:
+    """Return the settings of some of the records."""
+    own = dict(settings)
+    for name in _BY_RECORD:
+        if isinstance(own.get(name), list):
+            picked = [own[name][record] for record in records]
+            own[name] = picked[0] if alone and name != "lag_samples" else picked
+    own["kinds"] = dict(own["kinds"])
+    for name, kind in kinds.items():
+        different = np.unique(kind)
+        if different.size == 1:
+            own["kinds"][name] = str(different[0])
+    own["terms"] = [[name, own["kinds"][name]] for name, _ in own["terms"]]
+    return own

@@ -1,0 +1,52 @@
+"""A result in one line, and as a table of HTML for notebooks."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from tvident._status import describe
+
+_RECORDS = 3
+"""Of a batch that are shown."""
+
+
+def short(result: Any) -> str:
+    """Return the numbers of a result in one line."""
+    batch, n = result.inertia.shape[:-1], result.time.size
+    seconds = float(result.time[-1] - result.time[0]) if n else 0.0
+    what = f"{n} samples, {seconds:.4g} s"
+    if batch:
+        kinds = ", ".join(f"{name} {kind}" for name, kind in result.settings["kinds"].items())
+        return f"<Identification of {' x '.join(map(str, batch))} records of {what}: {kinds}; {_good(result)}>"
+    values = (f"{name} {result.value(name)}" for name in result.settings["kinds"])
+    return f"<Identification of {what}: {'; '.join(values)}; {_good(result)}>"
+
+
+def _good(result: Any) -> str:
+    return f"{float(np.mean(result.trusted)):.1%} can be trusted" if result.status.size else "no samples"
+
+
+def as_html(result: Any) -> str:
+    """Return a table of the parameters, and below it what to do."""
+    records = int(np.prod(result.inertia.shape[:-1], dtype=int))
+    several = result.inertia.ndim > 1
+    parts = [f"<p><b>{escape(short(result)[1:-1].partition(':')[0])}</b>, {escape(_good(result))}</p>"]
+    for record in range(min(records, _RECORDS)):
+        rows = []
+        for name in result.settings["kinds"]:
+            one = result.value(name, record if several else None)
+            words = escape(str(one))
+            rows.append(f"<tr><td>{escape(name)}</td><td>{escape(one.kind)}</td><td>{words}</td></tr>")
+        head = f"<caption>record {record}</caption>" if several else ""
+        parts.append(
+            f"<table>{head}<tr><th>parameter</th><th>kind</th><th>value ± standard error</th></tr>{''.join(rows)}</table>"
+        )
+    if records > _RECORDS:
+        parts.append(f"<p>and {records - _RECORDS} more records: result[{_RECORDS}]</p>")
+    if result.advice:
+        parts.append(f"<p>what to do</p><ul>{''.join(f'<li>{escape(line)}</li>' for line in result.advice)}</ul>")
+    flags = "".join(f"<li>{escape(line.strip())}</li>" for line in describe(result.status, result.record_status))
+    return f"{''.join(parts)}<ul>{flags}</ul>"

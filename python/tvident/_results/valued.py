@@ -1,0 +1,82 @@
+"""One number for each parameter of a result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._equation import UNITS
+from tvident._results.estimates import Estimates
+from tvident._results.measured import Measured, known_name, measured
+from tvident._tables import Tabular
+
+
+class Valued(Tabular):
+    """What has a number for each parameter."""
+
+    inertia: npt.NDArray[np.float64]
+    time: npt.NDArray[np.float64]
+    settings: dict[str, Any]
+    _found: Estimates
+
+    @property
+    def trusted(self) -> npt.NDArray[np.bool_]:
+        """Where values can be trusted."""
+        raise NotImplementedError
+
+    def value(self, name: str, record: int | None = None) -> Measured:
+        """Return one number for a parameter, with its error, whatever its kind.
+
+        Parameters
+        ----------
+        name : str
+            ``"inertia"``, ``"damping"``, ``"stiffness"``, a term, ``"natural_frequency"`` or ``"damping_ratio"``.
+        record : int, optional
+            Which record of a batch, counted along its flattened axes.
+
+        Returns
+        -------
+        Measured
+            ``value`` and ``stderr`` first: those of a constant; of a parameter that changes the medians over samples that can be
+            trusted, with ``least`` and ``greatest`` for nine tenths of them. ``str()`` of it has even digits and the unit.
+
+        Raises
+        ------
+        KeyError
+            If there is no such parameter.
+        ValueError
+            If there are several records and none is named.
+
+        Examples
+        --------
+        >>> import tvident
+        >>> rig = tvident.simulate_torsional_rig(duration=3.0)
+        >>> result = tvident.identify(rig.angle, rig.torque, sample_rate=rig.sample_rate)
+        >>> value, error, *_ = result.value("inertia")
+        >>> print(f"{value:.4f}")
+        0.0123
+        """
+        if self.inertia.ndim > 1 and record is None:
+            raise ValueError(f"a value is of one record; got {self._records} of them; give record=0, say")
+        return self._values(record or 0)[known_name(name, self._values(record or 0))]
+
+    @property
+    def _records(self) -> int:
+        return int(np.prod(self.inertia.shape[:-1], dtype=int))
+
+    def _values(self, record: int = 0) -> Mapping[str, Measured]:
+        """Return one number for everything that has a unit, in one record."""
+        table, trusted = self._table(), self.trusted.reshape(-1, self.time.size)[record]
+        kinds = self.settings["kinds"]
+        kinds = kinds | {name: str(kind.reshape(-1)[record]) for name, kind in self._found.kinds.items()}
+        changing = [kinds[name] for name in ("inertia", "stiffness") if kinds[name] in {"windowed", "varying"}]
+        kinds |= dict.fromkeys(("natural_frequency", "damping_ratio"), changing[0] if changing else "constant")
+        each = {name: values.reshape(-1, self.time.size)[record] for name, values in table.columns.items()}
+        return {
+            name: measured(each[name], each[f"{name}_stderr"], kinds[name], UNITS.get(name, ""), trusted)
+            for name in each
+            if f"{name}_stderr" in each
+        }
