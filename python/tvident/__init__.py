@@ -7,15 +7,19 @@ if TYPE_CHECKING:
     from tvident._compare import ModelComparison, compare_models
     from tvident._derivatives import LocalPolynomialFit, fit_local_polynomials, savgol_filter
     from tvident._equation import Term
+    from tvident._files import FileRecording, read_recording
     from tvident._identify import StrongForm, WeakForm, identify
     from tvident._regression import RollingRegression, rolling_least_squares
     from tvident._results import Identification, Scan, load
     from tvident._simulate import Recording, simulate_torsional_rig
     from tvident._status import Status
+    from tvident._units import Channel
 
     __version__: str
 
 __all__ = [
+    "Channel",
+    "FileRecording",
     "Identification",
     "LocalPolynomialFit",
     "ModelComparison",
@@ -30,6 +34,7 @@ __all__ = [
     "fit_local_polynomials",
     "identify",
     "load",
+    "read_recording",
     "rolling_least_squares",
     "savgol_filter",
     "simulate_torsional_rig",
@@ -39,11 +44,13 @@ _ROOMS = {
     "_compare": ("ModelComparison", "compare_models"),
     "_derivatives": ("LocalPolynomialFit", "fit_local_polynomials", "savgol_filter"),
     "_equation": ("Term",),
+    "_files": ("FileRecording", "read_recording"),
     "_identify": ("StrongForm", "WeakForm", "identify"),
     "_regression": ("RollingRegression", "rolling_least_squares"),
     "_results": ("Identification", "Scan", "load"),
     "_simulate": ("Recording", "simulate_torsional_rig"),
     "_status": ("Status",),
+    "_units": ("Channel",),
 }
 """Where each name comes from: a room is entered when a name of it is asked for, so that the command's help need not wait for NumPy."""
 

@@ -15,8 +15,8 @@ CORE = "tvident._core"
 """Everything may call it, and it calls nothing of the package."""
 
 ROOMS = (
-    "_arguments",
     "_units",
+    "_arguments",
     "_tables",
     "_equation",
     "_status",

@@ -1,11 +1,13 @@
 """Puts into words what was chosen, why, and what to do next."""
 
 from tvident._advice.instrument import words_with_instrument
+from tvident._advice.plausible import Plausible
 from tvident._advice.strong import ExplainedStrong
 from tvident._advice.weak import Explained
 
 __all__ = [
     "Explained",
     "ExplainedStrong",
+    "Plausible",
     "words_with_instrument",
 ]

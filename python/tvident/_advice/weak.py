@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from tvident import _core
 from tvident._advice.lists import listed
-from tvident._equation import BUILT_IN, COEFFICIENTS
+from tvident._equation import BUILT_IN, COEFFICIENTS, UNITS
 from tvident._results import Words
 from tvident._status import Status
 
@@ -62,6 +62,8 @@ class Explained:
         Samples from one number to the next.
     coherence : float, optional
         Of the noise of both channels, above the motion.
+    units : mapping of str to str, optional
+        Of parameters and terms.
     """
 
     found: _core.Identification
@@ -71,6 +73,7 @@ class Explained:
     period: float
     step: int
     coherence: float | None = None
+    units: Mapping[str, str] = field(default_factory=lambda: UNITS)
 
     def words(self, *, method_chosen: bool = False) -> Words:
         """Return what there is to say, with the reason for the weak form where nobody asked for it."""
@@ -122,7 +125,10 @@ class Explained:
 
     def _noise(self) -> str:
         angle, torque = np.sqrt(self.found.noise or (np.nan, np.nan))
-        return f"noise, assumed to be white: {angle:.2g} rad in the angle, {torque:.2g} N m in the torque"
+        of_angle, of_torque = ("rad", "N m") if self.units["stiffness"] == UNITS["stiffness"] else ("m", "N")
+        return (
+            f"noise, assumed to be white: {angle:.2g} {of_angle} in the angle, {torque:.2g} {of_torque} in the torque"
+        )
 
     def _unexplained(self) -> str:
         return (
@@ -330,7 +336,7 @@ class Explained:
             else:
                 term = BUILT_IN[one.name]
                 terms = [name for name in self.names if name not in COEFFICIENTS] + [one.name]
-                words.append(f"{term.suspicion.format(amount=f'{amount} {term.unit}')}: give terms={terms}")
+                words.append(f"{term.suspicion.format(amount=f'{amount} {self.units[term.name]}')}: give terms={terms}")
         if len(words) > 1:
             words.append("begin with the first of these: the others may then disappear")
         return words

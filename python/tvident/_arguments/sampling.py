@@ -10,6 +10,7 @@ import numpy.typing as npt
 from tvident._arguments.numbers import positive_number, whole_number
 from tvident._arguments.shown import shown
 from tvident._arguments.times import period_of_times
+from tvident._units import times_in_seconds
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0}
 
@@ -39,7 +40,7 @@ def sample_period(
             )
         return 1.0 / rate
     if t is not None:
-        return _possible("the step of t", period_of_times(t, samples))
+        return _possible("the step of t", period_of_times(times_in_seconds(t), samples))
     return 1.0 if delta is None else _possible("delta", positive_number("delta", delta))
 
 

@@ -10,15 +10,16 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import recordings
-from tvident._files import listed, printable
+from tvident._files import full_name, listed, printable
+from tvident._units import Channel, named_unit
 
 
 def channel_of(channels: recordings.Channels, name: str, file: str | None) -> npt.NDArray[Any]:
-    """Return a channel that holds one value a sample."""
-    values = recordings.channel(channels, name, file or "the command line")
-    if values.ndim != 1:
+    """Return a channel that holds one value a sample, with the unit of its header."""
+    full = full_name(channels, name, file or "the command line")
+    if channels[full].ndim != 1:
         raise click.UsageError(f"channel {name!r} must hold one value for every sample; it is a single number")
-    return values
+    return Channel(channels[full], named_unit(full)[1])
 
 
 def source_of(channels: recordings.Channels, name: str, file: str | None) -> npt.NDArray[Any]:
@@ -64,7 +65,7 @@ def scaled(
             f"a scale must be one number, or have one value for every sample; {scale!r} has {factor.size} values "
             f"for {values.size} samples; use another variable"
         )
-    return np.asarray(values * factor)
+    return np.asarray(np.asarray(values) * factor)
 
 
 def mask_of(values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:

@@ -84,6 +84,7 @@ def compare(
         models={name: {"terms": terms_of(tuple(name.split(",")))} for name in models} or None,
         **common,
     )
-    give(result.table, {"residual_std": "N m"}, result.summary(), output)
+    units = next(iter(result.results.values())).units
+    give(result.table, {"residual_std": units["residual_std"]}, result.summary(), output)
     if plot is not None:
         save_figure(result.plot(), Path(plot))

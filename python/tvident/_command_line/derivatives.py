@@ -32,6 +32,7 @@ from tvident._command_line.options import (
 from tvident._command_line.output import figures_on_file, give, save_figure
 from tvident._derivatives import Selection
 from tvident._status import describe
+from tvident._units import times_in_seconds
 
 
 # Every option is a parameter: so click passes them.
@@ -77,7 +78,7 @@ def derivatives(
     check_time(sample_rate, delta, time_channel)
     channels = recordings.read(file)
     samples = channel_of(channels, channel, file)
-    times = None if time_channel is None else channel_of(channels, time_channel, file)
+    times = None if time_channel is None else times_in_seconds(channel_of(channels, time_channel, file))
     fit = tvident.fit_local_polynomials(
         samples,
         length(window_length),

@@ -13,7 +13,6 @@ from tvident._command_line.group import main
 from tvident._command_line.identification import IDENTIFICATION, identified, inputs
 from tvident._command_line.options import PICTURE, RESULTS, RUN, SETTINGS, check_outputs
 from tvident._command_line.output import give, save_figure
-from tvident._equation import UNITS
 from tvident._files import replaced
 
 
@@ -37,7 +36,7 @@ def identify(
             written.write((json.dumps(result.settings, indent=1) + "\n").encode())
     words = [result.summary()]
     for name, (value, error) in result.constants.items():
-        words.append(f"{name} = {value:.8g} ± {error:.2g} {UNITS.get(name, '')}".rstrip())
-    give(result.columns(), UNITS, "\n".join(words), output)
+        words.append(f"{name} = {value:.8g} ± {error:.2g} {result.units.get(name, '')}".rstrip())
+    give(result.columns(), result.units, "\n".join(words), output)
     if plot is not None:
         save_figure(result.plot(), Path(plot))

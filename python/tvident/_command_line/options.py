@@ -34,6 +34,13 @@ CHANNELS = options_of(
     ),
     click.option("--angle-scale", metavar="SCALE", help="Number or variable to multiply the angle by."),
     click.option("--torque-scale", metavar="SCALE", help="Number or variable to multiply the torque by."),
+    click.option(
+        "--angle-unit", metavar="UNIT", help="Unit of the angle, as deg or mm; by default its header's, or rad."
+    ),
+    click.option(
+        "--torque-unit", metavar="UNIT", help="Unit of the torque, as 'N mm'; by default its header's, or N m."
+    ),
+    click.option("--time-unit", metavar="UNIT", help="Unit of the time channel, as ms; by default its header's, or s."),
 )
 
 PERIOD = click.option(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ import numpy.typing as npt
 from tvident._files import replaced, write_csv, write_table
 
 
-def give(columns: dict[str, npt.NDArray[Any]], units: dict[str, str], words: str, output: str | None) -> None:
+def give(columns: dict[str, npt.NDArray[Any]], units: Mapping[str, str], words: str, output: str | None) -> None:
     """Write results to a file and words to standard output, or results to standard output and words to standard error."""
     if output == "-":
         write_csv(sys.stdout.buffer, columns, units)

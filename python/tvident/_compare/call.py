@@ -93,7 +93,7 @@ def compare_models(
     >>> compared.best
     'with damping'
     """
-    angles, torques = arguments.channels(angle=angle, torque=torque)
+    angles, _ = arguments.channels(angle=angle, torque=torque)
     if sample_rate is None and delta is None and t is None:
         t = arguments.implied_times(angle)
     if angles.ndim != 1:
@@ -110,10 +110,10 @@ def compare_models(
     method = _common_form(calls)
     if "auto" in (method.window_length, method.exponent):
         most = max(calls.values(), key=lambda call: len(call.get("terms") or ()))
-        chosen = identify(angles, torques, **{**time, **most, "method": method}).settings
+        chosen = identify(angle, torque, **{**time, **most, "method": method}).settings
         method = replace(method, window_length=chosen["window_length"], exponent=chosen["exponent"])
     results: dict[str, Identification] = {
-        name: identify(angles, torques, **{**time, **call, "method": method}) for name, call in calls.items()
+        name: identify(angle, torque, **{**time, **call, "method": method}) for name, call in calls.items()
     }
     return ModelComparison(results, int(np.isfinite(angles).sum()))
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._compare.criterion import aicc, akaike_weights, averaged, effective_observations, effective_parameters
-from tvident._equation import COEFFICIENTS, UNITS
+from tvident._equation import COEFFICIENTS
 from tvident._files import aligned, write_table
 from tvident._results import Identification
 
@@ -119,6 +119,7 @@ class ModelComparison:
             numbers += [f"{self.table['aicc'][place]:.1f}", f"{self.table['difference'][place]:.1f}"]
             rows.append((str(name), "", *numbers, f"{self.table['weight'][place]:.3f}", ""))
         lines = [f"{len(self.results)} models, {self.observations:.0f} effective observations", "", *aligned(rows), ""]
+        units = next(iter(self.results.values())).units
         cells: list[tuple[str, ...]] = [("averaged", "", "median", "std. error", "unit")]
         for name, (value, error) in self.averaged.items():
             numbers = (
@@ -126,7 +127,7 @@ class ModelComparison:
                 if np.isfinite(value).any()
                 else ["nan", "nan"]
             )
-            cells.append((name, "", *numbers, UNITS.get(name, "")))
+            cells.append((name, "", *numbers, units.get(name, "")))
         lines += [*aligned(cells), ""]
         return "\n".join([*lines, self._words()])
 

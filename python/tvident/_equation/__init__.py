@@ -3,11 +3,12 @@
 from tvident._equation.built_in import BUILT_IN, TERM_NAMES
 from tvident._equation.kinds import COEFFICIENTS, Kind, Parameter, parameter
 from tvident._equation.terms import GivenTerm, Term, Unknown, all_terms
-from tvident._equation.units import UNITS
+from tvident._equation.units import LINEAR_UNITS, UNITS
 
 __all__ = [
     "BUILT_IN",
     "COEFFICIENTS",
+    "LINEAR_UNITS",
     "TERM_NAMES",
     "UNITS",
     "GivenTerm",

@@ -6,6 +6,8 @@ from tvident._equation.built_in import BUILT_IN
 
 UNITS = {
     "time": "s",
+    "angle": "rad",
+    "torque": "N m",
     "inertia": "kg m^2",
     "damping": "N m s/rad",
     "stiffness": "N m/rad",
@@ -15,3 +17,9 @@ UNITS = {
     "residual_std": "N m",
 } | {term.name: term.unit for term in BUILT_IN.values()}
 """Units of results for an angle in rad and a torque in N m."""
+
+
+LINEAR_UNITS = {
+    name: unit.replace("kg m^2", "kg").replace("N m", "N").replace("rad", "m") for name, unit in UNITS.items()
+}
+"""The same for a position in m and a force in N."""

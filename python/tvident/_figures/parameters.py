@@ -50,6 +50,7 @@ class Identified(Protocol):
     record_status: Status | npt.NDArray[np.uint16]
     order: npt.NDArray[np.uint8]
     settings: dict[str, Any]
+    units: Mapping[str, str]
 
     @property
     def stderr(self) -> Mapping[str, Array]:
@@ -133,7 +134,7 @@ def draw_parameters(result: Identified, shown: list[str], truth: Recording | Non
             draw_flags(panel, result)
             draw_parameter(panel, result.time, values, result.stderr[name])
             panel.set_title(title_of(name))
-            panel.set_ylabel(unit_of(name))
+            panel.set_ylabel(unit_of(name, result.units))
             if truth is not None and name in of_truth:
                 true = np.interp(result.time, truth.time, of_truth[name])
                 draw_line(panel, result.time, true, color=TRUTH, linewidth=1.1, linestyle=(0, (5, 2)), label="truth")
@@ -165,7 +166,7 @@ def _constants(result: Identified, truth: Recording | None) -> list[str]:
     """Return what is constant, in words."""
     words = []
     for name, (value, error) in result.constants.items():
-        line = f"{title_of(name)}: {arguments.with_error(value, error)} {unit_of(name)}".rstrip()
+        line = f"{title_of(name)}: {arguments.with_error(value, error)} {unit_of(name, result.units)}".rstrip()
         if truth is not None and hasattr(truth, name):
             line += f" (truth {np.mean(getattr(truth, name)):.5g})"
         words.append(line)
@@ -314,7 +315,7 @@ def plot_over_position(
         scale(panel, values[there], values[there] - 2 * error[there], values[there] + 2 * error[there])
         panel.set_title(f"{title_of(name)} over {plain(label)}")
         panel.set_xlabel(plain(label))
-        panel.set_ylabel(unit_of(name))
+        panel.set_ylabel(unit_of(name, result.units))
         bar = figure.colorbar(dots, ax=panel, pad=0.02, aspect=30)
         bar.set_label("time (s)")
         bar.outline.set_visible(False)

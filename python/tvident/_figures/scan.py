@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
@@ -23,6 +24,10 @@ class Scanned(Protocol):
     @property
     def band(self) -> Array:
         """Where half the power passes, in Hz."""
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units by name."""
 
     @property
     def estimates(self) -> dict[str, Array]:
@@ -103,7 +108,7 @@ def plot_scan(scan: Scanned, ax: Place = None) -> Figure:
             if np.isfinite(reach) and reach > 0:
                 panel.set_ylim(low - reach, high + reach)
             panel.set_title(name.replace("_", " ").capitalize())
-            panel.set_ylabel(unit_of(name))
+            panel.set_ylabel(unit_of(name, scan.units))
         axes[0].set_xscale("log")
         legend(axes[0], ax)
         axes[-1].set_xlabel("the equation is asked to hold up to (Hz)")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeAlias
 
@@ -73,9 +73,9 @@ def style() -> Iterator[None]:
         yield
 
 
-def unit_of(name: str) -> str:
+def unit_of(name: str, units: Mapping[str, str] = UNITS) -> str:
     """Return a unit as it is printed."""
-    return UNITS.get(name, "").replace("^2", "²").replace("^3", "³").replace(" ", "·")
+    return units.get(name, "").replace("^2", "²").replace("^3", "³").replace(" ", "·")
 
 
 def panels(

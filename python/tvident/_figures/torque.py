@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tvident._figures.parameters import Array, Identified, check_single, draw_flags
-from tvident._figures.style import ACCENT, FOUND, MUTED, Place, draw_line, legend, panels, scale, style
+from tvident._figures.style import ACCENT, FOUND, MUTED, Place, draw_line, legend, panels, scale, style, unit_of
 
 
 class Predicting(Identified, Protocol):
@@ -59,7 +59,7 @@ def plot_torque(result: Predicting, ax: Place = None) -> Figure:
     """
     check_single(result)
     time, recorded, predicted = result.predicted_torque()
-    left = recorded - predicted
+    left, unit = recorded - predicted, unit_of("torque", result.units)
     with style():
         figure, (above, below) = panels(ax, [2.6, 1.3])
         draw_flags(above, result)
@@ -69,11 +69,11 @@ def plot_torque(result: Predicting, ax: Place = None) -> Figure:
         weak = result.settings["form"] == "weak"
         above.set_title("Torque, averaged over the test function" if weak else "Torque")
         share = float(np.sqrt(np.nanmean(left**2) / np.nanmean(recorded**2)))
-        below.set_title(f"What is left: {np.sqrt(np.nanmean(left**2)):.3g} N·m rms, {share:.2g} of the torque")
+        below.set_title(f"What is left: {np.sqrt(np.nanmean(left**2)):.3g} {unit} rms, {share:.2g} of the torque")
         scale(above, recorded, predicted)
         scale(below, left)
         for panel in (above, below):
-            panel.set_ylabel("N·m")
+            panel.set_ylabel(unit)
             panel.margins(x=0)
         legend(above, ax)
         below.set_xlabel("time (s)")

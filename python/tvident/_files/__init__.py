@@ -1,8 +1,9 @@
 """Reads recordings from files and writes tables to them."""
 
-from tvident._files.channels import Channels, FileError, FileWarning, channel
+from tvident._files.channels import Channels, FileError, FileWarning, channel, full_name
 from tvident._files.names import listed, printable
 from tvident._files.places import check_apart, check_folder, check_place
+from tvident._files.recorded import FileRecording, read_recording
 from tvident._files.recordings import read
 from tvident._files.replacement import replaced
 from tvident._files.results import ENDINGS as RESULT_ENDINGS
@@ -13,15 +14,18 @@ __all__ = [
     "RESULT_ENDINGS",
     "Channels",
     "FileError",
+    "FileRecording",
     "FileWarning",
     "aligned",
     "channel",
     "check_apart",
     "check_folder",
     "check_place",
+    "full_name",
     "listed",
     "printable",
     "read",
+    "read_recording",
     "read_result",
     "replaced",
     "write_csv",

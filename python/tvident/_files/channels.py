@@ -9,6 +9,7 @@ from typing import Any
 import numpy.typing as npt
 
 from tvident._files.names import listed, printable
+from tvident._units import named_unit
 
 Channels = dict[str, npt.NDArray[Any]]
 
@@ -16,7 +17,6 @@ Say = Callable[[str], None]
 """Takes in what is not read, or not as it stands in the file."""
 
 
-_UNIT = re.compile(r"\s*[\[(][^\])]*[\])]\s*$")
 _NUMBER = re.compile(r"[0-9]{1,9}")
 
 
@@ -48,7 +48,7 @@ def channel(channels: Mapping[str, npt.NDArray[Any]], name: str, source: str) ->
     channels : mapping of str to ndarray
         What :func:`read` returned.
     name : str
-        Name with or without the unit in brackets, or number from 0.
+        Name with or without its unit, or number from 0.
     source : str
         What the file is called in the message.
 
@@ -74,16 +74,21 @@ def channel(channels: Mapping[str, npt.NDArray[Any]], name: str, source: str) ->
     >>> recordings.channel(channels, "angle", "rig.npz")
     array([1., 1., 1.])
     """
+    return channels[full_name(channels, name, source)]
+
+
+def full_name(channels: Mapping[str, Any], name: str, source: str) -> str:
+    """Return what a channel is called in the file."""
     if name in channels:
-        return channels[name]
-    same = [key for key in channels if key.startswith(name) and _UNIT.sub("", key) == name]
+        return name
+    same = [key for key in channels if key.startswith(name) and named_unit(key)[0] == name]
     if len(same) == 1:
-        return channels[same[0]]
+        return same[0]
     place, asked = printable(source), printable(name)
     if same:
         raise KeyError(
             f"{place} must have one channel '{asked}'; it has {listed(same)}; name one of these with its unit"
         )
     if _NUMBER.fullmatch(name) and int(name) < len(channels):
-        return list(channels.values())[int(name)]
+        return list(channels)[int(name)]
     raise KeyError(f"{place} has no channel '{asked}'; it has {listed(channels)}; use one of these or a number from 0")

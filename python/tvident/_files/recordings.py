@@ -4,19 +4,32 @@ from __future__ import annotations
 
 import stat
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from importlib import import_module
 from pathlib import Path
+from typing import cast
 
-from tvident._files.arrays import read_npy, read_npz
-from tvident._files.channels import Channels, FileError, FileWarning
-from tvident._files.headers import CURE
-from tvident._files.instrument_text import read_labview, read_opensim
-from tvident._files.matlab import read_matlab
+from tvident._files.channels import Channels, FileError, FileWarning, Say
 from tvident._files.names import printable
-from tvident._files.text import read_text
 
 TEXT, NUMPY, MATLAB = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm", ".mot", ".sto"), (".npy", ".npz"), (".mat",)
 """Endings of files that can be read."""
+
+
+_READERS = dict.fromkeys(TEXT, "text.read_text") | {
+    ".npy": "arrays.read_npy",
+    ".npz": "arrays.read_npz",
+    ".mat": "matlab.read_matlab",
+    ".lvm": "instrument_text.read_labview",
+    ".mot": "instrument_text.read_opensim",
+    ".sto": "instrument_text.read_opensim",
+}
+"""Files of this room and their functions: imported when they are needed, since few of them ever are."""
+
+
+def _reader(path: Path) -> Callable[[Path, Say], Channels]:
+    module, _, function = _READERS[path.suffix.lower()].partition(".")
+    return cast("Callable[[Path, Say], Channels]", getattr(import_module(f"tvident._files.{module}"), function))
 
 
 def check_readable(path: Path, endings: Iterable[str]) -> None:
@@ -94,18 +107,10 @@ def read(path: str | Path) -> Channels:
     """
     path = Path(path)
     place = printable(path)
-    readers = dict.fromkeys(TEXT, read_text) | {
-        ".npy": read_npy,
-        ".npz": read_npz,
-        ".mat": read_matlab,
-        ".lvm": read_labview,
-        ".mot": read_opensim,
-        ".sto": read_opensim,
-    }
-    check_readable(path, readers)
+    check_readable(path, _READERS)
     said: list[str] = []
     try:
-        channels = readers[path.suffix.lower()](path, said.append)
+        channels = _reader(path)(path, said.append)
     except FileError as error:
         kind = "a MATLAB file" if path.suffix.lower() in MATLAB else path.suffix
         raise FileError(f"{place}: cannot be read as {kind}: {error}") from None
@@ -116,5 +121,5 @@ def read(path: str | Path) -> Channels:
     for message in said:
         warnings.warn(f"{place}: {message}", FileWarning, stacklevel=2)
     if not channels:
-        raise FileError(f"{place}: holds no numbers; {CURE}")
+        raise FileError(f"{place}: holds no numbers; export the channels as columns of numbers, or as arrays")
     return channels

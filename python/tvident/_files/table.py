@@ -10,7 +10,7 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
-from tvident._files.names import printable
+from tvident._files.names import listed, printable
 from tvident._files.places import check_place
 from tvident._files.replacement import replaced
 
@@ -37,11 +37,23 @@ def write_table(path: str | Path, columns: Mapping[str, npt.NDArray[Any]], units
     """Write columns to a CSV or NPZ file, which appears whole or not at all."""
     path = Path(path)
     check_place(path)
+    if path.suffix != ".npz":
+        _check_lengths(columns)
     with replaced(path) as file:
         if path.suffix == ".npz":
             _write_npz(file, {header(name, units): values for name, values in columns.items()})
         else:
             write_csv(file, columns, units)
+
+
+def _check_lengths(columns: Mapping[str, npt.NDArray[Any]]) -> None:
+    """Refuse columns of a table that have no common length."""
+    shapes = {name: np.shape(values) for name, values in columns.items()}
+    if any(len(shape) != 1 for shape in shapes.values()) or len(set(shapes.values())) > 1:
+        got = listed(f"{name} {shape}" for name, shape in shapes.items())
+        raise ValueError(
+            f"columns of a table must have one length; got {got}; write a file that ends in .npz, or leave some out"
+        )
 
 
 def _write_npz(file: IO[bytes], columns: Mapping[str, npt.NDArray[Any]]) -> None:

@@ -16,6 +16,7 @@ from tvident._identify.methods import Method
 from tvident._identify.settings import resolve
 from tvident._identify.task import Data, Task
 from tvident._results import Identification
+from tvident._units import axis_of, scaled, times_in_seconds
 
 
 # All but the data are options, as users call it.
@@ -26,6 +27,9 @@ def identify(
     sample_rate: float | None = None,
     delta: float | None = None,
     t: npt.ArrayLike | None = None,
+    angle_unit: str | None = None,
+    torque_unit: str | None = None,
+    time_unit: str | None = None,
     method: Method = "auto",
     inertia: Parameter | None = None,
     damping: Parameter | None = None,
@@ -43,6 +47,9 @@ def identify(
     progress: arguments.Progress = None,
 ) -> Identification:
     r"""Identify I(t), C(t) and K(t) in I θ̈ + C θ̇ + K θ = T from a recorded angle and torque.
+
+    The torque is that which acts *on* the system, positive in the direction of a positive angle: a spring that pulls back has K > 0. The
+    torque with which the system acts on a sensor or a motor has the other sign: pass ``-torque``.
 
     In weak form, the default, the equation is multiplied by a test function φ = (1 - x²)^p, which is zero with its slope at both ends of
     a window, and integrated by parts: I⟨φ″θ⟩ - C⟨φ′θ⟩ + K⟨φθ⟩ = ⟨φT⟩. No derivative is estimated, the bias from the angle's noise is
@@ -67,6 +74,11 @@ def identify(
     t : array_like, shape (n,)
         Time of every sample: seconds, dates or durations, uniform to a thousandth of the sample period or within the digits that they
         were printed with. Dates, in any time zone, become seconds from the first sample on.
+    angle_unit, torque_unit, time_unit : str, optional
+        Units of `angle`, `torque`, and of `t` and `delta`: ``"deg"``, ``"N mm"``, ``"ms"`` and others. By default what an array says of
+        itself (a :class:`Channel`, a quantity of pint, ``attrs["units"]`` of xarray), or else rad, N m and s. A position in m, mm or in
+        and a force in N or lbf make the axis linear: results are in kg, N s/m and N/m. `quantisation` and `period` are in the unit of the
+        angle, parameters and terms in those of results.
     method : {"auto", "paper"}, WeakForm or StrongForm, optional
         ``"auto"``: weak form, all settings chosen from the record, inertia and damping constant unless a test rejects it, an offset of
         the torque. ``"paper"``: the paper's method: strong form, polynomials in windows of 201 samples, regression windows of 200, all
@@ -172,6 +184,12 @@ def identify(
     """
     angles, torques = arguments.channels(angle=angle, torque=torque)
     samples = angles.shape[-1]
+    axis = axis_of(angle, torque, t, angle_unit=angle_unit, torque_unit=torque_unit, time_unit=time_unit)
+    angles, torques = scaled(angles, axis.angle), scaled(torques, axis.torque)
+    if t is not None:
+        t = times_in_seconds(t, time_unit)
+    if delta is not None and axis.time != 1:
+        delta = arguments.positive_number("delta", delta) * axis.time
     if sample_rate is None and delta is None and t is None:
         t = arguments.implied_times(angle)
         if t is None:
@@ -183,8 +201,8 @@ def identify(
         "stiffness": stiffness,
         "terms": terms,
         "lag": lag,
-        "quantisation": quantisation,
-        "period": period,
+        "quantisation": _in_units_of_results("quantisation", quantisation, axis.angle),
+        "period": _in_units_of_results("period", period, axis.angle),
     }
     instruments = None if instrument is None else arguments.channel("instrument", instrument)
     if instruments is not None and instruments.shape != angles.shape:
@@ -213,5 +231,11 @@ def identify(
         workers=arguments.worker_count(workers),
         doubts=doubts,
         labels=arguments.labels_of(angle),
+        axis=axis,
     )
     return Task(data, request).run(progress)
+
+
+def _in_units_of_results(name: str, value: float | None, factor: float) -> float | None:
+    """Return what was given in the unit of the angle in that of results."""
+    return value if value is None or factor == 1 else arguments.finite_number(name, value) * factor

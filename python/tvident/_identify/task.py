@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from typing import Any
 
@@ -12,14 +12,15 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
-from tvident._advice import Explained, ExplainedStrong, words_with_instrument
+from tvident._advice import Explained, ExplainedStrong, Plausible, words_with_instrument
 from tvident._derivatives import SHORTEST_WINDOW, plan, quantisation_step
-from tvident._equation import COEFFICIENTS, Kind, Unknown, all_terms, parameter
+from tvident._equation import COEFFICIENTS, LINEAR_UNITS, UNITS, Kind, Unknown, all_terms, parameter
 from tvident._identify.batch import estimates
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm, exponent_of
 from tvident._identify.settings import Request, plain, resolve
 from tvident._results import Estimates, Identification, Recorded, Words, chosen, of_batch, of_records, settings_of
 from tvident._status import Status
+from tvident._units import ROTARY, Axis
 
 _WINDOW_OF_TERMS = 51
 """Samples of the polynomials that terms of one's own get angle and velocity from in weak form."""
@@ -46,6 +47,8 @@ class Data:
         What cannot be known of the channels, and of which record.
     labels : Labels, optional
         What the angle came with: an index, coordinates.
+    axis : Axis, optional
+        What the channels were measured in.
     """
 
     angles: npt.NDArray[np.number]
@@ -59,6 +62,7 @@ class Data:
     workers: int | None
     doubts: Sequence[tuple[int, str]] = ()
     labels: arguments.Labels | None = None
+    axis: Axis = field(default_factory=Axis)
 
     @property
     def batch(self) -> tuple[int, ...]:
@@ -105,6 +109,11 @@ class Task:
         self._names = [one.name for one in self._unknowns]
         self._known = {name: value for name, value in self._parameters.items() if not isinstance(value, str)}
 
+    @property
+    def _units(self) -> Mapping[str, str]:
+        """Units of results."""
+        return UNITS if self._data.axis.system is ROTARY else LINEAR_UNITS
+
     def run(self, progress: arguments.Progress, *, diagnose: bool = True) -> Identification:
         """Identify every record, and look for what may be missing in the equation."""
         data, request = self._data, self._request
@@ -141,7 +150,8 @@ class Task:
         settings = self._settings(found)
         explain: Any = self._words_of_strong_form if isinstance(request.form, StrongForm) else self._words_of_weak_form
         explain = self._words_with_instrument if data.instruments is not None else explain
-        words = explain(found, batch, settings)
+        batch = replace(batch, units=self._units)
+        words: Any = partial(self._with_plausibility, explain(found, batch, settings), batch)
         if data.doubts:
             batch, words = self._doubted(batch, words if isinstance(words, Words) else words())
         jumps = tuple(tuple(data.time[one.jumps].tolist()) for one in found)
@@ -362,13 +372,18 @@ class Task:
         coherences = _core.noise_coherence(self._data.angles, self._data.torques, variances)
         each = [
             Explained(
-                one, self._names, settings["chosen"], tested, self._data.period, self._data.step, coherence
+                one, self._names, settings["chosen"], tested, self._data.period, self._data.step, coherence, self._units
             ).words(method_chosen=self._request.chosen)
             for one, coherence in zip(found, coherences, strict=True)
         ]
         if not self._data.batch:
             return each[0]
         return of_batch(each)
+
+    def _with_plausibility(self, words: Words | Callable[[], Words], batch: Estimates) -> Words:
+        """Return words, and before them what a wrong unit, a wrong sign or swapped channels make implausible."""
+        told = words if isinstance(words, Words) else words()
+        return Plausible(self._data.axis, self._data.period, self._names).before(told, self._data.angles, batch)
 
     def _words_of_strong_form(
         self, found: Sequence[_core.Identification], batch: Estimates, settings: dict[str, Any]

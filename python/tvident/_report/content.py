@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._equation import COEFFICIENTS, UNITS
+from tvident._equation import COEFFICIENTS
 from tvident._report.packed import Series
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
 
@@ -41,6 +41,7 @@ class Reported(Protocol):
     record_status: Status | npt.NDArray[np.uint16]
     jumps: tuple[Any, ...]
     settings: dict[str, Any]
+    units: Mapping[str, str]
 
     @property
     def stderr(self) -> Mapping[str, Array]:
@@ -62,9 +63,9 @@ class Reported(Protocol):
         """Return the result in words."""
 
 
-def unit_of(name: str) -> str:
+def unit_of(name: str, units: Mapping[str, str]) -> str:
     """Return a unit as it is printed."""
-    unit = UNITS.get(name, "")
+    unit = units.get(name, "")
     return "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³").replace(" ", "·")
 
 
@@ -96,13 +97,13 @@ def content_of(result: Reported, recorded: list[Series], title: str) -> tuple[di
         if not np.isfinite(found).any():
             continue
         with np.errstate(all="ignore"):
-            reach = [add(name, unit_of(name), found + sign * 2 * error) for sign in (-1, 1)]
+            reach = [add(name, unit_of(name, result.units), found + sign * 2 * error) for sign in (-1, 1)]
         charts.append(
             {
                 "group": "Found",
                 "title": title_of(name),
-                "unit": unit_of(name),
-                "line": add(name, unit_of(name), found),
+                "unit": unit_of(name, result.units),
+                "line": add(name, unit_of(name, result.units), found),
                 "band": reach,
                 "shade": shade,
                 "robust": True,
@@ -120,8 +121,8 @@ def content_of(result: Reported, recorded: list[Series], title: str) -> tuple[di
             chart = {
                 "group": "How well",
                 "title": words,
-                "unit": unit_of(name),
-                "line": add(name, unit_of(name), numbers),
+                "unit": unit_of(name, result.units),
+                "line": add(name, unit_of(name, result.units), numbers),
             }
             charts.append(chart | {"shade": shade, "robust": name != "order"})
     marks = _flags_over_time(result)
@@ -172,7 +173,7 @@ def _numbers(result: Reported, values: Mapping[str, Array]) -> list[dict[str, st
         kind = str(result.settings["kinds"].get(name, ""))
         finite, error = found[np.isfinite(found)], result.stderr[name]
         error = error[np.isfinite(error)]
-        line = {"name": title_of(name), "unit": unit_of(name), "kind": kind, "more": ""}
+        line = {"name": title_of(name), "unit": unit_of(name, result.units), "kind": kind, "more": ""}
         if name in result.constants:
             line["value"] = arguments.with_error(*map(float, result.constants[name]))
             line["kind"] = "constant over the record"

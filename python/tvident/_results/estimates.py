@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident._equation import UNITS
 from tvident._results.scan import Scan
 from tvident._status import Status
 
@@ -40,6 +41,8 @@ class Estimates:
         What the samples came with: an index, coordinates.
     kinds : mapping of str to ndarray of str, shape (\*)
         How every unknown of every record turned out.
+    units : mapping of str to str
+        Of everything by name.
     """
 
     values: Mapping[str, Array]
@@ -55,3 +58,4 @@ class Estimates:
     scans: tuple[Scan, ...] = ()
     labels: arguments.Labels | None = None
     kinds: Mapping[str, npt.NDArray[np.str_]] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=lambda: UNITS)

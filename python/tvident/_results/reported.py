@@ -36,8 +36,8 @@ def report(
         shown.append(_report.Series(name, unit, numbers, start, 1 / rate))
 
     if recorded is not None and recorded.is_unchanged and result.inertia.ndim == 1:
-        show("Angle", "rad", recorded.angles)
-        show("Torque", "N·m", recorded.torques)
+        show("Angle", result.units["angle"], recorded.angles)
+        show("Torque", result.units["torque"].replace(" ", "·"), recorded.torques)
     step = int(result.settings["step"])
     samples = shown[0].values.size if shown else None
     for name, values in (channels or {}).items():

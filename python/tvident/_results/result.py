@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
@@ -11,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._equation import UNITS
 from tvident._files import RESULT_ENDINGS, write_table
 from tvident._results.estimates import Estimates
 from tvident._results.held_back import HeldBack
@@ -78,6 +78,8 @@ class Identification(Simulated, Valued):
     jumps : tuple of float
         Times in seconds at which parameters jump (``reasons`` says which), found if windows of all lengths are averaged; one such
         tuple per record in a batch.
+    units : mapping of str to str
+        Units of the parameters and of the columns by name: those of a rotary axis, or of a linear one (m, N).
     settings : dict
         Settings that were given and chosen, as plain JSON. ``identify(…, settings=result.settings)`` repeats it.
 
@@ -115,6 +117,7 @@ class Identification(Simulated, Valued):
         recorded: Recorded | None = None,
     ) -> None:
         super().__init__(recorded)
+        self.units = found.units
         self.time = time
         self.inertia = found.values["inertia"]
         self.damping = found.values["damping"]
@@ -208,7 +211,7 @@ class Identification(Simulated, Valued):
             )
         if not -len(scans) <= record < len(scans):
             raise IndexError(f"record must be below {len(scans)}, the number of records; got {record}")
-        return scans[record]
+        return replace(scans[record], units=self.units)
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """Return everything that has one value a sample, by name: what :meth:`save` writes.
@@ -242,7 +245,7 @@ class Identification(Simulated, Valued):
         records = np.asarray(self.record_status, np.uint16)[..., np.newaxis]
         columns["record_status"] = np.broadcast_to(records, self.status.shape).copy()
         columns["trusted"] = self.trusted.astype(np.uint8)
-        return Table(self.time, columns, UNITS, self.settings, self._found.labels)
+        return Table(self.time, columns, self.units, self.settings, self._found.labels)
 
     def save(self, path: str | Path) -> None:
         """Write every column to a file, with units in the header; all that :func:`tvident.load` needs too, if the file can hold it.
@@ -264,7 +267,7 @@ class Identification(Simulated, Valued):
             rest = {"terms": list(self.terms), "jumps": self.jumps, "words": plain_words(self._told)}
             store(Path(path), self._table(), self._found, rest)
         else:
-            write_table(path, self.columns(), UNITS)
+            write_table(path, self.columns(), self.units)
 
     def between(self, begin: float | None = None, end: float | None = None) -> Identification:
         """Return the part of the result from one time to another.

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,6 +42,8 @@ class Scan:
         Whether estimates are corrected for white noise of the angle.
     moved : bool
         Whether the test function was moved because of the scan.
+    units : mapping of str to str, optional
+        Units of the unknowns by name.
 
     See Also
     --------
@@ -74,6 +76,7 @@ class Scan:
     plateau: tuple[int, int] | None
     corrected: bool
     moved: bool
+    units: Mapping[str, str] = field(default_factory=lambda: UNITS)
 
     def summary(self) -> str:
         """Return a table with a row for every width; a star marks the plateau.
@@ -84,7 +87,7 @@ class Scan:
         """
         if not self.window_length.size:
             return "the record is too short to compare test functions of different widths"
-        units = [f"{name} ({UNITS[name]})" if UNITS.get(name) else name for name in self.estimates]
+        units = [f"{name} ({self.units[name]})" if self.units.get(name) else name for name in self.estimates]
         cells = [("", "samples", "band (Hz)", *units)]
         for place, length in enumerate(self.window_length):
             inside = self.plateau is not None and self.plateau[0] <= length <= self.plateau[1]

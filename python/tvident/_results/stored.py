@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._arguments import Labels, labels_in, labels_out
-from tvident._equation import COEFFICIENTS, UNITS
+from tvident._equation import COEFFICIENTS
 from tvident._files import FileError, printable, read_result, write_result
 from tvident._results.estimates import Estimates
 from tvident._results.scan import Scan
@@ -58,9 +58,10 @@ def store(path: Path, table: Table, found: Estimates, rest: Mapping[str, Any]) -
         "record_status": flags.tolist(),
         "scans": [_plain_scan(scan) for scan in found.scans],
         "labels": labels,
+        "units": dict(found.units),
         **rest,
     }
-    write_result(path, {**arrays, **more}, UNITS, json.dumps(facts))
+    write_result(path, {**arrays, **more}, found.units, json.dumps(facts))
 
 
 def restored(path: str | Path) -> tuple[Estimates, dict[str, Any], npt.NDArray[np.float64]]:
@@ -107,6 +108,7 @@ def _estimates(arrays: Arrays, facts: Mapping[str, Any]) -> Estimates:
         scans=tuple(_scan(scan) for scan in facts["scans"]),
         labels=_labels(arrays, facts),
         kinds={name: np.asarray(kind) for name, kind in facts["kinds"].items()},
+        units=facts["units"],
     )
 
 

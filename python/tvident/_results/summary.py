@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from tvident._equation import UNITS
 from tvident._files import aligned
 from tvident._status import describe
 
@@ -56,7 +55,7 @@ def summary_of(result: Any) -> str:
         shown = [f"{number:.5g}" for number in numbers] + [f"{np.median(error):.2g}" if error.size else "nan"]
         if kind not in {"windowed", "varying"}:
             shown[1] = shown[2] = ""
-        cells.append((name, kind, *shown, UNITS.get(name, "")))
+        cells.append((name, kind, *shown, result.units.get(name, "")))
     lines += aligned(cells)
     for name, title in (("reasons", "what was chosen, and why"), ("advice", "what to do")):
         sentences = getattr(result, name)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tvident._equation import UNITS
 from tvident._results.estimates import Estimates
 from tvident._results.measured import Measured, known_name, measured
 from tvident._tables import Tabular
@@ -20,6 +19,7 @@ class Valued(Tabular):
     inertia: npt.NDArray[np.float64]
     time: npt.NDArray[np.float64]
     settings: dict[str, Any]
+    units: Mapping[str, str]
     _found: Estimates
 
     @property
@@ -76,7 +76,7 @@ class Valued(Tabular):
         kinds |= dict.fromkeys(("natural_frequency", "damping_ratio"), changing[0] if changing else "constant")
         each = {name: values.reshape(-1, self.time.size)[record] for name, values in table.columns.items()}
         return {
-            name: measured(each[name], each[f"{name}_stderr"], kinds[name], UNITS.get(name, ""), trusted)
+            name: measured(each[name], each[f"{name}_stderr"], kinds[name], self.units.get(name, ""), trusted)
             for name in each
             if f"{name}_stderr" in each
         }

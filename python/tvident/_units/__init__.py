@@ -1,5 +1,7 @@
 """Reads units as headers of recordings write them, and converts to rad, N m and s."""
 
+from tvident._units.axis import Axis, axis_of, scaled, times_in_seconds
+from tvident._units.channel import Channel, unit_said
 from tvident._units.names import named_unit, with_unit
 from tvident._units.parse import Unit, is_unit, unit_of
 from tvident._units.quantities import LINEAR, ROTARY, System, UnitError, factor_to, system_of
@@ -7,13 +9,19 @@ from tvident._units.quantities import LINEAR, ROTARY, System, UnitError, factor_
 __all__ = [
     "LINEAR",
     "ROTARY",
+    "Axis",
+    "Channel",
     "System",
     "Unit",
     "UnitError",
+    "axis_of",
     "factor_to",
     "is_unit",
     "named_unit",
+    "scaled",
     "system_of",
+    "times_in_seconds",
     "unit_of",
+    "unit_said",
     "with_unit",
 ]

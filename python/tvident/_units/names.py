@@ -7,7 +7,7 @@ import re
 from tvident._units.parse import unit_of
 
 _IN_BRACKETS = re.compile(
-    r"(.*?)[\s_]*(?:\[([^\[\]]*)\]|\(([^()]*(?:\([^()]*\))?[^()]*)\)|\{([^{}]*)\}|<([^<>]*)>)\s*", re.DOTALL
+    r"(.*?)[\s_/]*(?:\[([^\[\]]*)\]|\(([^()]*(?:\([^()]*\))?[^()]*)\)|\{([^{}]*)\}|<([^<>]*)>)\s*", re.DOTALL
 )
 _BEHIND_A_SIGN = re.compile(r"(.+?)\s*(?:(?<![/\s])\s*/\s*|,\s*|\s+in\s+)([^,]+)", re.DOTALL)
 _BEHIND_A_LINE = re.compile(r"(.+)_(deg|degrees|rad|mrad|Nm|Nmm|mNm|ms|us|sec|mm|rpm)")

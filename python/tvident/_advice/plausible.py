@@ -1,0 +1,125 @@
+"""Asks about numbers that a wrong unit, a reversed sign or swapped channels would explain."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._results import Estimates, Words
+from tvident._units import ROTARY, Axis
+
+_ONE_TURN = 2 * math.pi
+"""An angle in rad that moves by more, to both sides, may be in degrees."""
+
+_SLOW = 0.5
+"""A sample period in seconds from which on it may be in milliseconds: nobody who identifies a vibration samples so slowly."""
+
+_CERTAIN = 4.0
+"""Standard errors by which a number differs from zero: one of 16 000 does so by chance."""
+
+_MOSTLY = 0.75
+"""Of the samples, at which a parameter that changes has a sign."""
+
+
+@dataclass(frozen=True)
+class Plausible:
+    """What is known of a call beside its numbers.
+
+    Parameters
+    ----------
+    axis : Axis
+        Units of the channels, and which of them nobody said.
+    period : float
+        Seconds from one sample to the next.
+    names : sequence of str
+        Unknowns.
+    """
+
+    axis: Axis
+    period: float
+    names: Sequence[str]
+
+    @np.errstate(all="ignore")
+    def before(self, words: Words, angles: npt.NDArray[np.number], found: Estimates) -> Words:
+        """Return words with questions before them: about the units, and about the signs of every record."""
+        records = np.asarray(angles).reshape(-1, angles.shape[-1])
+        asked = [(*self._slow(), *self._far(one), *self._signs(found, place)) for place, one in enumerate(records)]
+        if found.status.ndim == 1:
+            return replace(words, advice=(*asked[0], *words.advice))
+        lines = [f"record {place}: {line}" for place, each in enumerate(asked) for line in each]
+        each = tuple(
+            replace(one, advice=(*first, *one.advice)) for first, one in zip(asked, words.each, strict=bool(words.each))
+        )
+        return Words(words.reasons, (*lines, *words.advice), each)
+
+    def _far(self, angle: npt.NDArray[np.number]) -> list[str]:
+        if "angle" not in self.axis.assumed or self.axis.system is not ROTARY:
+            return []
+        finite = angle[np.isfinite(angle)].astype(np.float64)
+        if not finite.size:
+            return []
+        least, most = float(finite.min()), float(finite.max())
+        if most - least <= 2 * _ONE_TURN:
+            return []
+        reach = max(least, most, key=abs)
+        turns = (most - least) / _ONE_TURN
+        return [
+            f"the angle reaches {reach:.4g}: degrees? As rad it moves through {turns:.3g} turns; if it is in degrees, give angle_unit='deg'"
+        ]
+
+    def _slow(self) -> list[str]:
+        if self.period < _SLOW or "time" not in self.axis.assumed:
+            return []
+        return [
+            f"there is one sample in {self.period:.4g} s: is the time in milliseconds? Then give time_unit='ms' with t or delta"
+        ]
+
+    def _signs(self, found: Estimates, record: int) -> list[str]:
+        sign = {name: self._sign(found, name, record) for name in ("inertia", "damping", "stiffness")}
+        negative = [name for name, one in sign.items() if one < 0]
+        if not negative:
+            return []
+        if sign["inertia"] < 0 < sign["stiffness"]:
+            return ["inertia is negative and stiffness positive: are the channels of angle and torque swapped?"]
+        if sign["inertia"] < 0:
+            words = " and ".join(filter(None, (", ".join(negative[:-1]), negative[-1])))
+            question = f"{words} {'are' if len(negative) > 1 else 'is'} negative: is the torque's sign reversed, are the channels swapped?"
+            return [
+                f"{question} The torque is the one that acts on the system; if it is the reaction to it, pass -torque"
+            ]
+        asked = []
+        if sign["stiffness"] < 0 < sign["inertia"]:
+            asked.append(
+                "stiffness has the other sign than inertia: so it is about an unstable position, as of an inverted pendulum; else look "
+                "for a missing term (gravity, offset) or for a controller's torque that was not recorded"
+            )
+        if sign["damping"] < 0:
+            asked.append(
+                "damping is negative: energy would be fed in. Is the torque late (lag='auto'), was one channel filtered, does a controller "
+                "act (instrument=)?"
+            )
+        return asked
+
+    def _sign(self, found: Estimates, name: str, record: int) -> int:
+        """Return 1 or -1 where the sign of an unknown is certain, 0 otherwise."""
+        if name not in self.names:
+            return 0
+        count = found.status.shape[-1]
+        values, errors = (
+            np.broadcast_to(of[name], found.status.shape).reshape(-1, count)[record]
+            for of in (found.values, found.errors)
+        )
+        if name in found.factors:
+            errors = errors * np.asarray(found.factors[name]).reshape(-1)[record]
+        known = np.isfinite(values) & np.isfinite(errors)
+        if not known.any():
+            return 0
+        certain = np.where(np.abs(values) > _CERTAIN * errors, np.sign(values), 0.0)[known]
+        for sign in (-1, 1):
+            if float(np.mean(certain == sign)) >= _MOSTLY:
+                return sign
+        return 0

@@ -1,0 +1,253 @@
+"""A recording that was read from a file: channels by name, with units, at one sample rate."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._files.channels import Channels, full_name
+from tvident._files.names import listed, printable
+from tvident._files.recordings import read
+from tvident._files.table import write_table
+from tvident._units import ROTARY, Channel, named_unit, times_in_seconds, unit_of, with_unit
+
+_TIME = re.compile(
+    r"(t|time|times|zeit|temps|tiempo|tempo|x_value|timestamps?|elapsed( time)?|time_?stamp)([ _.-]?\d+)?",
+    re.IGNORECASE,
+)
+"""What a channel of times is called."""
+
+_RATE = re.compile(r"(fs|f_s|fsamp|sample_?rate|sampling_?(rate|frequency)|samplerate|fsample|rate)", re.IGNORECASE)
+
+_JITTER = 1e-3
+"""Of the sample period: how far times may lie from a uniform grid, as where arrays are taken."""
+
+
+class FileRecording(Mapping[str, Channel]):
+    """A recording from a file: a mapping of names to channels, each an array with its unit.
+
+    Parameters
+    ----------
+    channels : mapping of str to array_like
+        Channels by name; names may have units, as ``angle [deg]``.
+    sample_rate : float, optional
+        Samples per second, where the file says so itself.
+    source : str, optional
+        What messages call the file.
+
+    Attributes
+    ----------
+    units : dict of str to str
+        Units by name, as the file writes them.
+
+    Notes
+    -----
+    Names are without units, unless channels differ by these alone; a channel is also found by its name with the unit, and by its number
+    from 0. Numbers are those of the file: :func:`tvident.identify` converts by the unit of a channel, and so does
+    :meth:`tvident.Channel.to`.
+
+    See Also
+    --------
+    read_recording : reads one.
+    Channel : an array with its unit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tvident
+    >>> t = np.arange(1000) / 500
+    >>> recording = tvident.FileRecording({"time [s]": t, "angle [deg]": 10 * np.sin(9 * t)})
+    >>> recording.sample_rate
+    500.0
+    >>> recording["angle"].unit
+    'deg'
+    >>> len(recording.select(0.5, 1.0)["angle"])
+    250
+    """
+
+    def __init__(
+        self, channels: Mapping[str, npt.ArrayLike], *, sample_rate: float | None = None, source: str = "the recording"
+    ) -> None:
+        full = {str(name): np.asarray(values) for name, values in channels.items()}
+        bare = [named_unit(name)[0] for name in full]
+        self._channels: dict[str, Channel] = {}
+        for name, values in full.items():
+            short, unit = named_unit(name)
+            key = short if bare.count(short) == 1 and (short == name or short not in full) else name
+            self._channels[key] = Channel(values, unit or str(getattr(channels[name], "unit", "")))
+        self.units = {name: values.unit for name, values in self._channels.items()}
+        self._full: Channels = full
+        self._names = dict(zip(full, self._channels, strict=True))
+        self._rate = sample_rate
+        self._source = source
+
+    def __getitem__(self, name: str) -> Channel:
+        if name in self._channels:
+            return self._channels[name]
+        return self._channels[self._names[full_name(self._full, str(name), self._source)]]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._channels)
+
+    def __len__(self) -> int:
+        return len(self._channels)
+
+    def __repr__(self) -> str:
+        names = listed(self._headers())
+        sizes = {values.size for values in self._channels.values() if values.ndim}
+        try:
+            rate = f" at {self.sample_rate:.6g} Hz"
+        except ValueError:
+            rate = ""
+        return f"<FileRecording of {max(sizes, default=0)} samples{rate}: {names}>"
+
+    @property
+    def sample_rate(self) -> float:
+        """Samples per second: as the file says, or from its channel of times.
+
+        Raises
+        ------
+        ValueError
+            If the file says nothing, or its times are not uniform: the message says how to go on.
+        """
+        if self._rate is not None:
+            return float(self._rate)
+        for name, values in self._channels.items():
+            if values.size == 1 and _RATE.fullmatch(name) and float(values.reshape(-1)[0]) > 0:
+                return float(values.reshape(-1)[0])
+        time = self.time
+        if time is None or time.size < 2:  # noqa: PLR2004 - a period has two ends
+            raise ValueError(
+                f"a sample rate needs a channel of times; {self._source} has {listed(self)}; give sample_rate= where it is needed"
+            )
+        period = float(time[-1] - time[0]) / (time.size - 1)
+        grid = time[0] + period * np.arange(time.size)
+        if not (period > 0 and np.abs(time - grid).max() <= _JITTER * period):
+            raise ValueError(
+                f"a sample rate needs times that are uniform to a thousandth of their step; those of {self._source} are not; pass t= "
+                f"where times are taken, or resample"
+            )
+        # Times with few digits give a rate with many.
+        rate = 1 / period
+        return float(round(rate)) if abs(rate - round(rate)) < 1e-6 * rate else rate
+
+    @property
+    def time(self) -> npt.NDArray[np.float64] | None:
+        """Time of every sample in seconds, shape (n,); None where the file has no channel of times."""
+        for name, values in self._channels.items():
+            if values.ndim == 1 and values.size > 1 and _TIME.fullmatch(name):
+                unit = unit_of(values.unit)
+                if not values.unit or (unit is not None and unit.dimension == ROTARY.dimensions["time"]):
+                    return np.asarray(times_in_seconds(values), dtype=np.float64)
+        return None
+
+    def select(self, t0: float, t1: float) -> FileRecording:
+        """Return the samples from one time to another.
+
+        Parameters
+        ----------
+        t0, t1 : float
+            Seconds, as the channel of times has them, or from the first sample on where there is none. The sample at `t1` is left out.
+
+        Returns
+        -------
+        FileRecording
+            With the same names and units; its channels are views.
+
+        Raises
+        ------
+        ValueError
+            If no sample lies between, or nothing says when samples were taken.
+        """
+        sizes = [values.size for values in self._channels.values() if values.ndim]
+        time = self.time
+        if time is None:
+            time = np.arange(max(sizes, default=0)) / self.sample_rate
+        with np.errstate(invalid="ignore"):
+            inside = np.flatnonzero((time >= t0) & (time < t1))
+        if not inside.size:
+            raise ValueError(
+                f"a part must hold a sample; none of {self._source} lies from {t0:g} to {t1:g} s; its times go from {time[0]:g} to "
+                f"{time[-1]:g} s"
+            )
+        part = slice(int(inside[0]), int(inside[-1]) + 1)
+        cut = {
+            full: values[part] if values.ndim and values.shape[0] == time.size else values
+            for full, values in self._full.items()
+        }
+        return FileRecording(cut, sample_rate=self._rate, source=self._source)
+
+    def write(self, path: str | Path) -> None:
+        """Write every channel to a file, with its unit.
+
+        Parameters
+        ----------
+        path : str or Path
+            Its ending says how: ``.csv``, ``.npz`` and others, as for results. The file appears whole or not at all.
+
+        Raises
+        ------
+        ValueError
+            If the ending is unknown, or channels have different lengths and the file holds a table.
+        OSError
+            If there is no such folder, or the file cannot be written.
+        """
+        write_table(path, self._headers(), {})
+
+    def _headers(self) -> dict[str, Channel]:
+        """Return channels by their names with units."""
+        return {
+            name if named_unit(name)[1] else with_unit(name, values.unit): values
+            for name, values in self._channels.items()
+        }
+
+
+def read_recording(path: str | Path) -> FileRecording:
+    """Read a recording from a file: its channels by name, with their units and the sample rate.
+
+    Parameters
+    ----------
+    path : str or Path
+        Text (CSV, LabVIEW, OpenSim), NPY, NPZ, or what an extra reads: the ending says which. Units stand in names, as ``angle [deg]``,
+        ``Torque (Nmm)`` or ``t/ms``, or in a line of their own.
+
+    Returns
+    -------
+    FileRecording
+        ``recording["angle"]`` is an array with its unit, which :func:`tvident.identify` converts; ``.sample_rate``, ``.time``,
+        ``.select(t0, t1)``, ``.write(path)``.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read as it is meant: :mod:`tvident.recordings` has it. The message says what to do.
+
+    Warns
+    -----
+    FileWarning
+        If something in the file is not read, or not as it stands there.
+
+    Notes
+    -----
+    What can be read, and what it costs: see :func:`tvident.recordings.read`, which returns plain arrays.
+
+    See Also
+    --------
+    FileRecording : what is returned.
+    identify : identifies a system from two of its channels.
+
+    Examples
+    --------
+    >>> import tvident
+    >>> tvident.simulate_torsional_rig(duration=3.0).save("rig.csv")
+    >>> recording = tvident.read_recording("rig.csv")
+    >>> recording["torque"].unit, recording.sample_rate
+    ('N m', 1000.0)
+    >>> result = tvident.identify(recording["angle"], recording["torque"], sample_rate=recording.sample_rate)
+    """
+    path = Path(path)
+    return FileRecording(read(path), source=printable(path.name))

@@ -1,0 +1,56 @@
+"""A recording by channel name, with units, from file to result."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import tvident
+
+T = np.arange(500) / 250
+
+
+def written(path: Path, header: str, *columns: npt.NDArray[np.float64]) -> Path:
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=header, comments="", fmt="%.12g")
+    return path
+
+
+def test_channels_have_names_and_units(tmp_path: Path) -> None:
+    path = written(tmp_path / "x.csv", "t/ms,Angle [deg],Angle [rad],M (N mm)", 1e3 * T, T, T**2, T**3)
+    recording = tvident.read_recording(path)
+    assert list(recording) == ["t", "Angle [deg]", "Angle [rad]", "M"]
+    assert recording.units == {"t": "ms", "Angle [deg]": "deg", "Angle [rad]": "rad", "M": "N mm"}
+    assert recording["M (N mm)"] is recording["M"] is recording["3"]
+    assert recording.sample_rate == 250
+    assert recording.time is not None
+    np.testing.assert_allclose(recording.time, T, atol=1e-9)
+    assert repr(recording) == "<FileRecording of 500 samples at 250 Hz: t [ms], Angle [deg], Angle [rad], M [N mm]>"
+    with pytest.raises(KeyError, match=r"x\.csv must have one channel 'Angle'"):
+        recording["Angle"]
+    part = recording.select(0.5, 1.0)
+    np.testing.assert_array_equal(part["M"], recording["M"][125:250])
+    assert part.units == recording.units
+    with pytest.raises(ValueError, match=r"none of x\.csv lies from 3 to 4 s"):
+        recording.select(3, 4)
+    for name in ("again.csv", "again.npz"):
+        part.write(tmp_path / name)
+        again = tvident.read_recording(tmp_path / name)
+        assert again.units == part.units
+        np.testing.assert_array_equal(again["M"], part["M"])
+
+
+def test_a_sample_rate_is_what_the_file_says_or_an_error(tmp_path: Path) -> None:
+    np.savez(tmp_path / "x.npz", angle=T, fs=250.0)
+    recording = tvident.read_recording(tmp_path / "x.npz")
+    assert recording.sample_rate == 250
+    assert recording.select(0.5, 1)["angle"].size == 125
+    with pytest.raises(ValueError, match=r"columns of a table must have one length; got angle \(500,\), fs \(\)"):
+        recording.write(tmp_path / "x.csv")
+    assert not (tmp_path / "x.csv").exists()
+    with pytest.raises(ValueError, match="needs a channel of times; the recording has angle; give sample_rate="):
+        _ = tvident.FileRecording({"angle": T}).sample_rate
+    with pytest.raises(ValueError, match="uniform to a thousandth"):
+        _ = tvident.FileRecording({"t": T**2, "angle": T}).sample_rate

@@ -1,0 +1,146 @@
+"""Units as headers write them: each means what Pint's registry says, or is refused."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pint
+import pytest
+
+from tvident import Channel
+from tvident._units import LINEAR, ROTARY, factor_to, is_unit, named_unit, unit_of
+from tvident._units.symbols import SYMBOLS
+
+PINT: Any = pint.UnitRegistry()
+INTO = ("kg", "m", "s", "rad", "V", "A", "K", "count")
+"""What the powers of a dimension are of."""
+
+OTHER_NAMES = {
+    **dict.fromkeys(("rev", "revs", "revolutions", "turns"), "turn"),
+    **dict.fromkeys(("cts", "counts", "ticks", "LSB", "digits"), "count"),
+    "Nms": "newton * meter * second",
+    "gon": "grade",
+    "in": "inch",
+    "lbs": "pound",
+    "lbm": "pound",
+    "kp": "kgf",
+    "gf": "gram_force",
+    "°": "degree",
+    "Newton": "newton",
+    "Newtons": "newton",
+    "Volt": "volt",
+    "Volts": "volt",
+    "amp": "ampere",
+    "amps": "ampere",
+    "Amps": "ampere",
+    "secs": "second",
+    "millisecond": "ms",
+    "milliseconds": "ms",
+    "msecs": "ms",
+    "%": "percent",
+    "sec": "second",
+    "msec": "ms",
+    "usec": "us",
+    "nsec": "ns",
+}
+"""What Pint calls symbols that it does not know, or takes for something else."""
+
+
+def by_pint(text: str, dimension: tuple[int, ...]) -> float:
+    """Give the factor that Pint knows for the same unit."""
+    base = " * ".join(f"{unit}**{power}" for unit, power in zip(INTO, dimension, strict=True) if power)
+    return float((1 * PINT.parse_units(text)).to(base or "dimensionless").magnitude)
+
+
+@pytest.mark.parametrize("symbol", [one for one, (factor, _) in SYMBOLS.items() if not np.isnan(factor)])
+def test_every_symbol_means_what_pint_says(symbol: str) -> None:
+    factor, dimension = SYMBOLS[symbol]
+    name = OTHER_NAMES.get(symbol, symbol)
+    np.testing.assert_allclose(by_pint(name, dimension), factor, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "pints"),
+    [
+        *((text, "N*m") for text in ("N m", "Nm", "N·m", "N.m", "N-m", "[Nm]", "(N m)", "N*m", "newton * meter")),
+        *((text, "N*mm") for text in ("Nmm", "N mm", "N-mm")),
+        ("mNm", "mN*m"),
+        ("kNm", "kN*m"),
+        ("Ncm", "N*cm"),
+        ("lbf-in", "lbf*inch"),
+        ("N m s/rad", "N*m*s/rad"),
+        ("Nms/rad", "N*m*s/rad"),
+        ("Nm/(rad/s)", "N*m*s/rad"),
+        ("kgm2", "kg*m**2"),
+        ("kg·m²", "kg*m**2"),
+        ("rad s⁻²", "rad/s**2"),
+        ("°/s", "degree/s"),
+        ("m/s2", "m/s**2"),
+        ("1/s", "1/s"),
+        ("µrad", "urad"),
+        ("Nm/A", "N*m/A"),
+    ],
+)
+def test_units_as_headers_write_them(text: str, pints: str) -> None:
+    unit = unit_of(text)
+    assert unit is not None
+    np.testing.assert_allclose(by_pint(pints, unit.dimension), unit.factor, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "x", "angle", "Time", "t", "abs", "hh:mm:ss", "N m/", "N/(m", "m^", "raw", "N" * 70]
+)
+def test_words_are_no_units(text: str) -> None:
+    assert unit_of(text) is None
+    assert is_unit(text) == (text == "")
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("angle [deg]", ("angle", "deg")),
+        ("Torque (Nmm)", ("Torque", "Nmm")),
+        ("M/(N·m)", ("M", "N·m")),
+        ("t/ms", ("t", "ms")),
+        ("angle, deg", ("angle", "deg")),
+        ("knee_angle_deg", ("knee_angle", "deg")),
+        ("Force [N] (raw)", ("Force (raw)", "N")),
+        ("dθ/dt", ("dθ/dt", "")),
+        ("L/R", ("L/R", "")),
+        ("m/s", ("m/s", "")),
+        ("angle (tics)", ("angle", "tics")),
+    ],
+)
+def test_names_and_units_are_told_apart(name: str, expected: tuple[str, str]) -> None:
+    assert named_unit(name) == expected
+
+
+def test_what_cannot_be_converted_is_refused_with_the_cure() -> None:
+    assert factor_to(ROTARY, "torque", "in-lb", name="x") == pytest.approx(0.112984829)
+    assert factor_to(LINEAR, "torque", "kgf", name="x") == pytest.approx(9.80665)
+    assert factor_to(ROTARY, "time", None, name="x") == 1
+    for system, quantity, unit in (
+        (ROTARY, "angle", "counts"),
+        (ROTARY, "torque", "V"),
+        (LINEAR, "torque", "kg"),
+        (ROTARY, "angle", "grades"),
+        (ROTARY, "time", "°C"),
+    ):
+        with pytest.raises(ValueError, match=f"{quantity}_unit='{system.units[quantity]}' if the numbers are in"):
+            factor_to(system, quantity, unit, name="the channel")
+
+
+def test_slices_keep_their_unit_and_what_is_computed_has_none() -> None:
+    angle = Channel(np.arange(10.0), "deg")
+    for same in (angle[2:5], angle.copy(), pickle.loads(pickle.dumps(angle))):  # noqa: S301 - our own
+        assert isinstance(same, Channel)
+        assert same.unit == "deg"
+    for computed in (angle * 2, np.diff(angle), np.deg2rad(angle), angle.mean(keepdims=True)):
+        assert not isinstance(computed, Channel)
+    turned = angle.to("rad")
+    assert turned.unit == "rad"
+    np.testing.assert_allclose(turned, np.deg2rad(np.arange(10.0)))
+    with pytest.raises(ValueError, match="one of the same quantity; got 'deg' and 'N m'"):
+        angle.to("N m")

@@ -1,0 +1,129 @@
+"""Units of channels: what is in degrees, newton millimetres and milliseconds gives the same result as in rad, N m and s."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray
+
+import tvident
+
+RIG = tvident.simulate_torsional_rig(duration=4.0, pattern="constant", seed=3)
+PLAIN = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000)
+
+
+def assert_same(found: tvident.Identification) -> None:
+    """Compare results of the same samples that were rounded once more: by some 1e-16, which equations amplify by their condition."""
+    for name, (value, error) in PLAIN.constants.items():
+        assert abs(found.constants[name][0] - value) < 1e-3 * error
+    np.testing.assert_allclose(found.stiffness, PLAIN.stiffness, rtol=1e-6)
+
+
+def test_units_that_are_given() -> None:
+    found = tvident.identify(
+        np.rad2deg(RIG.angle), 1e3 * RIG.torque, t=1e3 * RIG.time, angle_unit="deg", torque_unit="N mm", time_unit="ms"
+    )
+    assert_same(found)
+    assert found.settings["sample_rate"] == pytest.approx(1000)
+    assert_same(tvident.identify(np.rad2deg(RIG.angle), RIG.torque, delta=1, angle_unit="°", time_unit="ms"))
+
+
+def test_units_that_channels_say(tmp_path: Path) -> None:
+    with (tmp_path / "x.csv").open("w") as file:
+        file.write("Zeit;Winkel;M\nms;°;Nmm\n")
+        for row in zip(1e3 * RIG.time, np.rad2deg(RIG.angle), 1e3 * RIG.torque, strict=True):
+            file.write(";".join(map(repr, map(float, row))) + "\n")
+    recording = tvident.read_recording(tmp_path / "x.csv")
+    call: dict[str, Any] = {"angle": recording["Winkel"], "torque": recording["M"]}
+    assert_same(tvident.identify(**call, t=recording["Zeit"]))
+    assert_same(tvident.identify(**call, sample_rate=recording.sample_rate))
+    degrees = xarray.DataArray(np.rad2deg(RIG.angle), dims="time", attrs={"units": "degrees"})
+    assert_same(tvident.identify(degrees, RIG.torque, sample_rate=1000))
+    compared = tvident.compare_models(
+        **call, models={"a": {}, "b": {"damping": 0}}, sample_rate=1000, stiffness="constant"
+    )
+    assert compared.results["a"].constants["inertia"][0] == pytest.approx(PLAIN.constants["inertia"][0], rel=0.01)
+
+
+def test_a_position_and_a_force_are_a_linear_axis(tmp_path: Path) -> None:
+    found = tvident.identify(1e3 * RIG.angle, RIG.torque, sample_rate=1000, angle_unit="mm", torque_unit="N")
+    assert_same(found)
+    assert (found.units["inertia"], found.units["damping"], found.units["stiffness"]) == ("kg", "N s/m", "N/m")
+    words = found.summary() + found.scan().summary()
+    assert "rad" not in words
+    assert "N m" not in words
+    assert " m in the angle" in words
+    assert found.plot().axes[0].get_ylabel() == "N/m"
+    found.save(tmp_path / "x.csv")
+    assert (tmp_path / "x.csv").read_text().startswith("time [s],inertia [kg],inertia_stderr [kg],damping [N s/m],")
+
+
+@pytest.mark.parametrize(
+    ("units", "message"),
+    [
+        ({"angle_unit": "counts"}, "the angle must be in a unit that can be converted to rad; got 'counts'"),
+        ({"torque_unit": "V"}, "the torque must be in a unit that can be converted to N m; got 'V'"),
+        (
+            {"angle_unit": "rad", "torque_unit": "N"},
+            "the angle must be in a unit that can be converted to m; got 'rad'",
+        ),
+        ({"time_unit": "ticks"}, "got 'ticks'; write one of s, ms, min"),
+        ({"angle_unit": "furlong"}, "must be one that is known; got 'furlong'"),
+    ],
+)
+def test_units_that_cannot_be_meant_are_refused(units: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, **units)
+    with pytest.raises(TypeError, match="angle_unit must be text"):
+        tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, angle_unit=1)  # type: ignore[arg-type]
+
+
+def advice(angle: Any, torque: Any, **call: Any) -> str:
+    return "; ".join(tvident.identify(angle, torque, **{"sample_rate": 1000, "stiffness": "constant", **call}).advice)
+
+
+def test_numbers_that_are_not_plausible_are_asked_about() -> None:
+    assert "?" not in advice(RIG.angle, RIG.torque)
+    degrees = np.rad2deg(RIG.angle) / np.abs(np.rad2deg(RIG.angle)).max() * 160
+    assert "the angle reaches" in advice(degrees, RIG.torque)
+    assert "160: degrees?" in advice(degrees, RIG.torque)
+    assert "degrees?" not in advice(degrees, RIG.torque, angle_unit="deg")
+    assert "time in milliseconds?" in advice(RIG.angle, RIG.torque, sample_rate=None, t=1e3 * RIG.time)
+    reversed_sign = advice(RIG.angle, -RIG.torque)
+    assert "negative: is the torque's sign reversed, are the channels swapped?" in reversed_sign
+    assert "inertia" in reversed_sign
+    assert "stiffness" in reversed_sign
+
+
+def test_a_damping_that_feeds_energy_and_a_spring_that_pushes_are_asked_about() -> None:
+    generator = np.random.default_rng(0)
+    t = np.arange(8000) / 1000
+    phases = generator.uniform(0, 2 * np.pi, 12)
+    rates = 2 * np.pi * np.linspace(0.7, 9, 12)
+    angle, velocity, acceleration = (
+        sum(
+            np.real((1j * rate) ** order * 0.1 * np.exp(1j * (rate * t + phase)))
+            for rate, phase in zip(rates, phases, strict=True)
+        )
+        for order in range(3)
+    )
+    torque = 0.02 * acceleration - 0.3 * velocity - 12 * angle + 0.01 * generator.standard_normal(t.size)
+    words = advice(angle + 1e-5 * generator.standard_normal(t.size), torque)
+    assert "damping is negative: energy would be fed in" in words
+    assert "stiffness has the other sign than inertia" in words
+
+
+def test_units_and_questions_stay_with_the_parts_of_a_result(tmp_path: Path) -> None:
+    both = np.stack([RIG.angle, RIG.angle]), np.stack([RIG.torque, -RIG.torque])
+    found = tvident.identify(*both, sample_rate=1000, angle_unit="m", torque_unit="N", stiffness="constant")
+    assert sum("sign reversed" in line for line in found.advice) == 1
+    assert "sign reversed" not in "".join(found[0].advice)
+    assert "sign reversed" in "".join(found[1].advice)
+    assert found[1].between(1, 2).units["stiffness"] == "N/m"
+    found[0].save(tmp_path / "x.npz")
+    again = tvident.load(tmp_path / "x.npz")
+    assert again.units["stiffness"] == again.scan().units["stiffness"] == "N/m"
+    assert "kg" in str(again.value("inertia"))
