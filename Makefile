@@ -63,6 +63,7 @@ sanitize:  ## unit tests of the core under AddressSanitizer (needs Rust's nightl
 docs: $(BUILT) rooms  ## make anew what documents show of the program: the picture, the command line's help, the rooms
 	$(BIN)/tvident demo
 	cp tvident-demo/parameters.png docs/identified.png
+	$(BIN)/python docs/comparison.py README.md docs/comparison.png
 	$(BIN)/python docs/command_line_reference.py docs/command-line.md
 
 .PHONY: rooms

@@ -147,6 +147,15 @@ def test_the_command_line_reference_is_what_the_commands_say() -> None:
     assert page == script("command_line_reference").reference(), "run `make docs`"
 
 
+def test_the_readmes_first_table_is_measured() -> None:
+    shown = table(ROOT / "README.md", "How *K*(t) is found")
+    measured = [line.strip("| ").split(" | ") for line in script("comparison").table().splitlines()[2:]]
+    for row, again in zip(shown, measured, strict=True):
+        assert [row["How *K*(t) is found"], row["what must be chosen"]] == [again[0], again[3]]
+        for cell, number in ((row["error"], again[1]), (row["with 1 % of noise"], again[2])):
+            assert float(cell.rstrip("% ")) == pytest.approx(float(number.rstrip("% ")), rel=MEASURED)
+
+
 def test_the_rooms_in_the_design_are_those_of_the_sources() -> None:
     rooms, page = script("rooms"), (ROOT / "DESIGN.md").read_text(encoding="utf-8")
     assert page.count("`make rooms` -->") == len(["core", "binding", "package"])
