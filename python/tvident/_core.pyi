@@ -36,6 +36,7 @@ __all__ = [
     "quantisation_step",
     "respond",
     "rolling_least_squares",
+    "sliding_velocity",
     "status_flags",
 ]
 
@@ -315,6 +316,7 @@ def respond(
     angle: npt.NDArray[np.number] | None = None,
     initial: list[list[float]] | None = None,
     spans: list[tuple[int, int, int]] | None = None,
+    stribeck: list[float] | None = None,
     workers: int | None = None,
 ) -> Responses: ...
 def rolling_least_squares(
@@ -326,6 +328,9 @@ def rolling_least_squares(
     workers: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> RollingRegressions: ...
+def sliding_velocity(
+    angle: npt.NDArray[np.number], delta: float, *, workers: int | None = None
+) -> npt.NDArray[np.float64]: ...
 def status_flags() -> list[tuple[str, int]]: ...
 def available_instructions() -> list[str]: ...
 def instructions() -> str: ...

@@ -12,7 +12,8 @@ from click.testing import CliRunner
 
 import tvident
 from tvident._command_line import main
-from tvident._compare.criterion import aicc, akaike_weights, averaged, effective_observations
+from tvident._compare.criterion import akaike_weights, averaged
+from tvident._identify import aicc, effective_observations
 
 Array = npt.NDArray[np.float64]
 

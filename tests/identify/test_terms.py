@@ -39,8 +39,9 @@ def swings(n: int = 8000) -> tuple[Array, Array]:
 
 
 def test_there_is_one_table_here_and_one_in_the_core() -> None:
-    assert list(BUILT_IN) == _core.built_in_terms()
-    assert list(BUILT_IN) == list(FUNCTIONS)
+    linear = [name for name, term in BUILT_IN.items() if not term.inner]
+    assert linear == _core.built_in_terms()
+    assert linear == list(FUNCTIONS)
     for term in BUILT_IN.values():
         assert "{amount}" in term.suspicion
         assert term.unit

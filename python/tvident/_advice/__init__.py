@@ -2,12 +2,15 @@
 
 from tvident._advice.instrument import words_with_instrument
 from tvident._advice.plausible import Plausible
+from tvident._advice.search import FoundBySearch, words_of_search
 from tvident._advice.strong import ExplainedStrong
 from tvident._advice.weak import Explained
 
 __all__ = [
     "Explained",
     "ExplainedStrong",
+    "FoundBySearch",
     "Plausible",
+    "words_of_search",
     "words_with_instrument",
 ]

@@ -335,7 +335,10 @@ class Explained:
                 )
             else:
                 term = BUILT_IN[one.name]
-                terms = [name for name in self.names if name not in COEFFICIENTS] + [one.name]
+                # Inner parameters come after their terms, and are none.
+                names = [name for name in self.names if name not in COEFFICIENTS]
+                inner = {name for name in names if any(name.startswith(f"{other}.") for other in names)}
+                terms = [name for name in names if name not in inner] + [one.name]
                 words.append(f"{term.suspicion.format(amount=f'{amount} {self.units[term.name]}')}: give terms={terms}")
         if len(words) > 1:
             words.append("begin with the first of these: the others may then disappear")

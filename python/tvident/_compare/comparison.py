@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from tvident._compare.criterion import aicc, akaike_weights, averaged, effective_observations, effective_parameters
+from tvident._compare.criterion import akaike_weights, averaged, effective_parameters
 from tvident._equation import COEFFICIENTS
 from tvident._files import aligned, write_table
+from tvident._identify import aicc, effective_observations
 from tvident._results import Identification
 
 if TYPE_CHECKING:

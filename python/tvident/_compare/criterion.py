@@ -1,8 +1,7 @@
-"""The criterion that models are compared by, and the weights that follow from it."""
+"""What models cost, and the weights that follow from their criteria."""
 
 from __future__ import annotations
 
-import math
 from typing import TypeAlias
 
 import numpy as np
@@ -11,19 +10,6 @@ import numpy.typing as npt
 from tvident._results import Identification
 
 Array: TypeAlias = npt.NDArray[np.float64]
-
-
-def effective_observations(samples: int, window_length: int, exponent: int) -> float:
-    """Return how many independent observations overlapping rows are worth: samples over the sum of their squared autocorrelations.
-
-    White noise of the torque makes rows whose autocorrelation is that of the test function. The logarithm of their mean square then
-    scatters as that of so many independent ones (Bartlett), and a regressor that is not needed, with the rows' spectrum, lowers it by
-    one over this number.
-    """
-    x = np.linspace(-1, 1, window_length)
-    function = (1 - x**2) ** exponent
-    autocorrelation = np.correlate(function, function, mode="full")
-    return float(samples / np.sum((autocorrelation / autocorrelation.max()) ** 2))
 
 
 def effective_parameters(result: Identification, samples: int) -> float:
@@ -37,15 +23,7 @@ def effective_parameters(result: Identification, samples: int) -> float:
             count += 1
         else:
             count += samples / settings["regression_window"] * (2 if settings["variation"] == "linear" else 1)
-    return count
-
-
-def aicc(mean_square: float, observations: float, parameters: float) -> float:
-    """Return the corrected Akaike information criterion; infinite where there are not more observations than parameters."""
-    k = parameters + 1  # and the variance
-    if not 0 < mean_square < math.inf or observations <= k + 1:
-        return math.inf
-    return observations * math.log(mean_square) + 2 * k * observations / (observations - k - 1)
+    return count + len(settings["inner"])
 
 
 def akaike_weights(scores: Array) -> Array:

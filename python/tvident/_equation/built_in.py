@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
@@ -19,12 +20,15 @@ class BuiltIn:
         What its factor multiplies.
     suspicion : str
         What is said where it seems to be missing, with a place for the amount.
+    inner : mapping of str to str
+        Units of inner parameters, which a search finds, by name.
     """
 
     name: str
     unit: str
     meaning: str
     suspicion: str
+    inner: Mapping[str, str] = field(default_factory=dict)
 
 
 BUILT_IN = {
@@ -44,6 +48,13 @@ BUILT_IN = {
             "N m s/rad",
             "the magnitude of the velocity: viscous friction that differs between the directions",
             "viscous friction seems to differ between the directions, by {amount}",
+        ),
+        BuiltIn(
+            "stribeck",
+            "N m",
+            "exp(-(velocity/Stribeck velocity)²) times the sign of the velocity: friction that fades as motion becomes faster",
+            "friction seems to fade with the velocity, by {amount}",
+            {"velocity": "rad/s"},
         ),
     )
 }

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._equation.built_in import TERM_NAMES
+from tvident._equation.built_in import BUILT_IN, TERM_NAMES
+from tvident._equation.inner import InnerParameter, ranges
 from tvident._equation.kinds import Kind
 from tvident._equation.names import name_of_term
 
@@ -27,14 +28,20 @@ class Term:
     function : callable
         Function of ``(t, angle, velocity)``: times in s of shape (n,), smoothed angle in rad and velocity in rad/s of the angle's shape.
         They are copies, which the function may change. Returns an array of that shape. The unit of the factor is N m over that of the
-        function.
+        function. With `search` it also takes the inner parameters, by name, and is called with single records of shape (n,).
+    search : mapping of str to (float, float), optional
+        Inner parameters, such as the delay of a reflex or the width of a backlash, and the range that each may lie in: at most three.
+        They are constant over a record, and found by a search for the lowest criterion of :func:`tvident.compare_models`, at 17 values
+        first. ``constants["name.delay"]`` holds the value and its standard error (delta method), which the errors of all other
+        parameters know of. :func:`tvident.identify` then costs about 10 to 20 times as much; ``settings=`` of a result repeats it
+        without a search. The summary says if the term does not earn its place, or if the best value is an end of the range.
 
     Raises
     ------
     ValueError
-        If the name is taken or holds other signs.
+        If the name is taken or holds other signs, or a range is empty.
     TypeError
-        If the name is no word, or the function cannot be called.
+        If the name is no word, the function cannot be called, or it does not take what is searched.
 
     See Also
     --------
@@ -54,10 +61,22 @@ class Term:
     >>> result = tvident.identify(rig.angle, rig.torque, sample_rate=1000, inertia=0.0123, terms=[drag])
     >>> result.terms["drag"].shape
     (3000,)
+
+    A reflex that answers the velocity of some time ago:
+
+    >>> def reflex(t, angle, velocity, delay):
+    ...     return np.interp(t - delay, t, velocity)
+    >>> torque = rig.torque + 0.05 * reflex(rig.time, rig.true_angle, rig.true_velocity, delay=0.045)
+    >>> term = tvident.Term("reflex", reflex, search={"delay": (0.02, 0.08)})
+    >>> result = tvident.identify(rig.angle, torque, sample_rate=1000, inertia=0.0123, damping="constant", terms=[term])
+    >>> delay, error = result.constants["reflex.delay"]
+    >>> bool(abs(delay - 0.045) < 4 * error)
+    True
     """
 
     name: str
-    function: Callable[[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]], npt.ArrayLike]
+    function: Callable[..., npt.ArrayLike]
+    search: Mapping[str, tuple[float, float]] | None = field(default=None, hash=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", str(name_of_term(self.name)))
@@ -66,11 +85,12 @@ class Term:
                 f"the function of term {self.name!r} must be callable; got {arguments.shown(self.function)}; "
                 "pass a function of (t, angle, velocity)"
             )
+        object.__setattr__(self, "search", ranges(self.name, self.function, {} if self.search is None else self.search))
 
     def values(
-        self, t: npt.NDArray[Any], angle: npt.NDArray[Any], velocity: npt.NDArray[Any]
+        self, t: npt.NDArray[Any], angle: npt.NDArray[Any], velocity: npt.NDArray[Any], **inner: float
     ) -> npt.NDArray[np.number]:
-        """Return the term at every sample, in the angle's shape.
+        """Return the term at every sample, in the angle's shape, with given inner parameters.
 
         Raises
         ------
@@ -80,7 +100,7 @@ class Term:
             If it returns no real numbers.
         """
         # The result's time and the angle of the next term are not for this function to change.
-        returned = self.function(t.copy(), angle.copy(), velocity.copy())
+        returned = self.function(t.copy(), angle.copy(), velocity.copy(), **inner)
         values = arguments.any_array(f"what the function of term {self.name!r} returns", returned)
         if values.shape != angle.shape:
             raise ValueError(
@@ -90,17 +110,46 @@ class Term:
         return values
 
 
+@dataclass(frozen=True)
+class FixedTerm:
+    """A term whose inner parameters are known, of every record of a batch.
+
+    Parameters
+    ----------
+    term : Term
+    inner : mapping of str to ndarray, shape (records,)
+        Values by keyword.
+    """
+
+    term: Term
+    inner: Mapping[str, npt.NDArray[np.float64]]
+
+    def values(
+        self, t: npt.NDArray[Any], angle: npt.NDArray[Any], velocity: npt.NDArray[Any]
+    ) -> npt.NDArray[np.number]:
+        """Return the term at every sample, in the angle's shape."""
+        if not self.inner:
+            return self.term.values(t, angle, velocity)
+        found = np.empty(angle.shape)
+        rows = [one.reshape(-1, angle.shape[-1]) for one in (found, angle, velocity)]
+        for record, (into, place, speed) in enumerate(zip(*rows, strict=True)):
+            given = {name: float(value[record]) for name, value in self.inner.items()}
+            into[:] = self.term.values(t, place, speed, **given)
+        return found
+
+
 GivenTerm: TypeAlias = str | Term | tuple[str | Term, Kind]
 """The name of a built-in term, a term of one's own, or a pair of one of these and its kind."""
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """A column of the equations: its name, its kind and, for a term of the user's own, the term."""
+    """A column of the equations: its name, its kind, the term if it is one of the user's own, and its inner parameters."""
 
     name: str
     kind: Kind
     own: Term | None = None
+    inner: tuple[InnerParameter, ...] = ()
 
 
 def all_terms(terms: Sequence[Any], default: Kind) -> list[Unknown]:
@@ -119,5 +168,18 @@ def all_terms(terms: Sequence[Any], default: Kind) -> list[Unknown]:
         name = arguments.one_of("a term", term, TERM_NAMES) if own is None else own.name
         if any(name.casefold() == other.name.casefold() for other in found):
             raise ValueError(f"every term must have a name of its own; {name!r} comes twice; drop or rename one")
-        found.append(Unknown(name, kind, own))
+        found.append(Unknown(name, kind, own, _inner_parameters(name, own)))
+    names = {one.name.casefold() for one in found}
+    for one in (one for term in found for one in term.inner):
+        if one.full_name.casefold() in names:
+            raise ValueError(
+                f"an inner parameter must not share its name with a term; got {one.full_name!r} twice; rename the term"
+            )
     return found
+
+
+def _inner_parameters(name: str, own: Term | None) -> tuple[InnerParameter, ...]:
+    """Return what is to be searched in a term."""
+    if own is None:
+        return tuple(InnerParameter(name, one, None, unit) for one, unit in BUILT_IN[name].inner.items())
+    return tuple(InnerParameter(name, one, limits) for one, limits in (own.search or {}).items())

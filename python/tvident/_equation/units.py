@@ -15,7 +15,9 @@ UNITS = {
     "damping_ratio": "1",
     "condition": "1",
     "residual_std": "N m",
-} | {term.name: term.unit for term in BUILT_IN.values()}
+}
+UNITS |= {term.name: term.unit for term in BUILT_IN.values()}
+UNITS |= {f"{term.name}.{name}": unit for term in BUILT_IN.values() for name, unit in term.inner.items()}
 """Units of results for an angle in rad and a torque in N m."""
 
 

@@ -1,6 +1,7 @@
 """Turns a call of ``identify`` into a task for the core: forms, settings, the task, its numbers by name."""
 
 from tvident._identify.call import identify
+from tvident._identify.criterion import aicc, effective_observations
 from tvident._identify.methods import Method, StrongForm, Variation, WeakForm
 
-__all__ = ["Method", "StrongForm", "Variation", "WeakForm", "identify"]
+__all__ = ["Method", "StrongForm", "Variation", "WeakForm", "aicc", "effective_observations", "identify"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import combinations
 from typing import Any, TypeAlias
 
@@ -98,6 +99,54 @@ def estimates(
             for place, name in enumerate(names)
         },
         record_status=flags.reshape(shape) if shape else Status(int(flags[0])),
+    )
+
+
+def with_inner(
+    found: Estimates,
+    inner: Mapping[str, _Numbers],
+    unknown: Mapping[str, _Numbers],
+    earned: Mapping[str, npt.NDArray[np.bool_]],
+    count: int,
+) -> Estimates:
+    r"""Return numbers with inner parameters of terms, whose unknowns were by how much each is to be moved.
+
+    Parameters
+    ----------
+    found : Estimates
+    inner : mapping of str to ndarray, shape (records,)
+        Values of inner parameters.
+    unknown : mapping of str to ndarray, shape (records,)
+        Standard errors of what is known of nothing but its range.
+    earned : mapping of str to ndarray of bool, shape (records,)
+        Whether the record tells more.
+    count : int
+        Numbers of a record.
+    """
+    values, errors = dict(found.values), dict(found.errors)
+    factors, constants, scans = dict(found.factors), dict(found.constants), list(found.scans)
+    records = np.shape(found.record_status)
+
+    def alone(numbers: _Numbers) -> Any:
+        return numbers.reshape(records) if records else float(numbers[0])
+
+    for name, value in inner.items():
+        error = unknown[name]
+        if name in errors and errors[name].shape[-1]:
+            told = (errors[name] * factors.pop(name, 1.0))[..., 0].ravel()
+            error = np.where(np.isfinite(told) & earned[name], told, np.fmax(told, error))
+        values[name] = np.broadcast_to(value.reshape(*records, 1), (*records, count))
+        errors[name] = np.broadcast_to(error.reshape(*records, 1), (*records, count))
+        constants[name] = (alone(value), alone(error))
+        scans = [
+            replace(scan, estimates={**scan.estimates, name: scan.estimates[name] + one})
+            if name in scan.estimates
+            else scan
+            for scan, one in zip(scans, value.tolist(), strict=False)
+        ]
+    kinds = {**found.kinds, **{name: np.full(records, "constant") for name in inner}}
+    return replace(
+        found, values=values, errors=errors, factors=factors, constants=constants, scans=tuple(scans), kinds=kinds
     )
 
 

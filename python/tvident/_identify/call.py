@@ -12,9 +12,10 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident._derivatives import quantisation_step
 from tvident._equation import GivenTerm, Parameter
+from tvident._identify.data import Data
 from tvident._identify.methods import Method
 from tvident._identify.settings import resolve
-from tvident._identify.task import Data, Task
+from tvident._identify.task import Task
 from tvident._results import Identification
 from tvident._units import axis_of, scaled, times_in_seconds
 
@@ -93,8 +94,10 @@ def identify(
     terms : sequence, optional
         Further terms of the left-hand side, each with an unknown factor: ``"offset"``, ``"coulomb"`` (the sign of the velocity),
         ``"cubic"`` (the cube of the angle), ``"gravity"`` (the sine of the angle), ``"viscous_asymmetric"`` (the magnitude of the
-        velocity) or a :class:`Term` of your own; or a pair of one of these and its kind. Without a kind a term is windowed if all unknown
-        parameters are, and constant otherwise. Beside ``"coulomb"`` equations that touch samples at rest do not count.
+        velocity), ``"stribeck"`` (exp(-(velocity/Stribeck velocity)²) times the sign of the velocity) or a :class:`Term` of your own; or a
+        pair of one of these and its kind. Without a kind a term is windowed if all unknown parameters are, and constant otherwise. Beside
+        ``"coulomb"`` and ``"stribeck"`` equations that touch samples at rest do not count. The Stribeck velocity, and what a term of your
+        own names in ``search=``, is found by a search, which costs 10 to 20 times as much; in a batch every record has its own.
     instrument : array_like, the angle's shape, optional
         A channel that no noise of angle or torque reaches, but that moves the system: the reference of a controller, or excitation that was
         added. Under feedback noise of the angle is part of the torque, and estimates without an instrument are biased. All unknowns are

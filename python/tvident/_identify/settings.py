@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from tvident import _arguments as arguments
-from tvident._equation import COEFFICIENTS, Term
+from tvident._equation import BUILT_IN, COEFFICIENTS, Term
 from tvident._identify.methods import Form, Method, StrongForm, WeakForm
 
 _OF_METHOD: dict[str, dict[str, Any]] = {
@@ -60,6 +60,10 @@ class Request:
     quantisation : float, optional
     period : float, optional
         Of a wrapped angle.
+    inner : mapping of str to float or sequence
+        Inner parameters of terms that an earlier result found.
+    earned : mapping of str to bool or sequence
+        Whether the terms earned their places there.
     chosen : bool
         Nobody asked for this form.
     """
@@ -73,6 +77,8 @@ class Request:
     lag_samples: Sequence[float] | None
     quantisation: float | None
     period: float | None
+    inner: Mapping[str, Any]
+    earned: Mapping[str, Any]
     chosen: bool
 
     @property
@@ -80,7 +86,7 @@ class Request:
         """Whether the equation is another one after a whole period of the angle."""
         turns = (self.period or 0.0) / (2 * math.pi)
         names = [term[0] if isinstance(term, tuple | list) else term for term in self.terms]
-        periodic = {"offset", "coulomb", "viscous_asymmetric"} | (
+        periodic = {"offset", "coulomb", "viscous_asymmetric", "stribeck"} | (
             {"gravity"} if turns and turns.is_integer() else set()
         )
         stiffness = self.parameters["stiffness"]
@@ -152,6 +158,8 @@ def resolve(
         lag_samples=earlier.get("lag_samples") if same_lag and earlier is not None else None,
         quantisation=asked["quantisation"],
         period=None if asked["period"] is None else arguments.positive_number("period", asked["period"]),
+        inner={} if earlier is None else dict(earlier.get("inner") or {}),
+        earned={} if earlier is None else dict(earlier.get("earned") or {}),
         chosen=earlier is None and name == "auto",
     )
 
@@ -177,6 +185,11 @@ def _with_instrument(asked: dict[str, Any], given: Mapping[str, Any]) -> dict[st
             raise ValueError(  # noqa: TRY004 - a term, but not one that will do
                 f"with an instrument terms must be built-in; got {own.name!r}, whose samples hold the angle's noise; use 'coulomb', "
                 "'cubic' or 'gravity', or leave the instrument out"
+            )
+        if isinstance(own, str) and own in BUILT_IN and BUILT_IN[own].inner:
+            raise ValueError(
+                f"with an instrument terms must be linear in what is unknown; got {own!r}, which holds an inner parameter; use 'coulomb', "
+                "or leave the instrument out"
             )
         if kind != "constant":
             raise ValueError(f"with an instrument unknowns must be constant; got term {own!r} {kind}; make it constant")
@@ -252,8 +265,16 @@ def _is_whole(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Mappi
         and all(isinstance(kinds[name], str) and (kinds[name] != "known" or name in known) for name in COEFFICIENTS)
         and all(one.name in earlier for one in fields(form))
         and isinstance(earlier["method"], str)
-        and all(isinstance(one, int | float) and math.isfinite(one) for one in earlier.get("lag_samples") or ())
+        and all(_is_finite(one) for one in earlier.get("lag_samples") or ())
+        and all(
+            all(map(_is_finite, one)) if isinstance(one, list | tuple) else _is_finite(one)
+            for one in dict(earlier.get("inner") or {}).values()
+        )
     )
+
+
+def _is_finite(number: object) -> bool:
+    return isinstance(number, int | float) and math.isfinite(number)
 
 
 def _with_earlier_kinds(terms: Sequence[Any], earlier: Mapping[str, Any]) -> Sequence[Any]:

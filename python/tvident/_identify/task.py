@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from functools import partial
+from dataclasses import fields, replace
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -12,74 +12,23 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
-from tvident._advice import Explained, ExplainedStrong, Plausible, words_with_instrument
+from tvident._advice import FoundBySearch
 from tvident._derivatives import SHORTEST_WINDOW, plan, quantisation_step
-from tvident._equation import COEFFICIENTS, LINEAR_UNITS, UNITS, Kind, Unknown, all_terms, parameter
-from tvident._identify.batch import estimates
+from tvident._equation import COEFFICIENTS, Kind, Unknown, all_terms, parameter
+from tvident._identify.batch import estimates, with_inner
+from tvident._identify.columns import Columns, Range, fixed, secant
+from tvident._identify.criterion import criterion_of
+from tvident._identify.data import Data
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm, exponent_of
+from tvident._identify.searched import Searched, factor_of, search
 from tvident._identify.settings import Request, plain, resolve
-from tvident._results import Estimates, Identification, Recorded, Words, chosen, of_batch, of_records, settings_of
-from tvident._status import Status
-from tvident._units import ROTARY, Axis
+from tvident._identify.told import Told
+from tvident._results import Estimates, Identification, Recorded, chosen, of_records, settings_of
+
+Numbers = npt.NDArray[np.float64]
 
 _WINDOW_OF_TERMS = 51
 """Samples of the polynomials that terms of one's own get angle and velocity from in weak form."""
-
-
-@dataclass(frozen=True)
-class Data:
-    r"""Records, and what is to be done with them.
-
-    Parameters
-    ----------
-    angles, torques : ndarray, shape (\\*, n)
-    instruments : ndarray, shape (\\*, n), optional
-    time : ndarray, shape (n,)
-    period : float
-        Seconds from one sample to the next.
-    mask : ndarray of bool, shape (\\*, n), optional
-    propagate : bool
-        Missing values make windows that hold one missing.
-    step : int
-        Every how many samples a result is wanted.
-    workers : int, optional
-    doubts : sequence of (int, str)
-        What cannot be known of the channels, and of which record.
-    labels : Labels, optional
-        What the angle came with: an index, coordinates.
-    axis : Axis, optional
-        What the channels were measured in.
-    """
-
-    angles: npt.NDArray[np.number]
-    torques: npt.NDArray[np.number]
-    instruments: npt.NDArray[np.number] | None
-    time: npt.NDArray[np.float64]
-    period: float
-    mask: npt.NDArray[np.bool_] | None
-    propagate: bool
-    step: int
-    workers: int | None
-    doubts: Sequence[tuple[int, str]] = ()
-    labels: arguments.Labels | None = None
-    axis: Axis = field(default_factory=Axis)
-
-    @property
-    def batch(self) -> tuple[int, ...]:
-        """Shape of the batch; empty for a single record."""
-        return self.angles.shape[:-1]
-
-    @property
-    def masks(self) -> list[npt.NDArray[np.bool_]] | None:
-        """The mask of every record, or None without one."""
-        if self.mask is None:
-            return None
-        return [np.ascontiguousarray(one) for one in self.mask.reshape(-1, self.time.size)]
-
-    @property
-    def records(self) -> int:
-        """How many records there are."""
-        return int(np.prod(self.batch, dtype=int))
 
 
 class Task:
@@ -107,53 +56,149 @@ class Task:
                 "at least one parameter must be unknown; all are given; use 'windowed' or 'constant' for one"
             )
         self._names = [one.name for one in self._unknowns]
+        self.inner = [one for term in self._terms for one in term.inner]
         self._known = {name: value for name, value in self._parameters.items() if not isinstance(value, str)}
-
-    @property
-    def _units(self) -> Mapping[str, str]:
-        """Units of results."""
-        return UNITS if self._data.axis.system is ROTARY else LINEAR_UNITS
 
     def run(self, progress: arguments.Progress, *, diagnose: bool = True) -> Identification:
         """Identify every record, and look for what may be missing in the equation."""
-        data, request = self._data, self._request
-        form, core_plan = self._form()
         with arguments.reporter(progress, "identification") as report:
-            found = _core.identify(
-                self._motions(core_plan),
-                [one.kind for one in self._unknowns],
-                form,
-                delta=data.period,
-                lag=self._lags(),
-                quantisation=request.quantisation,
-                masks=data.masks,
-                propagate=data.propagate,
-                step=data.step,
-                diagnose=diagnose,
-                instrument=data.instruments,
-                workers=data.workers,
-                progress=report,
-            )
-        return self._result(found)
+            searched = self._searched(report)
+            found = self.found(searched.values, slopes=diagnose, diagnose=diagnose, report=report)
+        return self._result(found, searched)
+
+    def found(
+        self,
+        inner: Mapping[str, Numbers],
+        *,
+        slopes: bool = False,
+        factors: Mapping[str, Sequence[Numbers]] | None = None,
+        diagnose: bool = False,
+        report: Callable[[int, int], object] | None = None,
+    ) -> Sequence[_core.Identification]:
+        """Identify with given inner parameters of terms, as unknowns too where slopes are wanted.
+
+        Parameters
+        ----------
+        inner : mapping of str to ndarray, shape (records,)
+        slopes : bool
+            By how much inner parameters are to be moved is unknown, too: it is zero where they are best, and its standard error is theirs.
+        factors : mapping of str to sequence of ndarray
+            Of the terms that have inner parameters, about; found first where they are not given.
+        diagnose : bool
+            Look for what may be missing.
+        report : callable, optional
+        """
+        data, request = self._data, self._request
+        moving = []
+        if slopes and self.inner:
+            if factors is None:
+                without = self.found(inner)
+                factors = {one.term: factor_of(without, self.place_of(one.term)) for one in self.inner}
+            moving = self._slopes(inner, factors)
+        motions = self._motions([*self._columns.samples(inner, repeated=not diagnose), *moving])
+        return _core.identify(
+            motions,
+            [*(one.kind for one in self._unknowns), *("constant" for _ in moving)],
+            self._form(),
+            delta=data.period,
+            lag=self._lags(),
+            quantisation=request.quantisation,
+            masks=data.masks,
+            propagate=data.propagate,
+            step=data.step,
+            diagnose=diagnose,
+            instrument=data.instruments,
+            workers=data.workers,
+            progress=report,
+        )
+
+    def place_of(self, name: str) -> int:
+        """Return the place of an unknown among those that were found, inner parameters last."""
+        return [*self._names, *(one.full_name for one in self.inner)].index(name)
+
+    @cached_property
+    def ranges(self) -> dict[str, Range]:
+        """Where inner parameters are searched."""
+        return {one.full_name: self._columns.range_of(one) for one in self.inner}
+
+    def frozen(self, found: Sequence[_core.Identification], inner: Mapping[str, Numbers]) -> Task:
+        """Return the same task with what was chosen; where something is windowed in windows of one length, which cost less."""
+        settings = plain(self._settings(found, Searched(inner)))
+        if not isinstance(self._request.form, StrongForm):
+            settings["averaging"] &= all(one.kind == "constant" for record in found for one in record.unknowns)
+        return self._replayed(settings, self._data)
+
+    def without(self, term: str) -> Task | None:
+        """Return the same task without a term; None where nothing would be left."""
+        if self._names == [term]:
+            return None
+        rest = [(one.own or one.name, one.kind) for one in self._terms if one.name != term]
+        return Task(self._data, replace(self._request, terms=rest))
+
+    def criterion(self, found: Sequence[_core.Identification], more: int) -> Numbers:
+        """Return the criterion of every record, with so many parameters more than the core knows of."""
+        linear = self._request.form.variation != "constant"
+        samples = np.isfinite(self._data.angles).sum(axis=-1).ravel()
+        scores = [criterion_of(one, int(n), more, linear=linear) for one, n in zip(found, samples, strict=True)]
+        return np.array(scores)
+
+    def _searched(self, report: Callable[[int, int], object] | None) -> Searched:
+        """Return inner parameters: those of an earlier result, or what a search finds."""
+        request, records = self._request, self._data.records
+        names = [one.full_name for one in self.inner]
+        if not names or not records:
+            return Searched({name: np.zeros(records) for name in names})
+        if not all(name in request.inner for name in names):
+            return search(self, report)
+
+        def each(name: str, value: Any) -> Numbers:
+            values = np.array(value if isinstance(value, list | tuple) else [value] * records)
+            if values.size != records:
+                raise ValueError(
+                    f"{name} must be one number, or one for each of the {records} records; got {values.size}; "
+                    "give settings of a result with as many records"
+                )
+            return values
+
+        earned = {one.term: each(one.term, request.earned.get(one.term, True)).astype(bool) for one in self.inner}
+        return Searched({name: each(name, request.inner[name]).astype(np.float64) for name in names}, earned=earned)
+
+    def _slopes(self, inner: Mapping[str, Numbers], factors: Mapping[str, Sequence[Numbers]]) -> list[Numbers]:
+        """Return what a unit more of each inner parameter does to the torque; nothing if one of them does nothing anywhere."""
+        slopes = []
+        for one in self.inner:
+            slope = self._columns.slope(one, secant(self.ranges[one.full_name], inner[one.full_name]), inner)
+            for record, factor in enumerate(factors[one.term]):
+                slope[record] *= np.repeat(factor, self._data.step)[: slope.shape[1]] if factor.size > 1 else factor
+            if not np.any(np.nan_to_num(slope)):
+                return []
+            slopes.append(slope.reshape(self._data.angles.shape))
+        return slopes
 
     # What leaves the range of doubles here is NaN or next to zero, whatever NumPy is told to do about it.
     @np.errstate(all="ignore")
-    def _result(self, found: Sequence[_core.Identification]) -> Identification:
+    def _result(self, found: Sequence[_core.Identification], searched: Searched) -> Identification:
         """Return the result of what the core found in every record."""
-        data, request = self._data, self._request
+        data = self._data
         known = {
             name: value if isinstance(value, float) else value[..., :: data.step] for name, value in self._known.items()
         }
-        batch = estimates(data.batch, self._names, found, known)
+        inner = [one.full_name for one in self.inner]
+        moving = inner if found and len(found[0].unknowns) > len(self._names) else []
+        names = [*self._names, *moving]
+        batch = estimates(data.batch, names, found, known)
+        if inner:
+            unknown = {name: one.unknown_error for name, one in self.ranges.items()}
+            earned = {one.full_name: searched.earned[one.term] for one in self.inner}
+            batch = with_inner(batch, searched.values, unknown, earned, data.time[:: data.step].size)
         if data.labels is not None:
             batch = replace(batch, labels=data.labels.at(slice(None, None, data.step)))
-        settings = self._settings(found)
-        explain: Any = self._words_of_strong_form if isinstance(request.form, StrongForm) else self._words_of_weak_form
-        explain = self._words_with_instrument if data.instruments is not None else explain
-        batch = replace(batch, units=self._units)
-        words: Any = partial(self._with_plausibility, explain(found, batch, settings), batch)
+        settings = self._settings(found, searched)
+        batch = replace(batch, units=data.units)
+        told = Told(data, self._request, self._unknowns, found, batch, settings)
+        words = told.words(names, self._found_by_search(searched, batch))
         if data.doubts:
-            batch, words = self._doubted(batch, words if isinstance(words, Words) else words())
+            batch = told.doubted()
         jumps = tuple(tuple(data.time[one.jumps].tolist()) for one in found)
         return Identification(
             batch,
@@ -189,45 +234,68 @@ class Task:
             request = replace(self._request, by_record={}, parameters={**self._request.parameters, **known}, lag=0.0)
             return Task(some_data, request)._recorded(own, of_records(found, place))  # noqa: SLF001 - of this class
 
+        inner = {name: np.ravel(value) for name, value in settings["inner"].items()}
         return Recorded(
             data.angles,
             data.torques,
-            own={term.name: term.own for term in self._terms if term.own is not None},
+            own={term.name: fixed(term.own, term, inner) for term in self._terms if term.own is not None},
             again=partial(self._again, settings),
             part=part if data.batch else None,
         )
 
-    def _doubted(self, batch: Estimates, words: Words) -> tuple[Estimates, Words]:
-        """Return estimates that are flagged where a channel leaves something open, and words that say what."""
-        data = self._data
-        flags = np.zeros(data.records, np.uint16)
-        flags[[record for record, _ in data.doubts]] = Status.CHANNEL_SUSPECTED
-        more: Any = flags.reshape(data.batch) if data.batch else Status(int(flags[0]))
-        lines = [f"record {record}: {line}" if data.batch else line for record, line in data.doubts]
-        flagged = replace(batch, record_status=batch.record_status | more)
-        each = list(words.each)
-        for record, line in data.doubts if each else ():
-            each[record] = replace(each[record], advice=(line, *each[record].advice))
-        return flagged, Words(words.reasons, (*lines, *words.advice), tuple(each))
+    def _found_by_search(self, searched: Searched, batch: Estimates) -> list[list[FoundBySearch]]:
+        """Return what was found of the inner parameters of every record."""
+        factors = {one.term: batch.values[one.term].reshape(self._data.records, -1) for one in self.inner}
+
+        def middle(values: Numbers) -> float:
+            there = values[np.isfinite(values)]
+            return float(np.median(there)) if there.size else float("nan")
+
+        return [
+            [
+                FoundBySearch(
+                    one,
+                    value=float(searched.values[one.full_name][record]),
+                    error=float(np.ravel(batch.constants[one.full_name][1])[record]),
+                    limits=self.ranges[one.full_name].of(record),
+                    factor=middle(factors[one.term][record]),
+                    **searched.of(one, record),
+                )
+                for one in self.inner
+            ]
+            for record in range(self._data.records)
+        ]
 
     def _again(self, settings: dict[str, Any], angles: npt.NDArray[np.number]) -> Identification:
         """Identify another angle with what was chosen; its missing values are left out."""
+        data = replace(self._data, angles=angles, propagate=False, step=1)
+        return self._replayed(settings, data).run(progress=None, diagnose=False)
+
+    def _replayed(self, settings: dict[str, Any], data: Data) -> Task:
+        """Return the task of other data with what was chosen."""
         given: dict[str, Any] = {name: value for name, value in self._known.items() if not isinstance(value, float)}
         if settings["own_terms"]:
             given["terms"] = [(term.own or term.name, settings["kinds"][term.name]) for term in self._terms]
         has_instrument = self._data.instruments is not None
         request = resolve("auto", given, settings, settings["sample_rate"], has_instrument=has_instrument)
-        return Task(replace(self._data, angles=angles, propagate=False, step=1), request).run(
-            progress=None, diagnose=False
-        )
+        return Task(data, request)
 
-    def _form(self) -> tuple[_core.WeakForm | _core.StrongForm, _core.LocalPolynomials | None]:
-        """Return the form as the core has it, and the polynomials that terms of the user's own need."""
-        form, own = self._request.form, any(term.own is not None for term in self._terms)
-        samples = self._data.time.size
+    @cached_property
+    def _columns(self) -> Columns:
+        """The terms, evaluated with the polynomials of the strong form, or with short ones."""
+        form, data = self._request.form, self._data
         if isinstance(form, StrongForm):
-            length = self._length("window_length", form.window_length, least=SHORTEST_WINDOW)
-            core_plan = self._plan(length, form)
+            core_plan = self._plan(self._length("window_length", form.window_length, least=SHORTEST_WINDOW), form)
+        else:
+            core_plan = self._plan(min(_WINDOW_OF_TERMS, (data.time.size - 1) // 2 * 2 + 1), StrongForm())
+        weak = not isinstance(form, StrongForm)
+        return Columns(self._terms, data.angles, data.time, data.period, core_plan, weak, data.workers)
+
+    def _form(self) -> _core.WeakForm | _core.StrongForm:
+        """Return the form as the core has it."""
+        form = self._request.form
+        if isinstance(form, StrongForm):
+            core_plan = self._plan(self._length("window_length", form.window_length, least=SHORTEST_WINDOW), form)
             rows = arguments.window_length("regression_window", form.regression_window, self._data.period, odd=False)
             if any(
                 one.kind in {"windowed", "varying"} or (one.name, one.kind) == ("stiffness", "auto")
@@ -235,7 +303,7 @@ class Task:
             ):
                 self._check_rows(rows)
             linear = form.variation == "linear"
-            return _core.StrongForm(core_plan, rows, filter_torque=form.filter_torque, linear=linear), core_plan
+            return _core.StrongForm(core_plan, rows, filter_torque=form.filter_torque, linear=linear)
         lengths = [
             None if value == "auto" else self._length("window_length", value, least=SHORTEST_TEST_FUNCTION)
             for value in self._each("window_length")
@@ -243,8 +311,7 @@ class Task:
         rows_of = [None if value == "auto" else self._rows(value) for value in self._each("regression_window")]
         exponents = [None if value == "auto" else int(exponent_of(value)) for value in self._each("exponent")]
         linear = form.variation != "constant"
-        weak = _core.WeakForm(lengths, exponents, rows_of, averaging=bool(form.averaging), linear=linear)
-        return weak, self._plan(min(_WINDOW_OF_TERMS, (samples - 1) // 2 * 2 + 1), StrongForm()) if own else None
+        return _core.WeakForm(lengths, exponents, rows_of, averaging=bool(form.averaging), linear=linear)
 
     def _each(self, name: str) -> Sequence[Any]:
         return self._request.each(name, self._data.records)
@@ -292,16 +359,11 @@ class Task:
             return list(found_earlier)
         return [None if late == "auto" else late / data.period for late in lags]
 
-    def _motions(self, core_plan: _core.LocalPolynomials | None) -> _core.Motions:
-        data = self._data
-        columns: list[npt.NDArray[np.number] | str] = [term.name for term in self._terms]
-        if core_plan is not None and any(term.own is not None for term in self._terms):
-            angle, velocity, _ = core_plan.estimate(data.angles, workers=data.workers).derivatives
-            columns = [term.own.values(data.time, angle, velocity) if term.own else term.name for term in self._terms]
+    def _motions(self, columns: list[npt.NDArray[np.number] | str]) -> _core.Motions:
         known = [self._known.get(name) for name in COEFFICIENTS]
-        return _core.Motions(data.angles, data.torques, known, columns)
+        return _core.Motions(self._data.angles, self._data.torques, known, columns)
 
-    def _settings(self, found: Sequence[_core.Identification]) -> dict[str, Any]:
+    def _settings(self, found: Sequence[_core.Identification], searched: Searched) -> dict[str, Any]:
         """Return inputs and choices."""
         request, data = self._request, self._data
 
@@ -347,53 +409,11 @@ class Task:
             "instrument": data.instruments is not None,
             "kinds": kinds,
             "terms": [[term.name, kinds[term.name]] for term in self._terms],
+            "inner": {name: by_record(value.tolist()) for name, value in searched.values.items()},
+            "earned": {name: by_record(value.tolist()) for name, value in searched.earned.items()},
             "own_terms": [term.name for term in self._terms if term.own is not None],
             "known": {name: value if isinstance(value, float) else None for name, value in self._known.items()},
             "sample_rate": 1 / data.period,
             "step": data.step,
             "chosen": chosen,
         }
-
-    def _words_with_instrument(
-        self, found: Sequence[_core.Identification], batch: Estimates, settings: dict[str, Any]
-    ) -> Words:
-        del batch, settings
-        each = [words_with_instrument(one) for one in found]
-        if not self._data.batch:
-            return each[0]
-        return of_batch(each)
-
-    def _words_of_weak_form(
-        self, found: Sequence[_core.Identification], batch: Estimates, settings: dict[str, Any]
-    ) -> Words:
-        del batch
-        tested = [one.name for one in self._unknowns if one.kind == "auto"]
-        variances = [one.noise[0] if one.noise else 0.0 for one in found]
-        coherences = _core.noise_coherence(self._data.angles, self._data.torques, variances)
-        each = [
-            Explained(
-                one, self._names, settings["chosen"], tested, self._data.period, self._data.step, coherence, self._units
-            ).words(method_chosen=self._request.chosen)
-            for one, coherence in zip(found, coherences, strict=True)
-        ]
-        if not self._data.batch:
-            return each[0]
-        return of_batch(each)
-
-    def _with_plausibility(self, words: Words | Callable[[], Words], batch: Estimates) -> Words:
-        """Return words, and before them what a wrong unit, a wrong sign or swapped channels make implausible."""
-        told = words if isinstance(words, Words) else words()
-        return Plausible(self._data.axis, self._data.period, self._names).before(told, self._data.angles, batch)
-
-    def _words_of_strong_form(
-        self, found: Sequence[_core.Identification], batch: Estimates, settings: dict[str, Any]
-    ) -> Callable[[], Words]:
-        mask, step = self._data.mask, self._data.step
-        explained = ExplainedStrong(
-            found=batch,
-            kinds={name: settings["kinds"][name] for name in self._names},
-            untested=[name for place, name in enumerate(self._names) if found[0].unknowns[place].untested],
-            settings=settings,
-            mask=None if mask is None else mask[..., ::step],
-        )
-        return explained.words

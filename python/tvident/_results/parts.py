@@ -83,8 +83,11 @@ def settings_of(
         if isinstance(own.get(name), list):
             picked = [own[name][record] for record in records]
             own[name] = picked[0] if alone and name != "lag_samples" else picked
+    for name in ("inner", "earned"):
+        parts = {key: [one[record] for record in records] for key, one in own[name].items()}
+        own[name] = {key: one[0] if alone else one for key, one in parts.items()}
     own["kinds"] = dict(own["kinds"])
-    for name, kind in kinds.items():
+    for name, kind in ((name, kind) for name, kind in kinds.items() if name in own["kinds"]):
         different = np.unique(kind)
         if different.size == 1:
             own["kinds"][name] = str(different[0])

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from tvident._equation import Term
+from tvident._equation import FixedTerm
 
 Numbers: TypeAlias = npt.NDArray[np.number]
 
@@ -24,8 +24,8 @@ class Recorded:
     Parameters
     ----------
     angles, torques : ndarray, shape (\*, n)
-    own : mapping of str to Term
-        Terms of the user's own.
+    own : mapping of str to FixedTerm
+        Terms of the user's own, with their inner parameters.
     again : callable
         Identifies once more, with the same settings and another angle.
     part : callable, optional
@@ -34,7 +34,7 @@ class Recorded:
 
     angles: Numbers
     torques: Numbers
-    own: Mapping[str, Term]
+    own: Mapping[str, FixedTerm]
     again: Callable[[Numbers], Any]
     part: Callable[[Any], Recorded] | None = None
     _mark: bytes = field(init=False, repr=False)

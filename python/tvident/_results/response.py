@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
-from tvident._equation import COEFFICIENTS, TERM_NAMES, Term
+from tvident._equation import COEFFICIENTS, TERM_NAMES, FixedTerm
 
 Array: TypeAlias = npt.NDArray[np.float64]
 Numbers: TypeAlias = npt.NDArray[np.number]
@@ -33,7 +33,7 @@ class Model:
     ----------
     values : mapping of str to ndarray
         Inertia, damping, stiffness and factors of terms: shape (\*, 1) if they are constant, (\*, n) otherwise.
-    own : mapping of str to Term
+    own : mapping of str to FixedTerm
         Terms of the user's own.
     period : float
         Seconds from one sample to the next.
@@ -43,14 +43,17 @@ class Model:
         Samples by which the torque of every record comes late.
     bridged : int
         Samples of the longest gap of a parameter that is bridged.
+    stribeck : sequence of float
+        The Stribeck velocity of every record, where there is one.
     """
 
     values: Mapping[str, Array]
-    own: Mapping[str, Term]
+    own: Mapping[str, FixedTerm]
     period: float
     start: float
     lags: Sequence[float]
     bridged: int
+    stribeck: Sequence[float] = ()
 
     @property
     def batch(self) -> tuple[int, ...]:
@@ -73,7 +76,9 @@ class Model:
             )
         if (self.values["inertia"] != 0).any():
             return
-        of_velocity = [name for name in ("coulomb", *self.own) if (self.values.get(name, np.zeros(1)) != 0).any()]
+        of_velocity = [
+            name for name in ("coulomb", "stribeck", *self.own) if (self.values.get(name, np.zeros(1)) != 0).any()
+        ]
         of_angle = [name for name in ("cubic", "gravity") if (self.values.get(name, np.zeros(1)) != 0).any()]
         if of_velocity or (of_angle and (self.values["damping"] == 0).all()):
             raise ValueError(
@@ -121,6 +126,7 @@ class Model:
             angle=how["angle"],
             initial=None if initial is None else initial.reshape(-1, 2).tolist(),
             spans=how["spans"],
+            stribeck=list(self.stribeck) or None,
         )
         lost = [(record, sample) for record, sample in enumerate(found.lost) if sample is not None]
         if lost:

@@ -57,7 +57,7 @@ class Identification(Simulated, Valued):
     terms : dict of str to ndarray, shape (\*, n)
         Factors of further terms.
     constants : dict of str to (value, stderr)
-        Parameters that are constant over the record.
+        Parameters that are constant over the record, and inner parameters of terms, as ``"stribeck.velocity"`` or ``"reflex.delay"``.
     stderr : mapping of str to ndarray, shape (\*, n)
         Standard errors of all of these, ``"natural_frequency"`` and ``"damping_ratio"`` (by the delta method, with all covariances). In
         weak form they contain the correlation of overlapping equations and changes that windows cannot follow. In strong form they are
@@ -236,6 +236,7 @@ class Identification(Simulated, Valued):
     def _table(self) -> Table:
         columns: dict[str, npt.NDArray[Any]] = {}
         values = {"inertia": self.inertia, "damping": self.damping, "stiffness": self.stiffness, **self.terms}
+        values |= {name: self._found.values[name] for name in self.settings["inner"]}
         values |= {"natural_frequency": self.natural_frequency, "damping_ratio": self.damping_ratio}
         for name, value in values.items():
             columns[name] = value

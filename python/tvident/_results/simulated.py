@@ -251,6 +251,7 @@ class Simulated:
             start=float(self.time[0]),
             lags=lag * records if len(lag) == 1 else lag,
             bridged=int(np.max(length)) if length else 0,
+            stribeck=np.ravel(s["inner"].get("stribeck.velocity", [])).tolist(),
         )
 
     def __getstate__(self) -> dict[str, Any]:

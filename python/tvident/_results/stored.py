@@ -80,7 +80,7 @@ def restored(path: str | Path) -> tuple[Estimates, dict[str, Any], npt.NDArray[n
 
 
 def _estimates(arrays: Arrays, facts: Mapping[str, Any]) -> Estimates:
-    names = [*COEFFICIENTS, *facts["terms"]]
+    names = [*COEFFICIENTS, *facts["terms"], *facts["settings"]["inner"]]
     factors = {name: np.asarray(factor, np.float64) for name, factor in facts["factors"].items()}
     errors = {name: arrays[f"{name}_stderr_before_factor" if name in factors else f"{name}_stderr"] for name in names}
     batch = arrays["status"].shape[:-1]

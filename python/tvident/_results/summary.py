@@ -56,6 +56,9 @@ def summary_of(result: Any) -> str:
         if kind not in {"windowed", "varying"}:
             shown[1] = shown[2] = ""
         cells.append((name, kind, *shown, result.units.get(name, "")))
+    for name in s["inner"]:
+        middle, spread = (float(np.nanmedian(one)) for one in result.constants[name])
+        cells.append((name, "searched", f"{middle:.5g}", "", "", f"{spread:.2g}", result.units.get(name, "")))
     lines += aligned(cells)
     for name, title in (("reasons", "what was chosen, and why"), ("advice", "what to do")):
         sentences = getattr(result, name)

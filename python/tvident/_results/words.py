@@ -15,6 +15,9 @@ class Words:
     each: tuple[Words, ...] = ()
     """The same of every record of a batch."""
 
+    def __add__(self, other: Words) -> Words:
+        return Words(self.reasons + other.reasons, self.advice + other.advice, self.each)
+
 
 def of_batch(each: Sequence[Words]) -> Words:
     """Return what there is to say of several records: advice alone, since reasons differ too much from one to the next."""

@@ -17,6 +17,7 @@ mod records;
 mod reserve;
 mod respond;
 mod rolling;
+mod sliding;
 mod watch;
 
 use pyo3::prelude::*;
@@ -46,6 +47,8 @@ mod _core {
     use crate::respond::{Responses, respond};
     #[pymodule_export]
     use crate::rolling::{RollingRegressions, rolling_least_squares};
+    #[pymodule_export]
+    use crate::sliding::sliding_velocity;
 
     /// Probability below which parts of a record differ by more than chance.
     #[pymodule_export]

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use tvident::equation::BuiltInTerm;
 use tvident::exec::workers as threads;
 use tvident::record::Samples;
-use tvident::response::{Begins, Factor, Span, System, respond as core_respond};
+use tvident::response::{Begins, Factor, Span, System, SystemTerm, respond as core_respond};
 
 use crate::arrays::zeros;
 use crate::records::{StridedSamples, records};
@@ -44,11 +44,30 @@ impl Held {
     }
 }
 
-/// Simulates every record of a torque. Coefficients and the factors of terms are numbers or arrays of the torque's shape. The state of each
+/// A term by its name; that with an inner parameter knows it of every record.
+enum Named {
+    BuiltIn(&'static BuiltInTerm),
+    Stribeck(Vec<f64>),
+}
+
+impl Named {
+    fn of(&self, record: usize) -> PyResult<SystemTerm> {
+        match self {
+            Self::BuiltIn(term) => Ok(SystemTerm::BuiltIn(term)),
+            Self::Stribeck(velocities) => match velocities.get(record) {
+                Some(&velocity) => Ok(SystemTerm::Stribeck { velocity }),
+                None => Err(PyValueError::new_err("every record needs a Stribeck velocity")),
+            },
+        }
+    }
+}
+
+/// Simulates every record of a torque. Coefficients and the factors of terms are numbers or arrays of the torque's shape. `stribeck` is the
+/// Stribeck velocity of every record, for the term of that name. The state of each
 /// record's beginning is given as angle and velocity in `initial`, or estimated from `angle`. `spans` are stretches that begin in a state of
 /// their own: first sample, end of what tells the state, end.
 #[pyfunction]
-#[pyo3(signature = (coefficients, terms, torque, *, delta, lag, bridged, angle=None, initial=None, spans=None, workers=None))]
+#[pyo3(signature = (coefficients, terms, torque, *, delta, lag, bridged, angle=None, initial=None, spans=None, stribeck=None, workers=None))]
 pub(crate) fn respond<'py>(
     py: Python<'py>,
     coefficients: [Bound<'py, PyAny>; 3],
@@ -60,13 +79,17 @@ pub(crate) fn respond<'py>(
     angle: Option<&Bound<'py, PyUntypedArray>>,
     initial: Option<Vec<[f64; 2]>>,
     spans: Option<Vec<[usize; 3]>>,
+    stribeck: Option<Vec<f64>>,
     workers: Option<NonZeroUsize>,
 ) -> PyResult<Responses> {
     let [inertia, damping, stiffness] = &coefficients;
     let held = [Held::new(inertia)?, Held::new(damping)?, Held::new(stiffness)?];
     let named = |(name, factor): &(String, Bound<'py, PyAny>)| {
-        let term = BuiltInTerm::named(name);
-        let term = term.ok_or_else(|| PyValueError::new_err(format!("no term is called {name:?}")))?;
+        let term = match (BuiltInTerm::named(name), &stribeck) {
+            (Some(term), _) => Named::BuiltIn(term),
+            (None, Some(velocities)) if name == "stribeck" => Named::Stribeck(velocities.clone()),
+            _ => return Err(PyValueError::new_err(format!("no term is called {name:?}"))),
+        };
         Ok((term, Held::new(factor)?))
     };
     let terms = terms.iter().map(named).collect::<PyResult<Vec<_>>>()?;
@@ -77,7 +100,10 @@ pub(crate) fn respond<'py>(
         let [inertia, damping, stiffness] = &held;
         let system = System {
             coefficients: [inertia.of(record)?, damping.of(record)?, stiffness.of(record)?],
-            terms: terms.iter().map(|(term, factor)| Ok((*term, factor.of(record)?))).collect::<PyResult<_>>()?,
+            terms: terms
+                .iter()
+                .map(|(term, factor)| Ok((term.of(record)?, factor.of(record)?)))
+                .collect::<PyResult<_>>()?,
             torque: one(&torques, record)?,
             lag: *lag.get(record).ok_or_else(|| PyValueError::new_err("every record needs a lag"))?,
             delta,

@@ -18,6 +18,7 @@ pub use instrumented::record::{InstrumentTest, WEAK_INSTRUMENT, identify_with_in
 pub use kinds::Kind;
 pub use options::{Method, Options, StrongForm, Task, WeakForm};
 pub use route::identify_all;
+pub use weak::friction::Sliding;
 pub use weak::lag::Lag;
 pub use weak::outside_mask::Outside;
 pub use weak::scanned::Scan;

@@ -110,7 +110,7 @@ impl<'a> Integrator<'a> {
             Derivatives::Second => x,
             Derivatives::First => {
                 let held: f64 =
-                    columns.of_angle.iter().map(|(function, factor)| here(factor) * at(*function, x[0])).sum();
+                    columns.of_angle.iter().map(|(function, factor)| here(factor) * function.at(x[0])).sum();
                 [x[0], (torque - here(stiffness) * x[0] - held) / here(damping)]
             }
             Derivatives::Static => [torque / here(stiffness), 0.0],
@@ -201,13 +201,13 @@ impl<'a> Integrator<'a> {
     /// What terms of the angle take of the torque.
     fn of_the_angle(&self, angle: f64) -> f64 {
         let terms = self.columns.of_angle.iter().zip(&self.of_angle);
-        terms.map(|((function, _), factor)| factor * at(*function, angle)).sum()
+        terms.map(|((function, _), factor)| factor * function.at(angle)).sum()
     }
 
     /// What terms of the velocity take of the torque.
     pub(crate) fn of_the_velocity(&self, velocity: f64) -> f64 {
         let terms = self.columns.of_velocity.iter().zip(&self.of_velocity);
-        terms.map(|((function, _), factor)| factor * at(*function, velocity)).sum()
+        terms.map(|((function, _), factor)| factor * function.at(velocity)).sum()
     }
 
     /// The torque at the beginning and the end of a part that stiffness and terms of the angle leave.
@@ -262,11 +262,4 @@ impl IntoEnd for [f64; 2] {
 
 fn sum(one: State, other: State) -> State {
     [one[0] + other[0], one[1] + other[1]]
-}
-
-/// A function of one value.
-fn at(function: fn(&mut [f64]), value: f64) -> f64 {
-    let mut values = [value];
-    function(&mut values);
-    values[0]
 }

@@ -9,4 +9,4 @@ pub(crate) mod system;
 pub(crate) mod transition;
 
 pub use spans::{Begins, Response, Span, respond};
-pub use system::{Factor, System};
+pub use system::{Factor, System, SystemTerm};

@@ -185,12 +185,14 @@ impl Responds for Simulation<'_> {
 mod tests {
     use super::*;
     use crate::equation::terms::BuiltInTerm;
-    use crate::response::system::Factor;
+    use crate::response::system::{Factor, SystemTerm};
 
     const DELTA: f64 = 0.01;
 
     fn system<'a>(torque: &'a dyn Samples, coefficients: [f64; 3], terms: &[(&str, f64)]) -> System<'a> {
-        let term = |&(name, factor): &(&str, f64)| (BuiltInTerm::named(name).unwrap(), Factor::Number(factor));
+        let term = |&(name, factor): &(&str, f64)| {
+            (SystemTerm::BuiltIn(BuiltInTerm::named(name).unwrap()), Factor::Number(factor))
+        };
         System {
             coefficients: coefficients.map(Factor::Number),
             terms: terms.iter().map(term).collect(),

@@ -1,6 +1,7 @@
 //! The system that is simulated: coefficients and terms with their factors, each constant or known at every sample.
 
 use crate::equation::terms::{BuiltInTerm, TermFunction, signs};
+use crate::record::derived::sign;
 use crate::record::samples::{Samples, read_around};
 use crate::response::gaps::bridge;
 
@@ -13,13 +14,25 @@ pub enum Factor<'a> {
     Record(&'a dyn Samples),
 }
 
+/// What a factor of a term is multiplied with.
+#[derive(Clone, Copy)]
+pub enum SystemTerm {
+    /// A term that has a name.
+    BuiltIn(&'static BuiltInTerm),
+    /// Friction that fades with the square of the velocity, over the Stribeck velocity's: `exp(-(v/vₛ)²) sign(v)`.
+    Stribeck {
+        /// The Stribeck velocity in rad/s.
+        velocity: f64,
+    },
+}
+
 /// One record to simulate: the equation of motion with every factor known, and the torque.
 #[derive(Clone)]
 pub struct System<'a> {
     /// Inertia, damping and stiffness.
     pub coefficients: [Factor<'a>; 3],
     /// Terms and their factors.
-    pub terms: Vec<(&'static BuiltInTerm, Factor<'a>)>,
+    pub terms: Vec<(SystemTerm, Factor<'a>)>,
     /// Samples of the torque, which is linear between them.
     pub torque: &'a dyn Samples,
     /// Samples by which the torque comes late.
@@ -30,8 +43,31 @@ pub struct System<'a> {
     pub bridged: usize,
 }
 
-/// A function that is applied in place, and its factor: one value, or one a sample.
-type Nonlinear = (fn(&mut [f64]), Vec<f64>);
+/// A function of the angle or of the velocity.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Shape {
+    /// Applied in place.
+    Named(fn(&mut [f64])),
+    /// With the Stribeck velocity.
+    Stribeck(f64),
+}
+
+impl Shape {
+    /// The function of one value.
+    pub(crate) fn at(self, value: f64) -> f64 {
+        match self {
+            Self::Named(function) => {
+                let mut values = [value];
+                function(&mut values);
+                values[0]
+            }
+            Self::Stribeck(velocity) => sign(value) * (-(value / velocity).powi(2)).exp(),
+        }
+    }
+}
+
+/// A function and its factor: one value, or one a sample.
+type Nonlinear = (Shape, Vec<f64>);
 
 /// The numbers of a system, in memory.
 #[derive(Clone, Debug)]
@@ -81,14 +117,21 @@ impl KnownSystem {
             if factor == [0.0] {
                 continue;
             }
-            match term.function {
+            let function = match term {
+                SystemTerm::Stribeck { velocity } => {
+                    columns.of_velocity.push((Shape::Stribeck(*velocity), factor));
+                    continue;
+                }
+                SystemTerm::BuiltIn(term) => term.function,
+            };
+            match function {
                 TermFunction::One => {
                     let torque = columns.torque.iter_mut().enumerate();
                     torque.for_each(|(sample, torque)| *torque -= factor.get(sample).unwrap_or(&factor[0]));
                 }
-                TermFunction::OfAngle(function) => columns.of_angle.push((function, factor)),
-                TermFunction::OfVelocity(function) => columns.of_velocity.push((function, factor)),
-                TermFunction::Direction => columns.of_velocity.push((signs, factor)),
+                TermFunction::OfAngle(function) => columns.of_angle.push((Shape::Named(function), factor)),
+                TermFunction::OfVelocity(function) => columns.of_velocity.push((Shape::Named(function), factor)),
+                TermFunction::Direction => columns.of_velocity.push((Shape::Named(signs), factor)),
             }
         }
         columns
@@ -128,6 +171,14 @@ fn late(torque: &dyn Samples, lag: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn stribeck_friction_fades_with_the_velocity() {
+        let shape = Shape::Stribeck(2.0);
+        assert_eq!(shape.at(0.0), 0.0);
+        assert!((shape.at(2.0) - (-1.0_f64).exp()).abs() < 1e-15 && shape.at(-2.0) == -shape.at(2.0));
+        assert!((shape.at(f64::MIN_POSITIVE) - 1.0).abs() < 1e-15);
+    }
 
     #[test]
     fn a_torque_that_comes_late_is_moved_back() {

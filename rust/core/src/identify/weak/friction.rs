@@ -32,6 +32,44 @@ const LONGER_THAN_PASSING: f64 = 10.0;
 /// Where less than this part of the record moves, rest is what the record is about.
 const LEAST_MOTION: f64 = 0.05;
 
+/// The velocity of a record as friction needs it.
+pub struct Sliding {
+    /// The velocity at every sample in rad/s; NaN at rest, where friction may be anything up to its limit.
+    pub velocity: Vec<f64>,
+    /// Its standard errors.
+    pub errors: Vec<f64>,
+}
+
+impl Sliding {
+    /// The velocity of an angle that is sampled every `delta` seconds.
+    ///
+    /// # Errors
+    /// If a window does not fit, or the watch cancels.
+    pub fn of(
+        angle: &dyn Samples,
+        (delta, instructions): (f64, Instructions),
+        workers: NonZeroUsize,
+        watch: &mut Watch<'_>,
+    ) -> Result<Self, Error> {
+        let ([mut velocity, errors], rests) = velocity_and_rest(angle, (delta, instructions), workers, watch)?;
+        velocity.iter_mut().zip(&rests).filter(|(_, rests)| **rests).for_each(|(velocity, _)| *velocity = f64::NAN);
+        Ok(Self { velocity, errors })
+    }
+}
+
+/// Velocity and its errors at every sample, and where a machine rests.
+fn velocity_and_rest(
+    angle: &dyn Samples,
+    (delta, instructions): (f64, Instructions),
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<([Vec<f64>; 2], Vec<bool>), Error> {
+    let window = 2 * half_window(angle, (delta, instructions)) + 1;
+    let both = velocity(angle, window, (delta, instructions), (workers, watch))?;
+    let rests = resting(&both[0], &both[1], window, delta);
+    Ok((both, rests))
+}
+
 /// What friction feels of a record.
 pub(crate) struct FrictionDirection {
     /// The velocity at every sample; empty where no term needs it.
@@ -57,9 +95,7 @@ impl FrictionDirection {
         if !motion.terms.iter().any(of_velocity) {
             return Ok(Self { velocity: Vec::new(), direction: Vec::new(), resting: 0.0 });
         }
-        let window = 2 * half_window(motion.angle, (delta, instructions)) + 1;
-        let [velocity, errors] = velocity(motion.angle, window, (delta, instructions), (workers, watch))?;
-        let rests = resting(&velocity, &errors, window, delta);
+        let ([velocity, errors], rests) = velocity_and_rest(motion.angle, (delta, instructions), workers, watch)?;
         let direction = velocity
             .iter()
             .zip(&errors)

@@ -1,0 +1,74 @@
+"""Records, and what is to be done with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident._equation import LINEAR_UNITS, UNITS
+from tvident._units import ROTARY, Axis
+
+
+@dataclass(frozen=True)
+class Data:
+    r"""Records, and what is to be done with them.
+
+    Parameters
+    ----------
+    angles, torques : ndarray, shape (\\*, n)
+    instruments : ndarray, shape (\\*, n), optional
+    time : ndarray, shape (n,)
+    period : float
+        Seconds from one sample to the next.
+    mask : ndarray of bool, shape (\\*, n), optional
+    propagate : bool
+        Missing values make windows that hold one missing.
+    step : int
+        Every how many samples a result is wanted.
+    workers : int, optional
+    doubts : sequence of (int, str)
+        What cannot be known of the channels, and of which record.
+    labels : Labels, optional
+        What the angle came with: an index, coordinates.
+    axis : Axis, optional
+        What the channels were measured in.
+    """
+
+    angles: npt.NDArray[np.number]
+    torques: npt.NDArray[np.number]
+    instruments: npt.NDArray[np.number] | None
+    time: npt.NDArray[np.float64]
+    period: float
+    mask: npt.NDArray[np.bool_] | None
+    propagate: bool
+    step: int
+    workers: int | None
+    doubts: Sequence[tuple[int, str]] = ()
+    labels: arguments.Labels | None = None
+    axis: Axis = field(default_factory=Axis)
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        """Shape of the batch; empty for a single record."""
+        return self.angles.shape[:-1]
+
+    @property
+    def masks(self) -> list[npt.NDArray[np.bool_]] | None:
+        """The mask of every record, or None without one."""
+        if self.mask is None:
+            return None
+        return [np.ascontiguousarray(one) for one in self.mask.reshape(-1, self.time.size)]
+
+    @property
+    def records(self) -> int:
+        """How many records there are."""
+        return int(np.prod(self.batch, dtype=int))
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units of results."""
+        return UNITS if self.axis.system is ROTARY else LINEAR_UNITS

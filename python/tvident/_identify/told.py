@@ -1,0 +1,125 @@
+"""What an identification says of itself in words, and what it doubts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _core
+from tvident._advice import Explained, ExplainedStrong, FoundBySearch, Plausible, words_of_search, words_with_instrument
+from tvident._equation import Unknown
+from tvident._identify.data import Data
+from tvident._identify.methods import StrongForm
+from tvident._identify.settings import Request
+from tvident._results import Estimates, Words, of_batch
+from tvident._status import Status
+
+
+@dataclass(frozen=True)
+class Told:
+    """What was found in some records.
+
+    Parameters
+    ----------
+    data : Data
+    request : Request
+    unknowns : sequence of Unknown
+        Those of the equation, without what a search found.
+    found : sequence of _core.Identification
+    batch : Estimates
+    settings : mapping
+    """
+
+    data: Data
+    request: Request
+    unknowns: Sequence[Unknown]
+    found: Sequence[_core.Identification]
+    batch: Estimates
+    settings: Mapping[str, Any]
+
+    def words(self, names: Sequence[str], searched: Sequence[Sequence[FoundBySearch]]) -> Words | Callable[[], Words]:
+        """Return reasons and advice; of several records the advice, since reasons differ too much from one to the next.
+
+        Parameters
+        ----------
+        names : sequence of str
+            What the core's unknowns are called.
+        searched : sequence of sequence
+            Inner parameters of every record.
+        """
+        data, several = self.data, bool(self.data.batch)
+        plausible = Plausible(data.axis, data.period, [one.name for one in self.unknowns])
+        more = [words_of_search(terms) for terms in searched]
+        if isinstance(self.request.form, StrongForm) and data.instruments is None:
+            # What to say takes longer than to identify a short record, so it waits until it is asked for.
+            later = partial(_later, self._of_strong_form(), plausible, data.angles, self.batch, more)
+            if not data.doubts:
+                return later
+            words = later()
+        else:
+            each = [one + search for one, search in zip(self._of_records(names), more, strict=True)]
+            words = plausible.before(of_batch(each) if several else each[0], data.angles, self.batch)
+        return _with_doubts(words, data.doubts, several=several)
+
+    def doubted(self) -> Estimates:
+        """Return the estimates, flagged where a channel leaves something open."""
+        data = self.data
+        flags = np.zeros(data.records, np.uint16)
+        flags[[record for record, _ in data.doubts]] = Status.CHANNEL_SUSPECTED
+        more: Any = flags.reshape(data.batch) if data.batch else Status(int(flags[0]))
+        return replace(self.batch, record_status=self.batch.record_status | more)
+
+    def _of_records(self, names: Sequence[str]) -> list[Words]:
+        """Return what there is to say of each record in weak form, or with an instrument."""
+        data = self.data
+        if data.instruments is not None:
+            return [words_with_instrument(one) for one in self.found]
+        tested = [one.name for one in self.unknowns if one.kind == "auto"]
+        variances = [one.noise[0] if one.noise else 0.0 for one in self.found]
+        coherences = _core.noise_coherence(data.angles, data.torques, variances)
+        return [
+            Explained(one, names, self.settings["chosen"], tested, data.period, data.step, coherence, data.units).words(
+                method_chosen=self.request.chosen
+            )
+            for one, coherence in zip(self.found, coherences, strict=True)
+        ]
+
+    def _of_strong_form(self) -> ExplainedStrong:
+        mask, step = self.data.mask, self.data.step
+        names = [one.name for one in self.unknowns]
+        return ExplainedStrong(
+            found=self.batch,
+            kinds={name: self.settings["kinds"][name] for name in names},
+            untested=[name for place, name in enumerate(names) if self.found[0].unknowns[place].untested],
+            settings=self.settings,
+            mask=None if mask is None else mask[..., ::step],
+        )
+
+
+def _later(
+    explained: ExplainedStrong,
+    plausible: Plausible,
+    angles: npt.NDArray[np.number],
+    batch: Estimates,
+    more: Sequence[Words],
+) -> Words:
+    """Return what there is to say of the strong form, and of what was searched."""
+    words = explained.words()
+    more_lines = of_batch(more) if batch.status.ndim > 1 else more[0]
+    return plausible.before(replace(words + more_lines, each=words.each), angles, batch)
+
+
+def _with_doubts(words: Words, doubts: Sequence[tuple[int, str]], *, several: bool) -> Words:
+    """Return words that begin with what cannot be known of the channels."""
+    if not doubts:
+        return words
+    lines = [f"record {record}: {line}" if several else line for record, line in doubts]
+    each = list(words.each)
+    for record, line in doubts if each else ():
+        each[record] = replace(each[record], advice=(line, *each[record].advice))
+    return Words(words.reasons, (*lines, *words.advice), tuple(each))
