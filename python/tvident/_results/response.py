@@ -126,7 +126,7 @@ class Model:
             angle=how["angle"],
             initial=None if initial is None else initial.reshape(-1, 2).tolist(),
             spans=how["spans"],
-            stribeck=list(self.stribeck) or None,
+            **({"stribeck": list(self.stribeck)} if "stribeck" in values else {}),
         )
         lost = [(record, sample) for record, sample in enumerate(found.lost) if sample is not None]
         if lost:
