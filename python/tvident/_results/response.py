@@ -116,6 +116,7 @@ class Model:
             return np.broadcast_to(value, shape)
 
         initial = how["initial"]
+        velocities: dict[str, Any] = {"stribeck": list(self.stribeck)} if "stribeck" in values else {}
         found = _core.respond(
             [factor(name) for name in COEFFICIENTS],
             [(name, factor(name)) for name in values if name in TERM_NAMES],
@@ -126,7 +127,7 @@ class Model:
             angle=how["angle"],
             initial=None if initial is None else initial.reshape(-1, 2).tolist(),
             spans=how["spans"],
-            **({"stribeck": list(self.stribeck)} if "stribeck" in values else {}),
+            **velocities,
         )
         lost = [(record, sample) for record, sample in enumerate(found.lost) if sample is not None]
         if lost:
