@@ -1,8 +1,8 @@
 """Measure the README's first table and draw its first picture: ``make docs``.
 
 One simulated rig whose stiffness is known, recorded with an encoder that is nearly perfect and with noise of 1 % in the angle, and what
-one may do to find K(t): 15 lines of SciPy, the paper's settings, a spline whose settings are the best for the true stiffness,
-which nobody knows outside a simulation, and tvident without any setting. ``python docs/comparison.py tune`` looks for the spline's settings again.
+one may do to find K(t): 15 lines of SciPy, the paper's settings, a spline whose settings are the best for the true stiffness, which nobody
+knows outside a simulation, and tvident without any setting. ``python docs/comparison.py tune`` looks for the spline's settings again.
 """
 
 from __future__ import annotations
