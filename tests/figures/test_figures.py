@@ -141,6 +141,16 @@ def test_a_spike_neither_hides_the_band_nor_is_lost(rig: tvident.Recording) -> N
     assert np.ptp(band[there, 1]) > widest
 
 
+def test_a_file_is_drawn_with_its_units(rig: tvident.Recording) -> None:
+    channels = {"time [ms]": 1000 * rig.time, "angle [deg]": np.degrees(rig.angle)}
+    recording = tvident.FileRecording(channels)
+    (drawn,) = figures.plot_recording(recording).axes
+    assert [drawn.get_title(loc="left"), drawn.get_ylabel()] == ["Angle", "deg"]
+    assert np.asarray(drawn.get_lines()[0].get_xdata(), float)[-1] == pytest.approx(rig.time[-1])
+    with pytest.raises(ValueError, match="a recording needs its time; got sample_rate=None; give sample_rate="):
+        figures.plot_recording({"angle": rig.angle})
+
+
 def test_every_picture_draws_on_axes_of_ones_own(
     rig: tvident.Recording, result: tvident.Identification, paper: tvident.Identification
 ) -> None:

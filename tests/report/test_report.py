@@ -135,8 +135,16 @@ def test_the_command_shows_every_channel_of_the_file(tmp_path: Path, monkeypatch
     assert done.exit_code == 0, done.output
     assert done.output.endswith("Written: page.html\n")
     text = Path("page.html").read_text(encoding="utf-8")
-    for name in ("Angle", "Torque", "slider_position", "Stiffness K", "Status over time"):
-        assert f'"title": "{name}"' in text
+    for name in (
+        "Angle",
+        "Torque",
+        "slider_position",
+        "Stiffness K",
+        "Torque, averaged over the test function",
+        "Status over time",
+    ):
+        assert text.count(f'"title": "{name}"') == 1
+    assert '"title": "angle"' not in text
     for output, message in (("page.pdf", "-o must end in .html"), ("no/page.html", "there is no such folder")):
         refused = CliRunner().invoke(main, [*call, "-o", output])
         assert refused.exit_code in {1, 2}

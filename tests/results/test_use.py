@@ -16,7 +16,7 @@ from numpy.testing import assert_array_equal
 import tvident
 from calls import paper, strong
 from tvident import recordings
-from tvident._results.digits import with_error
+from tvident._arguments import with_error
 
 xr = pytest.importorskip("xarray")
 

@@ -3,6 +3,7 @@
 from tvident._arguments.arrays import NanPolicy, RowPolicy, along_axis, any_array, check_nan, mask, real_array
 from tvident._arguments.channels import as_record, channel, channels
 from tvident._arguments.containers import fields_of, is_table, package_of, plain, time_axis
+from tvident._arguments.digits import percent, to_digits_of, with_error
 from tvident._arguments.labels import Labels, labels_in, labels_of, labels_out
 from tvident._arguments.numbers import (
     LARGEST,
@@ -16,7 +17,7 @@ from tvident._arguments.numbers import (
 )
 from tvident._arguments.progress import Progress, reporter
 from tvident._arguments.sampling import check_power, check_window, length_given, sample_period, seconds, window_length
-from tvident._arguments.shown import shown, with_error
+from tvident._arguments.shown import shown
 from tvident._arguments.times import begin_of, implied_times, times_of
 from tvident._arguments.workers import worker_count
 from tvident._arguments.wrapped import Unwrapped, unwrapped
@@ -50,6 +51,7 @@ __all__ = [
     "mask",
     "one_of",
     "package_of",
+    "percent",
     "plain",
     "positive_number",
     "real_array",
@@ -60,6 +62,7 @@ __all__ = [
     "shown",
     "time_axis",
     "times_of",
+    "to_digits_of",
     "unwrapped",
     "whole_number",
     "window_length",

@@ -12,7 +12,7 @@ from tvident._command_line.channels import source_of
 from tvident._command_line.group import main
 from tvident._command_line.identification import IDENTIFICATION, identified, inputs
 from tvident._command_line.options import REPORT, WORK, check_outputs
-from tvident._files import printable
+from tvident._files import full_name, printable
 
 _MOST_CHANNELS = 40
 """Of a file that are shown beside angle and torque: the first ones."""
@@ -42,15 +42,23 @@ def report(file: str | None, output: str, **options: Any) -> None:
     check_outputs({REPORT: output}, inputs(file, options))
     channels = {} if file is None else recordings.read(file)
     result = identified(channels, file, **options)
-    names = [options[name] for name in ("angle", "torque", "time_channel") if options[name] is not None]
-    shown = [source_of(channels, name, file) for name in names]
-    others = {
-        name: values
-        for name, values in channels.items()
-        if values.shape == shown[0].shape and not any(values is one for one in shown)
+    used = {
+        full_name(channels, options[name], "")
+        for name in ("angle", "torque", "time_channel")
+        if _is_in(channels, options[name])
     }
+    samples = source_of(channels, options["angle"], file).shape
+    others = {name: values for name, values in channels.items() if values.shape == samples and name not in used}
     for name in list(others)[_MOST_CHANNELS:]:
         del others[name]
     result.report(output, channels=others, title=None if file is None else Path(file).name)
     click.echo(result.summary())
     click.echo(f"\nWritten: {printable(output)}")
+
+
+def _is_in(channels: recordings.Channels, name: str | None) -> bool:
+    """Return whether a name is that of a channel, and not of a file of its own."""
+    try:
+        return name is not None and bool(full_name(channels, name, ""))
+    except KeyError:
+        return False

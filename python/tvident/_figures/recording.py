@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from tvident._figures.style import FOUND, MUTED, Place, draw_line, panels, plain, style
 from tvident._simulate import Recording
+from tvident._units import Channel, named_unit, times_in_seconds, unit_said, with_unit
 
 
 def plot_recording(
@@ -24,8 +25,8 @@ def plot_recording(
     Parameters
     ----------
     recording : Recording or mapping of str to array_like, shape (n,)
-        From :func:`tvident.simulate_torsional_rig`, or channels by name; a unit may follow the name in brackets, and a channel ``time``
-        gives seconds.
+        From :func:`tvident.simulate_torsional_rig` or :func:`tvident.read_recording`, or channels by name; a unit may follow the name in
+        brackets, and a channel ``time`` says when.
     sample_rate : float, optional
         Samples per second of channels without time.
     ax : Axes or sequence of Axes, optional
@@ -65,15 +66,16 @@ def plot_recording(
             "angle [rad]": recording.angle,
         }
     else:
-        channels = {name: np.asarray(values) for name, values in recording.items()}
+        named = {with_unit(name, "" if named_unit(name)[1] else unit_said(one)): one for name, one in recording.items()}
+        channels = {name: np.asarray(values) for name, values in named.items() if np.ndim(values)}
         time = _time(channels, sample_rate)
     with style():
         figure, axes = panels(ax, [1.6] * len(channels), width=8.0)
         for number, (panel, (name, values)) in enumerate(zip(axes, channels.items(), strict=True)):
-            title, _, unit = name.partition("[")
+            title, unit = named_unit(name)
             draw_line(panel, time, values, color=FOUND if number == len(channels) - 1 else MUTED, linewidth=0.9)
-            panel.set_title(plain(title.strip().capitalize()))
-            panel.set_ylabel(plain(unit.rstrip("] ")))
+            panel.set_title(plain(title[:1].upper() + title[1:]))
+            panel.set_ylabel(plain(unit))
             panel.yaxis.set_major_locator(MaxNLocator(4))
             panel.margins(x=0)
         axes[-1].set_xlabel("time (s)")
@@ -84,8 +86,10 @@ def plot_recording(
 
 def _time(channels: dict[str, npt.NDArray[Any]], sample_rate: float | None) -> npt.NDArray[np.float64]:
     """Take the time out of channels, or make it."""
-    named = [name for name in channels if name.partition("[")[0].strip().lower() == "time"]
-    time = channels.pop(named[0]) if named else None
+    named = [name for name in channels if named_unit(name)[0].strip().lower() == "time"]
+    time = None
+    if named:
+        time = np.asarray(times_in_seconds(Channel(channels.pop(named[0]), named_unit(named[0])[1])))
     sizes = {values.shape for values in channels.values()}
     if len(sizes) != 1 or len(next(iter(sizes))) != 1:
         raise ValueError(f"channels must be single records of one length; got shapes {sorted(sizes)}; cut them")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Protocol, TypeAlias
 
@@ -69,69 +69,19 @@ def unit_of(name: str, units: Mapping[str, str]) -> str:
     return "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³").replace(" ", "·")
 
 
-def content_of(result: Reported, recorded: list[Series], title: str) -> tuple[dict[str, Any], list[Series]]:
+def content_of(
+    result: Reported, recorded: list[Series], compared: Sequence[Array], title: str
+) -> tuple[dict[str, Any], list[Series]]:
     """Return what a page says, plain JSON, and the series of its plots; plots name them by number."""
-    series = list(recorded)
-    charts: list[dict[str, Any]] = [
-        {"group": "Recorded", "title": one.name, "unit": one.unit, "line": number}
-        for number, one in enumerate(recorded)
-    ]
+    drawn = _Drawn(result, list(recorded))
     values = _values(result)
-    period = float(result.settings["step"]) / float(result.settings["sample_rate"])
-    start = float(result.time[0]) if result.time.size else 0.0
-
-    def add(name: str, unit: str, numbers: npt.NDArray[Any]) -> int:
-        series.append(Series(name, unit, numbers, start, period))
-        return len(series) - 1
-
-    flagged = result.status & _worth_a_look(result) != 0
-    shade = add("flagged", "", flagged.view(np.uint8)) if flagged.any() else None
-    changing = [name for name in values if name not in result.constants and _is_unknown(result, name)]
-    if changing:
-        changing += ["natural_frequency", "damping_ratio"]
-    for name in changing:
-        found, error = (
-            (values[name] if name in values else getattr(result, name)),
-            result.stderr[name],
-        )
-        if not np.isfinite(found).any():
-            continue
-        with np.errstate(all="ignore"):
-            reach = [add(name, unit_of(name, result.units), found + sign * 2 * error) for sign in (-1, 1)]
-        charts.append(
-            {
-                "group": "Found",
-                "title": title_of(name),
-                "unit": unit_of(name, result.units),
-                "line": add(name, unit_of(name, result.units), found),
-                "band": reach,
-                "shade": shade,
-                "robust": True,
-            }
-        )
-    quality = {
-        "residual_std": "Residual of the torque, standard deviation",
-        "condition": "Condition number of the equations",
-    }
-    if result.order.any():
-        quality["order"] = "Order of the polynomial"
-    for name, words in quality.items():
-        numbers = np.asarray(getattr(result, name))
-        if np.isfinite(numbers).any() and np.nanmin(numbers) < np.nanmax(numbers):
-            chart = {
-                "group": "How well",
-                "title": words,
-                "unit": unit_of(name, result.units),
-                "line": add(name, unit_of(name, result.units), numbers),
-            }
-            charts.append(chart | {"shade": shade, "robust": name != "order"})
+    drawn.recorded()
+    drawn.found(values)
+    drawn.compared(compared)
+    drawn.quality()
     marks = _flags_over_time(result)
-    strips = [
-        {"flag": flag.name, "series": add(str(flag.name), "", mark.view(np.uint8))} for flag, mark in marks.items()
-    ]
-    if strips:
-        charts.append({"group": "How well", "title": "Status over time", "unit": "", "strips": strips})
-    words = result.summary()
+    drawn.status(marks)
+    series, words = drawn.series, result.summary()
     end = max([one.start + max(0, one.values.size - 1) * one.period for one in series], default=0.0)
     content = {
         "title": title,
@@ -146,10 +96,92 @@ def content_of(result: Reported, recorded: list[Series], title: str) -> tuple[di
         "settings": _settings(result),
         "repeat": json.dumps(result.settings, indent=1),
         "summary": words,
-        "charts": charts,
+        "charts": drawn.charts,
         "version": _version(),
     }
     return content, series
+
+
+class _Drawn:
+    """Collects what is drawn: series, and plots that name them by number."""
+
+    def __init__(self, result: Reported, series: list[Series]) -> None:
+        self.result = result
+        self.series = series
+        self.charts: list[dict[str, Any]] = []
+        self.rate = float(result.settings["sample_rate"])
+        self.start = float(result.time[0]) if result.time.size else 0.0
+        flagged = result.status & _worth_a_look(result) != 0
+        self.shade: int | None = None
+        self._flagged = flagged if flagged.any() else None
+
+    def recorded(self) -> None:
+        """Draw the channels."""
+        for number, one in enumerate(self.series):
+            self.charts.append({"group": "Recorded", "title": one.name, "unit": one.unit, "line": number})
+        if self._flagged is not None:
+            self.shade = self._add("flagged", "", self._flagged.view(np.uint8))
+
+    def found(self, values: Mapping[str, Array]) -> None:
+        """Draw what changes, with bands of two standard errors."""
+        result = self.result
+        changing = [name for name in values if name not in result.constants and _is_unknown(result, name)]
+        if changing:
+            changing += ["natural_frequency", "damping_ratio"]
+        for name in changing:
+            found, error = values[name] if name in values else getattr(result, name), result.stderr[name]
+            if not np.isfinite(found).any():
+                continue
+            unit = unit_of(name, result.units)
+            with np.errstate(all="ignore"):
+                band = [self._add(name, unit, found + sign * 2 * error) for sign in (-1, 1)]
+            self._draw("Found", title_of(name), unit, line=self._add(name, unit, found), band=band, robust=True)
+
+    def compared(self, torques: Sequence[Array]) -> None:
+        """Draw the recorded torque, the predicted one, and what is left."""
+        if not torques or not np.isfinite(torques[1]).any():
+            return
+        unit = unit_of("torque", self.result.units)
+        names = ("recorded", "predicted", "left")
+        numbers = [
+            self._add(name, unit, one, every_sample=True)
+            for name, one in zip(names, (*torques, torques[0] - torques[1]), strict=True)
+        ]
+        weak = self.result.settings["form"] == "weak"
+        words = "Torque, averaged over the test function" if weak else "Torque and its prediction"
+        self._draw("How well", words, unit, line=numbers[0], second=numbers[1], robust=True)
+        self._draw("How well", "Torque less what is predicted from the angle", unit, line=numbers[2], robust=True)
+
+    def quality(self) -> None:
+        """Draw residuals, condition and order where they change."""
+        words = {
+            "residual_std": "Residual of the torque, standard deviation",
+            "condition": "Condition number of the equations",
+        }
+        if self.result.order.any():
+            words["order"] = "Order of the polynomial"
+        for name, title in words.items():
+            numbers = np.asarray(getattr(self.result, name))
+            if np.isfinite(numbers).any() and np.nanmin(numbers) < np.nanmax(numbers):
+                unit = unit_of(name, self.result.units)
+                self._draw("How well", title, unit, line=self._add(name, unit, numbers), robust=name != "order")
+
+    def status(self, marks: Mapping[Status, npt.NDArray[np.bool_]]) -> None:
+        """Draw where each flag is set."""
+        strips = [
+            {"flag": flag.name, "series": self._add(str(flag.name), "", mark.view(np.uint8))}
+            for flag, mark in marks.items()
+        ]
+        if strips:
+            self.charts.append({"group": "How well", "title": "Status over time", "unit": "", "strips": strips})
+
+    def _add(self, name: str, unit: str, values: npt.NDArray[Any], *, every_sample: bool = False) -> int:
+        period = (1 if every_sample else int(self.result.settings["step"])) / self.rate
+        self.series.append(Series(name, unit, values, self.start, period))
+        return len(self.series) - 1
+
+    def _draw(self, group: str, title: str, unit: str, **what: Any) -> None:
+        self.charts.append({"group": group, "title": title, "unit": unit, "shade": self.shade} | what)
 
 
 def title_of(name: str) -> str:

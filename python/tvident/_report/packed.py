@@ -10,7 +10,7 @@ from __future__ import annotations
 import base64
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -29,6 +29,9 @@ _FINE_VALUES = 6_000_000
 
 _MOST_BYTES = 16_950_000
 """Of all series, packed. As text that is 22.6 MB, which leaves room for plotly in 25 MB."""
+
+_SHRINK = 64
+"""What is computed from channels is made so many times smaller than these before they lose samples themselves."""
 
 _CHUNK = 4096
 """Blocks that are worked on together: what they need stays in the cache."""
@@ -51,6 +54,8 @@ class Series:
         What is not finite is missing.
     start, period : float
         Time of the first number, and from one to the next, in seconds.
+    is_recorded : bool
+        Whether it is a channel: where not all fits, its samples stay longest.
     """
 
     name: str
@@ -58,6 +63,7 @@ class Series:
     values: npt.NDArray[Any]
     start: float
     period: float
+    is_recorded: bool = False
 
 
 @dataclass(frozen=True)
@@ -85,7 +91,9 @@ def packed(series: Sequence[Series], most_bytes: int = _MOST_BYTES) -> list[Pack
     sizes = [one.values.size * (cost / 8 + 8 / BLOCK) for one, cost in zip(reduced, bits, strict=True)]
     merged = [1] * len(sizes)
     while sum(sizes) > most_bytes:
-        largest = int(np.argmax(sizes))
+        largest = int(
+            np.argmax([size if one.is_recorded else _SHRINK * size for one, size in zip(series, sizes, strict=True)])
+        )
         # Two numbers stand for four samples at first, and for twice as many each time.
         merged[largest] = max(4, 2 * merged[largest])
         sizes[largest] /= 2
@@ -102,7 +110,7 @@ def _of_extremes(series: Series, every: int) -> Series:
     whole[: series.values.size] = series.values
     rows = whole.reshape(count, every)
     pairs = np.stack([np.fmin.reduce(rows, axis=1), np.fmax.reduce(rows, axis=1)], axis=1).ravel()
-    return Series(series.name, series.unit, pairs, series.start, series.period * every / 2)
+    return replace(series, values=pairs, period=series.period * every / 2)
 
 
 def _blocks(series: Series, first: int, last: int) -> Array:

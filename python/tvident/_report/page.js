@@ -79,6 +79,7 @@
       title.textContent = about.title + " ";
       if (about.unit) title.append(Object.assign(document.createElement("span"), { textContent: about.unit }));
       head.append(title);
+      if (about.second !== undefined) this.key(head, "recorded", "recorded", true), this.key(head, "found", "predicted", true);
       if (about.band) this.key(head, "found", "identified", true), this.key(head, "band", "± 2 standard errors");
       if (about.shade !== null && about.shade !== undefined) this.key(head, "shade", "flagged");
       if (about.robust) head.append(this.scaleButton());
@@ -113,11 +114,6 @@
       return button;
     }
 
-    used() {
-      const { line, band, shade } = this.about;
-      return [line, shade, ...(band ?? []), ...this.strips.map((one) => one.series)].filter((one) => one !== null && one !== undefined);
-    }
-
     draw() {
       if (!this.isStale || !this.isNear) return this.drawn;
       this.isStale = false;
@@ -141,8 +137,14 @@
         const isFew = seen.every === 1 && seen.x.length < columns / 6;
         traces.push({
           ...line(seen, series[this.about.line].period), mode: isFew ? "lines+markers" : "lines", marker: { size: 4 },
-          line: { width: 1.15, color: colour(this.about.band ? "found" : "recorded") }, hovertemplate: "%{y:.6g}<extra></extra>",
+          line: { width: this.about.second === undefined ? 1.15 : 2.2, color: colour(this.about.band ? "found" : "recorded") }, hovertemplate: "%{y:.6g}<extra></extra>",
         });
+        if (this.about.second !== undefined) {
+          traces.push({
+            ...line(view(this.about.second), series[this.about.second].period), mode: "lines",
+            line: { width: 1.1, color: colour("found") }, hovertemplate: "%{y:.6g}<extra></extra>",
+          });
+        }
       }
       if (this.about.shade !== null && this.about.shade !== undefined) {
         const { runs, missesLevels } = stretches(series[this.about.shade], from, to, columns);

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from tvident._results.digits import to_digits_of, with_error
+from tvident._arguments import to_digits_of, with_error
 
 Array = npt.NDArray[np.float64]
 

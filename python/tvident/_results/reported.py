@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Protocol, TypeAlias
 
+import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _report
 from tvident._files import listed
 from tvident._results.recorded import Recorded
+from tvident._units import named_unit, unit_said
 
-_UNIT = re.compile(r"(?P<name>.*\S)\s*[\[(](?P<unit>[^\[\]()]*)[\])]")
+Array: TypeAlias = npt.NDArray[np.float64]
+
+
+class Predicting(_report.Reported, Protocol):
+    """A result that predicts the torque."""
+
+    def predicted_torque(self) -> tuple[Array, Array, Array]:
+        """Return time, the recorded torque and the predicted one."""
 
 
 def report(
-    result: _report.Reported,
+    result: Predicting,
     path: str | Path,
     *,
     recorded: Recorded | None,
@@ -30,14 +39,16 @@ def report(
     rate = float(result.settings["sample_rate"])
     start = float(result.time[0]) if result.time.size else 0.0
     shown: list[_report.Series] = []
+    compared: list[Array] = []
 
     def show(name: str, unit: str, values: npt.ArrayLike) -> None:
         numbers = arguments.real_array("channels", values)
-        shown.append(_report.Series(name, unit, numbers, start, 1 / rate))
+        shown.append(_report.Series(name, unit, numbers, start, 1 / rate, is_recorded=True))
 
     if recorded is not None and recorded.is_unchanged and result.inertia.ndim == 1:
         show("Angle", result.units["angle"], recorded.angles)
         show("Torque", result.units["torque"].replace(" ", "·"), recorded.torques)
+        _, *compared = result.predicted_torque()
     step = int(result.settings["step"])
     samples = shown[0].values.size if shown else None
     for name, values in (channels or {}).items():
@@ -49,6 +60,6 @@ def report(
                 f"channels must have one value for every sample of the recording; got {arguments.shown(name)} with shape "
                 f"{numbers.shape}; leave out {listed([name])}, or cut it"
             )
-        parts = _UNIT.fullmatch(name)
-        show(parts["name"] if parts else name, parts["unit"] if parts else "", numbers)
-    _report.write_report(path, result, shown, title or Path(path).stem)
+        bare, unit = named_unit(name)
+        show(bare, unit or unit_said(values), numbers)
+    _report.write_report(path, result, shown, compared, title or Path(path).stem)
