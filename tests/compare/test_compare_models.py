@@ -55,6 +55,54 @@ def test_the_equation_is_found_and_no_other_term_is_believed() -> None:
     assert sum(float(one.averaged["cubic"][0]) > 3 * float(one.averaged["cubic"][1]) for one in chosen) <= 2
 
 
+def test_terms_with_inner_parameters_are_searched_and_pay_for_them() -> None:
+    generator = np.random.default_rng(5)
+    t = np.arange(2500) / 500
+    rates = 2 * np.pi * np.array([0.5, 1.3, 2.9, 4.7])
+    swing = [(0.3 / rate, rate, phase) for rate, phase in zip(rates, generator.uniform(0, 6, 4), strict=True)]
+    angle = sum(one * np.sin(rate * t + phase) for one, rate, phase in swing)
+    velocity = sum(one * rate * np.cos(rate * t + phase) for one, rate, phase in swing)
+    acceleration = -sum(one * rate**2 * np.sin(rate * t + phase) for one, rate, phase in swing)
+    friction = 0.2 + 0.15 * np.exp(-((velocity / 0.15) ** 2))
+    torque = 0.02 * acceleration + 0.1 * velocity + 8 * angle + friction * np.sign(velocity)
+    models: dict[str, dict[str, Any]] = {
+        "coulomb": {"terms": ("coulomb",)},
+        "stribeck": {"terms": ("coulomb", "stribeck")},
+    }
+    compared = tvident.compare_models(
+        angle + 1e-6 * generator.standard_normal(t.size),
+        torque + 0.02 * generator.standard_normal(t.size),
+        models=models,
+        sample_rate=500,
+        **CONSTANT,
+    )
+    assert compared.best == "stribeck"
+    assert compared.table["difference"][1] > 10
+    np.testing.assert_array_equal(compared.table["parameters"], [6, 4])
+    value, error = compared.results["stribeck"].constants["stribeck.velocity"]
+    assert abs(value - 0.15) < 4.5 * error
+
+
+def test_what_a_record_does_not_determine_chooses_nothing_and_is_said() -> None:
+    """A motion in one direction does not tell friction from an offset: the model with both must not choose the test function of all."""
+    generator = np.random.default_rng(2)
+    t = np.arange(8000) / 1000
+    rates, phases = 2 * np.pi * np.array([0.4, 1.1, 2.3]), (0.5, 2.0, 4.0)
+    pairs = list(zip(rates, phases, strict=True))
+    angle = 3 * t + sum(0.5 / rate * np.sin(rate * t + phase) for rate, phase in pairs)
+    velocity = 3 + sum(0.5 * np.cos(rate * t + phase) for rate, phase in pairs)
+    acceleration = -sum(0.5 * rate * np.sin(rate * t + phase) for rate, phase in pairs)
+    torque = 0.02 * acceleration + 0.1 * velocity + 0.3 + 0.01 * generator.standard_normal(t.size)
+    models: dict[str, dict[str, Any]] = {"offset": {"terms": ("offset",)}, "both": {"terms": ("offset", "coulomb")}}
+    call: dict[str, Any] = {"sample_rate": 1000, **CONSTANT, "stiffness": 0.0}
+    alone = tvident.identify(angle, torque, terms=["offset"], **call)
+    compared = tvident.compare_models(angle, torque, models=models, **call)
+    assert compared.results["offset"].settings["window_length"] == alone.settings["window_length"]
+    assert compared.averaged["inertia"] == pytest.approx(alone.constants["inertia"])
+    assert "the record does not determine 'both'" in compared.summary()
+    assert "in no model that counts: coulomb" in compared.summary()
+
+
 def test_errors_know_of_the_choice() -> None:
     compared = tvident.compare_models(*oscillator(3, cubic=1.5), models=CANDIDATES, sample_rate=1000, **CONSTANT)
     weights = dict(zip(compared.table["model"], compared.table["weight"], strict=True))

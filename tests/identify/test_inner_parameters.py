@@ -160,6 +160,10 @@ def test_settings_replay_what_was_found_without_a_search() -> None:
     # It says what it is told, and simulates with the value that was found.
     assert any(line.startswith("reflex.delay 0.04") and "as given" in line for line in again.reasons)
     assert "reflex.delay" in first.summary()
+    _, _, predicted = first.predicted_torque()
+    # Only what touches the first 45 ms, of which the term says nothing, is missing, beside the ends.
+    reach = first.settings["window_length"]
+    assert np.isfinite(predicted[reach + 25 : -reach]).all()
     assert first.columns()["reflex.delay"][7] == first.constants["reflex.delay"][0]
     np.testing.assert_array_equal(first.stderr["reflex.delay"], first.constants["reflex.delay"][1])
     scan = first.scan()
@@ -224,6 +228,9 @@ def test_stribeck_friction_is_simulated_with_what_was_found() -> None:
     angle, torque = (one[0] for one in records(CASES["stribeck"][0], 2e-5))
     result = tvident.identify(angle, torque, terms=["coulomb", "stribeck", "offset"], **CONSTANT)
     assert result.vaf() > 99
+    _, measured, predicted = result.predicted_torque()
+    inside = slice(100, -100)
+    assert np.std((measured - predicted)[inside]) < 0.1 * np.std(measured[inside])
     state = [float(angle[0]), float((angle[1] - angle[0]) * RATE)]
     slow, fast = (result.simulate(np.full(200, level), [0.0, 0.0]) for level in (0.4, 0.6))
     # Break-away needs both frictions, 0.5 N m, though coulomb alone is 0.2.

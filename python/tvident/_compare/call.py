@@ -13,6 +13,7 @@ from tvident import _arguments as arguments
 from tvident._compare.comparison import ModelComparison
 from tvident._identify import WeakForm, identify
 from tvident._results import Identification
+from tvident._status import Status
 
 _CANDIDATES: dict[str, dict[str, Any]] = {
     "undamped": {"damping": 0.0, "terms": ("offset",)},
@@ -38,7 +39,8 @@ def compare_models(
 ) -> ModelComparison:
     r"""Compare candidates for the equation of motion on one record.
 
-    Every model is identified in weak form with the same test function, so that all explain the same rows. The criterion is equation (8) of
+    Every model is identified in weak form with the same test function, so that all explain the same rows: that of the model with most
+    terms that the record tells apart. The criterion is equation (8) of
     the paper, AICc = N ln(mean square of the residuals) + 2 k N/(N - k - 1), where N is the effective number of overlapping rows and k
     counts parameters (a windowed one as often as there are windows) and the variance.
 
@@ -72,8 +74,9 @@ def compare_models(
 
     Notes
     -----
-    The cost is that of ``identify`` for every model, and once more: 1 to 15 µs a sample for each. Weights compare the models that are
-    given: if none of them holds, one is still the best. ``results[best].summary()`` says what it explains.
+    The cost is that of ``identify`` for every model, and once more: 1 to 15 µs a sample for each. Inner parameters of terms
+    (``"stribeck"``, ``Term(search=)``) are searched in every model that has them, and count as parameters. Weights compare the models that
+    are given: if none of them holds, one is still the best. ``results[best].summary()`` says what it explains.
 
     See Also
     --------
@@ -109,13 +112,28 @@ def compare_models(
     calls = {str(name): {**common, **one} for name, one in candidates.items()}
     method = _common_form(calls)
     if "auto" in (method.window_length, method.exponent):
-        most = max(calls.values(), key=lambda call: len(call.get("terms") or ()))
-        chosen = identify(angle, torque, **{**time, **most, "method": method}).settings
+        chosen = _richest_of_the_determined(angle, torque, {**time, "method": method}, calls).settings
         method = replace(method, window_length=chosen["window_length"], exponent=chosen["exponent"])
     results: dict[str, Identification] = {
         name: identify(angle, torque, **{**time, **call, "method": method}) for name, call in calls.items()
     }
     return ModelComparison(results, int(np.isfinite(angles).sum()))
+
+
+def _richest_of_the_determined(
+    angle: npt.ArrayLike, torque: npt.ArrayLike, common: Mapping[str, Any], calls: Mapping[str, Mapping[str, Any]]
+) -> Identification:
+    """Return what was identified with the model of most terms that the record tells apart, or with that of most terms.
+
+    What a record does not determine chooses no test function for models that it does: friction in one direction is an offset.
+    """
+    first: Identification | None = None
+    for call in sorted(calls.values(), key=lambda call: -len(call.get("terms") or ())):
+        found = identify(angle, torque, **{**common, **call, "method": common["method"]})
+        if not Status(int(found.record_status)) & (Status.RANK_DEFICIENT | Status.ILL_CONDITIONED):
+            return found
+        first = first or found
+    return found if first is None else first
 
 
 def _common_form(calls: Mapping[str, Mapping[str, Any]]) -> WeakForm:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -13,6 +13,7 @@ from tvident._equation import COEFFICIENTS
 from tvident._files import aligned, write_table
 from tvident._identify import aicc, effective_observations
 from tvident._results import Identification
+from tvident._status import DOUBTFUL_RECORD, Status
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,6 +23,9 @@ Array: TypeAlias = npt.NDArray[np.float64]
 
 _ABOUT_EQUAL = 2.0
 """Models whose criteria differ by less are supported about equally (Burnham & Anderson)."""
+
+_NO_WEIGHT = 1e-3
+"""Models of less weight say nothing of their terms."""
 
 
 class ModelComparison:
@@ -122,7 +126,8 @@ class ModelComparison:
         lines = [f"{len(self.results)} models, {self.observations:.0f} effective observations", "", *aligned(rows), ""]
         units = next(iter(self.results.values())).units
         cells: list[tuple[str, ...]] = [("averaged", "", "median", "std. error", "unit")]
-        for name, (value, error) in self.averaged.items():
+        idle = self._without_support()
+        for name, (value, error) in ((name, pair) for name, pair in self.averaged.items() if name not in idle):
             numbers = (
                 [f"{np.nanmedian(value):.5g}", f"{np.nanmedian(error):.2g}"]
                 if np.isfinite(value).any()
@@ -137,10 +142,41 @@ class ModelComparison:
             return "the record does not determine any of these models"
         close = [str(name) for name in self.table["model"][self.table["difference"] < _ABOUT_EQUAL]]
         if len(close) == 1:
-            return (
+            words = [
                 f"best: {close[0]}; its criterion is lower by {_ABOUT_EQUAL:g} or more than that of every other model"
+            ]
+        else:
+            words = [
+                f"the record hardly tells {_quoted(close)} apart: their criteria differ by less than {_ABOUT_EQUAL:g}"
+            ]
+        lost = [str(name) for name in self.table["model"][~np.isfinite(self.table["aicc"])]]
+        if lost:
+            words.append(f"the record does not determine {_quoted(lost)}")
+        idle = self._without_support()
+        if idle:
+            words.append(f"in no model that counts: {', '.join(idle)}")
+        flags = Status(int(self.results[self.best].record_status))
+        if flags & DOUBTFUL_RECORD:
+            names = ", ".join(str(flag.name) for flag in flags & DOUBTFUL_RECORD)
+            words.append(
+                f"do not trust {self.best!r}, though it is the best: {names}; see results[{self.best!r}].advice"
             )
-        return f"the record hardly tells {', '.join(close)} apart: their criteria differ by less than {_ABOUT_EQUAL:g}"
+        elif flags & (Status.NOISE_MODEL | Status.COLOURED):
+            words.append(
+                f"what {self.best!r} leaves is no white noise, so differences of the criterion count for less than they seem to: another "
+                f"term may be missing, see results[{self.best!r}].advice"
+            )
+        return "\n".join(words)
+
+    def _without_support(self) -> list[str]:
+        """Return terms that no model with some weight has."""
+        counts = {
+            str(name)
+            for name, weight in zip(self.table["model"], self.table["weight"], strict=True)
+            if weight > _NO_WEIGHT
+        }
+        kept = {term for name in counts for term in self.results[name].terms}
+        return [name for name in self.averaged if name not in kept and name not in COEFFICIENTS]
 
     def save(self, path: str) -> None:
         """Write the table of models to a CSV or NPZ file.
@@ -200,6 +236,11 @@ class ModelComparison:
 
     def __repr__(self) -> str:
         return f"<ModelComparison of {len(self.results)} models: best {self.best!r}>"
+
+
+def _quoted(names: Sequence[str]) -> str:
+    """Return names of models, which may hold commas, one after another."""
+    return ", ".join(repr(name) for name in names)
 
 
 def _mean_square(result: Identification) -> float:

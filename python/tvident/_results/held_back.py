@@ -49,7 +49,9 @@ class HeldBack:
             return f"how much of a held-back part the model explains is not known: {self.why_not}"
         several = np.ndim(self.simulated) > 0
         simulated, predicted = (_percent(float(np.nanmedian(value))) for value in (self.simulated, self.predicted))
-        where = "the last tenth of every tenth" if self.parts == PARTS else f"the last tenth of {self.parts} parts"
+        where = {PARTS: "the last tenth of every tenth", 1: "the last tenth"}.get(
+            self.parts, f"the last tenth of each of {self.parts} parts"
+        )
         whose = " (median of all records)" if several else ""
         return (
             f"explains {simulated} of the angle simulated and {predicted} predicted one test function ahead in {where}, "

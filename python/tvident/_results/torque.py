@@ -10,12 +10,16 @@ import numpy.typing as npt
 from numpy.polynomial import Polynomial
 
 from tvident._derivatives import fit_local_polynomials
+from tvident._equation import expected_stribeck
 from tvident._results.response import Model, every_sample, without_gaps
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
 _BLOCK = 1 << 14
 """Samples that are transformed together: they stay in the cache."""
+
+_TOUCHED = 1e-9
+"""Averages of a mask above this hold a masked sample; below it they are rounding."""
 
 _FUNCTIONS: dict[str, Callable[[Array, Array], Array]] = {
     "coulomb": lambda _, velocity: np.sign(velocity),
@@ -76,11 +80,22 @@ def _sum(model: Model, motion: tuple[Array, Array, Array], averaged: Callable[[A
         elif name in known:
             regressor = known[name]
         elif name in model.own:
-            regressor = averaged(np.asarray(model.own[name].values(t, angle.copy(), velocity.copy()), np.float64))
+            regressor = _where_known(np.asarray(model.own[name].values(t, angle.copy(), velocity.copy())), averaged)
+        elif name == "stribeck":
+            regressor = averaged(expected_stribeck(velocity, np.zeros(angle.size), model.stribeck[0]))
         else:
             regressor = averaged(_FUNCTIONS[name](angle, velocity))
         total = total + np.broadcast_to(every_sample(factor, angle.size, 1), angle.shape) * regressor
     return np.asarray(total)
+
+
+def _where_known(values: npt.NDArray[np.number], averaged: Callable[[Array], Array]) -> Array:
+    """Return averages of a term; NaN where they touch a sample of which it says nothing, as a delay does of the first ones."""
+    missing = ~np.isfinite(values)
+    found = averaged(np.where(missing, 0.0, values).astype(np.float64))
+    if not missing.any():
+        return found
+    return np.where(np.abs(averaged(missing.astype(np.float64))) > _TOUCHED, np.nan, found)
 
 
 def _kernels(half: int, exponent: float, period: float) -> Array:
