@@ -1,4 +1,4 @@
-"""Recordings in files: CSV and other text, NPY, NPZ and MATLAB; channels by name."""
+"""Recordings in files of many kinds: channels by name."""
 
 from tvident._files import Channels, FileError, FileWarning, channel, read
 

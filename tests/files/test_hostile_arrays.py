@@ -213,7 +213,7 @@ def test_a_reader_that_crashes_or_hangs_is_an_error_of_the_file(
     (tmp_path / "x.mat").write_bytes(bytes(200))
     monkeypatch.syspath_prepend(str(tmp_path))
     if "sleep" in what:
-        monkeypatch.setattr("tvident._files.matlab._SECONDS", 1)
+        monkeypatch.setattr("tvident._files.foreign._SECONDS", 1)
     assert said in refusal(tmp_path / "x.mat")
 
 

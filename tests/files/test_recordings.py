@@ -87,7 +87,7 @@ def test_channels_are_found_by_name_with_or_without_unit_and_by_number() -> None
     ("name", "content", "message"),
     [
         ("missing.csv", None, "there is no such file"),
-        ("recording.xlsx", b"PK", "the ending must be one of .csv"),
+        ("recording.wav", b"RIFF", "the ending must be one of .csv"),
         ("broken.npz", b"not a zip archive", "cannot be read as .npz"),
         ("broken.npy", b"\x93NUMPY", "cannot be read as .npy"),
         ("broken.mat", b"not a matlab file at all", "cannot be read as a MATLAB file"),
@@ -104,7 +104,7 @@ def test_files_that_cannot_be_used_say_why(tmp_path: Path, name: str, content: b
 
 
 def test_a_missing_reader_says_which_extra_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "m.mat").write_bytes(b"")
+    (tmp_path / "m.mat").write_bytes(b"MATLAB")
     monkeypatch.setitem(sys.modules, "pymatreader", None)
     with pytest.raises(recordings.FileError, match=r"pip install 'tvident\[io\]'"):
         recordings.read(tmp_path / "m.mat")

@@ -20,6 +20,7 @@ ROOMS = (
     "_tables",
     "_equation",
     "_status",
+    "_formats",
     "_files",
     "_derivatives",
     "_regression",

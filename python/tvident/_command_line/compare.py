@@ -40,7 +40,10 @@ from tvident._equation import COEFFICIENTS, TERM_NAMES
 @click.option("--mask", metavar="NAME", help="Channel, or file, that is not zero where a sample may be used.")
 @click.option("--workers", type=int, help="Threads; by default all processors.")
 @click.option(
-    "-o", "--output", type=click.Path(dir_okay=False), help="CSV or NPZ file for the table, or - for CSV here."
+    "-o",
+    "--output",
+    type=click.Path(dir_okay=False),
+    help="File for the table, of a kind by its ending, or - for CSV here.",
 )
 @click.option("--plot", type=click.Path(dir_okay=False), help="Picture of the weights: PNG, PDF or SVG.")
 def compare(

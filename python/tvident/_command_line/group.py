@@ -95,6 +95,6 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 def main() -> None:
     """Identify inertia, damping and stiffness that change while they are measured; differentiate noisy recordings.
 
-    Files may be text columns (CSV), NPY, NPZ or MATLAB. Channels are called by name, or by number from 0. Results go to files or standard
-    output, messages and progress to standard error.
+    Files may be text columns (CSV), NPZ, MATLAB, Parquet, HDF5, TDMS, MDF, MCAP and others. Channels are called by name, or by number
+    from 0. Results go to files or standard output, messages and progress to standard error.
     """

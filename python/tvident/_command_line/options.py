@@ -64,7 +64,10 @@ WORK = options_of(
 RUN = options_of(
     WORK,
     click.option(
-        "-o", "--output", type=click.Path(dir_okay=False), help="CSV or NPZ file for the results, or - for CSV here."
+        "-o",
+        "--output",
+        type=click.Path(dir_okay=False),
+        help="File for the results: .csv, .npz, .parquet, .h5, .mat or .xlsx, or - for CSV here.",
     ),
     click.option("--plot", type=click.Path(dir_okay=False), help="Picture of the results: PNG, PDF or SVG."),
 )

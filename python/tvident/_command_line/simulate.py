@@ -30,7 +30,7 @@ from tvident._simulate import Excitation, Pattern
 )
 @click.option("--encoder-counts", type=int, help="Counts a turn, instead of noise.")
 def simulate(output: str, **options: Any) -> None:
-    """Write a simulated recording of the paper's rig, with its truth, to OUTPUT (CSV or NPZ)."""
+    """Write a simulated recording of the paper's rig, with its truth, to OUTPUT: a CSV file, or of another kind by its ending."""
     check_place(Path(output))
     recording = tvident.simulate_torsional_rig(**options)
     recording.save(output)

@@ -48,7 +48,7 @@ def channel(channels: Mapping[str, npt.NDArray[Any]], name: str, source: str) ->
     channels : mapping of str to ndarray
         What :func:`read` returned.
     name : str
-        Name with or without its unit, or number from 0.
+        Name with or without its unit, and without its group where no other has such a channel, or number from 0.
     source : str
         What the file is called in the message.
 
@@ -84,7 +84,11 @@ def full_name(channels: Mapping[str, Any], name: str, source: str) -> str:
     same = [key for key in channels if key.startswith(name) and named_unit(key)[0] == name]
     if len(same) == 1:
         return same[0]
+    inside = [key for key in channels if named_unit(key)[0].endswith(f".{name}")]
+    if not same and len(inside) == 1 and not _NUMBER.fullmatch(name):
+        return inside[0]
     place, asked = printable(source), printable(name)
+    same = same or inside
     if same:
         raise KeyError(
             f"{place} must have one channel '{asked}'; it has {listed(same)}; name one of these with its unit"

@@ -9,17 +9,19 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from tvident._files.names import printable
+from tvident._files.table_formats import PACKAGES, check_installed
 
-ENDINGS = (".csv", ".npz")
+ENDINGS = (".csv", ".npz", *PACKAGES)
 """Kinds of files that tables are written to."""
 
 
 def check_place(path: Path) -> None:
     """Check that tables can be written to files of this kind, and that a file can be written there."""
-    if path.suffix not in ENDINGS:
-        raise ValueError(
-            f"results are written to files that end in {' or '.join(ENDINGS)}; got '{printable(path.name)}'; rename it"
-        )
+    ending = path.suffix.lower()
+    if ending not in ENDINGS:
+        known = f"{', '.join(ENDINGS[:-1])} or {ENDINGS[-1]}"
+        raise ValueError(f"results are written to files that end in {known}; got '{printable(path.name)}'; rename it")
+    check_installed(ending)
     check_folder(path)
 
 

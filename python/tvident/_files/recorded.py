@@ -196,7 +196,9 @@ class FileRecording(Mapping[str, Channel]):
         OSError
             If there is no such folder, or the file cannot be written.
         """
-        write_table(path, self._headers(), {})
+        write_table(
+            path, self._channels, {name: "" if named_unit(name)[1] else unit for name, unit in self.units.items()}
+        )
 
     def _headers(self) -> dict[str, Channel]:
         """Return channels by their names with units."""

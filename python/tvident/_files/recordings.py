@@ -1,4 +1,4 @@
-"""Recordings in files: CSV and other text, NPY, NPZ and MATLAB."""
+"""Recordings in files of every kind that can be read: which reader takes which."""
 
 from __future__ import annotations
 
@@ -11,18 +11,24 @@ from typing import cast
 
 from tvident._files.channels import Channels, FileError, FileWarning, Say
 from tvident._files.names import printable
+from tvident._formats import FORMATS
 
-TEXT, NUMPY, MATLAB = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm", ".mot", ".sto"), (".npy", ".npz"), (".mat",)
+TEXT, NUMPY = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm", ".mot", ".sto"), (".npy", ".npz")
+ARROW = (".parquet", ".feather", ".arrow")
 """Endings of files that can be read."""
 
+
+RECIPE = "numpy.savez('x.npz', angle=…, torque=…, sample_rate=…)"
+"""What anybody can do about a file that nobody reads."""
 
 _READERS = dict.fromkeys(TEXT, "text.read_text") | {
     ".npy": "arrays.read_npy",
     ".npz": "arrays.read_npz",
-    ".mat": "matlab.read_matlab",
     ".lvm": "instrument_text.read_labview",
     ".mot": "instrument_text.read_opensim",
     ".sto": "instrument_text.read_opensim",
+    **dict.fromkeys(FORMATS, "foreign.read_foreign"),
+    **dict.fromkeys(ARROW, "arrow.read_arrow"),
 }
 """Files of this room and their functions: imported when they are needed, since few of them ever are."""
 
@@ -46,9 +52,11 @@ def check_readable(path: Path, endings: Iterable[str]) -> None:
     if kind is not None and stat.S_ISDIR(kind):
         raise FileError(f"{place}: this is a folder; name a file in it")
     if path.suffix.lower() not in endings:
-        known = ", ".join((*TEXT, *NUMPY, *MATLAB))
+        known = ", ".join(endings)
         got = f"'{printable(path.suffix)}'" if path.suffix else "none"
-        raise FileError(f"{place}: the ending must be one of {known}; got {got}; convert or rename the file")
+        raise FileError(
+            f"{place}: the ending must be one of {known}; got {got}; rename the file, or convert it in Python: {RECIPE}"
+        )
     if kind is None:
         raise FileError(f"{place}: there is no such file; check the name and the folder")
     if not stat.S_ISREG(kind):
@@ -61,7 +69,8 @@ def read(path: str | Path) -> Channels:
     Parameters
     ----------
     path : str or Path
-        A text file of columns, an NPY or NPZ file, or a MATLAB file (with the extra ``io``).
+        A text file of columns, an NPY or NPZ file, or with an extra: Parquet, HDF5, MATLAB, TDMS, xlsx (``io``), MDF (``mdf``), universal
+        files (``uff``), C3D (``c3d``), XDF (``xdf``), ROS bags and MCAP (``ros``).
 
     Returns
     -------
@@ -83,8 +92,8 @@ def read(path: str | Path) -> Channels:
     Notes
     -----
     Channels are arrays of shape (n,), or single numbers; each column of a matrix is a channel. Units are not converted: they are part of
-    the name where the file has them there. Text costs some 0.2 µs a number, NPY and NPZ next to nothing, MATLAB files half a second for a
-    process of their own, since a damaged one can crash its reader.
+    the name where the file has them there. Text costs some 0.2 µs a number, NPY and NPZ next to nothing, files of other programs half a
+    second for a process of their own, since a damaged one can crash its reader.
 
     In text the line above the numbers names every column; a line of units may stand beside it. Numbers may be in quotes. A comma is a
     decimal sign where semicolons, tabs or blanks separate cells, or numbers are in quotes. Thousands may be separated (``1,234.5``,
@@ -112,7 +121,7 @@ def read(path: str | Path) -> Channels:
     try:
         channels = _reader(path)(path, said.append)
     except FileError as error:
-        kind = "a MATLAB file" if path.suffix.lower() in MATLAB else path.suffix
+        kind = FORMATS[path.suffix.lower()].name if path.suffix.lower() in FORMATS else path.suffix
         raise FileError(f"{place}: cannot be read as {kind}: {error}") from None
     except PermissionError:
         raise FileError(f"{place}: may not be read; check its permissions") from None

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from tvident._files.names import listed, printable
 from tvident._files.places import check_place
 from tvident._files.replacement import replaced
+from tvident._files.table_formats import WRITERS, check_rows
 
 _FORMULA = ("=", "+", "-", "@")
 """What a spreadsheet takes for the beginning of a formula."""
@@ -34,13 +35,17 @@ def _cell(name: str) -> str:
 
 
 def write_table(path: str | Path, columns: Mapping[str, npt.NDArray[Any]], units: Mapping[str, str]) -> None:
-    """Write columns to a CSV or NPZ file, which appears whole or not at all."""
+    """Write columns to a file of the kind that its ending says, which appears whole or not at all."""
     path = Path(path)
     check_place(path)
-    if path.suffix != ".npz":
+    ending = path.suffix.lower()
+    if ending != ".npz":
         _check_lengths(columns)
+        check_rows(ending, len(next(iter(columns.values()), ())))
     with replaced(path) as file:
-        if path.suffix == ".npz":
+        if ending in WRITERS:
+            WRITERS[ending](file, columns, units)
+        elif ending == ".npz":
             _write_npz(file, {header(name, units): values for name, values in columns.items()})
         else:
             write_csv(file, columns, units)

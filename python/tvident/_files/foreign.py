@@ -1,7 +1,8 @@
-"""Arrays in files of MATLAB."""
+"""Files of other programs: read in a process of its own by the library that knows them."""
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import sys
@@ -16,8 +17,8 @@ import numpy as np
 from tvident._files.arrays import fill, numeric
 from tvident._files.channels import Channels, FileError, Say
 from tvident._files.names import listed, printable
-
-_READER = Path(__file__).with_name("matlab_variables.py")
+from tvident._files.text import read_columns
+from tvident._formats import FORMATS, PROCESS
 
 _BYTES, _BYTES_FOR_EACH = 2 << 30, 64
 """Memory of the reader: what its libraries take, and compressed content."""
@@ -27,20 +28,22 @@ _SECONDS, _BYTES_A_SECOND = 30, 2_000_000
 
 _LONGEST_LINE = 1 << 20
 
-CURE = "save it again with -v7"
 
+def read_foreign(path: Path, say: Say) -> Channels:
+    """Read a file of another program.
 
-def read_matlab(path: Path, say: Say) -> Channels:
-    """Read a file of any version from 4 to 7.3.
-
-    A damaged file can crash SciPy's reader or keep it busy for ever, so it works in a process of its own, with a limit of time and memory.
+    A damaged file can crash the library that reads it or keep it busy for ever, so it works in a process of its own, with a limit of time
+    and memory.
     """
     import subprocess  # noqa: PLC0415 - few need it, and it takes long to import
 
-    if find_spec("pymatreader") is None:
-        raise FileError("MATLAB files need pymatreader; install it with: pip install 'tvident[io]'")
+    kind = FORMATS[path.suffix.lower()]
+    if find_spec(kind.package) is None:
+        raise FileError(f"{kind.name} needs {kind.package}; install it with: pip install 'tvident[{kind.extra}]'")
     with path.open("rb"):
         pass  # what may not be read says so in the same words as any other file
+    if not path.stat().st_size:
+        raise FileError(f"{kind.name} must not be empty; this one has no bytes; {kind.cure}")
     size = path.stat().st_size
     seconds = _SECONDS + size // _BYTES_A_SECOND
     limits = (str(_BYTES + _BYTES_FOR_EACH * size), str(seconds))
@@ -51,7 +54,7 @@ def read_matlab(path: Path, say: Say) -> Channels:
         "PYTHONWARNINGS": "ignore",
     }
     process = subprocess.Popen(  # noqa: S603 - Python itself
-        [sys.executable, "-P", str(_READER), str(path.absolute()), *limits],
+        [sys.executable, "-P", str(PROCESS), kind.module, str(path.absolute()), *limits],
         env=environment,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
@@ -63,7 +66,8 @@ def read_matlab(path: Path, say: Say) -> Channels:
     last: dict[str, Any] = {}
     try:
         assert process.stdout is not None  # noqa: S101 - a pipe was asked for
-        channels = numeric(_arrays(process.stdout, last), say)
+        texts: list[str] = []
+        channels = numeric(_arrays(process.stdout, last, texts), say)
         process.wait()
     finally:
         is_late = not late.is_alive()
@@ -74,15 +78,17 @@ def read_matlab(path: Path, say: Say) -> Channels:
             process.stdout.close()
     if not last:
         ended = f"took more than {seconds} s" if is_late else f"ended with status {process.returncode}"
-        raise FileError(f"a MATLAB file must be whole; its reader {ended}; copy it again, or {CURE}")
+        raise FileError(f"{kind.name} must be whole; its reader {ended}; copy it again, or {kind.cure}")
     if last["error"]:
-        raise FileError(f"a MATLAB file must be whole; its reader says: {printable(last['error'], 300)}; {CURE}")
+        raise FileError(f"{kind.name} must be whole; its reader says: {printable(last['error'], 300)}; {kind.cure}")
     if last["skipped"]:
         say(f"not read: {listed(last['skipped'])}")
+    for text in texts:
+        channels |= read_columns(io.StringIO(text), say)
     return channels
 
 
-def _arrays(pipe: IO[bytes], last: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+def _arrays(pipe: IO[bytes], last: dict[str, Any], texts: list[str]) -> Iterator[tuple[str, Any]]:
     """Give the arrays that the reader sends, and keep its last words."""
     while line := pipe.readline(_LONGEST_LINE):
         try:
@@ -92,6 +98,12 @@ def _arrays(pipe: IO[bytes], last: dict[str, Any]) -> Iterator[tuple[str, Any]]:
         if "error" in head:
             last.update(head)
             return
+        if "text" in head:
+            text = np.empty(head["text"], np.uint8)
+            if not fill(text, pipe):
+                return
+            texts.append(text.tobytes().decode())
+            continue
         array = np.empty(head["shape"], head["type"])
         if not fill(array, pipe):
             return

@@ -1,0 +1,101 @@
+"""Variables of MATLAB files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from tvident._formats.told import cut, in_words
+
+
+def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
+    """Give every variable, and the fields of structures with names joined by dots."""
+    yield from _flat("", _read(path, skipped))
+
+
+_VALUES = ("data", "values", "value", "signal", "y")
+_UNITS = ("unit", "units")
+"""Fields of a structure that is one channel."""
+
+
+def _read(path: str, skipped: list[str]) -> Mapping[str, Any]:
+    """Return all variables; where that fails, one by one those that can be read."""
+    from pymatreader import read_mat  # noqa: PLC0415 - within the limits
+
+    try:
+        variables = read_mat(path)
+    except Exception as error:
+        variables = {}
+        for name in _names(path, error):
+            try:
+                variables |= read_mat(path, variable_names=[name])
+            except Exception as reason:  # noqa: BLE001 - likewise
+                skipped.append(f"{cut(name)} ({in_words(reason)})")
+        if not variables:
+            raise
+    return variables
+
+
+def _names(path: str, error: Exception) -> list[str]:
+    from scipy.io import whosmat  # noqa: PLC0415 - within the limits
+
+    try:
+        return [name for name, _, _ in whosmat(path)]
+    except NotImplementedError:  # version 7.3
+        import h5py  # noqa: PLC0415 - within the limits
+
+        with h5py.File(path, "r") as file:
+            return [name for name in file if name != "#refs#"]
+    except Exception:  # noqa: BLE001 - the first error says more
+        raise error from None
+
+
+def _flat(prefix: str, variables: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Give the leaves of nested structures with names joined by dots, and with units where structures have these."""
+    fields = {str(name): value for name, value in variables.items() if not str(name).startswith("__")}
+    of_dspace = list(_of_dspace(fields))
+    if of_dspace:
+        yield from ((prefix + name, value) for name, value in of_dspace)
+        return
+    units: Mapping[str, Any] = next((fields[name] for name in _UNITS if isinstance(fields.get(name), Mapping)), {})
+    for name, value in fields.items():
+        if value is units and units:
+            continue
+        channel = _one_channel(value) if isinstance(value, Mapping) else (value, units.get(name, ""))
+        if channel is None:
+            yield from _flat(f"{prefix}{name}.", value)
+            continue
+        samples, unit = channel
+        yield (f"{prefix}{name} [{unit}]" if isinstance(unit, str) and unit else f"{prefix}{name}"), samples
+
+
+def _one_channel(fields: Mapping[str, Any]) -> tuple[Any, str] | None:
+    """Return the samples and the unit of a structure that holds these and words about them."""
+    lower = {str(name).lower(): value for name, value in fields.items()}
+    values = [name for name in _VALUES if name in lower and not isinstance(lower[name], str | Mapping)]
+    unit = next((lower[name] for name in _UNITS if isinstance(lower.get(name), str)), None)
+    rest = [value for name, value in lower.items() if name not in values and not isinstance(value, str)]
+    return (lower[values[0]], unit) if len(values) == 1 and unit is not None and not rest else None
+
+
+def _of_dspace(fields: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Give the channels of a capture of ControlDesk: X holds times, Y has a name, a unit and samples for every channel."""
+    inner = fields
+    if not {"X", "Y"} <= set(fields):
+        captures = [value for value in fields.values() if isinstance(value, Mapping)]
+        if len(captures) != 1 or not {"X", "Y"} <= set(captures[0]):
+            return
+        inner = captures[0]
+    x, y = inner["X"], inner["Y"]
+    if not (isinstance(y, Mapping) and {"Name", "Data"} <= set(y)):
+        return
+    if isinstance(x, Mapping) and "Data" in x:
+        times = x["Data"]
+        yield "time [s]", times[0] if isinstance(times, list) else times
+    names, data, units = (
+        [one] if not isinstance(one, list) else one for one in (y["Name"], y["Data"], y.get("Unit", []))
+    )
+    for index, (name, samples) in enumerate(zip(names, data, strict=False)):
+        unit = units[index] if index < len(units) and isinstance(units[index], str) else ""
+        bare = str(name).replace('"', "").strip()
+        yield (f"{bare} [{unit}]" if unit else bare), samples

@@ -1,0 +1,97 @@
+"""Messages of ROS bags: MCAP and SQLite of ROS 2, and the bags of ROS 1."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from tvident._formats.groups import Group, named
+from tvident._formats.told import cut, in_words
+
+_JOINTS = "sensor_msgs/msg/JointState"
+_QUANTITIES = ("position", "velocity", "effort")
+
+_MOST_ELEMENTS = 64
+"""Of an array in a message: more is a picture or a cloud of points."""
+
+
+def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
+    """Give position, velocity and effort of every joint, and every number of other messages; times are those of their headers."""
+    from rosbags.highlevel import AnyReader  # noqa: PLC0415 - an extra
+    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415 - likewise
+
+    store = get_typestore(Stores.ROS1_NOETIC if path.endswith(".bag") else Stores.ROS2_HUMBLE)
+    collected: dict[str, _Topic] = {}
+    with AnyReader([Path(path)], default_typestore=store) as reader:
+        for connection, received, raw in reader.messages():
+            topic = collected.setdefault(connection.topic, _Topic(connection.topic, connection.msgtype))
+            if topic.failed:
+                continue
+            try:
+                topic.add(reader.deserialize(raw, connection.msgtype), received)
+            except Exception as error:  # noqa: BLE001 - of one topic; the others may be whole
+                topic.failed = in_words(error)
+    groups = []
+    for topic in collected.values():
+        if topic.failed or not topic.columns:
+            skipped.append(f"{cut(topic.name)} ({topic.failed or 'no numbers'})")
+        else:
+            groups += topic.groups()
+    yield from named(groups)
+
+
+class _Topic:
+    def __init__(self, name: str, kind: str) -> None:
+        self.name = name.strip("/")
+        self.is_joints = kind == _JOINTS
+        self.failed = ""
+        self.columns: dict[str, tuple[list[int], list[float]]] = {}
+        """Stamps in nanoseconds and values by name."""
+
+    def add(self, message: Any, received: int) -> None:
+        stamp = getattr(getattr(message, "header", None), "stamp", None)
+        at = (
+            received
+            if stamp is None or not (stamp.sec or stamp.nanosec)
+            else 10**9 * int(stamp.sec) + int(stamp.nanosec)
+        )
+        for name, value in _of_joints(message) if self.is_joints else _numbers("", message):
+            stamps, values = self.columns.setdefault(name, ([], []))
+            stamps.append(at)
+            values.append(value)
+
+    def groups(self) -> list[Group]:
+        """Return the columns that have the same stamps together: joints may come in messages of their own."""
+        import numpy as np  # noqa: PLC0415 - within the limits
+
+        found: dict[bytes, Group] = {}
+        first = min(stamps[0] for stamps, _ in self.columns.values())
+        for name, (stamps, values) in self.columns.items():
+            exact = np.asarray(stamps, dtype=np.int64)
+            key = exact.tobytes()
+            if key not in found:
+                count = f"_{len(found)}" if found else ""
+                found[key] = Group(f"{self.name}{count}", (exact - first) / 1e9)
+            found[key].channels.append((name, "", np.asarray(values)))
+        return list(found.values())
+
+
+def _of_joints(message: Any) -> Iterator[tuple[str, float]]:
+    for quantity in _QUANTITIES:
+        for joint, value in zip(message.name, getattr(message, quantity), strict=False):
+            yield f"{joint}.{quantity}", float(value)
+
+
+def _numbers(prefix: str, message: Any) -> Iterator[tuple[str, float]]:
+    """Give the numbers of a message by the names of their fields."""
+    for field in getattr(message, "__dataclass_fields__", {}):
+        if field.startswith("__") or field == "header":
+            continue
+        value, name = getattr(message, field), f"{prefix}{field}"
+        if isinstance(value, bool | int | float):
+            yield name, float(value)
+        elif hasattr(value, "__dataclass_fields__"):
+            yield from _numbers(f"{name}.", value)
+        elif hasattr(value, "dtype") and value.dtype.kind in "biuf" and value.size <= _MOST_ELEMENTS:
+            yield from ((f"{name}.{index}", float(one)) for index, one in enumerate(value.reshape(-1)))

@@ -1,0 +1,48 @@
+"""Channels of TDMS files of National Instruments."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from tvident._formats.groups import Group, named
+from tvident._formats.told import cut
+
+
+def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
+    """Give every channel of numbers with its unit, and the times of those that know their sample period."""
+    import numpy as np  # noqa: PLC0415 - within the limits
+    from nptdms import TdmsFile  # noqa: PLC0415 - an extra
+
+    file = TdmsFile.read(path)
+    if file.file_status.incomplete_final_segment:
+        skipped.append("what was cut off at the end of the file (channels may have different lengths)")
+    groups: list[Group] = []
+    for group in file.groups():
+        for channel in group.channels():
+            samples, properties = channel[:], channel.properties
+            if samples.dtype.kind == "M":
+                unit, samples = (
+                    "s",
+                    (samples - samples[0]) / np.timedelta64(1, "s") if samples.size else samples.astype(float),
+                )
+            elif samples.dtype.kind not in "biuf":
+                skipped.append(f"{cut(channel.name)} (no numbers)")
+                continue
+            else:
+                unit = str(properties.get("unit_string") or properties.get("NI_UnitDescription") or "")
+            period, first = properties.get("wf_increment"), properties.get("wf_start_offset", 0.0)
+            time = None if not period or not samples.size else float(first) + float(period) * np.arange(samples.size)
+            part = Group(group.name, time, [(channel.name, unit, samples)])
+            before = next((one for one in groups if one.name == group.name and _same(one.time, time)), None)
+            if before is None:
+                groups.append(part)
+            else:
+                before.channels += part.channels
+    yield from named(groups)
+
+
+def _same(time: Any, other: Any) -> bool:
+    if time is None or other is None:
+        return time is other
+    return len(time) == len(other) and bool(abs(time - other).max() <= 0)

@@ -1,0 +1,137 @@
+"""Files of other programs: channels with units and times from each, a damaged one says what is missing, nothing harms."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+import recorded_files as examples
+import tvident
+from tvident import recordings
+from tvident._files import read
+from tvident._formats import FORMATS, matlab
+
+JOINTS = {".mcap"}
+"""Rad, and no units in the file."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("formats")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the libraries that write
+        for ending, write in examples.WRITTEN.items():
+            write(made / f"x{ending}")
+    return made
+
+
+@pytest.mark.parametrize("ending", examples.WRITTEN)
+def test_channels_come_with_units_and_a_sample_rate(folder: Path, ending: str) -> None:
+    found = tvident.read_recording(folder / f"x{ending}")
+    angle, torque = examples.ANGLE, examples.TORQUE
+    if ending in JOINTS:
+        np.testing.assert_allclose(found["elbow.position"], np.deg2rad(angle), rtol=1e-12)
+        np.testing.assert_allclose(found["elbow.effort"], torque)
+        assert found.sample_rate == pytest.approx(250)
+        return
+    name = "angle.x" if ending == ".c3d" else "angle"
+    # C3D has 32 bits a number, a sheet 16 digits.
+    precision = {".c3d": 1e-6, ".xlsx": 1e-15}.get(ending, 0)
+    np.testing.assert_allclose(found[name], angle, rtol=precision)
+    np.testing.assert_allclose(found["torque"], torque, rtol=precision)
+    assert (found[name].unit, found["torque"].unit) == ("deg", "N m")
+    if ending == ".mf4":
+        assert found["slow"].unit == "°C"
+        np.testing.assert_allclose(found["group1.time"], examples.T[::10])
+    else:
+        assert found.sample_rate == pytest.approx(250, rel=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # of a library that gave up
+@pytest.mark.parametrize(
+    "ending", [ending for ending in examples.WRITTEN if ending not in {".csv", ".npz", ".parquet", ".mat"}]
+)
+def test_a_file_that_was_cut_is_refused_or_says_so(folder: Path, tmp_path: Path, ending: str) -> None:
+    content = (folder / f"x{ending}").read_bytes()
+    (tmp_path / f"x{ending}").write_bytes(content[: int(0.8 * len(content))])
+    # What the process does that reads a file, without the time to start it.
+    skipped: list[str] = []
+    try:
+        found = dict(
+            import_module(f"tvident._formats.{FORMATS[ending].module}").variables(str(tmp_path / f"x{ending}"), skipped)
+        )
+    except Exception:  # noqa: BLE001 - of any kind: the process turns it into a message
+        return
+    assert skipped, f"{list(found)} were read without a word"
+
+
+def test_damage_is_one_line_and_empty_files_are_no_recordings(folder: Path, tmp_path: Path) -> None:
+    for ending in (".h5", ".parquet"):
+        content = (folder / f"x{ending}").read_bytes()
+        (tmp_path / f"x{ending}").write_bytes(content[:-100])
+        with pytest.raises(recordings.FileError, match=r"must be whole; .*; copy it again") as refused:
+            recordings.read(tmp_path / f"x{ending}")
+        assert str(refused.value).isprintable()
+    for ending in (*FORMATS, ".parquet", ".feather"):
+        (tmp_path / f"empty{ending}").touch()
+        with pytest.raises(recordings.FileError, match=r"must not be empty|must be whole"):
+            recordings.read(tmp_path / f"empty{ending}")
+
+
+def test_what_is_missing_is_named_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for ending, kind in FORMATS.items():
+        (tmp_path / f"x{ending}").write_bytes(b"x")
+        monkeypatch.setitem(sys.modules, kind.package, None)
+        with pytest.raises(
+            recordings.FileError, match=rf"needs {kind.package}; install it with: pip install 'tvident\[{kind.extra}\]'"
+        ):
+            recordings.read(tmp_path / f"x{ending}")
+    with pytest.raises(recordings.FileError, match=r"got '\.wav'; .* convert it in Python: numpy\.savez"):
+        recordings.read(tmp_path / "x.wav")
+    for ending in (".parquet", ".h5", ".mat", ".xlsx"):
+        monkeypatch.setitem(
+            sys.modules, {".mat": "scipy", ".xlsx": "openpyxl", ".h5": "h5py"}.get(ending, "pyarrow"), None
+        )
+        with pytest.raises(ImportError, match=r"install it with: pip install 'tvident\[io\]', or write to \.csv"):
+            examples.RECORDING.write(tmp_path / f"x{ending}")
+        assert not (tmp_path / f"x{ending}").exists() or ending in FORMATS
+
+
+def test_matlab_structures_are_channels_with_units(tmp_path: Path) -> None:
+    channel = np.zeros(2, dtype=[("Name", "O"), ("Data", "O"), ("Unit", "O")])
+    channel[0], channel[1] = ("Model/angle", examples.ANGLE, "deg"), ("torque", examples.TORQUE, "N m")
+    times = np.zeros(1, dtype=[("Name", "O"), ("Data", "O")])
+    times[0] = ("t", examples.T)
+    savemat(tmp_path / "dspace.mat", {"rec1": {"X": times, "Y": channel, "Description": "x"}})
+    found = tvident.FileRecording(dict(matlab.variables(str(tmp_path / "dspace.mat"), [])))
+    assert found.units == {"time": "s", "Model/angle": "deg", "torque": "N m"}
+    assert found.sample_rate == pytest.approx(250)
+    nested = {
+        "angle": {"data": examples.ANGLE, "unit": "deg"},
+        "rig": {"torque": {"values": examples.TORQUE, "units": "N m"}},
+    }
+    savemat(tmp_path / "nested.mat", nested | {"fs": 250.0, "comment": "words"})
+    numbers = matlab.variables(str(tmp_path / "nested.mat"), [])
+    found = tvident.FileRecording({name: value for name, value in numbers if not isinstance(value, str)})
+    assert found.units == {"angle": "deg", "rig.torque": "N m", "fs": ""}
+    assert found["torque"] is found["rig.torque"]
+
+
+def test_results_go_to_files_of_every_kind(tmp_path: Path) -> None:
+    rig = tvident.simulate_torsional_rig(duration=1.0, pattern="constant")
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=1000, stiffness="constant", step=10)
+    for ending in (".parquet", ".h5"):
+        result.save(tmp_path / f"x{ending}")
+        found = tvident.FileRecording(read(tmp_path / f"x{ending}"))
+        assert found["stiffness"].unit == "N m/rad"
+        np.testing.assert_allclose(found["stiffness"], result.stiffness, rtol=1e-15)
+    with pytest.raises(ValueError, match=r"end in \.csv, \.npz, .* or \.xlsx; got 'x\.ods'"):
+        result.save(tmp_path / "x.ods")
+    with pytest.raises(ValueError, match="at most 1048575 rows of numbers; there are 1048576"):
+        tvident.FileRecording({"a": np.zeros(1 << 20)}).write(tmp_path / "long.xlsx")
