@@ -1,6 +1,6 @@
 """Checks what users pass: every message states the rule, the value that broke it and the cure."""
 
-from tvident._arguments.arrays import NanPolicy, RowPolicy, along_axis, any_array, check_nan, mask, real_array
+from tvident._arguments.arrays import NanPolicy, RowPolicy, along_axis, any_array, check_nan, mask, real_array, weights
 from tvident._arguments.channels import as_record, channel, channels
 from tvident._arguments.containers import fields_of, is_table, package_of, plain, time_axis
 from tvident._arguments.digits import percent, to_digits_of, with_error
@@ -64,6 +64,7 @@ __all__ = [
     "times_of",
     "to_digits_of",
     "unwrapped",
+    "weights",
     "whole_number",
     "window_length",
     "with_error",

@@ -119,3 +119,26 @@ def mask(name: str, values: npt.ArrayLike | None, shape: tuple[int, ...]) -> npt
         raise ValueError(
             f"{name} must have one value for every sample; got shape {array.shape} for an angle of shape {shape}; check its length"
         ) from None
+
+
+def weights(name: str, values: npt.ArrayLike | None, shape: tuple[int, ...]) -> npt.NDArray[np.float64] | None:
+    """Return weights, one for every sample, or nothing; a masked one is zero."""
+    if values is None:
+        return None
+    array = np.array(
+        any_array(name, np.ma.filled(values, 0.0) if np.ma.is_masked(values) else values), dtype=np.float64
+    )
+    if array.shape != shape:
+        raise ValueError(
+            f"{name} must have one value for every sample, shape {shape}; got shape {array.shape}; check its length"
+        )
+    wrong = ~(np.isfinite(array) & (array >= 0))
+    if wrong.any():
+        place = tuple(int(index[0]) for index in np.nonzero(wrong))
+        raise ValueError(
+            f"{name} must be finite and not negative; {name}[{', '.join(map(str, place))}] is {array[place]}; give one over the "
+            "variance of the sample's noise, relative to the others, and 0 where it is not to be used"
+        )
+    if not array.any():
+        raise ValueError(f"{name} must leave something to use; got zeros alone; give a weight above zero")
+    return array

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
+from tvident._status import Status
 
 MOST_REGRESSORS = 16
 """No problem may have more regressors than this."""
@@ -64,11 +65,12 @@ def rolling_least_squares(
     b: npt.ArrayLike,
     window_length: int,
     *,
+    weights: npt.ArrayLike | None = None,
     step: int = 1,
     workers: int | None = None,
     progress: arguments.Progress = None,
 ) -> RollingRegression:
-    """Solve ``A x ≈ b`` by least squares in a window around every row.
+    r"""Solve ``A x ≈ b`` by least squares in a window around every row.
 
     The window around row ``i`` holds the rows ``i - w//2 … i - w//2 + w - 1``. Rows are only appended to factors, and factors
     merged; no row is ever subtracted, so an outlier leaves with its row, and no digits are lost however long the record is.
@@ -81,6 +83,9 @@ def rolling_least_squares(
         Right-hand sides.
     window_length : int
         Rows in a window, more than ``p``.
+    weights : array_like, shape (n,), optional
+        Weight of every row, not negative: one over the variance of its noise, relative to the others. Rows of weight 0 are not used,
+        whatever they hold, and a masked weight is 0. Weights of 1 change nothing, and a factor of all weights changes ``rss`` alone.
     step : int, optional
         Every how many rows a result is wanted.
     workers : int, optional
@@ -97,15 +102,16 @@ def rolling_least_squares(
     Raises
     ------
     ValueError
-        If lengths differ, the window is not longer than the number of regressors or longer than the record, or there are too many
-        regressors.
+        If lengths differ, the window is not longer than the number of regressors or longer than the record, there are too many
+        regressors, or a weight is negative or no finite number.
     TypeError
         If an array is complex or holds no numbers.
 
     Notes
     -----
     Equations (3) and (4) of the paper are of this kind. Factors are updated by rotations without square roots. The cost for three
-    regressors is some 30 ns a row and thread, whatever the window; it grows with the square of their number.
+    regressors is some 30 ns a row and thread, whatever the window; it grows with the square of their number. With weights
+    :math:`\sum w_i (b_i - A_i x)^2` is least, which is ``rss``, and rows of weight 0 do not count as rows.
 
     See Also
     --------
@@ -143,12 +149,18 @@ def rolling_least_squares(
         raise ValueError(f"A must have at most {MOST_REGRESSORS} columns; got {count}; drop or combine some")
     length = arguments.whole_number("window_length", window_length, least=1)
     arguments.check_window("window_length", length, rows, least=count + 1)
+    every = arguments.whole_number("step", step, least=1)
+    weight = arguments.weights("weights", weights, (rows,))
+    if weight is not None:
+        root = np.sqrt(weight / weight.max())[:, None]
+        regressors, columns = (_weighted(one, root) for one in (regressors, sides.reshape(rows, -1)))
+        sides = columns.reshape(sides.shape)
     with arguments.reporter(progress, "least squares") as report:
         found = _core.rolling_least_squares(
             regressors.T,
             sides.reshape(rows, -1).T,
             length,
-            step=arguments.whole_number("step", step, least=1),
+            step=every,
             workers=arguments.worker_count(workers),
             progress=report,
         )
@@ -156,4 +168,33 @@ def rolling_least_squares(
         params, stderr, rss = found.params[:, 0].T, found.stderr[:, 0].T, found.rss[0]
     else:
         params, stderr, rss = np.moveaxis(found.params, -1, 0), np.moveaxis(found.stderr, -1, 0), found.rss.T
-    return RollingRegression(params, stderr, rss, found.condition, found.status)
+    if weight is None:
+        return RollingRegression(params, stderr, rss, found.condition, found.status)
+    freedom, used = _used(weight > 0, length, count, every)
+    status = np.where(used, found.status, found.status | np.uint16(Status.INVALID | Status.RANK_DEFICIENT))
+    over = (..., None) if stderr.ndim == 2 else (..., None, None)  # noqa: PLR2004 - one right-hand side
+    rest = used if rss.ndim == 1 else used[:, None]
+    return RollingRegression(
+        np.where(used[over], params, np.nan),
+        np.where(used[over], stderr * freedom[over], np.nan),
+        np.where(rest, rss * weight.max(), np.nan),
+        np.where(used, found.condition, np.nan),
+        status.astype(np.uint16),
+    )
+
+
+def _weighted(columns: npt.NDArray[np.number], root: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return columns whose rows are multiplied by the roots of their weights; what has none may be anything."""
+    return np.where(root > 0, np.asarray(columns, dtype=np.float64), 0.0) * root
+
+
+def _used(
+    is_used: npt.NDArray[np.bool_], length: int, count: int, step: int
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
+    """Return by how much errors grow since rows are not used, and whether more of them are than there are regressors."""
+    rows = np.arange(0, is_used.size, step)
+    first, end = np.maximum(rows - length // 2, 0), np.minimum(rows - length // 2 + length, is_used.size)
+    before = np.concatenate([[0], np.cumsum(is_used)])
+    there = before[end] - before[first]
+    enough = there > count
+    return np.sqrt(np.maximum(end - first - count, 1) / np.where(enough, there - count, 1)), enough
