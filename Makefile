@@ -59,12 +59,17 @@ sanitize: TARGET = $(shell rustc --version --verbose | sed -n 's/^host: //p')
 sanitize:  ## unit tests of the core under AddressSanitizer (needs Rust's nightly toolchain)
 	ASAN_OPTIONS=allocator_may_return_null=1 RUSTFLAGS=-Zsanitizer=address cargo +nightly test --package tvident --lib --target $(TARGET) --target-dir target/sanitize
 
+.PHONY: site
+site: $(BUILT)  ## build the site in docs/site from the pages, the docstrings and the gallery; a warning is an error
+	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs docs/site
+
 .PHONY: docs
-docs: $(BUILT) rooms  ## make anew what documents show of the program: the picture, the command line's help, the rooms
+docs: $(BUILT) rooms  ## make anew what documents show of the program (pictures, help of the commands, rooms), then the site
 	$(BIN)/tvident demo
 	cp tvident-demo/parameters.png docs/identified.png
 	$(BIN)/python docs/comparison.py README.md docs/comparison.png
 	$(BIN)/python docs/command_line_reference.py docs/command-line.md
+	$(MAKE) --no-print-directory site
 
 .PHONY: rooms
 rooms: $(BUILT)  ## make anew what DESIGN.md shows of the rooms: their tables, who uses whom
@@ -94,7 +99,7 @@ record-instructions: $(READY)  ## write down the instructions that a window cost
 
 .PHONY: clean
 clean:  ## remove everything that was made
-	rm -rf $(VENV) $(BENCH) $(ACCURACY) target dist tvident-demo
+	rm -rf $(VENV) $(BENCH) $(ACCURACY) target dist tvident-demo docs/site docs/built docs/shown
 
 $(READY): requirements-development.txt
 	$(PYTHON) -m venv $(VENV)

@@ -22,7 +22,7 @@ import pytest
 
 import tvident
 from calls import paper
-from tvident import Status
+from tvident import Status, figures, recordings
 from tvident._command_line import main
 
 ROOT = Path(__file__).parents[2]
@@ -154,6 +154,15 @@ def test_the_readmes_first_table_is_measured() -> None:
         assert [row["How *K*(t) is found"], row["what must be chosen"]] == [again[0], again[3]]
         for cell, number in ((row["error"], again[1]), (row["with 1 % of noise"], again[2])):
             assert float(cell.rstrip("% ")) == pytest.approx(float(number.rstrip("% ")), rel=MEASURED)
+
+
+def test_the_reference_has_every_public_name() -> None:
+    page = (ROOT / "docs" / "api.rst").read_text(encoding="utf-8")
+    listed = re.findall(r"^   ([\w.]+)$", page, re.MULTILINE)
+    doors = {f"figures.{name}" for name in figures.__all__}
+    classes_and_functions = {name for name in recordings.__all__ if name != "Channels"}  # an alias has no page
+    doors |= {f"recordings.{name}" for name in classes_and_functions}
+    assert sorted(listed) == sorted({*tvident.__all__, *doors})
 
 
 def test_the_rooms_in_the_design_are_those_of_the_sources() -> None:
