@@ -9,6 +9,7 @@ from typing import Any
 
 import ezc3d
 import numpy as np
+import numpy.typing as npt
 import pyuff
 from asammdf import MDF, Signal
 from nptdms import ChannelObject, TdmsWriter
@@ -130,7 +131,12 @@ def xdf(path: Path) -> None:
     )
 
 
-def mcap(path: Path) -> None:
+def mcap(
+    path: Path,
+    times: npt.NDArray[np.float64] = T,
+    angle: npt.NDArray[np.float64] = ANGLE * np.pi / 180,
+    torque: npt.NDArray[np.float64] = TORQUE,
+) -> None:
     store = get_typestore(Stores.ROS2_HUMBLE)
     types: Any = store.types
     joints, header, time = (
@@ -139,14 +145,14 @@ def mcap(path: Path) -> None:
     folder = path.parent / "bag"
     with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         connection = writer.add_connection("/joint_states", joints.__msgtype__, typestore=store)
-        for at, angle, torque in zip(T, np.deg2rad(ANGLE), TORQUE, strict=True):
+        for at, *values in zip(times, angle, torque, strict=True):
             stamp = round(1e9 * at) + 10**18
             message = joints(
                 header=header(stamp=time(sec=stamp // 10**9, nanosec=stamp % 10**9), frame_id=""),
                 name=["shoulder", "elbow"],
-                position=np.array([0.0, angle]),
+                position=np.array([0.0, values[0]]),
                 velocity=np.array([]),
-                effort=np.array([0.0, torque]),
+                effort=np.array([0.0, values[1]]),
             )
             writer.write(connection, stamp + 5000, store.serialize_cdr(message, joints.__msgtype__))
     next(folder.glob("*.mcap")).rename(path)

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
+import tempfile
+import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +16,30 @@ import numpy.typing as npt
 
 from tvident import recordings
 from tvident._files import full_name, listed, printable
-from tvident._units import Channel, named_unit
+from tvident._units import Channel, named_unit, unit_said
+
+_BAGS, _EVEN, _MOST_SCATTER = {".mcap", ".db3", ".bag"}, 1e-3, 2.0
+"""Endings of ROS bags; periods by which stamps are even, and by which they scatter without a gap."""
+
+_FEWEST = 3
+"""Stamps between which there is one that may scatter."""
+
+_MOST_START = 4096
+_BEGINNINGS = {
+    b"PK\x03\x04": ".npz",
+    b"\x93NUMPY": ".npy",
+    b"PAR1": ".parquet",
+    b"ARROW1": ".feather",
+    b"\x89HDF": ".h5",
+    b"MATLAB": ".mat",
+    b"TDSm": ".tdms",
+    b"MDF     ": ".mf4",
+    b"XDF:": ".xdf",
+    b"\x89MCAP": ".mcap",
+    b"#ROSBAG": ".bag",
+    b"LabVIEW": ".lvm",
+}
+"""How files begin."""
 
 
 def channel_of(channels: recordings.Channels, name: str, file: str | None) -> npt.NDArray[Any]:
@@ -20,6 +48,78 @@ def channel_of(channels: recordings.Channels, name: str, file: str | None) -> np
     if channels[full].ndim != 1:
         raise click.UsageError(f"channel {name!r} must hold one value for every sample; it is a single number")
     return Channel(channels[full], named_unit(full)[1])
+
+
+def times_of(channels: recordings.Channels, name: str | None, beside: str, file: str | None) -> npt.NDArray[Any] | None:
+    """Return a channel of times; of several called ``time`` the one of the group that another channel is in."""
+    if name is None:
+        return None
+    try:
+        return channel_of(channels, name, file)
+    except KeyError:
+        try:
+            group = full_name(channels, beside, "").rpartition(beside)[0]
+        except KeyError:
+            group = ""
+        if not group:
+            raise
+        return channel_of(channels, f"{group}{name}", file)
+
+
+def at_even_times(
+    times: npt.NDArray[Any], signals: Sequence[npt.NDArray[Any]], file: str | None
+) -> tuple[npt.NDArray[Any], list[npt.NDArray[Any]]]:
+    """Return messages of a ROS bag as if they had been stamped at even times: between stamps that scatter, straight lines."""
+    given = times, list(signals)
+    if (
+        Path(file or "").suffix.lower() not in _BAGS
+        or times.size < _FEWEST
+        or any(one.shape != times.shape for one in signals)
+    ):
+        return given
+    even = np.linspace(float(times[0]), float(times[-1]), times.size)
+    period = even[1] - even[0]
+    scatter = float(np.abs(np.asarray(times) - even).max())
+    # What is lost for several periods is a gap, which nobody may fill.
+    if not _EVEN * period < scatter < _MOST_SCATTER * period or not (np.diff(times) > 0).all():
+        return given
+    click.echo(
+        f"Warning: stamps of the messages scatter by up to {scatter / period:.2g} of their period; angle and torque are interpolated "
+        f"between them, at {1 / period:.6g} Hz",
+        err=True,
+    )
+    return Channel(even, "s"), [Channel(np.interp(even, times, one), unit_said(one)) for one in signals]
+
+
+def channels_in(file: str | None) -> recordings.Channels:
+    """Return the channels of a file, of standard input where it is called ``-``, and none where there is none."""
+    if file is None:
+        return {}
+    return recordings.read(file) if file != "-" else _standard_input()
+
+
+def _standard_input() -> recordings.Channels:
+    """Return the channels of what is piped in: its first bytes say what it is, text otherwise."""
+    if sys.stdin is None:
+        raise click.UsageError("the file - is standard input, which is closed; name a file")
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", recordings.FileWarning)
+        content = Path(folder) / "content"
+        with content.open("wb") as file:
+            shutil.copyfileobj(sys.stdin.buffer, file)
+        with content.open("rb") as file:
+            start = file.read(_MOST_START)
+        ending = next((ending for magic, ending in _BEGINNINGS.items() if start.startswith(magic)), ".csv")
+        if ending == ".npz" and (b"xl/" in start or b"[Content_Types]" in start):
+            ending = ".xlsx"
+        named = content.rename(content.with_name(f"standard-input{ending}"))
+        try:
+            found = recordings.read(named)
+        except recordings.FileError as error:
+            raise recordings.FileError(str(error).replace(str(named), "standard input")) from None
+    for one in said:
+        click.echo(f"Warning: {str(one.message).replace(str(named), 'standard input')}", err=True)
+    return found
 
 
 def source_of(channels: recordings.Channels, name: str, file: str | None) -> npt.NDArray[Any]:

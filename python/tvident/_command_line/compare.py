@@ -8,8 +8,7 @@ from typing import Any
 import click
 
 import tvident
-from tvident import recordings
-from tvident._command_line.channels import channel_of, mask_of, scaled, source_of
+from tvident._command_line.channels import at_even_times, channels_in, mask_of, scaled, source_of, times_of
 from tvident._command_line.equation import lag_of, parameter_of, terms_of
 from tvident._command_line.group import main
 from tvident._command_line.options import CHANNELS, PICTURE, RECORDING, RESULTS, TIME, check_outputs, check_time, given
@@ -70,7 +69,7 @@ def compare(
     )
     if not check_time(options["sample_rate"], options["delta"], time_channel):
         raise click.UsageError("compare needs the sample period; got none; give --sample-rate, --delta or --time")
-    channels = {} if file is None else recordings.read(file)
+    channels = channels_in(file)
     common: dict[str, Any] = {
         name: parameter_of(value, channels, file) if name in COEFFICIENTS else value
         for name, value in given(options).items()
@@ -79,11 +78,13 @@ def compare(
         common["lag"] = lag_of(lag)
     if mask is not None:
         common["mask"] = mask_of(source_of(channels, mask, file))
-    if time_channel is not None:
-        common["t"] = channel_of(channels, time_channel, file)
+    signals = [source_of(channels, name, file) for name in (angle, torque)]
+    times = times_of(channels, time_channel, angle, file)
+    if times is not None:
+        common["t"], signals = at_even_times(times, signals, file)
     result = tvident.compare_models(
-        scaled(source_of(channels, angle, file), angle_scale, channels, file),
-        scaled(source_of(channels, torque, file), torque_scale, channels, file),
+        scaled(signals[0], angle_scale, channels, file),
+        scaled(signals[1], torque_scale, channels, file),
         models={name: {"terms": terms_of(tuple(name.split(",")))} for name in models} or None,
         **common,
     )

@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 import tvident
 from tvident import _arguments as arguments
-from tvident import recordings
-from tvident._command_line.channels import channel_of
+from tvident._command_line.channels import channel_of, channels_in
 from tvident._command_line.group import main
 from tvident._command_line.options import (
     CRITERION,
@@ -76,7 +75,7 @@ def derivatives(
     """Differentiate a channel of FILE with a polynomial order chosen in every window."""
     check_outputs({RESULTS: output, PICTURE: plot}, {RECORDING: file})
     check_time(sample_rate, delta, time_channel)
-    channels = recordings.read(file)
+    channels = channels_in(file)
     samples = channel_of(channels, channel, file)
     times = None if time_channel is None else times_in_seconds(channel_of(channels, time_channel, file))
     fit = tvident.fit_local_polynomials(

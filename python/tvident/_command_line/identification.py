@@ -14,7 +14,7 @@ import numpy as np
 import tvident
 from tvident import _arguments as arguments
 from tvident import recordings
-from tvident._command_line.channels import channel_of, mask_of, scaled, source_of
+from tvident._command_line.channels import at_even_times, mask_of, scaled, source_of, times_of
 from tvident._command_line.equation import lag_of, parameter_of, terms_of
 from tvident._command_line.method import METHOD, NAMES, method_of
 from tvident._command_line.options import (
@@ -111,11 +111,15 @@ def identified(
         )
     of_method = {name: value for name, value in given(options).items() if name in NAMES}
     turn = None if period is None else scaled(np.asarray(period_of(period)), angle_scale, channels, file)
+    signals = [source_of(channels, name, file) for name in (angle, torque)]
+    times = times_of(channels, time_channel, angle, file)
+    if times is not None:
+        times, signals = at_even_times(times, signals, file)
     return tvident.identify(
-        scaled(source_of(channels, angle, file), angle_scale, channels, file),
-        scaled(source_of(channels, torque, file), torque_scale, channels, file),
+        scaled(signals[0], angle_scale, channels, file),
+        scaled(signals[1], torque_scale, channels, file),
         method=method_of(method, of_method, has_settings=settings is not None),
-        t=None if time_channel is None else channel_of(channels, time_channel, file),
+        t=times,
         instrument=None if instrument is None else source_of(channels, instrument, file),
         period=None if turn is None else abs(float(turn)),
         lag=None if lag is None else lag_of(lag),

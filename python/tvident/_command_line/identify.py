@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from tvident import recordings
+from tvident._command_line.channels import channels_in
 from tvident._command_line.group import main
 from tvident._command_line.identification import IDENTIFICATION, identified, inputs
 from tvident._command_line.options import PICTURE, RESULTS, RUN, SETTINGS, check_outputs
@@ -29,7 +29,7 @@ def identify(
     What is not given is chosen from the recording, and the summary says what and why.
     """
     check_outputs({RESULTS: output, PICTURE: plot, SETTINGS: settings_output}, inputs(file, options))
-    channels = {} if file is None else recordings.read(file)
+    channels = channels_in(file)
     result = identified(channels, file, **options)
     if settings_output is not None:
         with replaced(Path(settings_output)) as written:

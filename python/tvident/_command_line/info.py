@@ -8,7 +8,7 @@ import click
 import numpy as np
 import numpy.typing as npt
 
-from tvident import recordings
+from tvident._command_line.channels import channels_in
 from tvident._command_line.group import main
 from tvident._files import aligned, printable
 
@@ -17,7 +17,7 @@ from tvident._files import aligned, printable
 @click.argument("file", type=click.Path())
 def info(file: str) -> None:
     """List the channels of FILE: how many samples, their range, and what is missing."""
-    channels = recordings.read(file)
+    channels = channels_in(file)
     rows: list[tuple[str, ...]] = [
         ("channel", "type", "samples", "mean", "std", "least", "greatest", "missing", "remark")
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Mapping
+from functools import wraps
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -27,11 +28,30 @@ def options_of(*options: Callable[[Decorated], Decorated]) -> Callable[[Decorate
     return decorate
 
 
+def _named(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Put what a joint is recorded as in place of its name, and ask for channels where there is none."""
+
+    @wraps(function)
+    def call(*, joint: str | None = None, **options: Any) -> Any:
+        missing = [name for name in ("angle", "torque") if options[name] is None]
+        if joint is None and missing:
+            raise click.UsageError(f"Missing option '--{missing[0]}'; name the channel, or a --joint of a ROS bag")
+        if joint is not None:
+            if len(missing) < 2:  # noqa: PLR2004 - angle and torque
+                raise click.UsageError("--joint stands for --angle and --torque; got one of these too; drop it")
+            options |= {"angle": f"{joint}.position", "torque": f"{joint}.effort"}
+            if not any(options.get(name) for name in ("sample_rate", "delta", "time_channel")):
+                options["time_channel"] = "time"
+        return function(**options)
+
+    return call
+
+
 CHANNELS = options_of(
-    click.option("--angle", required=True, metavar="NAME", help="Channel of the angle, or a file that holds it alone."),
-    click.option(
-        "--torque", required=True, metavar="NAME", help="Channel of the torque, or a file that holds it alone."
-    ),
+    click.option("--angle", metavar="NAME", help="Channel of the angle, or a file that holds it alone."),
+    click.option("--torque", metavar="NAME", help="Channel of the torque, or a file that holds it alone."),
+    click.option("--joint", metavar="NAME", help="Of a ROS bag, instead: its position, its effort and their stamps."),
+    _named,
     click.option("--angle-scale", metavar="SCALE", help="Number or variable to multiply the angle by."),
     click.option("--torque-scale", metavar="SCALE", help="Number or variable to multiply the torque by."),
     click.option(

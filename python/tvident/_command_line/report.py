@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from tvident import _report, recordings
-from tvident._command_line.channels import source_of
+from tvident._command_line.channels import channels_in, source_of
 from tvident._command_line.group import main
 from tvident._command_line.identification import IDENTIFICATION, identified, inputs
 from tvident._command_line.options import REPORT, WORK, check_outputs
@@ -40,7 +40,7 @@ def report(file: str | None, output: str, **options: Any) -> None:
         raise click.UsageError(f"-o must end in .html; got '{printable(output)}'; rename it")
     _report.check_plotly()
     check_outputs({REPORT: output}, inputs(file, options))
-    channels = {} if file is None else recordings.read(file)
+    channels = channels_in(file)
     result = identified(channels, file, **options)
     used = {
         full_name(channels, options[name], "")
