@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -221,6 +222,22 @@ def test_the_predicted_torque_leaves_the_noise(rig: tvident.Recording, result: t
         )
         _, recorded, predicted = found.predicted_torque()
         assert np.nanstd(recorded - predicted) < 0.1 * np.nanstd(recorded), method
+
+
+def test_where_nothing_is_found_pictures_and_reports_say_so(tmp_path: Path) -> None:
+    nothing = tvident.identify(np.zeros(2000), np.zeros(2000), sample_rate=1000)
+    for what in ("parameters", "status", "poles"):
+        nothing.plot(what).savefig("/dev/null", format="png")
+    assert panels(nothing.plot("torque"))[1].get_title(loc="left") == "Nothing is predicted: there are no parameters"
+    nothing.report(tmp_path / "nothing.html")
+    assert '"tone": "bad"' in (tmp_path / "nothing.html").read_text(encoding="utf-8")
+
+    rig = tvident.simulate_torsional_rig(2.0)
+    linear = tvident.identify(rig.angle, rig.torque, sample_rate=1000, angle_unit="m", torque_unit="N")
+    assert panels(linear.plot("torque"))[0].get_title(loc="left") == "Force, averaged over the test function"
+    linear.report(tmp_path / "linear.html")
+    text = (tmp_path / "linear.html").read_text(encoding="utf-8")
+    assert all(f'"title": "{name}", "unit": "{unit}"' in text for name, unit in (("Position", "m"), ("Force", "N")))
 
 
 def test_poles_are_the_roots_and_positions_the_places(rig: tvident.Recording, result: tvident.Identification) -> None:

@@ -66,10 +66,9 @@ def plot_torque(result: Predicting, ax: Place = None) -> Figure:
         draw_line(above, time, recorded, color=MUTED, linewidth=1.6, alpha=0.55, label="recorded")
         draw_line(above, time, predicted, color=FOUND, linewidth=0.9, label="predicted from the angle")
         draw_line(below, time, left, color=ACCENT, linewidth=0.8)
-        weak = result.settings["form"] == "weak"
-        above.set_title("Torque, averaged over the test function" if weak else "Torque")
-        share = float(np.sqrt(np.nanmean(left**2) / np.nanmean(recorded**2)))
-        below.set_title(f"What is left: {np.sqrt(np.nanmean(left**2)):.3g} {unit} rms, {share:.2g} of the torque")
+        name = "Force" if unit == "N" else "Torque"
+        above.set_title(f"{name}, averaged over the test function" if result.settings["form"] == "weak" else name)
+        below.set_title(_left_in_words(left, recorded, unit))
         scale(above, recorded, predicted)
         scale(below, left)
         for panel in (above, below):
@@ -80,3 +79,13 @@ def plot_torque(result: Predicting, ax: Place = None) -> Figure:
         if ax is None:
             figure.align_ylabels()
     return figure
+
+
+def _left_in_words(left: Array, recorded: Array, unit: str) -> str:
+    """Return how much is left, in its unit and as a share."""
+    there = np.isfinite(left)
+    if not there.any():
+        return "Nothing is predicted: there are no parameters"
+    rms, of = (float(np.sqrt(np.mean(one[there] ** 2))) for one in (left, recorded))
+    share = f", {rms / of:.2g} of the {'force' if unit == 'N' else 'torque'}" if of > 0 else ""
+    return f"What is left: {rms:.3g} {unit} rms{share}"

@@ -148,14 +148,15 @@ class _Drawn:
             for name, one in zip(names, (*torques, torques[0] - torques[1]), strict=True)
         ]
         weak = self.result.settings["form"] == "weak"
-        words = "Torque, averaged over the test function" if weak else "Torque and its prediction"
+        name = "Force" if unit == "N" else "Torque"
+        words = f"{name}, averaged over the test function" if weak else f"{name} and its prediction"
         self._draw("How well", words, unit, line=numbers[0], second=numbers[1], robust=True)
-        self._draw("How well", "Torque less what is predicted from the angle", unit, line=numbers[2], robust=True)
+        self._draw("How well", f"{name} less what is predicted", unit, line=numbers[2], robust=True)
 
     def quality(self) -> None:
         """Draw residuals, condition and order where they change."""
         words = {
-            "residual_std": "Residual of the torque, standard deviation",
+            "residual_std": "Residual, standard deviation",
             "condition": "Condition number of the equations",
         }
         if self.result.order.any():
@@ -245,6 +246,8 @@ def _warnings(result: Reported, marks: Mapping[Status, npt.NDArray[np.bool_]]) -
         if int(result.record_status) & flag
     ]
     for flag, mark in marks.items():
+        if int(result.record_status) & flag and mark.all():
+            continue  # said already
         edges = np.flatnonzero(np.diff(mark.view(np.int8), prepend=0, append=0))
         first, last = edges[::2], edges[1::2] - 1
         longest = np.sort(np.argsort(first - last, kind="stable")[:_STRETCHES])

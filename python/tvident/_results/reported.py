@@ -46,8 +46,12 @@ def report(
         shown.append(_report.Series(name, unit, numbers, start, 1 / rate, is_recorded=True))
 
     if recorded is not None and recorded.is_unchanged and result.inertia.ndim == 1:
-        show("Angle", result.units["angle"], recorded.angles)
-        show("Torque", result.units["torque"].replace(" ", "·"), recorded.torques)
+        show("Position" if result.units["angle"] == "m" else "Angle", result.units["angle"], recorded.angles)
+        show(
+            "Force" if result.units["torque"] == "N" else "Torque",
+            result.units["torque"].replace(" ", "·"),
+            recorded.torques,
+        )
         _, *compared = result.predicted_torque()
     step = int(result.settings["step"])
     samples = shown[0].values.size if shown else None
