@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -149,3 +150,19 @@ def test_the_command_shows_every_channel_of_the_file(tmp_path: Path, monkeypatch
         refused = CliRunner().invoke(main, [*call, "-o", output])
         assert refused.exit_code in {1, 2}
         assert message in refused.output
+
+
+def test_without_plotly_it_is_said_what_to_install(
+    result: tvident.Identification, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A module of that name that holds no drawing library stands for one that is not installed.
+    (tmp_path / "plotly.py").write_text("")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "plotly", raising=False)
+    with pytest.raises(ImportError, match=r"pip install 'tvident\[report\]'"):
+        result.report(tmp_path / "page.html")
+    call = ["report", "rig.csv", "--angle", "angle", "--torque", "torque", "--time", "time"]
+    refused = CliRunner().invoke(main, [*call, "-o", str(tmp_path / "page.html")])
+    assert refused.exit_code == 2
+    assert "pip install 'tvident[report]'" in refused.output
+    assert not (tmp_path / "page.html").exists()
