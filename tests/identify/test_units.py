@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -127,3 +128,29 @@ def test_units_and_questions_stay_with_the_parts_of_a_result(tmp_path: Path) -> 
     again = tvident.load(tmp_path / "x.npz")
     assert again.units["stiffness"] == again.scan().units["stiffness"] == "N/m"
     assert "kg" in str(again.value("inertia"))
+
+
+def test_channels_with_units_are_converted_wherever_they_are_taken() -> None:
+    degrees, millimetres = tvident.Channel(np.rad2deg(RIG.angle), "deg"), tvident.Channel(1e3 * RIG.torque, "N mm")
+    assert PLAIN.vaf(degrees, millimetres) == pytest.approx(PLAIN.vaf(RIG.angle, RIG.torque))
+    np.testing.assert_allclose(
+        PLAIN.simulate(millimetres, angle=degrees), PLAIN.simulate(RIG.torque, angle=RIG.angle), rtol=1e-9
+    )
+    with pytest.raises(ValueError, match="the torque must be in a unit that can be converted to N m; got 'V'"):
+        PLAIN.vaf(degrees, tvident.Channel(RIG.torque, "V"))
+    inertia = tvident.Channel(np.full(RIG.angle.size, 0.0123e7), "g cm^2")
+    known = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, inertia=inertia)
+    assert known.inertia[0] == pytest.approx(0.0123)
+    damping = tvident.Channel(np.full(RIG.angle.size, 8.0), "N mm s")
+    assert tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, damping=damping).damping[0] == pytest.approx(0.008)
+    with pytest.raises(
+        ValueError, match=r"a known inertia must be in a unit that can be converted to kg m\^2; got 'kg'"
+    ):
+        tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, inertia=tvident.Channel(inertia, "kg"))
+
+
+def test_a_result_with_functions_of_ones_own_can_be_stored() -> None:
+    term = tvident.Term("own", lambda t, angle, velocity: angle**3)  # noqa: ARG005 - what a term is given
+    found = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, terms=["offset", term])
+    assert len(pickle.dumps(found)) < 2 * sum(values.nbytes for values in found.columns().values())
+    assert pickle.loads(pickle.dumps(found)).advice == found.advice  # noqa: S301 - our own

@@ -9,6 +9,8 @@ import click
 from tvident import _arguments as arguments
 from tvident import recordings
 from tvident._equation import Kind
+from tvident._files import full_name
+from tvident._units import Channel, named_unit
 
 
 def parameter_of(value: str, channels: recordings.Channels, file: str | None) -> Any:
@@ -18,7 +20,8 @@ def parameter_of(value: str, channels: recordings.Channels, file: str | None) ->
     try:
         return float(value)
     except ValueError:
-        return recordings.channel(channels, value, file or "the command line")
+        full = full_name(channels, value, file or "the command line")
+        return Channel(channels[full], named_unit(full)[1])
 
 
 def terms_of(texts: tuple[str, ...]) -> list[Any] | None:

@@ -11,13 +11,13 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._derivatives import quantisation_step
-from tvident._equation import GivenTerm, Parameter
+from tvident._equation import LINEAR_UNITS, UNITS, GivenTerm, Parameter
 from tvident._identify.data import Data
 from tvident._identify.methods import Method
 from tvident._identify.settings import resolve
 from tvident._identify.task import Task
 from tvident._results import Identification
-from tvident._units import axis_of, scaled, times_in_seconds
+from tvident._units import ROTARY, Axis, axis_of, factor_between, scaled, times_in_seconds, unit_said
 
 
 # All but the data are options, as users call it.
@@ -199,9 +199,9 @@ def identify(
             raise TypeError("identify needs the sample period; got none; give sample_rate=, delta= or t=")
     seconds = arguments.sample_period(samples, delta=delta, sample_rate=sample_rate, t=t)
     given = {
-        "inertia": inertia,
-        "damping": damping,
-        "stiffness": stiffness,
+        "inertia": _known("inertia", inertia, axis),
+        "damping": _known("damping", damping, axis),
+        "stiffness": _known("stiffness", stiffness, axis),
         "terms": terms,
         "lag": lag,
         "quantisation": _in_units_of_results("quantisation", quantisation, axis.angle),
@@ -242,3 +242,11 @@ def identify(
 def _in_units_of_results(name: str, value: float | None, factor: float) -> float | None:
     """Return what was given in the unit of the angle in that of results."""
     return value if value is None or factor == 1 else arguments.finite_number(name, value) * factor
+
+
+def _known(name: str, value: Any, axis: Axis) -> Any:
+    """Return a parameter that says its unit in that of results; anything else as it is."""
+    said = unit_said(value)
+    units = UNITS if axis.system is ROTARY else LINEAR_UNITS
+    factor = factor_between(said, units[name], name=f"a known {name}") if said else 1.0
+    return value if factor == 1 else scaled(np.asarray(value), factor)

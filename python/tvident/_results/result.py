@@ -168,6 +168,10 @@ class Identification(Simulated, Valued):
         r"""Damping ratio C/(2√(KI)), shape (\*, n), without unit; NaN where KI is negative."""
         return self._oscillator.damping_ratio
 
+    def __getstate__(self) -> dict[str, Any]:
+        # What finds the words knows the record.
+        return super().__getstate__() | {"_words": self._told}
+
     # What to say is found when it is asked for: a short record is identified in less time than that takes.
     @cached_property
     def _told(self) -> Words:

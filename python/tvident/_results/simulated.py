@@ -14,6 +14,7 @@ from tvident._results.recorded import Recorded
 from tvident._results.response import Model, accounted_for, every_sample
 from tvident._results.torque import compared
 from tvident._status import Status
+from tvident._units import LINEAR, ROTARY, factor_to, scaled, unit_said
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -26,7 +27,7 @@ class Simulated:
 
     Attributes
     ----------
-    time, inertia, damping, stiffness, terms, constants, settings, status, stderr :
+    time, inertia, damping, stiffness, terms, constants, settings, status, stderr, units :
         Those of the result.
     """
 
@@ -39,6 +40,7 @@ class Simulated:
     settings: dict[str, Any]
     status: npt.NDArray[np.uint16]
     stderr: Mapping[str, Array]
+    units: Mapping[str, str]
 
     def __init__(self, recorded: Recorded | None) -> None:
         self._recorded = recorded
@@ -60,7 +62,8 @@ class Simulated:
         Parameters
         ----------
         torque : array_like, shape (\*, m)
-            Torque in N m at the record's sample rate; as long as the record if parameters change with time.
+            Torque at the record's sample rate, in N m or in the unit that a :class:`Channel` says; as long as the record if parameters
+            change with time.
         initial : array_like, shape (2,) or (\*, 2), optional
             Angle in rad and velocity in rad/s at the first sample. By default the state in which the record began, estimated by least
             squares from its angle.
@@ -78,13 +81,13 @@ class Simulated:
             If shapes do not match, the record is not there to tell the state, or the response leaves the range of numbers, as that of an
             unstable system does.
         """
-        torques = arguments.channel("torque", torque)
+        torques = self._channel("torque", torque)
         model = self._model()
         model.check(torques)
         if initial is not None and angle is not None:
             raise ValueError("the state must come from initial= or from angle=; got both; drop one")
         if angle is not None:
-            return model.respond(torques, angle=_like_torque("angle", angle, torques))[0]
+            return model.respond(torques, angle=_like_torque("angle", self._channel("angle", angle), torques))[0]
         if initial is None:
             recorded = self._record("initial=, or angle= of the same recording")
             if np.array_equal(recorded.torques, torques, equal_nan=True):
@@ -124,8 +127,8 @@ class Simulated:
         if angle is None or torque is None:
             recorded = self._record("angle= and torque=")
             angle, torque = recorded.angles, recorded.torques
-        torques = arguments.channel("torque", torque)
-        angles = _like_torque("angle", angle, torques)
+        torques = self._channel("torque", torque)
+        angles = _like_torque("angle", self._channel("angle", angle), torques)
         share = accounted_for(angles, self.simulate(torques, angle=angles))
         return share if share.ndim else float(share)
 
@@ -219,6 +222,12 @@ class Simulated:
             )
         return self._recorded
 
+    def _channel(self, name: str, values: npt.ArrayLike) -> npt.NDArray[np.number]:
+        """Return a channel in the unit of the result, by the unit that it says it has."""
+        system = ROTARY if self.units["angle"] == ROTARY.units["angle"] else LINEAR
+        factor = factor_to(system, name, unit_said(values), name=f"the {name}")
+        return scaled(arguments.channel(name, values), factor)
+
     def _model(self, without: npt.NDArray[np.bool_] | None = None) -> Model:
         """Return the equation of motion that was found, with nothing at samples that are left out."""
         s = self.settings
@@ -259,9 +268,8 @@ class Simulated:
         return self.__dict__ | {"_recorded": None}
 
 
-def _like_torque(name: str, channel: npt.ArrayLike, torque: npt.NDArray[np.number]) -> npt.NDArray[np.number]:
+def _like_torque(name: str, array: npt.NDArray[np.number], torque: npt.NDArray[np.number]) -> npt.NDArray[np.number]:
     """Return a channel that has the shape of the torque."""
-    array = arguments.channel(name, channel)
     if array.shape != torque.shape:
         raise ValueError(
             f"{name} and torque must have the same shape; got {array.shape} and {torque.shape}; cut or reshape one of them"

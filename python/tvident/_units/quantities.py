@@ -16,6 +16,9 @@ class UnitError(ValueError):
 
 _ANGLE, _LENGTH, _TIME = (0, 0, 0, 1, *NONE[4:]), (0, 1, *NONE[2:]), (0, 0, 1, *NONE[3:])
 _TORQUE, _FORCE = (1, 2, -2, *NONE[3:]), (1, 1, -2, *NONE[3:])
+_RADIAN = 3
+"""Which of the powers of a dimension is that of rad."""
+
 _WEIGHT_ON_AN_ARM = (1, 1, *NONE[2:])
 """kg cm, in-lb: what a mass weighs, on an arm."""
 
@@ -94,3 +97,23 @@ def _in(unit: Unit, dimension: Dimension) -> float:
     if dimension == _TORQUE and unit.dimension == _WEIGHT_ON_AN_ARM:
         return unit.factor * GRAVITY
     return math.nan
+
+
+def factor_between(text: str, wanted: str, *, name: str) -> float:
+    """Return what a parameter in one unit is multiplied by to be in another; rad may be left out, as in N m s for N m s/rad.
+
+    Raises
+    ------
+    UnitError
+        If the unit is unknown, or of another quantity.
+    """
+    if not text:
+        return 1.0
+    unit, other = unit_of(text), unit_of(wanted)
+    if unit is not None and other is not None:
+        without = tuple(0 if base == _RADIAN else power for base, power in enumerate(other.dimension))
+        if unit.dimension in {other.dimension, without} and math.isfinite(unit.factor):
+            return unit.factor / other.factor
+    raise UnitError(
+        f"{name} must be in a unit that can be converted to {wanted}; got {text!r}; pass plain numbers in {wanted}"
+    )
