@@ -384,3 +384,11 @@ def test_any_encoding_of_the_terminal_will_do(folder: Path) -> None:
     done = run(folder, *IDENTIFY, env=os.environ | {"PYTHONIOENCODING": "iso8859-5"})
     assert done.returncode == 0, done.stderr
     assert " \\xb1 " in done.stdout
+
+
+def test_explain_walks_through_what_was_found(folder: Path) -> None:
+    done = run(folder, *IDENTIFY, "--explain")
+    steps = [line[:2] for line in done.stdout.splitlines() if line[1:3] == ". "]
+    assert steps == ["1.", "2.", "3.", "4.", "5.", "6."], done
+    assert "I θ̈ + C θ̇ + K θ + offset = T" in done.stdout
+    assert "K(t) known to" in done.stdout

@@ -166,7 +166,7 @@ def test_records_of_a_batch_are_simulated_on_their_own(rig: tvident.Recording) -
     assert both.held_back().simulated.shape == (2, 1)
     alone = tvident.identify(angle[1, 0], torque[1, 0], sample_rate=1000)
     assert both.vaf()[1, 0] == pytest.approx(alone.vaf(), rel=1e-12)
-    assert "(median of all records)" in both.summary().splitlines()[0]
+    assert "(median of all records)" in both.summary().splitlines()[1]
     with pytest.raises(ValueError, match=r"torque must have a record for each.*shape \(4000,\)"):
         both.simulate(torque[0, 0])
 
@@ -200,7 +200,7 @@ def test_a_result_knows_its_record_only_as_long_as_it_is_there(rig: tvident.Reco
     angle, torque = rig.angle.copy(), rig.torque.copy()
     result = tvident.identify(angle, torque, sample_rate=1000, stiffness="constant")
     again = pickle.loads(pickle.dumps(result))  # noqa: S301 - its own
-    assert "the record was not kept with the result" in again.summary().splitlines()[0]
+    assert "the record was not kept with the result" in again.summary().splitlines()[1]
     with pytest.raises(ValueError, match=r"stored without it; give angle= and torque="):
         again.vaf()
     assert again.vaf(angle, torque) == result.vaf()
@@ -211,7 +211,7 @@ def test_a_result_knows_its_record_only_as_long_as_it_is_there(rig: tvident.Reco
         result.simulate(torque)
     changed = tvident.identify(angle, torque, sample_rate=1000, stiffness="constant")
     angle *= 2
-    assert "hold other samples by now" in changed.summary().splitlines()[0]
+    assert "hold other samples by now" in changed.summary().splitlines()[1]
 
 
 def test_a_part_that_was_held_back_tells_a_good_model_from_a_bad_one(
@@ -224,7 +224,7 @@ def test_a_part_that_was_held_back_tells_a_good_model_from_a_bad_one(
     constant: dict[str, Any] = {"inertia": "constant", "damping": "constant", "stiffness": "constant"}
     bad = tvident.identify(rig.angle, rig.torque, sample_rate=1000, **constant).held_back()
     assert bad.simulated < 90 < bad.predicted < good.predicted
-    first = result.summary().splitlines()[0]
+    first = result.summary().splitlines()[1]
     assert first.startswith("explains 99.")
     assert "predicted one test function ahead in the last tenth of every tenth, held back" in first
     paper = tvident.identify(rig.angle, rig.torque, sample_rate=1000, method="paper").held_back()

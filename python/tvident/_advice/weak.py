@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -23,11 +24,6 @@ _BEYOND_CHANCE = 4.0
 _TAKES_PART = 0.3
 """A constant that has at least this share in the worst determined combination is named."""
 
-_WEAK = (
-    "weak form: on simulated recordings (four patterns, five noise levels) its errors were 1.4 to 55 times smaller for stiffness and 3 to "
-    "78 times smaller for inertia than those of the strong form with the same kinds"
-)
-"""Why nothing else is chosen; measured as docs/automatic.md says."""
 
 _PERIODS = (2 * math.pi, math.pi, 360.0, 180.0, 1.0, *(2.0**bits for bits in range(8, 25)))
 """Periods of wrapped angles: a turn or half of one in rad, degrees and turns, and encoders' counts."""
@@ -40,6 +36,9 @@ def _period(jump: float) -> float:
     """Return the period of an angle that jumps so far."""
     near = [one for one in _PERIODS if (1 - _NEAR) * one <= jump <= (1 + _NEAR / 2) * one]
     return min(near, key=lambda one: abs(one - jump), default=jump)
+
+
+_BEGIN = "begin with the first of these: the others may then disappear"
 
 
 @dataclass(frozen=True)
@@ -75,12 +74,8 @@ class Explained:
     coherence: float | None = None
     units: Mapping[str, str] = field(default_factory=lambda: UNITS)
 
-    def words(self, *, method_chosen: bool = False) -> Words:
-        """Return what there is to say, with the reason for the weak form where nobody asked for it."""
-        words = self._words()
-        return Words((_WEAK, *words.reasons), words.advice) if method_chosen else words
-
-    def _words(self) -> Words:
+    def words(self) -> Words:
+        """Return what there is to say."""
         flags = Status(self.found.record_status)
         if self.found.unexplained and Status.RANK_DEFICIENT in flags:
             return Words((self._noise(),), (*self._defects(), self._unexplained()))
@@ -104,14 +99,13 @@ class Explained:
         )
         advice = (
             *self._feedback(),
-            *self._defects(),
             *self._disagreement(flags),
             *self._misfit(flags),
             *self._outside(),
         )
-        advice = (*advice, *self._suspects(), *self._contradictions())
-        advice = (*advice, *self._told_apart(flags))
-        return Words(reasons, (*advice, *self._limits(flags)))
+        advice = (*advice, *self._contradictions(), *self._told_apart(flags), *self._limits(flags))
+        # What can be typed comes before what is to be looked for.
+        return Words(reasons, (*self._defects(), *self.suspicions(), *advice))
 
     def _constants(self) -> list[tuple[str, _core.Unknown]]:
         """Return the constants by name."""
@@ -263,7 +257,7 @@ class Explained:
         if not self.found.lengths:
             return []
         words, error = f"windows of {self.found.regression_window} samples", self.found.prediction_error
-        left = f"cross-validation error {error:.2f} times the variance of the noise (1 is the best possible)"
+        left = f"cross-validation error {error:.3g} times the variance of the noise (1 is the best possible)"
         why = "best of all lengths" if "regression_window" in self.chosen else "as given"
         return [
             f"{words}: {why}; {left}",
@@ -311,7 +305,7 @@ class Explained:
         words = []
         if Status.NOISE_MODEL in flags:
             words.append(
-                f"the cross-validation error is {self.found.prediction_error:.1f} times the variance of the noise: is a term missing, "
+                f"the cross-validation error is {self.found.prediction_error:.3g} times the variance of the noise: is a term missing, "
                 "is the torque delayed, or is the noise not white because a channel was filtered or drifts? Standard errors are "
                 "estimated from the residuals instead, and may be too small"
             )
@@ -322,16 +316,26 @@ class Explained:
             )
         return words
 
-    def _suspects(self) -> list[str]:
-        found = [suspect for suspect in self.found.suspects if suspect.conspicuous]
+    @property
+    def suspects(self) -> list[Any]:
+        """What seems to be missing, the surest first; friction that drives the motion is no friction."""
+        found = [
+            one for one in self.found.suspects if one.conspicuous and not (one.name == "coulomb" and one.value <= 0)
+        ]
         found.sort(key=lambda suspect: -abs(suspect.value) / suspect.stderr if suspect.stderr > 0 else -math.inf)
+        return found
+
+    def suspicions(self, names: Collection[str] | None = None) -> list[str]:
+        """Return what seems to be missing, in words: everything, or some of it by name."""
         words = []
-        for one in found:
-            amount = f"{one.value:.3g} ± {one.stderr:.1g}"
+        for one in self.suspects:
+            if names is not None and one.name not in names:
+                continue
             if one.name == "lag":
+                amount = f"{abs(one.value):.3g} ± {one.stderr:.1g}"
                 words.append(
-                    f"the torque seems to be delayed by {amount} samples: give lag={one.value * self.period:.3g} (seconds), "
-                    "or align the channels"
+                    f"the torque seems to be {'delayed' if one.value > 0 else 'early'} by {amount} samples: give "
+                    f"lag={one.value * self.period:.3g} (seconds), or align the channels"
                 )
             else:
                 term = BUILT_IN[one.name]
@@ -339,9 +343,10 @@ class Explained:
                 names = [name for name in self.names if name not in COEFFICIENTS]
                 inner = {name for name in names if any(name.startswith(f"{other}.") for other in names)}
                 terms = [name for name in names if name not in inner] + [one.name]
-                words.append(f"{term.suspicion.format(amount=f'{amount} {self.units[term.name]}')}: give terms={terms}")
+                amount = f"{one.value:.3g} ± {one.stderr:.1g} {self.units[term.name]}"
+                words.append(f"{term.suspicion.format(amount=amount)}: give terms={terms}")
         if len(words) > 1:
-            words.append("begin with the first of these: the others may then disappear")
+            words.append(_BEGIN)
         return words
 
     def _contradictions(self) -> list[str]:
@@ -385,6 +390,8 @@ class Explained:
             return []
         lengths = [length for length, _ in self.found.lengths]
         if lengths and self.found.regression_window <= min(lengths):
+            if all(one.kind != "windowed" for one in self.found.unknowns):
+                return []
             words = (
                 f"windows of {self.found.regression_window} samples are the shortest that were tried: windowed parameters change too fast "
                 "to be followed, or the record is too short: record ten cycles or more, and excite higher frequencies"

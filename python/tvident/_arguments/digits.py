@@ -44,3 +44,13 @@ def percent(share: float) -> str:
     left = min(abs(100 - value), abs(value))
     digits = min(6, max(0, 1 - math.floor(math.log10(left)))) if 0 < left < math.inf else 0
     return f"{value:.{digits}f} %"
+
+
+def own_digits(error: float) -> str:
+    """Return an error with two digits."""
+    if not math.isfinite(error):
+        return "none"
+    if not _SMALL <= error < _LARGE:
+        return f"{error:.1e}".replace("e-0", "e-").replace("e+0", "e+") if error else "0"
+    places = decimals(error)
+    return f"{round(error, places):.{max(0, places)}f}"

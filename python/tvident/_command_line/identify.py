@@ -14,15 +14,22 @@ from tvident._command_line.identification import IDENTIFICATION, identified, inp
 from tvident._command_line.options import PICTURE, RESULTS, RUN, SETTINGS, check_outputs
 from tvident._command_line.output import give, save_figure
 from tvident._files import replaced
+from tvident._results import explained_steps
 
 
 @main.command(epilog="Example: tvident identify rig.csv --angle angle --torque torque --time time -o result.csv")
 @click.argument("file", type=click.Path(), required=False)
 @IDENTIFICATION
 @click.option("--settings-output", type=click.Path(dir_okay=False), help="JSON file for the settings of this run.")
+@click.option("--explain", is_flag=True, help="Walk through what was asked, found, tested and tried.")
 @RUN
 def identify(
-    file: str | None, settings_output: str | None, output: str | None, plot: str | None, **options: Any
+    file: str | None,
+    settings_output: str | None,
+    output: str | None,
+    plot: str | None,
+    explain: bool,  # noqa: FBT001 - click passes options by name
+    **options: Any,
 ) -> None:
     """Identify inertia, damping and stiffness from the angle and torque in FILE.
 
@@ -34,7 +41,7 @@ def identify(
     if settings_output is not None:
         with replaced(Path(settings_output)) as written:
             written.write((json.dumps(result.settings, indent=1) + "\n").encode())
-    words = [result.summary()]
+    words = [explained_steps(result) if explain else result.summary()]
     for name, (value, error) in result.constants.items():
         words.append(f"{name} = {value:.8g} ± {error:.2g} {result.units.get(name, '')}".rstrip())
     give(result.columns(), result.units, "\n".join(words), output)

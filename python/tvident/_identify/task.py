@@ -19,11 +19,12 @@ from tvident._identify.batch import estimates, with_inner
 from tvident._identify.columns import Columns, Range, fixed, secant
 from tvident._identify.criterion import criterion_of
 from tvident._identify.data import Data
+from tvident._identify.improved import Improvement, is_to_be_tried
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm, exponent_of
 from tvident._identify.searched import Searched, factor_of, search
 from tvident._identify.settings import Request, plain, resolve
 from tvident._identify.told import Told
-from tvident._results import Estimates, Identification, Recorded, chosen, of_records, settings_of
+from tvident._results import Estimates, Identification, Recorded, Words, chosen, of_records, settings_of
 
 Numbers = npt.NDArray[np.float64]
 
@@ -207,8 +208,19 @@ class Task:
             jumps=jumps if data.batch else jumps[0],
             words=words,
             settings=plain(settings),
-            recorded=self._recorded(plain(settings), batch),
+            recorded=replace(self._recorded(plain(settings), batch), improve=self._improve(found)),
         )
+
+    def _improve(self, found: Sequence[_core.Identification]) -> Callable[[Any, Words], Words] | None:
+        """Return what puts first into words which change of the equation leads to the answer; None where nothing is to be tried."""
+        if self.inner or not is_to_be_tried(self._data, self._request, found):
+            return None
+        given = {name: self._known.get(name, value) for name, value in self._request.parameters.items()}
+
+        def run(request: Request, data: Data, *, diagnose: bool) -> Identification:
+            return Task(data, request).run(progress=None, diagnose=diagnose)
+
+        return Improvement(self._data, self._request, found[0], given, self._terms, run).words
 
     def _recorded(self, settings: dict[str, Any], found: Estimates) -> Recorded:
         """Return the records, which can be identified once more, all or some of them."""

@@ -83,9 +83,9 @@ class Told:
         variances = [one.noise[0] if one.noise else 0.0 for one in self.found]
         coherences = _core.noise_coherence(data.angles, data.torques, variances)
         return [
-            Explained(one, names, self.settings["chosen"], tested, data.period, data.step, coherence, data.units).words(
-                method_chosen=self.request.chosen
-            )
+            Explained(
+                one, names, self.settings["chosen"], tested, data.period, data.step, coherence, data.units
+            ).words()
             for one, coherence in zip(self.found, coherences, strict=True)
         ]
 

@@ -1,6 +1,7 @@
 """Holds the result of an identification: parameters by name, standard errors, natural frequency, the summary."""
 
 from tvident._results.estimates import Estimates
+from tvident._results.explained import explained_steps
 from tvident._results.loaded import load
 from tvident._results.parts import chosen, of_records, settings_of
 from tvident._results.recorded import Recorded
@@ -15,6 +16,7 @@ __all__ = [
     "Scan",
     "Words",
     "chosen",
+    "explained_steps",
     "load",
     "of_batch",
     "of_records",

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._equation import FixedTerm
+from tvident._results.words import Words
 
 Numbers: TypeAlias = npt.NDArray[np.number]
 
@@ -30,6 +31,8 @@ class Recorded:
         Identifies once more, with the same settings and another angle.
     part : callable, optional
         Gives what NumPy's indexing takes of several records.
+    improve : callable, optional
+        Tries what a result advises, and returns words that begin with what leads to the answer.
     """
 
     angles: Numbers
@@ -37,6 +40,7 @@ class Recorded:
     own: Mapping[str, FixedTerm]
     again: Callable[[Numbers], Any]
     part: Callable[[Any], Recorded] | None = None
+    improve: Callable[[Any, Words], Words] | None = None
     _mark: bytes = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -175,7 +175,11 @@ class Identification(Simulated, Valued):
     # What to say is found when it is asked for: a short record is identified in less time than that takes.
     @cached_property
     def _told(self) -> Words:
-        return self._words if isinstance(self._words, Words) else self._words()
+        words = self._words if isinstance(self._words, Words) else self._words()
+        recorded = self._recorded
+        if recorded is None or recorded.improve is None or not recorded.is_unchanged:
+            return words
+        return recorded.improve(self, words)
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -422,6 +426,10 @@ class Identification(Simulated, Valued):
             If there is no such folder, or the file cannot be written.
         """
         report(self, path, recorded=self._recorded, channels=channels, title=title)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Words are found when they are asked for, some by trying on the record, which stays behind.
+        return super().__getstate__() | {"_words": self._told}
 
     def __repr__(self) -> str:
         return short(self)

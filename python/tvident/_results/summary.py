@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
+from tvident._arguments import own_digits, to_digits_of
 from tvident._files import aligned
+from tvident._results.verdict import verdict
 from tvident._status import describe
 
 _MOST_SENTENCES = 20
@@ -29,42 +32,41 @@ def summary_of(result: Any) -> str:
     """Return what :meth:`tvident.Identification.summary` does."""
     s = result.settings
     n, seconds = result.time.size, float(result.time[-1] - result.time[0]) if result.time.size else 0.0
-    lines = [
-        result.held_back().words(),
-        f"{n} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz, method {s['method']}",
-    ]
     length, rows = (_range(s[name]) for name in ("window_length", "regression_window"))
     if s["form"] == "strong":
-        lines.append(
-            f"strong form: windows of {length} samples, orders up to {s['max_order']} by {s['criterion']}; "
-            f"regression windows of {rows} samples"
-        )
+        form = f"strong form: windows of {length} samples, orders up to {s['max_order']} by {s['criterion']}"
     else:
-        lines.append(
-            f"weak form: test functions of {length} samples, exponent {_range(s['exponent'])}; "
-            f"regression windows of {rows} samples"
-        )
-    lines.append("")
-    cells = [("parameter", "kind", "median", "5 %", "95 %", "std. error", "unit")]
-    values = {"inertia": result.inertia, "damping": result.damping, "stiffness": result.stiffness, **result.terms}
-    for name, value in values.items():
-        kind = s["kinds"][name]
-        finite, error = value[np.isfinite(value)], result.stderr[name]
-        numbers = np.percentile(finite, [50, 5, 95]) if finite.size else [np.nan] * 3
-        error = error[np.isfinite(error)]
-        shown = [f"{number:.5g}" for number in numbers] + [f"{np.median(error):.2g}" if error.size else "nan"]
-        if kind not in {"windowed", "varying"}:
-            shown[1] = shown[2] = ""
-        cells.append((name, kind, *shown, result.units.get(name, "")))
-    for name in s["inner"]:
-        middle, spread = (float(np.nanmedian(one)) for one in result.constants[name])
-        cells.append((name, "searched", f"{middle:.5g}", "", "", f"{spread:.2g}", result.units.get(name, "")))
-    lines += aligned(cells)
-    for name, title in (("reasons", "what was chosen, and why"), ("advice", "what to do")):
+        form = f"weak form: test functions of {length} samples, exponent {_range(s['exponent'])}"
+    lines = [
+        verdict(result),
+        result.held_back().words(),
+        "",
+        *aligned([("parameter", "kind", "median", "5 %", "95 %", "std. error", "unit"), *_rows(result)]),
+    ]
+    for name, title in (("advice", "what to do"), ("reasons", "what was chosen, and why")):
         sentences = getattr(result, name)
         if sentences:
             lines += ["", title, *(f"  {sentence}" for sentence in sentences[:_MOST_SENTENCES])]
         if len(sentences) > _MOST_SENTENCES:
             lines.append(f"  and {len(sentences) - _MOST_SENTENCES} more in .{name}")
-    lines += ["", *describe(result.status, result.record_status)]
-    return "\n".join(lines)
+    lines += ["", f"{n} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz, method {s['method']}"]
+    lines.append(f"{form}; regression windows of {rows} samples")
+    return "\n".join([*lines, "", *describe(result.status, result.record_status)])
+
+
+def _rows(result: Any) -> Iterator[tuple[str, ...]]:
+    """Return a row of cells for every parameter, with digits that go together."""
+    values = {"inertia": result.inertia, "damping": result.damping, "stiffness": result.stiffness, **result.terms}
+    for name, value in values.items():
+        kind = result.settings["kinds"][name]
+        finite, error = value[np.isfinite(value)], result.stderr[name]
+        numbers = np.percentile(finite, [50, 5, 95]).tolist() if finite.size else [np.nan] * 3
+        error = error[np.isfinite(error)]
+        middle = float(np.median(error)) if error.size else np.nan
+        shown = [to_digits_of(number, middle) for number in numbers]
+        if kind not in {"windowed", "varying"}:
+            shown[1] = shown[2] = ""
+        yield name, kind, *shown, own_digits(middle), result.units.get(name, "")
+    for name in result.settings["inner"]:
+        middle, spread = (float(np.nanmedian(one)) for one in result.constants[name])
+        yield name, "searched", to_digits_of(middle, spread), "", "", own_digits(spread), result.units.get(name, "")

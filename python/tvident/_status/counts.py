@@ -11,7 +11,7 @@ from tvident._status.flags import Status
 
 
 def describe(status: npt.NDArray[Any], record_status: npt.ArrayLike = 0) -> list[str]:
-    """Return a line for every flag that occurs: how often, and what it means; then those of the records."""
+    """Return a line for every flag that occurs: how often, and what it means; then the names of those of the records."""
     if not status.size:
         return ["no samples"]
     lines = [f"{float(np.mean(status == 0)):6.1%}  good"]
@@ -22,5 +22,5 @@ def describe(status: npt.NDArray[Any], record_status: npt.ArrayLike = 0) -> list
     for flag, count in counts.items():
         if count:
             which = "record" if records.size == 1 else f"{count} of {records.size} records"
-            lines.append(f"{which:>6}  {flag.name}: {flag.advice}")
+            lines.append(f"{which:>6}  {flag.name}")
     return lines

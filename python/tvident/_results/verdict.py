@@ -1,0 +1,162 @@
+"""The first line of a summary: how well the parameters are known, or why not to trust them."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tvident._arguments import percent, to_digits_of
+from tvident._status import Status
+
+_SYMBOLS = {"stiffness": "K", "inertia": "I", "damping": "C"}
+"""In the order in which they are told."""
+
+_BEYOND = 2.0
+"""Standard errors below zero from which on a sample is negative, not merely uncertain."""
+
+_OFTEN = 0.05
+"""A share of the samples that is no chance."""
+
+_LITTLE = 0.5
+"""A share of the torque that a model must explain to be one."""
+
+_DISTRUST = {
+    Status.RANK_DEFICIENT: "the record does not determine the parameters",
+    Status.ILL_CONDITIONED: "the record hardly tells the parameters apart",
+    Status.SCALES_DISAGREE: "slow and fast motion give different parameters",
+}
+
+_DOUBTS = (
+    Status.NOISE_MODEL
+    | Status.KIND_CONTRADICTED
+    | Status.WINDOW_LIMIT
+    | Status.LAG_SUSPECTED
+    | Status.TERM_SUSPECTED
+    | Status.CHANNEL_SUSPECTED
+)
+"""Flags of a record with which errors hold only if the model does."""
+
+_RECORDS = 100
+"""Of a batch that are looked at."""
+
+
+def verdict(result: Any) -> str:
+    """Return the verdict on a result of one record or of several."""
+    if not result.status.size:
+        return "no verdict: there are no samples"
+    if result.inertia.ndim == 1:
+        return _of_one(result)
+    shape = result.inertia.shape[:-1]
+    count = int(np.prod(shape, dtype=int))
+    places = list(np.ndindex(shape))[:_RECORDS]
+    reasons = {place: reason for place in places if (reason := distrust(result[place if len(place) > 1 else place[0]]))}
+    known = _errors(result)
+    words = f"{count} records: {known}" if known else f"{count} records"
+    if len(places) < count:
+        words += f"; the first {len(places)} were looked at"
+    if not reasons:
+        return f"{words}; no reason to distrust any"
+    first = next(iter(reasons))
+    where = first[0] if len(first) == 1 else first
+    return f"{words}; do not trust {len(reasons)} of them, such as record {where}: {reasons[first]}"
+
+
+def _of_one(result: Any) -> str:
+    reason = distrust(result)
+    if reason:
+        return f"do not trust: {reason}{'; ' + 'see what to do' if result.advice else ''}"
+    share, known = explained(result), _errors(result)
+    parts = [known] if known else []
+    if share is not None:
+        parts.append(f"model explains {percent(share)} of the torque")
+    words = ", ".join(parts) or "nothing was unknown"
+    if result.record_status & _DOUBTS and result.advice:
+        return f"{words}; errors hold if the model does: see what to do"
+    return words
+
+
+def explained(result: Any) -> float | None:
+    """Return the share of the torque's variance that a record's model predicts; None where the record is not there."""
+    try:
+        _, recorded, predicted = result.predicted_torque()
+    except ValueError:
+        return None
+    there = np.isfinite(recorded) & np.isfinite(predicted)
+    spread = float(np.var(recorded[there])) if there.any() else 0.0
+    return 1 - float(np.var((recorded - predicted)[there])) / spread if spread > 0 else None
+
+
+def distrust(result: Any) -> str | None:
+    """Return why numbers of a record are not to be trusted, in words; None where nothing says so."""
+    valid = result.status & Status.INVALID == 0
+    if not valid.any():
+        return "nothing could be identified"
+    for flag, words in _DISTRUST.items():
+        if result.record_status & flag:
+            return words
+    for name in ("inertia", "damping", "stiffness"):
+        reason = _sign(result, name)
+        if reason:
+            return reason
+    share = explained(result)
+    if share is not None and share < _LITTLE:
+        return f"the model explains {percent(share)} of the torque"
+    trusted = float(np.mean(result.trusted))
+    return f"{1 - trusted:.0%} of the samples are flagged" if trusted < _LITTLE else None
+
+
+def _sign(result: Any, name: str) -> str | None:
+    """Return what is wrong with a parameter's sign: mass is never negative, and stiffness that has both signs is none."""
+    if result.settings["kinds"][name] == "known":
+        return None
+    value, error = getattr(result, name), result.stderr[name]
+    there = np.isfinite(value) & np.isfinite(error)
+    if not there.any():
+        return None
+    below = float(np.mean(value[there] < -_BEYOND * error[there]))
+    above = float(np.mean(value[there] > _BEYOND * error[there]))
+    if name != "stiffness" and below > _OFTEN:
+        return f"{name} is negative" + ("" if below > 1 - _OFTEN else f" in {below:.0%} of the record")
+    if name == "stiffness" and below > _OFTEN and above > _OFTEN:
+        one = result.value(name)
+        ends = " to ".join(to_digits_of(end, one.stderr) for end in (one.least, one.greatest))
+        return f"stiffness has both signs ({ends} {one.unit})"
+    return None
+
+
+def _errors(result: Any) -> str:
+    """Return how well every unknown parameter is known, relative to itself."""
+    found = []
+    for name, symbol in _SYMBOLS.items():
+        kind = result.settings["kinds"][name]
+        if kind == "known":
+            continue
+        value, error = getattr(result, name), result.stderr[name]
+        there = np.isfinite(value) & np.isfinite(error) & result.trusted
+        if not there.any():
+            continue
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a record of which nothing can be trusted has no median
+            middles = (np.nanmedian(np.where(there, one, np.nan), axis=-1) for one in (error, np.abs(value)))
+            relative = float(np.nanmedian(np.divide(*middles)))
+        changes = "(t)" if kind in {"windowed", "varying"} else ""
+        found.append((f"{symbol}{changes}", relative))
+    return _sentence(found)
+
+
+def _sentence(found: Sequence[tuple[str, float]]) -> str:
+    shown = [
+        f"{symbol} known to ± {_two_digits(100 * relative)} %"
+        if relative < 1
+        else f"{symbol} not known (± {100 * relative:.0f} %)"
+        for symbol, relative in found
+        if np.isfinite(relative)
+    ]
+    return ", ".join([*shown[:1], *(one.replace(" known to", "") for one in shown[1:])])
+
+
+def _two_digits(value: float) -> str:
+    return f"{value:.2g}" if value < 10 else f"{value:.0f}"  # noqa: PLR2004 - two digits before the point
