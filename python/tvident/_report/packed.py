@@ -8,8 +8,10 @@ the signal as steps, and with blocks seven bits a sample are finer than a screen
 from __future__ import annotations
 
 import base64
+import os
 import zlib
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
@@ -32,6 +34,8 @@ _MOST_BYTES = 16_950_000
 
 _SHRINK = 64
 """What is computed from channels is made so many times smaller than these before they lose samples themselves."""
+
+_MOST_THREADS = 4
 
 _CHUNK = 4096
 """Blocks that are worked on together: what they need stays in the cache."""
@@ -97,10 +101,13 @@ def packed(series: Sequence[Series], most_bytes: int = _MOST_BYTES) -> list[Pack
         # Two numbers stand for four samples at first, and for twice as many each time.
         merged[largest] = max(4, 2 * merged[largest])
         sizes[largest] /= 2
-    return [
-        _packed(one if every == 1 else _of_extremes(one, every), top, every)
-        for one, every in zip(reduced, merged, strict=True)
-    ]
+
+    def work(one: Series, every: int) -> Packed:
+        return _packed(one if every == 1 else _of_extremes(one, every), top, every)
+
+    # Nearly all of the work is NumPy's and zlib's, which let other threads run.
+    with ThreadPoolExecutor(min(_MOST_THREADS, os.cpu_count() or 1)) as pool:
+        return list(pool.map(work, reduced, merged))
 
 
 def _of_extremes(series: Series, every: int) -> Series:
