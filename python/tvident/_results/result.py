@@ -427,10 +427,6 @@ class Identification(Simulated, Valued):
         """
         report(self, path, recorded=self._recorded, channels=channels, title=title)
 
-    def __getstate__(self) -> dict[str, Any]:
-        # Words are found when they are asked for, some by trying on the record, which stays behind.
-        return super().__getstate__() | {"_words": self._told}
-
     def __repr__(self) -> str:
         return short(self)
 
