@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.io import savemat
 
@@ -135,3 +136,19 @@ def test_results_go_to_files_of_every_kind(tmp_path: Path) -> None:
         result.save(tmp_path / "x.ods")
     with pytest.raises(ValueError, match="at most 1048575 rows of numbers; there are 1048576"):
         tvident.FileRecording({"a": np.zeros(1 << 20)}).write(tmp_path / "long.xlsx")
+
+
+@pytest.mark.filterwarnings("ignore")  # of libraries about each other
+def test_tables_of_matlab_are_channels(tmp_path: Path) -> None:
+    times = pd.to_timedelta(1e3 * examples.T, unit="ms")
+    table = pd.DataFrame(
+        {"angle": examples.ANGLE, "torque": examples.TORQUE, "note": ["x"] * examples.T.size}, index=times
+    )
+    table.index.name = "Time"
+    import_module("matio").save_to_mat(str(tmp_path / "x.mat"), {"run": table})
+    skipped: list[str] = []
+    found = tvident.FileRecording(dict(matlab.variables(str(tmp_path / "x.mat"), skipped)))
+    assert list(found) == ["Time", "angle", "torque"]
+    assert skipped == ["run.note (no numbers)"]
+    assert found.sample_rate == pytest.approx(250)
+    np.testing.assert_array_equal(found["angle"], examples.ANGLE)

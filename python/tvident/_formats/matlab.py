@@ -5,12 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from tvident._formats.matlab_tables import has_objects, tables
 from tvident._formats.told import cut, in_words
 
 
 def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     """Give every variable, and the fields of structures with names joined by dots."""
-    yield from _flat("", _read(path, skipped))
+    objects = tables(path, skipped) if has_objects(path) else {}
+    # What the other reader makes of objects is nothing that anybody called so.
+    rest = {
+        name: value for name, value in _read(path, skipped).items() if name not in objects and name != "#subsystem#"
+    }
+    yield from _flat("", rest)
+    for variable, columns in objects.items():
+        prefix = f"{variable}." if len(objects) > 1 or rest else ""
+        yield from ((prefix + name, values) for name, values in columns.items())
 
 
 _VALUES = ("data", "values", "value", "signal", "y")
