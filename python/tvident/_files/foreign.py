@@ -45,7 +45,7 @@ def read_foreign(path: Path, say: Say) -> Channels:
     if not path.stat().st_size:
         raise FileError(f"{kind.name} must not be empty; this one has no bytes; {kind.cure}")
     size = path.stat().st_size
-    seconds = _SECONDS + size // _BYTES_A_SECOND
+    seconds = kind.slowness * (_SECONDS + size // _BYTES_A_SECOND)
     limits = (str(_BYTES + _BYTES_FOR_EACH * size), str(seconds))
     # -P: the folder of the reader is no place to import from; the rest is found where this process finds it.
     environment = os.environ | {

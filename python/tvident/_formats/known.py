@@ -25,6 +25,8 @@ class Format:
         Of this package, which installs it.
     cure : str
         What to do about a damaged file.
+    slowness : int
+        How many times longer than others it may take: some libraries are large.
     """
 
     name: str
@@ -32,12 +34,13 @@ class Format:
     package: str
     extra: str
     cure: str = "copy it again"
+    slowness: int = 1
 
 
 _MATLAB = Format("a MATLAB file", "matlab", "pymatreader", "io", "save it again with -v7")
 _HDF5 = Format("an HDF5 file", "hdf5", "h5py", "io")
 _XLSX = Format("a workbook", "xlsx", "openpyxl", "io", "save it again, or export CSV")
-_MDF = Format("an MDF file", "mdf", "asammdf", "mdf")
+_MDF = Format("an MDF file", "mdf", "asammdf", "mdf", slowness=4)
 _UFF = Format("a universal file", "uff", "pyuff", "uff")
 _XDF = Format("an XDF file", "xdf", "pyxdf", "xdf")
 _ROS = Format("a ROS bag", "ros", "rosbags", "ros")

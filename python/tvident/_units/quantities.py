@@ -86,7 +86,9 @@ def factor_to(system: System, quantity: str, text: str | None, *, name: str) -> 
         raise UnitError(f"the unit of {name} must be one that is known; got {text!r}; {cure}")
     factor = _in(unit, system.dimensions[quantity])
     if not math.isfinite(factor):
-        raise UnitError(f"{name} must be in a unit that can be converted to {wanted}; got {text!r}; {cure}")
+        raise UnitError(
+            f"{name} must be in a unit that can be converted to {wanted}; got {text!r}; {cure}; a factor of your own converts it too"
+        )
     return factor
 
 
