@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 import warnings
 from importlib import import_module
@@ -68,7 +69,9 @@ def test_a_file_that_was_cut_is_refused_or_says_so(folder: Path, tmp_path: Path,
             import_module(f"tvident._formats.{FORMATS[ending].module}").variables(str(tmp_path / f"x{ending}"), skipped)
         )
     except Exception:  # noqa: BLE001 - of any kind: the process turns it into a message
-        return
+        found = {}
+        skipped.append("everything")
+    gc.collect()  # what a library leaves behind complains here, and in no other test
     assert skipped, f"{list(found)} were read without a word"
 
 
