@@ -260,6 +260,10 @@ class Identification:
     @property
     def lag(self) -> tuple[float, float] | None: ...
     @property
+    def angle_zero(self) -> tuple[float, float] | None: ...
+    @property
+    def free_offset(self) -> tuple[float, float] | None: ...
+    @property
     def suspects(self) -> list[Suspect]: ...
     @property
     def defects(self) -> list[tuple[int, str, float]]: ...
@@ -295,6 +299,7 @@ def identify(
     *,
     delta: float,
     lag: Sequence[float | None],
+    angle_zero: Sequence[float | None] | None = None,
     quantisation: float | None = None,
     masks: Sequence[npt.NDArray[np.bool_]] | None = None,
     propagate: bool = False,

@@ -92,6 +92,7 @@ class Explained:
             *self._scales(),
             *self._rest(),
             *self._lag(),
+            *self._angle_zero(),
             *self._windows(),
             *self._weights(),
             *self._kinds(),
@@ -103,7 +104,13 @@ class Explained:
             *self._misfit(flags),
             *self._outside(),
         )
-        advice = (*advice, *self._contradictions(), *self._told_apart(flags), *self._limits(flags))
+        advice = (
+            *advice,
+            *self._contradictions(),
+            *self._free_offset(),
+            *self._told_apart(flags),
+            *self._limits(flags),
+        )
         # What can be typed comes before what is to be looked for.
         return Words(reasons, (*self._defects(), *self.suspicions(), *advice))
 
@@ -207,6 +214,16 @@ class Explained:
         return [
             f"the torque is delayed by {value:.3f} ± {error:.1g} samples: with this lag its rate explains nothing more"
         ]
+
+    def _angle_zero(self) -> list[str]:
+        if self.found.angle_zero is None:
+            return []
+        value, error = self.found.angle_zero
+        words = (
+            f"the spring is relaxed at {value:.4g} ± {error:.1g} {self.units['angle_zero']} of the encoder: its torque is stiffness times "
+            "(angle - this), since a constant offset alone is contradicted, and rows are predicted better so"
+        )
+        return [words]
 
     def _jumps(self) -> list[str]:
         jumps = self.found.jumps
@@ -365,6 +382,17 @@ class Explained:
                     f"{name} was taken as constant, but differs between parts of the record: something drifts, or a term is missing"
                 )
         return words
+
+    def _free_offset(self) -> list[str]:
+        if self.found.free_offset is None:
+            return []
+        error, free = self.found.free_offset
+        others = [name for name in self.names if name not in {*COEFFICIENTS, "offset"}]
+        words = (
+            f"an offset that is free in every window predicts better: its cross-validation error is {free:.2f} times the variance of the "
+            f"noise, not {error:.2f}: give terms={[*others, ('offset', 'windowed')]}"
+        )
+        return [words]
 
     def _told_apart(self, flags: Status) -> list[str]:
         if self.found.unexplained:

@@ -13,6 +13,7 @@ UNITS = {
     "stiffness": "N m/rad",
     "natural_frequency": "Hz",
     "damping_ratio": "1",
+    "angle_zero": "rad",
     "condition": "1",
     "residual_std": "N m",
 }

@@ -98,6 +98,8 @@ def identify(
         pair of one of these and its kind. Without a kind a term is windowed if all unknown parameters are, and constant otherwise. Beside
         ``"coulomb"`` and ``"stribeck"`` equations that touch samples at rest do not count. The Stribeck velocity, and what a term of your
         own names in ``search=``, is found by a search, which costs 10 to 20 times as much; in a batch every record has its own.
+        In weak form, where the record contradicts a constant offset beside a windowed stiffness, the angle at which the spring is relaxed
+        is looked for, K (θ - θ₀), and kept where it predicts better: ``constants["angle_zero"]``.
     instrument : array_like, the angle's shape, optional
         A channel that no noise of angle or torque reaches, but that moves the system: the reference of a controller, or excitation that was
         added. Under feedback noise of the angle is part of the torque, and estimates without an instrument are biased. All unknowns are

@@ -57,6 +57,8 @@ class Request:
         Seconds.
     lag_samples : sequence of float, optional
         The same in samples, where an earlier result found it: seconds may round to other samples.
+    angle_zero : sequence of float, optional
+        The angle at which the spring of every record is relaxed, where an earlier result found it.
     quantisation : float, optional
     period : float, optional
         Of a wrapped angle.
@@ -75,6 +77,7 @@ class Request:
     terms: Sequence[Any]
     lag: Any
     lag_samples: Sequence[float] | None
+    angle_zero: Sequence[float] | None
     quantisation: float | None
     period: float | None
     inner: Mapping[str, Any]
@@ -156,12 +159,19 @@ def resolve(
         terms=asked["terms"],
         lag=lag,
         lag_samples=earlier.get("lag_samples") if same_lag and earlier is not None else None,
+        angle_zero=_angle_zero(earlier) if earlier is not None and isinstance(form, WeakForm) else None,
         quantisation=asked["quantisation"],
         period=None if asked["period"] is None else arguments.positive_number("period", asked["period"]),
         inner={} if earlier is None else dict(earlier.get("inner") or {}),
         earned={} if earlier is None else dict(earlier.get("earned") or {}),
         chosen=earlier is None and name == "auto",
     )
+
+
+def _angle_zero(earlier: Mapping[str, Any]) -> Sequence[float] | None:
+    """Return the angle at which the spring of every record was relaxed."""
+    found = earlier.get("angle_zero")
+    return [found] if isinstance(found, int | float) else found
 
 
 def _with_instrument(asked: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
@@ -265,7 +275,7 @@ def _is_whole(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Mappi
         and all(isinstance(kinds[name], str) and (kinds[name] != "known" or name in known) for name in COEFFICIENTS)
         and all(one.name in earlier for one in fields(form))
         and isinstance(earlier["method"], str)
-        and all(_is_finite(one) for one in earlier.get("lag_samples") or ())
+        and all(_is_finite(one) for one in (*(earlier.get("lag_samples") or ()), *(_angle_zero(earlier) or ())))
         and all(
             all(map(_is_finite, one)) if isinstance(one, list | tuple) else _is_finite(one)
             for one in dict(earlier.get("inner") or {}).values()

@@ -103,6 +103,7 @@ class Task:
             self._form(),
             delta=data.period,
             lag=self._lags(),
+            angle_zero=self._angle_zeros(),
             quantisation=request.quantisation,
             masks=data.masks,
             propagate=data.propagate,
@@ -371,6 +372,11 @@ class Task:
             return list(found_earlier)
         return [None if late == "auto" else late / data.period for late in lags]
 
+    def _angle_zeros(self) -> list[float | None]:
+        """Return about which angle the spring of every record is relaxed; None where the record decides."""
+        zeros = self._request.angle_zero
+        return list(zeros) if zeros is not None and len(zeros) == self._data.records else [None] * self._data.records
+
     def _motions(self, columns: list[npt.NDArray[np.number] | str]) -> _core.Motions:
         known = [self._known.get(name) for name in COEFFICIENTS]
         return _core.Motions(self._data.angles, self._data.torques, known, columns)
@@ -397,6 +403,7 @@ class Task:
             lag = {"lag": request.lag}
         else:
             chosen = [name for name in names if "auto" in self._each(name)]
+            used["angle_zero"] = by_record([0.0 if one.angle_zero is None else one.angle_zero[0] for one in found])
             used["variation"] = "constant" if request.form.variation == "constant" else "linear"
             if request.lag == "auto":
                 chosen.append("lag")

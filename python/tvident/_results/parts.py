@@ -12,7 +12,7 @@ import numpy.typing as npt
 from tvident._results.estimates import Estimates
 from tvident._status import Status
 
-_BY_RECORD = ("window_length", "exponent", "regression_window", "lag", "lag_stderr", "lag_samples")
+_BY_RECORD = ("window_length", "exponent", "regression_window", "lag", "lag_stderr", "lag_samples", "angle_zero")
 """Settings that are a list where there are several records."""
 
 
@@ -48,6 +48,10 @@ def of_records(found: Estimates, place: Any) -> Estimates:
         for name, kind in kinds.items()
         if np.all(kind == "constant") and values[name].shape[-1]
     }
+    if "angle_zero" in found.constants:
+        zero, error = (number(each[place]) for each in found.constants["angle_zero"])
+        if np.any(error):
+            constants["angle_zero"] = (zero, error)
     batch = found.status.shape[:-1]
     flags = np.asarray(found.record_status)[place]
     return replace(

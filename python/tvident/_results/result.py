@@ -57,7 +57,8 @@ class Identification(Simulated, Valued):
     terms : dict of str to ndarray, shape (\*, n)
         Factors of further terms.
     constants : dict of str to (value, stderr)
-        Parameters that are constant over the record, and inner parameters of terms, as ``"stribeck.velocity"`` or ``"reflex.delay"``.
+        Parameters that are constant over the record, and inner parameters of terms, as ``"stribeck.velocity"`` or ``"reflex.delay"``;
+        ``"angle_zero"``, in rad, where the spring is relaxed at another angle than zero.
     stderr : mapping of str to ndarray, shape (\*, n)
         Standard errors of all of these, ``"natural_frequency"`` and ``"damping_ratio"`` (by the delta method, with all covariances). In
         weak form they contain the correlation of overlapping equations and changes that windows cannot follow. In strong form they are

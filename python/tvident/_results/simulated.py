@@ -242,8 +242,15 @@ class Simulated:
         samples = None if recorded is None else recorded.angles.shape[-1]
         period, step = 1 / s["sample_rate"], s["step"]
 
+        alone = {name for name in values if name in self.constants}
+        if "angle_zero" in self.constants:
+            # K (θ - θ₀): the spring's torque at the encoder's zero is one more offset, which changes as the stiffness does.
+            zero = np.asarray(self.constants["angle_zero"][0])[..., np.newaxis]
+            values["offset"] = values["offset"] - zero * self.stiffness
+            alone.discard("offset")
+
         def prepared(name: str, value: Array) -> Array:
-            if name in self.constants or isinstance(s["known"].get(name), int | float):
+            if name in alone or isinstance(s["known"].get(name), int | float):
                 return value[..., :1]
             value = value if without is None else np.where(without, np.nan, value)
             return every_sample(value, samples or (value.shape[-1] - 1) * step + 1, step)

@@ -67,6 +67,10 @@ def _rows(result: Any) -> Iterator[tuple[str, ...]]:
         if kind not in {"windowed", "varying"}:
             shown[1] = shown[2] = ""
         yield name, kind, *shown, own_digits(middle), result.units.get(name, "")
+    if "angle_zero" in result.constants:
+        middle, spread = (float(np.nanmedian(one)) for one in result.constants["angle_zero"])
+        unit = result.units["angle_zero"]
+        yield "angle_zero", "constant", to_digits_of(middle, spread), "", "", own_digits(spread), unit
     for name in result.settings["inner"]:
         middle, spread = (float(np.nanmedian(one)) for one in result.constants[name])
         yield name, "searched", to_digits_of(middle, spread), "", "", own_digits(spread), result.units.get(name, "")

@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use tvident::identify::{
-    Identification as Found, InstrumentTest, Kind, Outside, Scan as FoundScan, Unknown as FoundUnknown, WeakDetails,
+    FreeOffset, Identification as Found, InstrumentTest, Kind, Outside, Scan as FoundScan, Unknown as FoundUnknown,
+    WeakDetails,
 };
 use tvident::inference::Suspect as FoundSuspect;
 use tvident::noise::Defect;
@@ -95,6 +96,9 @@ pub(crate) struct Identification {
     mostly_noise: bool,
     unexplained: bool,
     lag: Option<(f64, f64)>,
+    angle_zero: Option<(f64, f64)>,
+    /// Where an offset that is free in every window predicts better: the error with the one that was used, and with a free one.
+    free_offset: Option<(f64, f64)>,
     suspects: Vec<Py<Suspect>>,
     defects: Vec<(usize, &'static str, f64)>,
     resting: f64,
@@ -157,6 +161,11 @@ impl Identification {
             mostly_noise: weak.is_some_and(|weak| weak.mostly_noise),
             unexplained: weak.is_some_and(|weak| weak.unexplained),
             lag: weak.and_then(|weak| weak.lag).map(|lag| (lag.value, lag.error)),
+            angle_zero: weak.and_then(|weak| weak.angle_zero).map(|zero| (zero.value, zero.error)),
+            free_offset: weak
+                .map(|weak| weak.free_offset)
+                .filter(FreeOffset::is_better)
+                .map(|offset| (offset.error, offset.free)),
             suspects: weak.map_or(Ok(Vec::new()), |weak| weak.suspects.iter().map(suspect).collect::<PyResult<_>>())?,
             defects: weak.map(defects).unwrap_or_default(),
             resting: weak.map_or(0.0, |weak| weak.resting),

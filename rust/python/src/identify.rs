@@ -96,10 +96,10 @@ impl Form<'_> {
 }
 
 /// Identifies every record. `kinds` holds one word an unknown, `lag` the samples by which the torque of each record comes late (None: estimate
-/// it), `masks` one mask a record, `instrument` a channel a record that noise does not reach.
+/// it), `angle_zero` the angle about which each spring is relaxed (None: zero, unless the record contradicts that), `masks` one mask a record, `instrument` a channel a record that noise does not reach.
 #[pyfunction]
 #[pyo3(signature = (
-    motions, kinds, method, *, delta, lag, quantisation=None, masks=None, propagate=false, step=1, diagnose=true, instrument=None, workers=None, progress=None
+    motions, kinds, method, *, delta, lag, angle_zero=None, quantisation=None, masks=None, propagate=false, step=1, diagnose=true, instrument=None, workers=None, progress=None
 ))]
 pub(crate) fn identify<'py>(
     py: Python<'py>,
@@ -108,6 +108,7 @@ pub(crate) fn identify<'py>(
     method: Form<'py>,
     delta: f64,
     lag: Vec<Option<f64>>,
+    angle_zero: Option<Vec<Option<f64>>>,
     quantisation: Option<f64>,
     masks: Option<Vec<Bound<'py, PyUntypedArray>>>,
     propagate: bool,
@@ -133,7 +134,8 @@ pub(crate) fn identify<'py>(
     for (record, motion) in motions.all()?.into_iter().enumerate() {
         let lag = *lag.get(record).ok_or_else(|| PyValueError::new_err("every record needs a lag"))?;
         let mask = masks.as_ref().and_then(|masks| masks.get(record)).map(Vec::as_slice);
-        tasks.push(Task { motion, mask, method: method.of(record)?, lag });
+        let angle_zero = angle_zero.as_ref().and_then(|zeros| zeros.get(record).copied().flatten());
+        tasks.push(Task { motion, mask, method: method.of(record)?, lag, angle_zero });
     }
     let instruments = instrument.map(records).transpose()?;
     let mut found: Vec<(Found, Option<InstrumentTest>)> = Vec::new();

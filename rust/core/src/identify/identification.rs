@@ -1,6 +1,8 @@
 //! The result of one record, whatever its route.
 
 use crate::identify::kinds::Kind;
+use crate::identify::weak::angle_zero::outcome::AngleZero;
+use crate::identify::weak::angle_zero::outcome::FreeOffset;
 use crate::identify::weak::lag::Lag;
 use crate::identify::weak::outside_mask::Outside;
 use crate::identify::weak::scanned::Scan;
@@ -86,6 +88,10 @@ pub struct WeakDetails {
     pub unexplained: bool,
     /// The lag that was estimated; `None` if it was given or is not determined.
     pub lag: Option<Lag>,
+    /// The angle at which the spring is relaxed, where a constant offset was contradicted and this predicts better.
+    pub angle_zero: Option<AngleZero>,
+    /// How much better an offset would predict that is free in every window, where the record contradicts a constant one.
+    pub free_offset: FreeOffset,
     /// What may have been left out.
     pub suspects: Vec<Suspect>,
     /// What was done to angle and torque: clipped, held or wrapped samples.

@@ -18,6 +18,8 @@ pub use instrumented::record::{InstrumentTest, WEAK_INSTRUMENT, identify_with_in
 pub use kinds::Kind;
 pub use options::{Method, Options, StrongForm, Task, WeakForm};
 pub use route::identify_all;
+pub use weak::angle_zero::outcome::AngleZero;
+pub use weak::angle_zero::outcome::FreeOffset;
 pub use weak::friction::Sliding;
 pub use weak::lag::Lag;
 pub use weak::outside_mask::Outside;

@@ -69,6 +69,9 @@ pub struct Task<'a> {
     pub method: Method<'a>,
     /// By how many samples the torque comes late; estimated if `None`, which the weak form can.
     pub lag: Option<f64>,
+    /// About which angle the spring is relaxed, in weak form beside a constant offset: zero, or another angle that is then estimated from
+    /// there on; if `None` it is zero unless the record contradicts that.
+    pub angle_zero: Option<f64>,
 }
 
 /// What is the same for all records of a call.

@@ -28,6 +28,25 @@ impl Samples for Whole<'_> {
     }
 }
 
+/// A channel that counts from another zero.
+pub(crate) struct Shifted<'a> {
+    pub(crate) channel: &'a dyn Samples,
+    pub(crate) zero: f64,
+}
+
+impl Samples for Shifted<'_> {
+    fn len(&self) -> usize {
+        self.channel.len()
+    }
+
+    fn read(&self, first: usize, into: &mut [f64]) {
+        self.channel.read(first, into);
+        for value in into {
+            *value -= self.zero;
+        }
+    }
+}
+
 /// A channel that is delayed by whole samples. Samples beyond its ends are missing.
 pub(crate) struct Late<'a> {
     pub(crate) channel: &'a dyn Samples,

@@ -41,6 +41,8 @@ pub(crate) struct Record<'a> {
     pub(crate) terms: Vec<TermSamples<'a>>,
     /// Lag of the torque in samples.
     pub(crate) lag: f64,
+    /// The angle at which an unknown spring is relaxed.
+    pub(crate) angle_zero: f64,
     /// Where a sample may be the centre of a row.
     pub(crate) mask: Option<&'a [bool]>,
 }
@@ -142,6 +144,9 @@ impl WeakRows {
             let noise = [self.kernels.values[index].clone(), self.kernels.slopes[index].clone()];
             self.rows.regressors.push(Regressor { value, companion, noise });
         }
+        if record.angle_zero != 0.0 {
+            self.move_zero(record.angle_zero);
+        }
         self.rows.rhs = next();
         for term in &record.terms {
             let (value, companion) = match term {
@@ -178,6 +183,12 @@ impl WeakRows {
                 self.rows.rhs_noise.iter_mut().zip(noise).for_each(|(sum, value)| *sum -= known * value);
             }
         }
+    }
+
+    /// Moves the angle at which the spring is relaxed.
+    pub(crate) fn move_zero(&mut self, by: f64) {
+        let angle = &mut self.rows.regressors[2].value;
+        angle.iter_mut().zip(&self.rows.usable).filter(|(_, usable)| **usable).for_each(|(angle, _)| *angle -= by);
     }
 
     /// Rows that a test function reaches on either side.

@@ -68,6 +68,7 @@ impl Session<'_, '_, '_> {
             expected,
             jumps: Vec::new(),
             whole: None,
+            spring: None,
             white: None,
         };
         if self.options.averaging {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::exec::stages::Stages;
+use crate::identify::weak::angle_zero::spring::SpringColumn;
 use crate::inference::constancy::Test;
 use crate::inference::jumps::jump::Jump;
 use crate::inference::slowly_varying;
@@ -43,6 +44,8 @@ pub(crate) struct Decided {
     pub(crate) jumps: Vec<Jump>,
     /// All rows, also those over jumps; nothing without jumps.
     pub(crate) whole: Option<Rows>,
+    /// The stiffness as a regressor, which is the last of the constants, where the spring's zero is sought.
+    pub(crate) spring: Option<SpringColumn>,
     /// Rows whose noise is white, and how they were made so, where the constants were taken from them.
     pub(crate) white: Option<(Rows, Whitening)>,
 }

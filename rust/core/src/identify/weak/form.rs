@@ -7,6 +7,7 @@ use crate::equation::terms::{BuiltInTerm, TermFunction};
 use crate::error::Error;
 use crate::exec::pool::{Piece, Watch};
 use crate::exec::stages::Stages;
+use crate::identify::weak::angle_zero::outcome::FreeOffset;
 use crate::identify::weak::found::WeakIdentified;
 use crate::identify::weak::friction::FrictionDirection;
 use crate::identify::weak::options::WeakOptions;
@@ -75,6 +76,7 @@ pub(crate) fn with_record<R>(
         coefficients: motion.coefficients,
         terms: terms.collect(),
         lag,
+        angle_zero: 0.0,
         mask,
     };
     Ok((work(record, watch)?, friction.resting))
@@ -95,11 +97,20 @@ fn identify(
         given.unwrap_or_else(|| channel_variance(channel, step, options.instructions))
     };
     let levels = stages.map(pieces.into(), || (), level)?;
-    let mut session = Session { record, options, noise: [levels[0], levels[1]], scan: Scan::default(), stages };
+    let mut session = Session {
+        record,
+        options,
+        noise: [levels[0], levels[1]],
+        scan: Scan::default(),
+        free_offset: FreeOffset::default(),
+        stages,
+    };
     let model = session.model();
-    let (chosen, decided, lag) = session.choose_and_decide(&model)?;
+    let (chosen, decided, lag) = session.settle(&model)?;
     let (mut found, at_rows) = session.report(chosen, &decided)?;
     found.scan = std::mem::take(&mut session.scan);
+    found.free_offset = session.free_offset;
+    found.angle_zero = session.take_angle_zero(&mut found, &decided);
     let status = found.scan.status(&found.constants);
     found.record_status |= status;
     // Rows and windows take as much memory as the results.

@@ -1,6 +1,8 @@
 //! The result of one record in weak form.
 
 use crate::identify::results::{Constant, SampleResults};
+use crate::identify::weak::angle_zero::outcome::AngleZero;
+use crate::identify::weak::angle_zero::outcome::FreeOffset;
 use crate::identify::weak::lag::Lag;
 use crate::identify::weak::outside_mask::Outside;
 use crate::identify::weak::scanned::Scan;
@@ -42,6 +44,10 @@ pub(crate) struct WeakIdentified {
     pub(crate) suspects: Vec<Suspect>,
     /// The estimated lag, or `None` if it was given or is not determined.
     pub(crate) lag: Option<Lag>,
+    /// The angle at which the spring is relaxed, or `None` if it was not needed.
+    pub(crate) angle_zero: Option<AngleZero>,
+    /// How much better an offset would predict that is free in every window.
+    pub(crate) free_offset: FreeOffset,
     /// What the rows say that the mask keeps out; nothing without a mask.
     pub(crate) outside_mask: Option<Outside>,
     /// Unknowns that change, in the order of the values at the samples.

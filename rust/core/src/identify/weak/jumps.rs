@@ -6,7 +6,7 @@ use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
 use crate::inference::jumps::jump::{Jump, JumpSearch};
 use crate::inference::slowly_varying;
-use crate::record::derived::{Ones, Whole};
+use crate::record::derived::{Ones, Shifted, Whole};
 use crate::record::samples::Samples;
 use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
@@ -72,7 +72,7 @@ fn signals<'a>(record: &Record<'a>, model: &Model) -> Option<Vec<Box<dyn Samples
     }
     let of = |&index: &usize| -> Option<Box<dyn Samples + 'a>> {
         match index.checked_sub(2)? {
-            0 => Some(Box::new(Whole(record.angle))),
+            0 => Some(Box::new(Shifted { channel: record.angle, zero: record.angle_zero })),
             term => match record.terms[term - 1] {
                 TermSamples::One => Some(Box::new(Ones(record.angle.len()))),
                 TermSamples::Given(samples) => Some(Box::new(Whole(samples))),

@@ -43,13 +43,23 @@ pub struct Lag {
     pub error: f64,
 }
 
+/// What was chosen and decided, and the lag that was found on the way.
+pub(crate) type Settled = (Chosen, Decided, Option<Lag>);
+
 impl Session<'_, '_, '_> {
-    /// Chooses the test function and what is constant, and finds the lag where it is not given.
-    pub(crate) fn choose_and_decide(&mut self, model: &Model) -> Result<(Chosen, Decided, Option<Lag>), Error> {
+    /// Chooses the test function.
+    pub(crate) fn choose(&mut self, model: &Model) -> Result<Chosen, Error> {
+        let chosen = self.choose_test_function(model)?;
+        self.onto_plateau(chosen, model)
+    }
+
+    /// Decides what is constant with the test function that was chosen, finds the lag where it is not given, and chooses again with it.
+    pub(crate) fn decide_and_choose_again(&mut self, mut chosen: Chosen, model: &Model) -> Result<Settled, Error> {
         let mut lag = None;
         for choice in 1..=CHOICES {
-            let chosen = self.choose_test_function(model)?;
-            let mut chosen = self.onto_plateau(chosen, model)?;
+            if choice > 1 {
+                chosen = self.choose(model)?;
+            }
             let decided = self.decide(&mut chosen, model)?;
             if self.options.lag.is_some() {
                 return Ok((chosen, decided, None));
@@ -66,8 +76,7 @@ impl Session<'_, '_, '_> {
             self.record.lag = found.value;
         }
         self.record.lag = 0.0;
-        let chosen = self.choose_test_function(model)?;
-        let mut chosen = self.onto_plateau(chosen, model)?;
+        let mut chosen = self.choose(model)?;
         let decided = self.decide(&mut chosen, model)?;
         Ok((chosen, decided, lag))
     }

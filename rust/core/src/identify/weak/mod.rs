@@ -1,5 +1,6 @@
 //! Identification in weak form: test function, decisions, report.
 
+pub(crate) mod angle_zero;
 pub(crate) mod choice;
 pub(crate) mod decide;
 pub(crate) mod decided;

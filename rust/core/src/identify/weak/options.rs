@@ -26,6 +26,9 @@ pub(crate) struct WeakOptions {
     pub(crate) noise: [Option<f64>; 2],
     /// By how many samples the torque comes late; estimated where not given.
     pub(crate) lag: Option<f64>,
+    /// About which angle the spring is relaxed: zero, or another one that is estimated from there on; where not given zero, unless the record
+    /// contradicts that.
+    pub(crate) angle_zero: Option<f64>,
     /// The step that the angle was rounded to, zero for none; looked for where not given.
     pub(crate) quantisation: Option<f64>,
     /// Every how many samples numbers are wanted.

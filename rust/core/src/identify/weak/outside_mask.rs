@@ -69,6 +69,9 @@ impl Session<'_, '_, '_> {
         if let Some(found) = &decided.found {
             rows.rhs = slowly_varying::without(&rows, &decided.slow, &found.varying);
         }
+        if let Some(spring) = &decided.spring {
+            rows.regressors.push(spring.regressor(&rows.usable));
+        }
         rows.clear_unusable();
         let rows = decided.as_white(rows, &mut self.stages)?;
         let model = &decided.model;

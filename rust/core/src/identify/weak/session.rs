@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::exec::memory;
 use crate::exec::stages::Stages;
 use crate::identify::kinds::Kind;
+use crate::identify::weak::angle_zero::outcome::FreeOffset;
 use crate::identify::weak::options::WeakOptions;
 use crate::identify::weak::scanned::Scan;
 use crate::regression::constants::Expected;
@@ -27,6 +28,8 @@ pub(crate) struct Session<'a, 'b, 'c> {
     pub(crate) noise: [f64; 2],
     /// Estimates by the width of the test function.
     pub(crate) scan: Scan,
+    /// How much better an offset would predict that is free in every window, where the record contradicts a constant one.
+    pub(crate) free_offset: FreeOffset,
     pub(crate) stages: Stages<'b, 'c>,
 }
 

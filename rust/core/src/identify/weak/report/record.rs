@@ -124,6 +124,8 @@ impl Session<'_, '_, '_> {
             unexplained: false,
             suspects: Vec::new(),
             lag: None,
+            angle_zero: None,
+            free_offset: self.free_offset,
             outside_mask: None,
             changing: decided.model.windowed.iter().chain(&decided.slow).copied().collect(),
             constant_pairs: Vec::new(),

@@ -1,0 +1,212 @@
+//! The search for the angle at which the spring is relaxed, `K(t) (θ - θ₀)`, where the record contradicts a constant offset.
+//!
+//! Minus the stiffness is the regressor of what is left of that angle, as the torque's rate is that of its lag. The rows are moved by
+//! what was found until nothing remains. There the regressor's own noise no longer matters, and beside it all other unknowns have the errors
+//! that come from not knowing the angle.
+
+use crate::error::Error;
+use crate::identify::weak::angle_zero::first_guess::with_free_offset;
+use crate::identify::weak::angle_zero::outcome::{AngleZero, FreeOffset};
+use crate::identify::weak::angle_zero::spring::{STIFFNESS, SpringColumn};
+use crate::identify::weak::choice::Chosen;
+use crate::identify::weak::decided::Decided;
+use crate::identify::weak::found::WeakIdentified;
+use crate::identify::weak::lag::Settled;
+use crate::identify::weak::session::Session;
+use crate::inference::missing_terms::JudgedTerm;
+use crate::regression::model::Model;
+use crate::weak_form::weak_rows::TermSamples;
+
+/// Times that test function and windows are chosen again with the angle that was found.
+const CHOICES: usize = 3;
+/// Steps towards it with one choice.
+const STEPS: usize = 8;
+/// A step so small, in standard errors, is the last with one choice, and a choice that moves the angle by no more is the last.
+const SETTLED: f64 = 0.02;
+const CHOSEN: f64 = 0.3;
+/// It is there beyond so many standard errors, as a term is suspected.
+const CONSPICUOUS: f64 = 5.0;
+/// The part of what an offset that is free in every window explains that the angle must explain.
+const LEAST_SHARE: f64 = 0.9;
+
+impl Session<'_, '_, '_> {
+    /// Chooses and decides, and where the record contradicts a constant offset, tries an angle other than zero at which the spring is relaxed.
+    /// It stays if it predicts better.
+    pub(crate) fn settle(&mut self, model: &Model) -> Result<Settled, Error> {
+        let offset = self.offset_beside_changing_stiffness(model);
+        if let (Some(_), Some(given)) = (offset, self.options.angle_zero.filter(|given| *given != 0.0)) {
+            self.record.angle_zero = given;
+            if let Some(mut settled) = self.settle_around(model, None)?
+                && self.add_spring(&mut settled)?
+            {
+                return Ok(settled);
+            }
+            self.record.angle_zero = 0.0;
+        }
+        let mut chosen = self.choose(model)?;
+        let Some(offset) = offset.filter(|_| self.options.angle_zero.is_none()) else {
+            return self.decide_and_choose_again(chosen, model);
+        };
+        // Before anything else follows what the offset may not: looking for what changes and jumps takes longest where nothing fits.
+        let missed = self.offset_is_missed(&mut chosen, model, offset)?;
+        if missed && let Some(settled) = self.with_angle_zero(model, offset)? {
+            return Ok(settled);
+        }
+        let first = self.decide_and_choose_again(chosen, model)?;
+        if !missed
+            && self.offset_is_contradicted(&first.0.weak, &first.1, offset)?
+            && let Some(settled) = self.with_angle_zero(model, offset)?
+        {
+            return Ok(settled);
+        }
+        Ok(first)
+    }
+
+    /// Chooses and decides with an angle at which the spring is relaxed; `None`, with everything as it was, if it does not predict better.
+    fn with_angle_zero(&mut self, model: &Model, offset: usize) -> Result<Option<Settled>, Error> {
+        let before = (self.scan.clone(), self.record.lag);
+        if let Some(guess) = self.guess_angle_zero(model, offset)? {
+            self.record.angle_zero = guess;
+            if let Some(mut settled) = self.settle_around(model, Some(offset))?
+                && self.add_spring(&mut settled)?
+            {
+                return Ok(Some(settled));
+            }
+        }
+        self.record.angle_zero = 0.0;
+        (self.scan, self.record.lag) = before;
+        Ok(None)
+    }
+
+    /// The regressor of a constant offset beside a windowed stiffness, where such an angle may be looked for.
+    fn offset_beside_changing_stiffness(&self, model: &Model) -> Option<usize> {
+        let offset = 3 + self.record.terms.iter().position(|term| matches!(term, TermSamples::One))?;
+        let sought = model.windowed.contains(&STIFFNESS) && model.constant.contains(&offset);
+        sought.then_some(offset)
+    }
+
+    /// Chooses and decides around an angle and moves it until nothing remains; `None` if the rows do not determine it. Where an offset is
+    /// given to compare with, also if the angle is no better or within its error of zero.
+    fn settle_around(&mut self, model: &Model, offset: Option<usize>) -> Result<Option<Settled>, Error> {
+        for choice in 1..=CHOICES {
+            let start = self.record.angle_zero;
+            let mut chosen = self.choose(model)?;
+            if !self.approach(&mut chosen, model)? {
+                return Ok(None);
+            }
+            if let Some(offset) = offset.filter(|_| choice == 1)
+                && !self.predicts_better(&mut chosen, model, offset)?
+            {
+                return Ok(None);
+            }
+            let (mut chosen, mut decided, lag) = self.decide_and_choose_again(chosen, model)?;
+            let mut step = 1;
+            let error = loop {
+                let Some((left, error)) = self.left_of_zero(&chosen, &decided)? else { return Ok(None) };
+                if left.abs() <= SETTLED * error {
+                    break error;
+                }
+                if step == STEPS {
+                    return Ok(None);
+                }
+                step += 1;
+                if let Some(whole) = decided.whole.take() {
+                    chosen.weak.rows = whole;
+                }
+                self.move_zero(&mut chosen, left);
+                decided = self.decide(&mut chosen, model)?;
+            };
+            let zero = self.record.angle_zero;
+            if (zero - start).abs() <= CHOSEN * error || choice == CHOICES {
+                let is_there = offset.is_none() || zero.abs() > CONSPICUOUS * error;
+                return Ok(is_there.then_some((chosen, decided, lag)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Moves the angle until next to nothing remains while everything that is not windowed is constant; whether it comes to rest.
+    fn approach(&mut self, chosen: &mut Chosen, model: &Model) -> Result<bool, Error> {
+        for _ in 0..STEPS {
+            let fitted = match chosen.fitted.take() {
+                Some(fitted) => fitted,
+                None => self.fit_first(chosen, model)?,
+            };
+            let Some((left, error)) = self.left_of_zero(chosen, &fitted)? else { return Ok(false) };
+            if left.abs() <= CHOSEN * error {
+                chosen.fitted = Some(fitted);
+                return Ok(true);
+            }
+            self.move_zero(chosen, left);
+        }
+        Ok(false)
+    }
+
+    /// Moves the angle at which the spring is relaxed.
+    fn move_zero(&mut self, chosen: &mut Chosen, by: f64) {
+        chosen.weak.move_zero(by);
+        self.record.angle_zero += by;
+    }
+
+    /// What is left of the angle at which the spring is relaxed, and its standard error.
+    fn left_of_zero(&mut self, chosen: &Chosen, decided: &Decided) -> Result<Option<(f64, f64)>, Error> {
+        let Some(fit) = &decided.fit else { return Ok(None) };
+        let mut rows = chosen.weak.rows.clone();
+        let Some(spring) = SpringColumn::new(&decided.model, fit, rows.len(), rows.period) else { return Ok(None) };
+        let place = rows.regressors.len();
+        rows.regressors.push(spring.regressor(&rows.usable));
+        let correlated = decided.model.correlated(&rows, &decided.covariance, &mut self.stages)?;
+        let judged = JudgedTerm {
+            rows: &rows,
+            model: &decided.model,
+            rhs: decided.rhs(&rows),
+            noise: self.noise[0],
+            fit,
+            covariance: &decided.covariance,
+            correlated: &correlated,
+            expected: decided.expected,
+            inflation: decided.error.max(1.0),
+            instructions: self.options.instructions,
+        };
+        let found = judged.factor(place, &mut self.stages)?;
+        Ok(found.filter(|(left, error)| left.is_finite() && error.is_finite()))
+    }
+
+    /// Whether rows are predicted better with the angle that was found than without, by nearly as much as with an offset that is free in every
+    /// window: one that drifts follows the stiffness in part.
+    fn predicts_better(&mut self, chosen: &mut Chosen, model: &Model, offset: usize) -> Result<bool, Error> {
+        let with = chosen.fitted.as_ref().map_or(f64::INFINITY, |fitted| fitted.error);
+        let free = self.error_of(chosen, &with_free_offset(model, offset))?;
+        let zero = self.record.angle_zero;
+        chosen.weak.move_zero(-zero);
+        let without = self.error_of(chosen, model)?;
+        chosen.weak.move_zero(zero);
+        let better = with < without && without - with >= LEAST_SHARE * (without - free);
+        self.free_offset = FreeOffset { error: if better { with } else { without }, free };
+        Ok(better)
+    }
+
+    /// Lets what is left of the angle be one more constant, so that every error knows of it. Returns whether the rows determine it.
+    fn add_spring(&mut self, (chosen, decided, _): &mut Settled) -> Result<bool, Error> {
+        let rows = &mut chosen.weak.rows;
+        let Some(fit) = &decided.fit else { return Ok(false) };
+        let Some(spring) = SpringColumn::new(&decided.model, fit, rows.len(), rows.period) else { return Ok(false) };
+        decided.model.constant.push(rows.regressors.len());
+        rows.regressors.push(spring.regressor(&rows.usable));
+        decided.spring = Some(spring);
+        let problem = decided.problem(rows, self.noise[0]);
+        let again = fit.again(&problem, decided.expected, self.options.instructions, &mut self.stages)?;
+        decided.fit = again;
+        Ok(decided.fit.is_some())
+    }
+
+    /// Takes the angle out of the constants of a record, as far as it was sought.
+    pub(crate) fn take_angle_zero(&self, found: &mut WeakIdentified, decided: &Decided) -> Option<AngleZero> {
+        decided.spring.as_ref()?;
+        let regressor = *decided.model.constant.last()?;
+        found.weakest.pop();
+        let place = found.constants.iter().position(|one| one.unknown == regressor)?;
+        let left = found.constants.remove(place);
+        Some(AngleZero { value: self.record.angle_zero + left.value, error: left.error })
+    }
+}
