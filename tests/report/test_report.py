@@ -104,6 +104,15 @@ def test_a_page_is_whole_and_the_same_each_time(result: tvident.Identification, 
         assert words.replace("<", "\\u003c") in text.replace('\\"', '"')
 
 
+def test_a_page_is_never_greener_than_its_verdict(tmp_path: Path) -> None:
+    rig = tvident.simulate_torsional_rig(3.0)
+    for sign, tone in ((1, "good"), (-1, "bad")):
+        found = tvident.identify(rig.angle, sign * rig.torque, sample_rate=1000)
+        found.report(tmp_path / "page.html")
+        assert found.summary().startswith("do not trust") == (tone == "bad")
+        assert f'"tone": "{tone}"' in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [

@@ -86,7 +86,7 @@ def content_of(
     content = {
         "title": title,
         "verdict": words.splitlines()[0],
-        "tone": _tone(result),
+        "tone": _tone(result, words.splitlines()[0]),
         "span": [min([one.start for one in series], default=0.0), end],
         "numbers": _numbers(result, values),
         "advice": list(result.advice),
@@ -260,9 +260,13 @@ def _warnings(result: Reported, marks: Mapping[Status, npt.NDArray[np.bool_]]) -
     return warnings
 
 
-def _tone(result: Reported) -> str:
-    """Return whether all is well, something deserves a look, or nothing is to be believed."""
-    if int(result.record_status) & int(DOUBTFUL_RECORD) or not result.trusted.any():
+def _tone(result: Reported, verdict: str) -> str:
+    """Return whether all is well, something deserves a look, or nothing is to be believed: never better than the verdict."""
+    if (
+        verdict.startswith("do not trust")
+        or int(result.record_status) & int(DOUBTFUL_RECORD)
+        or not result.trusted.any()
+    ):
         return "bad"
     return "doubtful" if result.advice or int(result.record_status) else "good"
 
