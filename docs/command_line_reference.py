@@ -11,9 +11,11 @@ from tvident._command_line import main
 WIDTH = 110
 INTRODUCTION = """\
 Every argument of the Python functions has an option of the same name. Results go to files or to standard output, messages and
-progress to standard error, so `-o -` can be piped. The exit status is 0, 2 for misuse, 1 for a file that cannot be used. Ctrl-C
-stops at once; files appear whole or not at all, keep the mode of those that they replace, and never replace what is read. The
-command comes with `pip install 'tvident[cli]'`. This page is written by `make docs` from what the commands say themselves."""
+progress to standard error, so `-o -` can be piped. The exit status is 0, 2 for a wrong call, 1 where there is no usable result or a
+file cannot be used. Ctrl-C stops at once; files appear whole or not at all, keep the mode of those that they replace, and never
+replace what is read. The command comes with `pip install 'tvident[cli]'`. `--settings` takes a TOML file of options, such as
+`inertia = 0.0123` and `term = ["coulomb"]`, what `--settings-output` wrote, or a result as NPZ or Parquet: it holds its settings, so
+a run can be repeated from what it wrote. This page is written by `make docs` from what the commands say themselves."""
 
 
 def reference() -> str:

@@ -309,7 +309,11 @@ GOOD = ("--angle", "angle", "--torque", "torque", "--sample-rate", "1000")
         (("info", "decimal-commas.csv"), 1, "with a point as the decimal sign"),
         (("info", "broken.npz"), 1, "broken.npz: cannot be read as .npz"),
         (("info", "nothing.xyz"), 1, "the ending must be one of"),
-        (("derivatives", "FILE", "--channel", "angle", "--order", "16"), 2, "order must be at most 15; got 16"),
+        (
+            ("derivatives", "FILE", "--channel", "angle", "--order", "16", "--delta", "1"),
+            2,
+            "order must be at most 15; got 16",
+        ),
         (
             ("derivatives", "FILE", "--channel", "angle", "--time", "angle"),
             2,

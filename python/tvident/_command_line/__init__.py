@@ -10,7 +10,6 @@ else:
     except ImportError:
         from tvident._command_line.missing import main
     else:
-        from tvident._command_line import compare, demo, derivatives, identify, info, report, simulate  # noqa: F401 - each adds its command
         from tvident._command_line.group import main
 
 __all__ = ["main"]

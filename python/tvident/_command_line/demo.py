@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,10 @@ PICTURES = ("recording.png", "window.png", "window-with-noise.png", "parameters.
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the simulated recording.")
 def demo(folder: Path, seed: int) -> None:
     """Identify a simulated recording, compare with the truth and draw the paper's figures."""
+    if find_spec("matplotlib") is None:
+        click.echo(
+            "Pictures need matplotlib, which is not installed: pip install 'tvident[plot]'. Numbers follow.\n", err=True
+        )
     folder.mkdir(parents=True, exist_ok=True)
     check_own(folder, (*TABLES, *PICTURES))
     recording = tvident.simulate_torsional_rig(seed=seed)
@@ -54,6 +59,8 @@ def demo(folder: Path, seed: int) -> None:
         save(folder / name)
         note_own(folder, name)
     click.echo(f"Written to {printable(folder)}: {', '.join(TABLES)}")
+    if find_spec("matplotlib") is None:
+        return
     figures = figures_on_file()
     drawn = (
         figures.paper_figure_2(recording),

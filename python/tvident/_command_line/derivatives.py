@@ -39,7 +39,10 @@ from tvident._units import times_in_seconds
 @click.argument("file", type=click.Path())
 @click.option("--channel", required=True, metavar="NAME", help="Channel to differentiate.")
 @click.option(
-    "--window-length", default="201", show_default=True, help="Samples, odd, a duration such as '0.2 s', or auto."
+    "--window-length",
+    default="auto",
+    show_default=True,
+    help="Samples, odd, a duration such as '0.2 s', or auto: chosen.",
 )
 @TIME
 @click.option("--max-order", type=int, default=15, show_default=True, help="Highest candidate order.")
@@ -74,7 +77,8 @@ def derivatives(
 ) -> None:
     """Differentiate a channel of FILE with a polynomial order chosen in every window."""
     check_outputs({RESULTS: output, PICTURE: plot}, {RECORDING: file})
-    check_time(sample_rate, delta, time_channel)
+    if not check_time(sample_rate, delta, time_channel):
+        raise click.UsageError("derivatives need the sample period; got none; give --sample-rate, --delta or --time")
     channels = channels_in(file)
     samples = channel_of(channels, channel, file)
     times = None if time_channel is None else times_in_seconds(channel_of(channels, time_channel, file))

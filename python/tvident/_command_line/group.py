@@ -8,13 +8,11 @@ import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from io import TextIOWrapper
 from typing import Any
 
 import click
-
-from tvident import recordings
-from tvident._files import printable
 
 _LONGEST_LINE = 1500
 """Characters of a message."""
@@ -27,11 +25,11 @@ def _in_plain_words() -> Iterator[None]:
         yield
     except click.ClickException as error:
         # Names of files and channels are part of messages, and may hold what a terminal obeys.
-        error.message = "\n".join(printable(line, _LONGEST_LINE) for line in error.message.split("\n"))
+        error.message = "\n".join(_line(line) for line in error.message.split("\n"))
         raise
     except (click.exceptions.Exit, click.Abort):
         raise
-    except recordings.FileError as error:
+    except _file_error() as error:
         raise click.ClickException(_line(error)) from None
     except KeyError as error:
         raise click.UsageError(_line(error.args[0])) from None
@@ -47,7 +45,7 @@ def _in_plain_words() -> Iterator[None]:
         if error.errno == errno.EPIPE:
             raise  # whoever reads the output has had enough: click ends without a word
         _let_go_of_output()
-        place = "the output" if error.filename is None else printable(error.filename)
+        place = "the output" if error.filename is None else _line(error.filename)
         raise click.ClickException(f"{place}: {_line(error.strerror)}") from None
 
 
@@ -64,8 +62,28 @@ def _let_go_of_output() -> None:
         os.close(nowhere)
 
 
+# Rooms of the package take NumPy, which help and version need not wait for: they are entered when something goes wrong or is done.
 def _line(message: object) -> str:
-    return printable(message, _LONGEST_LINE)
+    text: str = import_module("tvident._files").printable(message, _LONGEST_LINE)
+    return text
+
+
+def _file_error() -> type[Exception]:
+    kind: type[Exception] = import_module("tvident.recordings").FileError
+    return kind
+
+
+COMMANDS = {
+    "compare": "Compare candidates for the equation of motion of the angle and torque in FILE.",
+    "completion": "Print what makes a shell complete names and options.",
+    "demo": "Identify a simulated recording, compare with the truth and draw the paper's figures.",
+    "derivatives": "Differentiate a channel of FILE with a polynomial order chosen in every window.",
+    "identify": "Identify inertia, damping and stiffness from the angle and torque in FILE.",
+    "info": "List the channels of FILE: how many samples, their range, and what is missing.",
+    "report": "Identify as identify does, and write a page that shows the recording and the result.",
+    "simulate": "Write a simulated recording of the paper's rig, with its truth, to OUTPUT: a CSV file, or of another kind by its ending.",
+}
+"""Every command, a file each, and the first sentence of what it says of itself."""
 
 
 class _Command(click.Group):
@@ -75,13 +93,28 @@ class _Command(click.Group):
         with _in_plain_words():
             return super().make_context(*arguments, **options)
 
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        del ctx
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name in COMMANDS:
+            import_module(f"tvident._command_line.{cmd_name}")  # which adds it
+        return super().get_command(ctx, cmd_name)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        del ctx
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
     def invoke(self, ctx: click.Context) -> Any:
         for stream in (sys.stdout, sys.stderr):
             # Where a terminal has no letter for a sign, its number is better than nothing.
             if isinstance(stream, TextIOWrapper):
                 stream.reconfigure(errors="backslashreplace")
         with _in_plain_words(), warnings.catch_warnings():
-            warnings.simplefilter("always", recordings.FileWarning)  # an error elsewhere is a word here
+            # An error elsewhere is a word here.
+            warnings.simplefilter("always", import_module("tvident.recordings").FileWarning)
             warnings.showwarning = _show_warning
             return super().invoke(ctx)
 
@@ -90,8 +123,25 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     click.echo(f"Warning: {_line(message)}", err=True)
 
 
-@click.group(cls=_Command, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
-@click.version_option(package_name="tvident", message="%(version)s")
+def _show_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:  # noqa: FBT001 - an option's value
+    if wanted and not ctx.resilient_parsing:
+        click.echo(import_module("tvident").__version__)
+        ctx.exit()
+
+
+@click.group(
+    cls=_Command,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    epilog="Exit status: 0, 1 where there is no usable result or a file cannot be used, 2 for a wrong call.",
+)
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_show_version,
+    help="Show the version and exit.",
+)
 def main() -> None:
     """Identify inertia, damping and stiffness that change while they are measured; differentiate noisy recordings.
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import stat
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, get_args
 
 import click
@@ -28,11 +25,8 @@ from tvident._command_line.options import (
     period_of,
     wanted_progress,
 )
+from tvident._command_line.settings import options_from_toml, read_settings
 from tvident._equation import COEFFICIENTS, TERM_NAMES
-from tvident._files import printable
-
-_MOST_BYTES = 100_000_000
-"""Of settings, which are some lines for every record of a batch."""
 
 IDENTIFICATION = options_of(
     CHANNELS,
@@ -60,7 +54,11 @@ IDENTIFICATION = options_of(
     ),
     click.option("--mask", metavar="NAME", help="Channel, or file, that is not zero where a sample may be used."),
     click.option(
-        "--settings", type=click.Path(), help="Settings of an earlier run: a JSON file that --settings-output wrote."
+        "--settings",
+        type=click.Path(),
+        is_eager=True,
+        callback=options_from_toml,
+        help="Settings of an earlier run: its result (NPZ, Parquet), or what --settings-output wrote; or a TOML file of options.",
     ),
     click.option(
         "--nan-policy",
@@ -124,7 +122,7 @@ def identified(
         period=None if turn is None else abs(float(turn)),
         lag=None if lag is None else lag_of(lag),
         mask=None if mask is None else mask_of(source_of(channels, mask, file)),
-        settings=None if settings is None else _read_settings(settings),
+        settings=None if settings is None else read_settings(settings),
         terms=terms_of(terms),
         progress=wanted_progress(progress),
         **{
@@ -133,18 +131,3 @@ def identified(
             if name not in NAMES
         },
     )
-
-
-def _read_settings(path: str) -> dict[str, Any]:
-    """Return what an earlier run chose."""
-    place, cure = printable(path), "give a file that --settings-output wrote"
-    kind = Path(path).stat()
-    if not stat.S_ISREG(kind.st_mode) or kind.st_size > _MOST_BYTES:
-        raise recordings.FileError(f"{place}: settings must be a file of at most {_MOST_BYTES} bytes; {cure}")
-    try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise recordings.FileError(f"{place}: holds no settings ({error}); {cure}") from None
-    if not isinstance(content, dict):
-        raise recordings.FileError(f"{place}: holds no settings; {cure}")
-    return content

@@ -1,0 +1,64 @@
+"""Settings from files: those of an earlier result as JSON, TOML or in the result itself, and options that are written down as TOML."""
+
+from __future__ import annotations
+
+import json
+import stat
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import click
+
+import tvident
+from tvident import recordings
+from tvident._files import RESULT_ENDINGS, printable
+
+_MOST_BYTES = 100_000_000
+"""Of settings, which are some lines for every record of a batch."""
+
+
+def read_settings(path: str) -> dict[str, Any]:
+    """Return what an earlier run chose, or what a TOML file holds."""
+    place = printable(path)
+    cure = f"give a file that --settings-output wrote, a result ({', '.join(RESULT_ENDINGS)}), or options as TOML"
+    ending = Path(path).suffix.lower()
+    if ending in RESULT_ENDINGS:
+        return tvident.load(path).settings
+    kind = Path(path).stat()
+    if not stat.S_ISREG(kind.st_mode) or kind.st_size > _MOST_BYTES:
+        raise recordings.FileError(f"{place}: settings must be a file of at most {_MOST_BYTES} bytes; {cure}")
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+        content = tomllib.loads(text) if ending == ".toml" else json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise recordings.FileError(f"{place}: holds no settings ({error}); {cure}") from None
+    if not isinstance(content, dict):
+        raise recordings.FileError(f"{place}: holds no settings; {cure}")
+    return content
+
+
+def options_from_toml(ctx: click.Context, _: click.Parameter, path: str | None) -> str | None:
+    """Take what a TOML file holds for the options that are not given; return the path of settings of an earlier result."""
+    if path is None or Path(path).suffix.lower() != ".toml":
+        return path
+    content = read_settings(path)
+    if {"form", "kinds"} <= content.keys():
+        return path
+    known = {name.lstrip("-"): one for one in ctx.command.params for name in (*one.opts, *one.secondary_opts)}
+    foreign = [name for name in content if name.replace("_", "-") not in known or name == "settings"]
+    if foreign:
+        raise click.UsageError(
+            f"{printable(path)} must hold options of tvident {ctx.command.name}, without dashes before them; got {foreign[0]!r}; "
+            f"use {', '.join(sorted(name for name in known if len(name) > 1))}"
+        )
+    values = {known[name.replace("_", "-")]: value for name, value in content.items()}
+    ctx.default_map = {one.name or "": _as_typed(one, value) for one, value in values.items()}
+    return None
+
+
+def _as_typed(option: click.Parameter, value: Any) -> Any:
+    """Return a value as it would be typed, where the option takes text."""
+    if isinstance(value, list):
+        return [_as_typed(option, one) for one in value]
+    return str(value) if option.type is click.STRING and not isinstance(value, bool) else value

@@ -1,0 +1,128 @@
+"""What a command does as users of other commands expect: quick help, completion, JSON, settings from files, exit codes."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import tvident
+from tvident._command_line import main
+from tvident._command_line.group import COMMANDS
+
+TVIDENT = str(Path(sys.executable).with_name("tvident"))
+IDENTIFY = ("identify", "rig.npz", "--angle", "angle", "--torque", "torque", "--sample-rate", "1000")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    tvident.simulate_torsional_rig(duration=2.0).save(tmp_path / "rig.npz")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def invoke(*arguments: str) -> Any:
+    return CliRunner().invoke(main, arguments)
+
+
+@pytest.mark.parametrize("option", ["--help", "--version"])
+def test_help_and_version_do_not_wait_for_numpy(option: str) -> None:
+    code = f"import sys; from tvident._command_line import main\ntry: main([{option!r}])\nfinally: print('numpy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "False"
+    if option == "--version":
+        assert done.stdout.splitlines()[0] == tvident.__version__
+    assert max(map(len, done.stdout.splitlines())) <= 80
+
+
+def test_every_command_is_listed_with_what_it_says_of_itself() -> None:
+    context = click.Context(main)
+    folder = Path(main.callback.__code__.co_filename).parent if main.callback else Path()
+    files = {path.stem for path in folder.glob("*.py") if "@main.command" in path.read_text(encoding="utf-8")}
+    assert set(COMMANDS) == files
+    for name, sentence in COMMANDS.items():
+        command = main.get_command(context, name)
+        assert command is not None
+        assert (command.help or "").partition("\n\n")[0].replace("\n", " ") == sentence
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_of_names_and_options(shell: str) -> None:
+    script = invoke("completion", shell).stdout
+    assert "_TVIDENT_COMPLETE" in script
+    variables = {"COMP_WORDS": "tvident identify --stiff", "COMP_CWORD": "2" if shell != "fish" else "--stiff"}
+    done = subprocess.run(
+        [TVIDENT],
+        env=variables | {"_TVIDENT_COMPLETE": f"{shell}_complete"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "--stiffness" in done.stdout
+
+
+def test_json_says_what_the_summary_says(folder: Path) -> None:
+    said = json.loads(invoke(*IDENTIFY, "--json", "-o", "result.npz").stdout)
+    result = tvident.load(folder / "result.npz")
+    assert said["settings"] == result.settings
+    assert said["parameters"]["inertia"]["value"] == result.constants["inertia"][0]
+    assert said["verdict"].startswith("K(t) known to")
+    assert said["advice"] == list(result.advice)
+
+
+def test_a_run_is_repeated_from_its_result_and_from_toml(folder: Path) -> None:
+    options = ["--inertia", "0.0123", "--term", "coulomb", "--window-length", "41"]
+    assert invoke(*IDENTIFY, *options, "-o", "first.npz").exit_code == 0
+    assert invoke(*IDENTIFY, "--settings", "first.npz", "-o", "again.npz").exit_code == 0
+    (folder / "run.toml").write_text(
+        'angle = "angle"\ntorque = "torque"\nsample-rate = 1000\ninertia = 0.0123\nterm = ["coulomb"]\nwindow-length = 41\n'
+    )
+    assert invoke("identify", "rig.npz", "--settings", "run.toml", "-o", "toml.npz").exit_code == 0
+    first, *others = (tvident.load(f"{name}.npz") for name in ("first", "again", "toml"))
+    for other in others:
+        np.testing.assert_array_equal(other.stiffness, first.stiffness)
+        assert other.settings["window_length"] == 41
+    given = invoke("identify", "rig.npz", "--settings", "run.toml", "--inertia", "0.02", "-o", "given.npz")
+    assert given.exit_code == 0
+    assert tvident.load("given.npz").inertia[0] == 0.02
+    (folder / "run.toml").write_text("stifness = 0\n")
+    wrong = invoke(*IDENTIFY, "--settings", "run.toml")
+    assert wrong.exit_code == 2
+    assert "must hold options of tvident identify, without dashes before them; got 'stifness'; use" in wrong.output
+
+
+def test_exit_codes(folder: Path) -> None:
+    assert invoke(*IDENTIFY).exit_code == 0
+    np.savez(folder / "rig.npz", angle=np.zeros(500), torque=np.zeros(500))
+    assert invoke(*IDENTIFY, "-o", "nothing.csv").exit_code == 1
+    assert (folder / "nothing.csv").exists()
+    assert invoke("identify", "none.npz", *IDENTIFY[2:]).exit_code == 1
+    assert invoke(*IDENTIFY[:-2]).exit_code == 2
+    assert "Exit status: 0, 1 where there is no usable result" in invoke("--help").output
+
+
+def test_derivatives_behave_as_identify_does(folder: Path) -> None:
+    call = ("derivatives", "rig.npz", "--channel", "angle")
+    none = invoke(*call)
+    assert none.exit_code == 2
+    assert "derivatives need the sample period; got none; give --sample-rate, --delta or --time" in none.output
+    assert invoke(*call, "--sample-rate", "1000", "-o", "found.npz").exit_code == 0
+    angle = np.load(folder / "rig.npz")["angle [rad]"]
+    expected = tvident.fit_local_polynomials(angle, "auto", sample_rate=1000).derivatives[2]
+    np.testing.assert_array_equal(np.load(folder / "found.npz")["derivative_2"], expected)
+
+
+@pytest.mark.usefixtures("folder")
+def test_the_demo_says_at_once_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tvident._command_line.demo.find_spec", lambda _: None)
+    done = invoke("demo")
+    assert done.exit_code == 0
+    assert done.stderr.startswith("Pictures need matplotlib, which is not installed: pip install 'tvident[plot]'")
+    assert done.output.count("result.csv") == 1
