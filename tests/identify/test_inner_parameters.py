@@ -112,8 +112,8 @@ def test_an_inner_parameter_is_found_within_its_error_and_nothing_else_is_biased
         assert np.abs(score).max() < 4.5, parameter
         assert abs(score.mean()) < 3.5 / np.sqrt(RECORDS), parameter
         scores.append(score)
-    # Errors that are half as large as they should be make this 4, twice as large 1/4; the noise of a torque that jumps is overestimated.
-    assert 0.1 < np.mean(np.square(scores)) < 2
+    # The parameters of six records are some twenty independent numbers, whose mean square lies between these but for one of a thousand.
+    assert 0.35 < np.mean(np.square(scores)) < 2.2
     assert all(all(earned) for earned in result.settings["earned"].values())
     inner = next(parameter for parameter in truth if "." in parameter)
     assert (result.constants[inner][1] < 0.1 * truth[inner]).all()

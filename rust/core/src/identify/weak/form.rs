@@ -13,8 +13,10 @@ use crate::identify::weak::friction::FrictionDirection;
 use crate::identify::weak::options::WeakOptions;
 use crate::identify::weak::scanned::Scan;
 use crate::identify::weak::session::Session;
+use crate::identify::weak::torque_jumps::without_jumps;
 use crate::noise::channel::channel_variance;
 use crate::noise::defects::{Defect, defects};
+use crate::noise::quantisation_step;
 use crate::record::samples::Samples;
 use crate::simd::instructions::Instructions;
 use crate::status::Status;
@@ -36,7 +38,9 @@ pub(crate) fn identify_weak(
 ) -> Result<WeakIdentified, Error> {
     let lag = options.lag.unwrap_or(0.0);
     with_record(motion, (mask, lag), (options.delta, options.instructions), (workers, watch), |record, watch| {
-        identify(record, options, workers, watch)
+        let jumping: Vec<_> = motion.terms.iter().zip(&record.terms).filter_map(jumping).collect();
+        let calm = without_jumps(record.torque, &jumping);
+        identify(record, calm.as_deref(), options, workers, watch)
     })
     .map(|(found, resting)| {
         let defects = [defects(motion.angle), defects_of_torque(motion.torque)];
@@ -82,16 +86,29 @@ pub(crate) fn with_record<R>(
     Ok((work(record, watch)?, friction.resting))
 }
 
-/// Identifies one record.
+/// The samples of a term that may jump from one to the next.
+fn jumping<'a>((term, samples): (&Term<'a>, &TermSamples<'a>)) -> Option<&'a dyn Samples> {
+    let smooth = |term: &BuiltInTerm| matches!(term.function, TermFunction::One | TermFunction::OfAngle(_));
+    match (term, samples) {
+        (Term::BuiltIn(term), _) if smooth(term) => None,
+        (_, TermSamples::Given(samples)) => Some(*samples),
+        _ => None,
+    }
+}
+
+/// Identifies one record. The noise of the torque is that of a `calm` one, without jumps, where there is one.
 fn identify(
     record: Record<'_>,
+    calm: Option<&[f64]>,
     options: &WeakOptions,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<WeakIdentified, Error> {
     let samples = record.angle.len();
     let mut stages = Stages::new(workers, samples, STAGES, watch);
-    let channels = [(record.angle, options.noise[0], options.quantisation), (record.torque, options.noise[1], None)];
+    let calm = calm.as_ref().map(|calm| (calm as &dyn Samples, quantisation_step(record.torque)));
+    let (torque, step) = calm.map_or((record.torque, None), |(calm, step)| (calm, Some(step)));
+    let channels = [(record.angle, options.noise[0], options.quantisation), (torque, options.noise[1], step)];
     let pieces = channels.map(|channel| Piece { size: samples, content: channel });
     let level = |(channel, given, step): (_, Option<f64>, _), (): &mut ()| {
         given.unwrap_or_else(|| channel_variance(channel, step, options.instructions))

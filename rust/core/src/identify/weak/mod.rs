@@ -15,5 +15,6 @@ pub(crate) mod report;
 pub(crate) mod scan;
 pub(crate) mod scanned;
 pub(crate) mod session;
+pub(crate) mod torque_jumps;
 pub(crate) mod weighting;
 pub(crate) mod windows;
