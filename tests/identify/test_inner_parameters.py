@@ -239,6 +239,14 @@ def test_stribeck_friction_is_simulated_with_what_was_found() -> None:
     assert np.isfinite(result.simulate(torque, state)).all()
 
 
+def test_friction_that_fades_too_fast_for_the_samples_is_said() -> None:
+    """With 90 rad/s² the velocity crosses twice 0.25 rad/s within three samples."""
+    angle, torque = one_record(lambda t, _, velocity: np.sign(velocity(t)) * 0.2 + 0.5 * stribeck(velocity(t), 0.25))
+    result = tvident.identify(angle, torque, terms=["coulomb", "stribeck", "offset"], **CONSTANT)
+    assert any("samples of a turn, so stribeck.velocity and its factor hang" in line for line in result.advice)
+    assert not any("negative" in line for line in result.advice)
+
+
 def test_the_stribeck_function_is_its_expectation() -> None:
     generator = np.random.default_rng(1)
     velocity, error = np.array([-1.0, 0.0, 0.1, 0.4, 2.0, np.nan]), np.array([0.3, 0.3, 0.2, 0.0, 1e-3, 0.1])

@@ -9,6 +9,9 @@ from dataclasses import dataclass
 from tvident._equation import InnerParameter
 from tvident._results import Words
 
+_FEWEST_SAMPLES = 5.0
+"""Of a turn, below which simulated Stribeck friction was off by up to four standard errors."""
+
 
 @dataclass(frozen=True)
 class FoundBySearch:
@@ -32,6 +35,8 @@ class FoundBySearch:
         How likely noise makes the term as significant, at any value of the range; NaN where its factor changes.
     at_end : bool
         Whether the value is an end of the range.
+    lasts : float
+        Samples of a turn in which Stribeck friction fades.
     """
 
     parameter: InnerParameter
@@ -44,6 +49,7 @@ class FoundBySearch:
     gain: float = math.inf
     chance: float = math.nan
     at_end: bool = False
+    lasts: float = math.inf
 
     @property
     def is_determined(self) -> bool:
@@ -96,6 +102,11 @@ class FoundBySearch:
             )
             words.append(
                 f"the best {name} is the {which} of its range, {self.value:.4g}: {wider}; its error means nothing there"
+            )
+        if self.earned and self.lasts < _FEWEST_SAMPLES:
+            words.append(
+                f"{term} fades within {self.lasts:.2g} samples of a turn, so {name} and its factor hang on how the velocity was smoothed, "
+                "by more than their errors: record at a higher rate, or turn more slowly"
             )
         if self.earned and self.parameter.limits is None and self.factor < 0:
             words.append(

@@ -144,6 +144,14 @@ class Columns:
         slowest = np.clip(_WITHIN_NOISE * noise, _SLOWEST * fastest, 0.5 * fastest)
         return Range(slowest, fastest, logarithmic=True)
 
+    def samples_of_fading(self, scales: Array) -> Array:
+        """Return for how many samples the velocity of a turn is below the Stribeck velocity, at the record's typical acceleration."""
+        changes = np.diff(self._sliding[0], axis=-1)
+        there = np.isfinite(changes)
+        with np.errstate(all="ignore"):
+            typical = np.sqrt(np.sum(np.where(there, changes, 0.0) ** 2, axis=-1) / there.sum(axis=-1))
+            return np.asarray(2 * scales / typical)
+
     def samples(self, inner: Mapping[str, Array], *, repeated: bool = False) -> list[npt.NDArray[np.number] | str]:
         """Return every term as the core takes it, with the inner parameters of every record.
 

@@ -272,6 +272,9 @@ class Task:
                     error=float(np.ravel(batch.constants[one.full_name][1])[record]),
                     limits=self.ranges[one.full_name].of(record),
                     factor=middle(factors[one.term][record]),
+                    lasts=float(self._columns.samples_of_fading(searched.values[one.full_name])[record])
+                    if one.limits is None
+                    else np.inf,
                     **searched.of(one, record),
                 )
                 for one in self.inner

@@ -16,7 +16,7 @@ use crate::identify::weak::session::Session;
 use crate::identify::weak::torque_jumps::without_jumps;
 use crate::noise::channel::channel_variance;
 use crate::noise::defects::{Defect, defects};
-use crate::noise::quantisation_step;
+use crate::noise::quantisation::quantisation_step;
 use crate::record::samples::Samples;
 use crate::simd::instructions::Instructions;
 use crate::status::Status;

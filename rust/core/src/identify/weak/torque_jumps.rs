@@ -33,7 +33,7 @@ pub(crate) fn without_jumps(torque: &dyn Samples, terms: &[&dyn Samples]) -> Opt
     let mut columns: Vec<Vec<f64>> = terms.iter().map(|term| read(*term)).collect();
     let torque = read(torque);
     while !columns.is_empty() {
-        let products = Products::new(&torque, &columns);
+        let products = Differenced::new(&torque, &columns);
         let Some((factors, variances)) = products.solve() else {
             // Terms that depend on each other explain together what one of them does alone.
             columns.pop();
@@ -61,14 +61,14 @@ pub(crate) fn without_jumps(torque: &dyn Samples, terms: &[&dyn Samples]) -> Opt
 }
 
 /// Products of the differences of terms with each other and with those of the torque.
-struct Products {
+struct Differenced {
     terms: Mat<f64>,
     with_torque: Vec<f64>,
     torque: f64,
     count: f64,
 }
 
-impl Products {
+impl Differenced {
     fn new(torque: &[f64], columns: &[Vec<f64>]) -> Self {
         let terms = columns.len();
         let mut found =
