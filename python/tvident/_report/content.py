@@ -220,6 +220,11 @@ def _numbers(result: Reported, values: Mapping[str, Array]) -> list[dict[str, st
             line["more"] = f"90 % lie between {low:.4g} and {high:.4g}"
             line["kind"] = "known: as given" if kind == "known" else f"{kind}: the median of its values"
         lines.append(line)
+    for name in [one for one in result.constants if one not in values]:
+        # The angle zero, and what was searched inside of terms.
+        value = arguments.with_error(*map(float, result.constants[name]))
+        words = {"name": title_of(name.replace(".", " ")), "unit": unit_of(name, result.units), "more": ""}
+        lines.append(words | {"value": value, "kind": "constant over the record"})
     return lines
 
 
