@@ -29,6 +29,7 @@ __all__ = [
     "built_in_terms",
     "estimate_automatically",
     "force_instructions",
+    "fuse",
     "identify",
     "instructions",
     "noise",
@@ -85,6 +86,9 @@ class Motions:
         torque: npt.NDArray[np.number],
         coefficients: list[npt.NDArray[np.number] | float | None],
         terms: list[npt.NDArray[np.number] | str],
+        *,
+        channels: Sequence[npt.NDArray[np.number] | None] = ...,
+        noise: Sequence[tuple[float, int, Sequence[tuple[int, float]]]] | None = None,
     ) -> Motions: ...
 
 @final
@@ -291,6 +295,11 @@ def noise(samples: npt.NDArray[np.number], quantisation: float | None = None) ->
 def noise_coherence(
     angle: npt.NDArray[np.number], torque: npt.NDArray[np.number], variances: list[float]
 ) -> list[float | None]: ...
+def fuse(
+    record: npt.NDArray[np.number],
+    others: Sequence[tuple[int, float, npt.NDArray[np.number]]],
+    delta: float,
+) -> npt.NDArray[np.float64]: ...
 def quantisation_step(samples: npt.NDArray[np.number]) -> float: ...
 def identify(
     motions: Motions,

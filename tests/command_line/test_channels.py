@@ -50,3 +50,26 @@ def test_a_period_that_cannot_be_is_refused(tmp_path: Path, period: str) -> None
     done = run("derivatives", "rig.npz", "--channel", "angle", "--period", period, cwd=tmp_path)
     assert done.returncode == 2
     assert "--period must be a number above zero, or a multiple of pi such as 2pi" in done.stderr
+
+
+def test_a_velocity_beside_the_angle_or_in_its_place(tmp_path: Path) -> None:
+    rig = tvident.simulate_torsional_rig(duration=4, sample_rate=500, seed=2)
+    velocity = rig.true_velocity + 0.01 * np.random.default_rng(0).standard_normal(rig.angle.size)
+    np.savez(
+        tmp_path / "rig.npz", angle=rig.angle, torque=rig.torque, gyro=velocity, accelerometer=rig.true_acceleration
+    )
+    call = ("identify", "rig.npz", "--torque", "torque", "--sample-rate", 500, "-o", "out.npz")
+    done = run(*call, "--angle", "angle", "--velocity", "gyro", "--acceleration", "accelerometer", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    expected = tvident.identify(
+        rig.angle, rig.torque, sample_rate=500, velocity=velocity, acceleration=rig.true_acceleration
+    )
+    found = recordings.read(tmp_path / "out.npz")["stiffness [N m/rad]"]
+    np.testing.assert_allclose(found, expected.stiffness, rtol=1e-9)
+    assert "velocity_bias = " in done.stdout
+    assert "rad/s" in done.stdout
+
+    assert run(*call, "--velocity", "gyro", "--stiffness", "constant", cwd=tmp_path).returncode == 0
+    none = run(*call, cwd=tmp_path)
+    assert none.returncode == 2
+    assert "Missing option '--angle'" in none.stderr

@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 
 use tvident::Error;
-use tvident::equation::{Coefficient, Motion};
+use tvident::equation::{Coefficient, Measured, Motion};
 use tvident::identify::{Kind, Method, Options, StrongForm, Task, identify_all};
 use tvident::lanes::Elements;
 use tvident::least_squares::HALF_OF_THE_DIGITS;
@@ -163,6 +163,7 @@ fn identify(lengths: usize) -> Result<usize, Error> {
     let (angle, torque) = (Repeated::new(0, windows), Repeated::new(1, windows));
     let motion = Motion {
         angle: &angle,
+        measured: Measured::default(),
         torque: &torque,
         coefficients: [Coefficient::Unknown, Coefficient::Unknown, Coefficient::Unknown],
         terms: Vec::new(),
@@ -173,7 +174,7 @@ fn identify(lengths: usize) -> Result<usize, Error> {
         filter_torque: false,
         linear: false,
     });
-    let task = Task { motion, mask: None, method, lag: Some(0.0) };
+    let task = Task { motion, mask: None, method, lag: Some(0.0), angle_zero: None };
     let options = Options {
         delta: 1e-3,
         kinds: vec![Kind::Windowed; 3],

@@ -176,12 +176,14 @@ class Explained:
     def _defects(self) -> list[str]:
         words = []
         for channel, defect, amount in self.found.defects:
-            name = ("angle", "torque")[channel]
+            name = ("angle", "torque", "velocity", "acceleration")[channel]
             if defect == "clipped":
                 cure = (
                     f"is clipped: {amount:.1%} of its samples lie at its largest or smallest value: make these NaN, or record with a "
                     "larger range"
                 )
+            elif defect == "held" and name in {"velocity", "acceleration"}:
+                cure = f"holds every value for {amount:.0f} samples: keep every {amount:.0f}th sample of all channels"
             elif defect == "held":
                 late = (amount - 1) / 2 * (-1 if name == "angle" else 1) * self.period
                 cure = (

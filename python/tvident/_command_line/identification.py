@@ -15,6 +15,7 @@ from tvident._command_line.channels import at_even_times, mask_of, scaled, sourc
 from tvident._command_line.equation import lag_of, parameter_of, terms_of
 from tvident._command_line.method import METHOD, NAMES, method_of
 from tvident._command_line.options import (
+    BESIDE,
     CHANNELS,
     PERIOD,
     RECORDING,
@@ -30,6 +31,7 @@ from tvident._equation import COEFFICIENTS, TERM_NAMES
 
 IDENTIFICATION = options_of(
     CHANNELS,
+    BESIDE,
     PERIOD,
     TIME,
     METHOD,
@@ -73,7 +75,13 @@ IDENTIFICATION = options_of(
 
 def inputs(file: str | None, options: Mapping[str, Any]) -> dict[str, str | None]:
     """Return the files that are read, by what messages call them."""
-    named = {"the mask": "mask", "the instrument": "instrument", "earlier settings": "settings"}
+    named = {
+        "the velocity": "velocity",
+        "the acceleration": "acceleration",
+        "the mask": "mask",
+        "the instrument": "instrument",
+        "earlier settings": "settings",
+    }
     return {
         RECORDING: file,
         "the angle": options["angle"],
@@ -87,7 +95,9 @@ def identified(
     channels: recordings.Channels,
     file: str | None,
     *,
-    angle: str,
+    angle: str | None,
+    velocity: str | None,
+    acceleration: str | None,
     torque: str,
     angle_scale: str | None,
     torque_scale: str | None,
@@ -109,13 +119,20 @@ def identified(
         )
     of_method = {name: value for name, value in given(options).items() if name in NAMES}
     turn = None if period is None else scaled(np.asarray(period_of(period)), angle_scale, channels, file)
-    signals = [source_of(channels, name, file) for name in (angle, torque)]
-    times = times_of(channels, time_channel, angle, file)
+    motion = {"angle": angle, "velocity": velocity, "acceleration": acceleration}
+    named = {name: channel for name, channel in motion.items() if channel is not None}
+    recorded = [source_of(channels, name, file) for name in (*named.values(), torque)]
+    times = times_of(channels, time_channel, next(iter(named.values())), file)
     if times is not None:
-        times, signals = at_even_times(times, signals, file)
+        times, recorded = at_even_times(times, recorded, file)
+    signals = dict(zip(named, recorded, strict=False))
+    if "angle" in signals:
+        signals["angle"] = scaled(signals["angle"], angle_scale, channels, file)
     return tvident.identify(
-        scaled(signals[0], angle_scale, channels, file),
-        scaled(signals[1], torque_scale, channels, file),
+        signals.get("angle"),
+        scaled(recorded[-1], torque_scale, channels, file),
+        velocity=signals.get("velocity"),
+        acceleration=signals.get("acceleration"),
         method=method_of(method, of_method, has_settings=settings is not None),
         t=times,
         instrument=None if instrument is None else source_of(channels, instrument, file),

@@ -34,6 +34,8 @@ def _named(function: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(function)
     def call(*, joint: str | None = None, **options: Any) -> Any:
         missing = [name for name in ("angle", "torque") if options[name] is None]
+        if joint is None and (options.get("velocity") or options.get("acceleration")):
+            missing = [name for name in missing if name != "angle"]
         if joint is None and missing:
             raise click.UsageError(f"Missing option '--{missing[0]}'; name the channel, or a --joint of a ROS bag")
         if joint is not None:
@@ -61,6 +63,13 @@ CHANNELS = options_of(
         "--torque-unit", metavar="UNIT", help="Unit of the torque, as 'N mm'; by default its header's, or N m."
     ),
     click.option("--time-unit", metavar="UNIT", help="Unit of the time channel, as ms; by default its header's, or s."),
+)
+
+BESIDE = options_of(
+    click.option(
+        "--velocity", metavar="NAME", help="Channel, or file, of a measured velocity, beside the angle or in its place."
+    ),
+    click.option("--acceleration", metavar="NAME", help="The same for a measured acceleration."),
 )
 
 PERIOD = click.option(

@@ -44,10 +44,10 @@ def report(file: str | None, output: str, **options: Any) -> None:
     result = identified(channels, file, **options)
     used = {
         full_name(channels, options[name], "")
-        for name in ("angle", "torque", "time_channel")
+        for name in ("angle", "velocity", "acceleration", "torque", "time_channel")
         if _is_in(channels, options[name])
     }
-    samples = source_of(channels, options["angle"], file).shape
+    samples = source_of(channels, options["torque"], file).shape
     others = {name: values for name, values in channels.items() if values.shape == samples and name not in used}
     for name in list(others)[_MOST_CHANNELS:]:
         del others[name]

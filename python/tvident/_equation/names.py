@@ -24,6 +24,8 @@ _COLUMNS = (
     "status",
     "record_status",
     "trusted",
+    "velocity_bias",
+    "acceleration_bias",
 )
 """Columns of every result."""
 

@@ -16,6 +16,8 @@ UNITS = {
     "angle_zero": "rad",
     "condition": "1",
     "residual_std": "N m",
+    "velocity_bias": "rad/s",
+    "acceleration_bias": "rad/s^2",
 }
 UNITS |= {term.name: term.unit for term in BUILT_IN.values()}
 UNITS |= {f"{term.name}.{name}": unit for term in BUILT_IN.values() for name, unit in term.inner.items()}

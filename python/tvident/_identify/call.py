@@ -12,6 +12,7 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident._derivatives import quantisation_step
 from tvident._equation import LINEAR_UNITS, UNITS, GivenTerm, Parameter
+from tvident._identify.channels import motion_channels
 from tvident._identify.data import Data
 from tvident._identify.methods import Method
 from tvident._identify.settings import resolve
@@ -22,7 +23,7 @@ from tvident._units import ROTARY, Axis, axis_of, factor_between, scaled, times_
 
 # All but the data are options, as users call it.
 def identify(
-    angle: npt.ArrayLike,
+    angle: npt.ArrayLike | None,
     torque: npt.ArrayLike,
     *,
     sample_rate: float | None = None,
@@ -36,6 +37,8 @@ def identify(
     damping: Parameter | None = None,
     stiffness: Parameter | None = None,
     terms: Sequence[GivenTerm] | None = None,
+    velocity: npt.ArrayLike | None = None,
+    acceleration: npt.ArrayLike | None = None,
     instrument: npt.ArrayLike | None = None,
     lag: float | Literal["auto"] | None = None,
     quantisation: float | None = None,
@@ -62,10 +65,11 @@ def identify(
 
     Parameters
     ----------
-    angle : array_like, shape (\*, n)
-        Angle in rad. Time is the last axis; any others are a batch of records. Masked samples are missing, as NaN is. Tables of pandas
-        and polars have time along their rows, arrays of xarray along ``time``; their labels come back with ``to_pandas()``,
-        ``to_polars()`` and ``to_xarray()`` of the result. A column, shape (n, 1), is one record.
+    angle : array_like, shape (\*, n), or None
+        Angle in rad; None where `velocity` or `acceleration` was measured in its place. Time is the last axis; any others are a batch of
+        records. Masked samples are missing, as NaN is. Tables of pandas and polars have time along their rows, arrays of xarray along
+        ``time``; their labels come back with ``to_pandas()``, ``to_polars()`` and ``to_xarray()`` of the result. A column, shape (n, 1),
+        is one record.
     torque : array_like, same shape
         Torque in N m.
     sample_rate : float
@@ -100,6 +104,13 @@ def identify(
         own names in ``search=``, is found by a search, which costs 10 to 20 times as much; in a batch every record has its own.
         In weak form, where the record contradicts a constant offset beside a windowed stiffness, the angle at which the spring is relaxed
         is looked for, K (θ - θ₀), and kept where it predicts better: ``constants["angle_zero"]``.
+    velocity, acceleration : array_like, the angle's shape, optional
+        Channels that were measured too, or instead of the angle: rad/s of a gyroscope or tachometer, rad/s² of an accelerometer. The
+        most likely angle is made of all of them, each with the weight that its noise gives it. Their constant biases are in
+        ``constants["velocity_bias"]`` and ``constants["acceleration_bias"]``. A channel that is a multiple of the angle's derivative is
+        left out, and the advice says so. Without an angle it is the integral of what there is: its zero and its drift are an offset of
+        the torque, which is then windowed by default; terms of the angle cannot be told, and beside a spring the mean of the channel
+        counts as its bias. An acceleration alone drifts so fast that it tells little of a stiffness.
     instrument : array_like, the angle's shape, optional
         A channel that no noise of angle or torque reaches, but that moves the system: the reference of a controller, or excitation that was
         added. Under feedback noise of the angle is part of the torque, and estimates without an instrument are biased. All unknowns are
@@ -145,7 +156,7 @@ def identify(
     ------
     ValueError
         If shapes differ, a window does not fit, `t` is not uniform, nothing is unknown, the angle spans more than one and a half of
-        `period`, or a name is unknown.
+        `period`, a name is unknown, there is no channel of the motion, or something needs the angle where there is none.
     TypeError
         If an array is complex or holds no numbers, or there is no sample period.
 
@@ -187,16 +198,25 @@ def identify(
     >>> bool(abs(paper.stiffness[2000] - 15) < 0.01)
     True
     """
-    angles, torques = arguments.channels(angle=angle, torque=torque)
-    samples = angles.shape[-1]
+    motion = {"angle": angle, "velocity": velocity, "acceleration": acceleration}
+    measured = {name: values for name, values in motion.items() if values is not None}
+    if not measured:
+        raise ValueError(
+            "identify needs a motion; got angle=None; give velocity= or acceleration= where there is no angle"
+        )
+    first = next(iter(measured.values()))
+    *arrays, torques = arguments.channels(**measured, torque=torque)
+    channels = dict(zip(measured, arrays, strict=True))
+    samples = torques.shape[-1]
     axis = axis_of(angle, torque, t, angle_unit=angle_unit, torque_unit=torque_unit, time_unit=time_unit)
-    angles, torques = scaled(angles, axis.angle), scaled(torques, axis.torque)
+    channels = {name: scaled(values, axis.angle) if name == "angle" else values for name, values in channels.items()}
+    torques = scaled(torques, axis.torque)
     if t is not None:
         t = times_in_seconds(t, time_unit)
     if delta is not None and axis.time != 1:
         delta = arguments.positive_number("delta", delta) * axis.time
     if sample_rate is None and delta is None and t is None:
-        t = arguments.implied_times(angle)
+        t = arguments.implied_times(first)
         if t is None:
             raise TypeError("identify needs the sample period; got none; give sample_rate=, delta= or t=")
     seconds = arguments.sample_period(samples, delta=delta, sample_rate=sample_rate, t=t)
@@ -210,32 +230,34 @@ def identify(
         "period": _in_units_of_results("period", period, axis.angle),
     }
     instruments = None if instrument is None else arguments.channel("instrument", instrument)
-    if instruments is not None and instruments.shape != angles.shape:
+    if instruments is not None and instruments.shape != torques.shape:
         raise ValueError(
-            f"an instrument must have the angle's shape {angles.shape}; got {instruments.shape}; resample it"
+            f"an instrument must have the angle's shape {torques.shape}; got {instruments.shape}; resample it"
         )
-    request = resolve(method, given, settings, 1 / seconds, has_instrument=instruments is not None)
-    for name, array in (("angle", angles), ("torque", torques)):
+    request = resolve(method, given, settings, 1 / seconds, list(measured), has_instrument=instruments is not None)
+    for name, array in (*channels.items(), ("torque", torques)):
         arguments.check_nan(name, array, nan_policy, arguments.RowPolicy)
     doubts: list[tuple[int, str]] = []
     turn = request.period
     if turn is not None:
         # Whole periods need not be multiples of the step that the angle was rounded to.
-        request = replace(request, quantisation=quantisation_step(angles, request.quantisation))
-        turned = arguments.unwrapped("angle", angles, turn)
-        angles, doubts = turned.longest("angle", split=request.counts_turns)
+        request = replace(request, quantisation=quantisation_step(channels["angle"], request.quantisation))
+        turned = arguments.unwrapped("angle", channels["angle"], turn)
+        channels["angle"], doubts = turned.longest("angle", split=request.counts_turns)
+    together = motion_channels(channels, seconds, has_spring=request.has_spring, quantisation=request.quantisation)
     data = Data(
-        angles=angles,
+        angles=together.angles,
+        motion=together,
         torques=torques,
         time=arguments.begin_of(t) + np.arange(samples, dtype=np.float64) * seconds,
         period=seconds,
         instruments=instruments,
-        mask=arguments.mask("mask", mask, angles.shape),
+        mask=arguments.mask("mask", mask, torques.shape),
         propagate=nan_policy == "propagate",
         step=arguments.whole_number("step", step, least=1),
         workers=arguments.worker_count(workers),
-        doubts=doubts,
-        labels=arguments.labels_of(angle),
+        doubts=[*doubts, *together.doubts],
+        labels=arguments.labels_of(first),
         axis=axis,
     )
     return Task(data, request).run(progress)

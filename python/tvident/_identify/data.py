@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._equation import LINEAR_UNITS, UNITS
+from tvident._identify.channels import MotionChannels
 from tvident._units import ROTARY, Axis
 
 
@@ -20,6 +21,8 @@ class Data:
     Parameters
     ----------
     angles, torques : ndarray, shape (\\*, n)
+    motion : MotionChannels
+        What the angles were made of.
     instruments : ndarray, shape (\\*, n), optional
     time : ndarray, shape (n,)
     period : float
@@ -40,6 +43,7 @@ class Data:
 
     angles: npt.NDArray[np.number]
     torques: npt.NDArray[np.number]
+    motion: MotionChannels
     instruments: npt.NDArray[np.number] | None
     time: npt.NDArray[np.float64]
     period: float

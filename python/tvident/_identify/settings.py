@@ -85,6 +85,11 @@ class Request:
     chosen: bool
 
     @property
+    def has_spring(self) -> bool:
+        """Whether a stiffness is unknown, or known and not zero."""
+        return _has_spring(self.parameters)
+
+    @property
     def counts_turns(self) -> bool:
         """Whether the equation is another one after a whole period of the angle."""
         turns = (self.period or 0.0) / (2 * math.pi)
@@ -92,9 +97,7 @@ class Request:
         periodic = {"offset", "coulomb", "viscous_asymmetric", "stribeck"} | (
             {"gravity"} if turns and turns.is_integer() else set()
         )
-        stiffness = self.parameters["stiffness"]
-        free = isinstance(stiffness, int | float) and stiffness == 0
-        return not (free and all(isinstance(name, str) and name in periodic for name in names))
+        return self.has_spring or not all(isinstance(name, str) and name in periodic for name in names)
 
     def each(self, name: str, records: int) -> Sequence[Any]:
         """Return a setting of every record: the same for all, or what an earlier result chose for each."""
@@ -114,6 +117,7 @@ def resolve(
     given: Mapping[str, Any],
     earlier: Mapping[str, Any] | None,
     sample_rate: float,
+    channels: Sequence[str] = ("angle",),
     *,
     has_instrument: bool = False,
 ) -> Request:
@@ -139,8 +143,7 @@ def resolve(
     asked = _OF_METHOD["paper" if name == "paper" else "auto"] | before | given
     if earlier is not None and earlier.get("instrument") and not has_instrument:
         raise ValueError("settings of a result with an instrument need it again; got none; pass instrument=")
-    if has_instrument:
-        asked = _with_instrument(asked, {**before, **given})
+    asked = _as_far_as_measured(asked, {**before, **given}, channels, has_instrument=has_instrument)
     lag = asked["lag"]
     if isinstance(lag, tuple | list) and isinstance(form, WeakForm):
         by_record["lag"] = [arguments.finite_number("lag", one) for one in lag]
@@ -172,6 +175,51 @@ def _angle_zero(earlier: Mapping[str, Any]) -> Sequence[float] | None:
     """Return the angle at which the spring of every record was relaxed."""
     found = earlier.get("angle_zero")
     return [found] if isinstance(found, int | float) else found
+
+
+def _as_far_as_measured(
+    asked: dict[str, Any], given: Mapping[str, Any], channels: Sequence[str], *, has_instrument: bool
+) -> dict[str, Any]:
+    """Return what is asked for of these channels."""
+    if has_instrument:
+        if list(channels) != ["angle"]:
+            raise ValueError(
+                f"an instrument needs the angle alone; got {' and '.join(channels)}; leave the instrument or the other channels out"
+            )
+        return _with_instrument(asked, given)
+    return asked if "angle" in channels else _without_angle(asked, given)
+
+
+def _without_angle(asked: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is asked for where the angle is integrated: beside a spring its zero and its drift are an offset that changes."""
+    if asked["period"] is not None:
+        raise ValueError(
+            f"a period is for an angle; got period={asked['period']} and angle=None; leave one of them out"
+        )
+    terms = [term if isinstance(term, tuple | list) else (term, None) for term in asked["terms"]]
+    for term, _ in terms:
+        if isinstance(term, Term) or term in {"cubic", "gravity"}:
+            raise ValueError(
+                f"terms of the angle need the angle; got term {getattr(term, 'name', term)!r} and angle=None; give the angle, or leave the "
+                "term out"
+            )
+    if not _has_spring(asked):
+        return asked
+    if "terms" not in given:
+        return {**asked, "terms": (("offset", "windowed"),)}
+    return {
+        **asked,
+        "terms": [
+            ("offset", "windowed") if pair == ("offset", None) else term
+            for term, pair in zip(asked["terms"], terms, strict=True)
+        ],
+    }
+
+
+def _has_spring(parameters: Mapping[str, Any]) -> bool:
+    """Return whether a stiffness is unknown, or known and not zero."""
+    stiffness = parameters["stiffness"]
+    return not (isinstance(stiffness, int | float) and stiffness == 0)
 
 
 def _with_instrument(asked: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:

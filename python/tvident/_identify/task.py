@@ -16,6 +16,7 @@ from tvident._advice import FoundBySearch
 from tvident._derivatives import SHORTEST_WINDOW, plan, quantisation_step
 from tvident._equation import COEFFICIENTS, Kind, Unknown, all_terms, parameter
 from tvident._identify.batch import estimates, with_inner
+from tvident._identify.channels import constants_of
 from tvident._identify.columns import Columns, Range, fixed, secant
 from tvident._identify.criterion import criterion_of
 from tvident._identify.data import Data
@@ -195,6 +196,7 @@ class Task:
             batch = with_inner(batch, searched.values, unknown, earned, data.time[:: data.step].size)
         if data.labels is not None:
             batch = replace(batch, labels=data.labels.at(slice(None, None, data.step)))
+        batch = replace(batch, constants={**batch.constants, **constants_of(data.motion, data.batch)})
         settings = self._settings(found, searched)
         batch = replace(batch, units=data.units)
         told = Told(data, self._request, self._unknowns, found, batch, settings)
@@ -235,6 +237,7 @@ class Task:
                 data,
                 angles=data.angles[place],
                 torques=data.torques[place],
+                motion=data.motion.part(place, data.batch),
                 instruments=some(data.instruments),
                 mask=some(data.mask),
                 doubts=(),
@@ -293,7 +296,9 @@ class Task:
         if settings["own_terms"]:
             given["terms"] = [(term.own or term.name, settings["kinds"][term.name]) for term in self._terms]
         has_instrument = self._data.instruments is not None
-        request = resolve("auto", given, settings, settings["sample_rate"], has_instrument=has_instrument)
+        request = resolve(
+            "auto", given, settings, settings["sample_rate"], data.motion.names, has_instrument=has_instrument
+        )
         return Task(data, request)
 
     @cached_property
@@ -382,7 +387,9 @@ class Task:
 
     def _motions(self, columns: list[npt.NDArray[np.number] | str]) -> _core.Motions:
         known = [self._known.get(name) for name in COEFFICIENTS]
-        return _core.Motions(self._data.angles, self._data.torques, known, columns)
+        data, motion = self._data, self._data.motion
+        recorded = [motion.recorded.get(name) for name in ("angle", "velocity", "acceleration")]
+        return _core.Motions(data.angles, data.torques, known, columns, channels=recorded, noise=motion.noise)
 
     def _settings(self, found: Sequence[_core.Identification], searched: Searched) -> dict[str, Any]:
         """Return inputs and choices."""

@@ -81,7 +81,10 @@ class Told:
             return [words_with_instrument(one) for one in self.found]
         tested = [one.name for one in self.unknowns if one.kind == "auto"]
         variances = [one.noise[0] if one.noise else 0.0 for one in self.found]
-        coherences = _core.noise_coherence(data.angles, data.torques, variances)
+        # What was made of several channels, or integrated, has no noise above the motion that would be the angle's alone.
+        coherences: Sequence[float | None] = [None] * len(variances)
+        if not data.motion.recorded:
+            coherences = _core.noise_coherence(data.angles, data.torques, variances)
         return [
             Explained(
                 one, names, self.settings["chosen"], tested, data.period, data.step, coherence, data.units

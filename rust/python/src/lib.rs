@@ -42,7 +42,7 @@ mod _core {
     #[pymodule_export]
     use crate::motions::Motions;
     #[pymodule_export]
-    use crate::noise::{Noise, noise, noise_coherence, quantisation_step};
+    use crate::noise::{Noise, fuse, noise, noise_coherence, quantisation_step};
     #[pymodule_export]
     use crate::respond::{Responses, respond};
     #[pymodule_export]

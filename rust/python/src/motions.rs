@@ -3,7 +3,8 @@
 use numpy::PyUntypedArray;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use tvident::equation::{BuiltInTerm, Coefficient, Motion, Term};
+use tvident::equation::{BuiltInTerm, Coefficient, Measured, Motion, Term};
+use tvident::noise::{AngleNoise, Beside};
 use tvident::record::Samples;
 
 use crate::records::{StridedSamples, records};
@@ -34,11 +35,18 @@ impl Held {
     }
 }
 
+/// The variance of the first channel that an angle was made of, how often that was integrated, and which derivatives were fused with it, each with
+/// its noise.
+type NoiseOfAngle = (f64, usize, Vec<(usize, f64)>);
+
 /// The equation of motion of every record of some arrays, which have time along their last axis.
 #[pyclass(frozen, module = "tvident._core")]
 pub(crate) struct Motions {
     angles: Vec<StridedSamples>,
     torques: Vec<StridedSamples>,
+    /// What was recorded of the motion, where the angle was made of it, and its noise.
+    channels: [Option<Vec<StridedSamples>>; 3],
+    noises: Option<Vec<AngleNoise>>,
     coefficients: [Held; 3],
     terms: Vec<Held>,
     /// Keeps the memory of all of them.
@@ -47,13 +55,18 @@ pub(crate) struct Motions {
 
 #[pymethods]
 impl Motions {
-    /// Coefficients are unknown (None), a number, or an array; terms are a name or an array.
+    /// Coefficients are unknown (None), a number, or an array; terms are a name or an array. Where the angle was made of the recorded channels
+    /// (angle, velocity, acceleration), `noise` holds for every record the variance of the first of them, how often that was integrated, and
+    /// which derivatives were fused with it, with their noise.
     #[new]
+    #[pyo3(signature = (angle, torque, coefficients, terms, *, channels=[None, None, None], noise=None))]
     fn new(
         angle: &Bound<'_, PyUntypedArray>,
         torque: &Bound<'_, PyUntypedArray>,
         coefficients: [Bound<'_, PyAny>; 3],
         terms: Vec<Bound<'_, PyAny>>,
+        channels: [Option<Bound<'_, PyUntypedArray>>; 3],
+        noise: Option<Vec<NoiseOfAngle>>,
     ) -> PyResult<Self> {
         let held = |given: &Bound<'_, PyAny>| {
             if given.is_none() {
@@ -70,10 +83,16 @@ impl Motions {
             term.ok_or_else(|| PyValueError::new_err(format!("no term is called {name:?}")))
         };
         let [inertia, damping, stiffness] = &coefficients;
-        let arrays = [angle.as_any(), torque.as_any()].into_iter().chain(&coefficients).chain(&terms);
+        let measured = channels.iter().flatten().map(Bound::as_any);
+        let arrays = [angle.as_any(), torque.as_any()].into_iter().chain(&coefficients).chain(&terms).chain(measured);
+        let [recorded, velocity, acceleration] =
+            channels.each_ref().map(|channel| channel.as_ref().map(records).transpose());
+        let noises = noise.map(|noise| noise.into_iter().map(angle_noise).collect());
         Ok(Self {
             angles: records(angle)?,
             torques: records(torque)?,
+            channels: [recorded?, velocity?, acceleration?],
+            noises,
             coefficients: [held(inertia)?, held(damping)?, held(stiffness)?],
             terms: terms.iter().map(held).collect::<PyResult<_>>()?,
             _arrays: arrays.map(|array| array.clone().unbind()).collect(),
@@ -83,10 +102,17 @@ impl Motions {
 
 impl Motions {
     /// The equation of motion of one record.
-    fn motion(&self, record: usize) -> PyResult<Motion<'_>> {
+    fn motion<'a>(&'a self, record: usize) -> PyResult<Motion<'a>> {
         let [inertia, damping, stiffness] = &self.coefficients;
+        let measured =
+            |channel: &'a Option<Vec<StridedSamples>>| channel.as_ref().map(|channel| one(channel, record)).transpose();
+        let [angle, velocity, acceleration] = &self.channels;
         Ok(Motion {
             angle: one(&self.angles, record)?,
+            measured: Measured {
+                channels: [measured(angle)?, measured(velocity)?, measured(acceleration)?],
+                noise: self.noises.as_ref().and_then(|noises| noises.get(record)),
+            },
             torque: one(&self.torques, record)?,
             coefficients: [inertia.coefficient(record)?, damping.coefficient(record)?, stiffness.coefficient(record)?],
             terms: self.terms.iter().map(|term| term.term(record)).collect::<PyResult<_>>()?,
@@ -97,6 +123,12 @@ impl Motions {
     pub(crate) fn all(&self) -> PyResult<Vec<Motion<'_>>> {
         (0..self.angles.len()).map(|record| self.motion(record)).collect()
     }
+}
+
+/// What is known of the noise of an angle.
+fn angle_noise((variance, integrations, beside): NoiseOfAngle) -> AngleNoise {
+    let beside = beside.into_iter().map(|(derivative, noise)| Beside { derivative, noise }).collect();
+    AngleNoise { variance, integrations, beside }
 }
 
 /// The samples that belong to one record.

@@ -1,9 +1,13 @@
 //! The noise and the quantisation of channels.
 
-use numpy::PyUntypedArray;
+use numpy::{PyArray1, PyUntypedArray};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tvident::Error;
-use tvident::noise::{noise as core_noise, noise_coherence as core_coherence, quantisation_step as core_step};
+use tvident::noise::{
+    Beside, fuse as core_fuse, noise as core_noise, noise_coherence as core_coherence, quantisation_step as core_step,
+};
+use tvident::record::Samples;
 use tvident::simd::Instructions;
 
 use crate::records::records;
@@ -37,6 +41,34 @@ pub(crate) fn noise(samples: &Bound<'_, PyUntypedArray>, quantisation: Option<f6
         Ok::<(), Error>(())
     })?;
     Ok(noises)
+}
+
+/// The most likely motion from a record and its derivatives: which each is, and its noise over the record's in the unit of a sample.
+#[pyfunction]
+pub(crate) fn fuse(
+    py: Python<'_>,
+    record: &Bound<'_, PyUntypedArray>,
+    others: Vec<(usize, f64, Bound<'_, PyUntypedArray>)>,
+    delta: f64,
+) -> PyResult<Py<PyArray1<f64>>> {
+    let first = values(record)?;
+    let derivatives: Vec<Beside> = others.iter().map(|&(derivative, noise, _)| Beside { derivative, noise }).collect();
+    let values: Vec<Vec<f64>> = others.iter().map(|(_, _, other)| values(other)).collect::<PyResult<_>>()?;
+    if values.iter().any(|other| other.len() != first.len()) {
+        return Err(PyValueError::new_err("channels of a motion need as many samples as each other"));
+    }
+    let pairs: Vec<(Beside, &[f64])> = derivatives.into_iter().zip(values.iter().map(Vec::as_slice)).collect();
+    let fused = py.detach(|| core_fuse(&first, &pairs, delta));
+    Ok(PyArray1::from_vec(py, fused).unbind())
+}
+
+/// The samples of a single record.
+fn values(record: &Bound<'_, PyUntypedArray>) -> PyResult<Vec<f64>> {
+    let records = records(record)?;
+    let [one] = &records[..] else { return Err(PyValueError::new_err("one record is fused at a time")) };
+    let mut values = vec![0.0; one.len()];
+    one.read(0, &mut values);
+    Ok(values)
 }
 
 /// The smallest quantisation step of the records along the last axis, zero where one of them has none.

@@ -4,5 +4,5 @@ pub(crate) mod motion;
 pub(crate) mod rows;
 pub(crate) mod terms;
 
-pub use motion::{Coefficient, Motion, Term};
+pub use motion::{Coefficient, Measured, Motion, Term};
 pub use terms::{BUILT_IN_TERMS, BuiltInTerm};

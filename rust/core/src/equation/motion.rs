@@ -3,6 +3,7 @@
 //! Unknown coefficients have a column of regressors; known terms move to the right-hand side.
 
 use crate::equation::terms::{BuiltInTerm, TermFunction, signs};
+use crate::noise::fused::AngleNoise;
 use crate::record::samples::Samples;
 
 /// What is known of inertia, damping or stiffness beforehand.
@@ -25,11 +26,22 @@ pub enum Term<'a> {
     Record(&'a dyn Samples),
 }
 
+/// What was measured of a motion beside its angle, or in its place.
+#[derive(Clone, Copy, Default)]
+pub struct Measured<'a> {
+    /// The channels as they were recorded: angle, velocity and acceleration.
+    pub channels: [Option<&'a dyn Samples>; 3],
+    /// The noise of an angle that was made of several channels, or integrated from one; `None` where it was measured alone.
+    pub noise: Option<&'a AngleNoise>,
+}
+
 /// The equation of motion of one record.
 #[derive(Clone)]
 pub struct Motion<'a> {
     /// Samples of the angle.
     pub angle: &'a dyn Samples,
+    /// What the angle was made of, where it is not what was measured.
+    pub measured: Measured<'a>,
     /// Samples of the torque.
     pub torque: &'a dyn Samples,
     /// Inertia, damping and stiffness.

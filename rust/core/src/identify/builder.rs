@@ -2,7 +2,7 @@
 
 use std::num::NonZeroUsize;
 
-use crate::equation::motion::{Coefficient, Motion, Term};
+use crate::equation::motion::{Coefficient, Measured, Motion, Term};
 use crate::equation::terms::{BUILT_IN_TERMS, BuiltInTerm};
 use crate::error::Error;
 use crate::exec::pool::{Watch, workers};
@@ -263,7 +263,8 @@ impl<'a> Identify<'a> {
         let named =
             |&(name, _): &(&str, Kind)| BuiltInTerm::named(name).map(Term::BuiltIn).ok_or_else(|| no_such_term(name));
         let terms = self.terms.iter().map(named).collect::<Result<Vec<_>, _>>()?;
-        let motion = Motion { angle: &self.angle, torque: &self.torque, coefficients, terms };
+        let measured = Measured::default();
+        let motion = Motion { angle: &self.angle, measured, torque: &self.torque, coefficients, terms };
         let kind = |parameter: &Parameter<'_>| match parameter {
             Parameter::Unknown(kind) => Some(*kind),
             _ => None,

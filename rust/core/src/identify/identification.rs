@@ -94,8 +94,8 @@ pub struct WeakDetails {
     pub free_offset: FreeOffset,
     /// What may have been left out.
     pub suspects: Vec<Suspect>,
-    /// What was done to angle and torque: clipped, held or wrapped samples.
-    pub defects: [Vec<Defect>; 2],
+    /// What was done to angle and torque, then velocity and acceleration where they were measured: clipped, held or wrapped samples.
+    pub defects: Vec<Vec<Defect>>,
     /// The part of the record that rests, where a term of friction asks for it: equations there say nothing of friction and are left out.
     pub resting: f64,
     /// Estimates by the width of the test function.

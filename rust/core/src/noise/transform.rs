@@ -58,6 +58,22 @@ impl Transform {
     }
 }
 
+/// A kernel whose responses are multiplied by real gains: at the frequencies of a transform of a power of two, from zero to half the sample rate.
+pub(crate) fn filtered(kernel: &[f64], gains: &[f64]) -> Vec<f64> {
+    let length = 2 * (gains.len() - 1);
+    let (forward, back) =
+        [FftDirection::Forward, FftDirection::Inverse].map(|direction| Radix4::new(length, direction)).into();
+    let mut padded: Vec<Complex<f64>> = kernel.iter().map(|value| Complex::new(*value, 0.0)).collect();
+    padded.resize(length, Complex::ZERO);
+    let mut scratch = vec![Complex::ZERO; forward.get_inplace_scratch_len().max(back.get_inplace_scratch_len())];
+    forward.process_with_scratch(&mut padded, &mut scratch);
+    for (bin, value) in padded.iter_mut().enumerate() {
+        *value *= gains[bin.min(length - bin)] / length as f64;
+    }
+    back.process_with_scratch(&mut padded, &mut scratch);
+    padded[..kernel.len()].iter().map(|value| value.re).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use std::f64::consts::PI;

@@ -22,7 +22,7 @@ pub(crate) struct RowCovariance {
 
 impl RowCovariance {
     /// The covariance that the noise of both channels gives rows `stride` samples apart. `parameters` are inertia,
-    /// damping and stiffness; the noise is given by its variance, that of the angle first.
+    /// damping and stiffness; `kernels` are those by which the angle's noise enters; the noise is given by its variance, that of the angle first.
     pub(crate) fn known(
         kernels: &Kernels,
         torque: &[f64],
@@ -154,6 +154,9 @@ fn sum_of_products(one: &[f64], other: &[f64]) -> f64 {
 
 /// `Σ_k a(k) b(k + lag)` for two kernels of one length.
 pub(crate) fn products(one: &[f64], other: &[f64], lag: usize) -> f64 {
+    if lag >= one.len() {
+        return 0.0;
+    }
     sum_of_products(&one[..one.len() - lag], &other[lag..])
 }
 

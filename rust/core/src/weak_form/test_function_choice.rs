@@ -13,6 +13,7 @@ use faer::linalg::solvers::{DenseSolveCore, Llt, Solve};
 use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
+use crate::noise::fused::AngleNoise;
 use crate::noise::transform::Transform;
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 
@@ -35,6 +36,8 @@ pub(crate) struct Evidence {
     pub(crate) samples: usize,
     /// Variance of the noise of angle and torque.
     pub(crate) noise: [f64; 2],
+    /// Variance of the angle's noise by frequency, where it is not white.
+    pub(crate) coloured: Option<Vec<f64>>,
     /// Seconds from one sample to the next.
     pub(crate) delta: f64,
     /// Which of inertia, damping and stiffness are unknown.
@@ -42,6 +45,20 @@ pub(crate) struct Evidence {
 }
 
 impl Evidence {
+    /// Variance of the angle's noise at a frequency.
+    fn noise_at(&self, bin: usize) -> f64 {
+        self.coloured.as_ref().map_or(self.noise[0], |coloured| coloured[bin])
+    }
+
+    /// The evidence of an angle whose noise is not white.
+    pub(crate) fn with_noise(mut self, noise: Option<&AngleNoise>) -> Self {
+        let step = AngleNoise::lowest(2 * (self.power.len() - 1));
+        // Nothing is known of the zero of what was integrated.
+        let at = |noise: &AngleNoise, bin: usize| noise.power(step * bin.max(1) as f64, self.delta);
+        self.coloured = noise.map(|noise| (0..self.power.len()).map(|bin| at(noise, bin)).collect());
+        self
+    }
+
     /// Samples in a typical cycle of the signal, by the mean frequency of its velocity.
     pub(crate) fn period(&self) -> f64 {
         let length = 2 * (self.power.len() - 1);
@@ -49,7 +66,8 @@ impl Evidence {
         for (bin, &power) in self.power.iter().enumerate().skip(1) {
             let frequency = bin as f64 / length as f64;
             // Power that scatters about the noise does not count: high frequencies are many and weigh most.
-            let signal = if power > ABOVE_NOISE * self.noise[0] { power - self.noise[0] } else { 0.0 };
+            let noise = self.noise_at(bin);
+            let signal = if power > ABOVE_NOISE * noise { power - noise } else { 0.0 };
             let weight = signal * frequency * frequency;
             sum += weight * frequency;
             weights += weight;
@@ -160,13 +178,15 @@ impl Tried {
     /// Half the logarithm of the determinant of the expected squared errors; infinite if the noise of the angle dominates.
     fn score(&self, evidence: &Evidence, parameters: [f64; 3]) -> f64 {
         let length = 2 * (evidence.power.len() - 1);
-        let [angle_noise, torque_noise] = evidence.noise;
+        let torque_noise = evidence.noise[1];
+        let mut added = [[0.0; 3]; 3];
         let mut information = [[0.0; 3]; 3];
         let mut noisy = [[0.0; 3]; 3];
         let mut quadrature = [0.0; 3];
         for (bin, &power) in evidence.power.iter().enumerate().take(self.responses[0].len()) {
             let both = if bin == 0 || bin == length / 2 { 1.0 } else { 2.0 };
             let weight = both * evidence.samples as f64 / length as f64;
+            let angle_noise = evidence.noise_at(bin);
             let omega = 2.0 * std::f64::consts::PI * bin as f64 / (length as f64 * evidence.delta);
             let [inertia, damping, stiffness] = std::array::from_fn(|i| self.responses[i][bin]);
             let [even, odd] = [parameters[0] * inertia + parameters[2] * stiffness, parameters[1] * damping];
@@ -183,6 +203,7 @@ impl Tried {
                 (2, 2, stiffness * stiffness),
             ] {
                 information[i][j] += weight * product * power;
+                added[i][j] += weight * product * angle_noise;
                 noisy[i][j] += weight * product * power * row;
             }
             for (i, product) in [(0, inertia * error[0]), (1, damping * error[1]), (2, stiffness * error[0])] {
@@ -191,7 +212,11 @@ impl Tried {
         }
         information[2][0] = information[0][2];
         noisy[2][0] = noisy[0][2];
-        let gram = |i: usize, j: usize| evidence.samples as f64 * angle_noise * self.gram[i][j];
+        added[2][0] = added[0][2];
+        let gram = |i: usize, j: usize| match evidence.coloured {
+            Some(_) => added[i][j],
+            None => evidence.samples as f64 * evidence.noise[0] * self.gram[i][j],
+        };
         let chosen: Vec<usize> = (0..3).filter(|&i| evidence.unknown[i]).collect();
         let size = chosen.len();
         let scale: Vec<f64> = chosen.iter().map(|&i| (information[i][i] - gram(i, i)).abs().sqrt().recip()).collect();

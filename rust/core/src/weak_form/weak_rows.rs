@@ -13,8 +13,10 @@ use crate::equation::rows::BLOCK;
 use crate::equation::rows::{Regressor, Rows, joints};
 use crate::error::Error;
 use crate::exec::pool::{self, Piece, Watch};
+use crate::noise::fused::AngleNoise;
 use crate::record::derived::{Late, Scaled, Whole};
 use crate::record::samples::Samples;
+use crate::weak_form::angle_noise::entered;
 use crate::weak_form::filter_bank::{FilterBank, FilterScratch};
 use crate::weak_form::test_function::{Kernels, TestFunction};
 
@@ -37,6 +39,8 @@ pub(crate) enum TermSamples<'a> {
 pub(crate) struct Record<'a> {
     pub(crate) angle: &'a dyn Samples,
     pub(crate) torque: &'a dyn Samples,
+    /// What is known of the noise of an angle that was fused or integrated.
+    pub(crate) noise: Option<&'a AngleNoise>,
     pub(crate) coefficients: [Coefficient<'a>; 3],
     pub(crate) terms: Vec<TermSamples<'a>>,
     /// Lag of the torque in samples.
@@ -52,6 +56,8 @@ pub(crate) struct Record<'a> {
 pub(crate) struct WeakRows {
     pub(crate) function: TestFunction,
     pub(crate) kernels: Kernels,
+    /// The kernels by which the noise of the angle enters.
+    pub(crate) noise: Kernels,
     /// The kernel of the torque.
     pub(crate) torque: Vec<f64>,
     /// Sample of the first row.
@@ -128,6 +134,7 @@ impl WeakRows {
             first: half,
             stride,
             rows: Rows { usable, jumps: joints(stretches), period: stride as f64 * delta, ..Rows::default() },
+            noise: entered(&kernels, record.noise, delta),
             kernels,
         };
         rows.assemble(record, columns);
@@ -141,7 +148,7 @@ impl WeakRows {
         let values = [next(), next(), next()];
         let companions = [next(), next(), next()];
         for (index, (value, companion)) in values.into_iter().zip(companions).enumerate() {
-            let noise = [self.kernels.values[index].clone(), self.kernels.slopes[index].clone()];
+            let noise = [self.noise.values[index].clone(), self.noise.slopes[index].clone()];
             self.rows.regressors.push(Regressor { value, companion, noise });
         }
         if record.angle_zero != 0.0 {
@@ -159,7 +166,7 @@ impl WeakRows {
             self.rows.regressors.push(Regressor { value, companion, noise: Default::default() });
         }
         for (index, coefficient) in record.coefficients.iter().enumerate() {
-            let noise = &self.kernels.values[index];
+            let noise = &self.noise.values[index];
             let mut known = 0.0;
             match *coefficient {
                 Coefficient::Unknown => continue,

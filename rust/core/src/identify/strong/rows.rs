@@ -1,6 +1,6 @@
 //! Rows of the strong form, one per sample, from derivatives of local polynomials.
 
-use crate::equation::motion::{Coefficient, Motion, Term};
+use crate::equation::motion::{Coefficient, Measured, Motion, Term};
 use crate::equation::rows::{Regressor, Rows};
 use crate::equation::terms::{BuiltInTerm, TermFunction, signs};
 use crate::error::Error;
@@ -45,12 +45,41 @@ pub(crate) fn differentiate(
         };
         plan.run(vec![(motion.angle, estimates)], true, workers, watch)
     })?;
+    take_measured(plan, &motion.measured, &mut found.derivatives, stages)?;
     let torque = Delayed::new(motion.torque, lag);
     torque.read(0, &mut found.torque);
     if filter_torque {
         smooth_torque(plan, &mut found, stages)?;
     }
     Ok(found)
+}
+
+/// Takes derivatives from the channel that measured the nearest one, smoothed as the angle is.
+fn take_measured(
+    plan: &LocalPolynomials,
+    measured: &Measured<'_>,
+    derivatives: &mut [Vec<f64>; 3],
+    stages: &mut Stages<'_, '_>,
+) -> Result<(), Error> {
+    for (derivative, channel) in measured.channels.iter().enumerate().skip(1) {
+        let Some(channel) = *channel else { continue };
+        let samples = channel.len();
+        let mut own = [(); 3].map(|()| vec![0.0; samples]);
+        let (mut order, mut status) = (vec![0; samples], vec![0; samples]);
+        let workers = stages.workers;
+        stages.stage(|watch| {
+            let estimates = Estimates {
+                elements: Elements { first: 0, step: 1 },
+                derivatives: own.iter_mut().map(Vec::as_mut_slice).collect(),
+                order: &mut order,
+                status: &mut status,
+                sigma: &mut [],
+            };
+            plan.run(vec![(channel, estimates)], true, workers, watch)
+        })?;
+        derivatives[derivative..].iter_mut().zip(own).for_each(|(column, own)| *column = own);
+    }
+    Ok(())
 }
 
 /// Smooths the torque with polynomials of the order that was chosen for the angle at each sample.

@@ -66,13 +66,15 @@ impl Session<'_, '_, '_> {
 
     /// What the choice of a test function is made from, with spectra of some length.
     pub(crate) fn evidence(&mut self, length: usize) -> Result<Evidence, Error> {
-        Ok(Evidence {
+        let evidence = Evidence {
             power: power_in_pieces(self.record.angle, length, &mut self.stages)?,
             samples: self.record.angle.len(),
             noise: self.noise,
+            coloured: None,
             delta: self.options.delta,
             unknown: std::array::from_fn(|index| matches!(self.record.coefficients[index], Coefficient::Unknown)),
-        })
+        };
+        Ok(evidence.with_noise(self.record.noise))
     }
 
     /// Chooses half-width and exponent where they are not given, and estimates the coefficients on the way.

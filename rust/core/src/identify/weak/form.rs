@@ -43,7 +43,16 @@ pub(crate) fn identify_weak(
         identify(record, calm.as_deref(), options, workers, watch)
     })
     .map(|(found, resting)| {
-        let defects = [defects(motion.angle), defects_of_torque(motion.torque)];
+        let [angle, rates @ ..] = motion.measured.channels;
+        let mut defects = vec![
+            if rates.iter().all(Option::is_none) {
+                defects(motion.angle)
+            } else {
+                angle.map_or_else(Vec::new, defects)
+            },
+            defects_of_torque(motion.torque),
+        ];
+        defects.extend(rates.map(|rate| rate.map_or_else(Vec::new, defects_of_rate)));
         let suspected =
             if defects.iter().any(|defects| !defects.is_empty()) { Status::CHANNEL_SUSPECTED } else { Status::GOOD };
         WeakIdentified { record_status: found.record_status | suspected, resting, defects, ..found }
@@ -77,6 +86,7 @@ pub(crate) fn with_record<R>(
     let record = Record {
         angle: motion.angle,
         torque: motion.torque,
+        noise: motion.measured.noise,
         coefficients: motion.coefficients,
         terms: terms.collect(),
         lag,
@@ -106,9 +116,10 @@ fn identify(
 ) -> Result<WeakIdentified, Error> {
     let samples = record.angle.len();
     let mut stages = Stages::new(workers, samples, STAGES, watch);
+    let told = record.noise.map(|noise| noise.variance);
     let calm = calm.as_ref().map(|calm| (calm as &dyn Samples, quantisation_step(record.torque)));
     let (torque, step) = calm.map_or((record.torque, None), |(calm, step)| (calm, Some(step)));
-    let channels = [(record.angle, options.noise[0], options.quantisation), (torque, options.noise[1], step)];
+    let channels = [(record.angle, options.noise[0].or(told), options.quantisation), (torque, options.noise[1], step)];
     let pieces = channels.map(|channel| Piece { size: samples, content: channel });
     let level = |(channel, given, step): (_, Option<f64>, _), (): &mut ()| {
         given.unwrap_or_else(|| channel_variance(channel, step, options.instructions))
@@ -138,6 +149,11 @@ fn identify(
     session.stages.finish()?;
     found.lag = lag;
     Ok(found)
+}
+
+/// What was done to a velocity or an acceleration; wrapping is for angles.
+fn defects_of_rate(rate: &dyn Samples) -> Vec<Defect> {
+    defects(rate).into_iter().filter(|defect| !matches!(defect, Defect::Wrapped(_))).collect()
 }
 
 /// What was done to the torque. One that stays at a limit is what the drive does, and wrapping is for angles.

@@ -60,8 +60,8 @@ pub(crate) struct WeakIdentified {
     pub(crate) jumps: Vec<usize>,
     /// Estimates by the width of the test function.
     pub(crate) scan: Scan,
-    /// What was done to angle and torque.
-    pub(crate) defects: [Vec<Defect>; 2],
+    /// What was done to angle, torque and other channels.
+    pub(crate) defects: Vec<Vec<Defect>>,
     /// The part of the record that rests, where a term of friction asks for it.
     pub(crate) resting: f64,
     /// What holds for the whole record.

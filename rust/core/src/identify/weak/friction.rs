@@ -157,6 +157,7 @@ fn half_window(angle: &dyn Samples, (delta, instructions): (f64, Instructions)) 
         power: power(angle, spectrum_length(samples, 200)),
         samples,
         noise: [channel_variance(angle, None, instructions), 0.0],
+        coloured: None,
         delta,
         unknown: [true; 3],
     };

@@ -67,8 +67,8 @@ impl Session<'_, '_, '_> {
 
     /// The rows' covariance as the noise of both channels makes it, and what windows are expected to leave.
     pub(crate) fn covariance(&self, weak: &WeakRows, parameters: [f64; 3]) -> (RowCovariance, Expected) {
-        let known = RowCovariance::known(&weak.kernels, &weak.torque, parameters, self.noise, weak.stride);
-        let torque = RowCovariance::known(&weak.kernels, &weak.torque, [0.0; 3], self.noise, weak.stride).variance();
+        let known = RowCovariance::known(&weak.noise, &weak.torque, parameters, self.noise, weak.stride);
+        let torque = RowCovariance::known(&weak.noise, &weak.torque, [0.0; 3], self.noise, weak.stride).variance();
         let expected = Expected::new(&known, torque);
         (known, expected)
     }

@@ -133,7 +133,7 @@ impl Session<'_, '_, '_> {
             jumps: decided.jumps.iter().map(|jump| jump.sample).collect(),
             scan: Scan::default(),
             resting: 0.0,
-            defects: Default::default(),
+            defects: Vec::new(),
             record_status: Status::GOOD,
             results: SampleResults::default(),
         }
