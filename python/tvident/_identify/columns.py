@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeAlias
@@ -26,6 +26,9 @@ _WITHIN_NOISE = 2.0
 
 _SPECK = 1e-30
 """Values of a term smaller than this part of its largest are none."""
+
+WINDOW_OF_TERMS = 51
+"""Samples of the polynomials that terms of one's own get angle and velocity from in weak form."""
 
 _STEP = 1 / 64
 """By how much of its range an inner parameter is moved to see what a term does with it."""
@@ -90,8 +93,8 @@ class Columns:
     angles : ndarray, shape (\*, n)
     time : ndarray, shape (n,)
     period : float
-    plan : LocalPolynomials
-        Tells angle and velocity to terms of the user's own.
+    plan : callable
+        Makes the polynomials that tell angle and velocity to terms of the user's own.
     weak : bool
         In weak form friction knows rest, and the velocity's error.
     workers : int, optional
@@ -101,7 +104,7 @@ class Columns:
     angles: npt.NDArray[np.number]
     time: Array
     period: float
-    plan: _core.LocalPolynomials
+    plan: Callable[[], _core.LocalPolynomials]
     weak: bool
     workers: int | None = None
     _kept: dict[str, Array] = field(default_factory=dict, repr=False)
@@ -109,7 +112,7 @@ class Columns:
     @cached_property
     def _smoothed(self) -> tuple[Array, Array]:
         """Angle and velocity, of the angle's shape."""
-        angle, velocity, _ = self.plan.estimate(self.angles, workers=self.workers).derivatives
+        angle, velocity, _ = self.plan().estimate(self.angles, workers=self.workers).derivatives
         return angle, velocity
 
     @cached_property

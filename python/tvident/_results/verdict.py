@@ -26,7 +26,6 @@ _LITTLE = 0.5
 _DISTRUST = {
     Status.RANK_DEFICIENT: "the record does not determine the parameters",
     Status.ILL_CONDITIONED: "the record hardly tells the parameters apart",
-    Status.SCALES_DISAGREE: "slow and fast motion give different parameters",
 }
 
 _DOUBTS = (
@@ -101,6 +100,8 @@ def distrust(result: Any) -> str | None:
         reason = _sign(result, name)
         if reason:
             return reason
+    if result.record_status & Status.SCALES_DISAGREE:
+        return "slow and fast motion give different parameters"
     share = explained(result)
     if share is not None and share < _LITTLE:
         return f"the model explains {percent(share)} of the torque"

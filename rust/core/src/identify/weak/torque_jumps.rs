@@ -137,7 +137,7 @@ mod tests {
         let both = uniform(6000);
         let (torque, other) = both.split_at(3000);
         assert!(without_jumps(&torque, &[&other]).is_none());
-        let rests: &[f64] = &[f64::NAN; 3000];
-        assert!(without_jumps(&torque, &[&rests]).is_none());
+        let rests = vec![f64::NAN; 3000];
+        assert!(without_jumps(&torque, &[&rests.as_slice()]).is_none());
     }
 }

@@ -115,7 +115,9 @@ mod tests {
         assert!((found - zero).abs() < 4.0 * 0.11 / (1.4 * 4000.0_f64.sqrt()), "{found}");
         // Noise alone gives squares of either sign; where they are positive the slope is that of the noise or larger.
         let mut none = windows(0.0);
-        none.iter_mut().for_each(|both| both.covariance[0] *= 1.1);
+        for both in &mut none {
+            both.covariance[0] *= 1.1;
+        }
         assert_eq!(slope(&none), None);
     }
 }
