@@ -157,6 +157,7 @@ class WeakForm:
         averaging: bool = True,
         linear: bool = True,
         noise: tuple[float | None, float | None] = ...,
+        shown_noise: Sequence[float] | None = None,
     ) -> WeakForm: ...
 
 @final
@@ -245,6 +246,8 @@ class Identification:
     def jumps(self) -> list[int]: ...
     @property
     def noise(self) -> tuple[float, float] | None: ...
+    @property
+    def shown_noise(self) -> float | None: ...
     @property
     def lengths(self) -> list[tuple[int, float]]: ...
     @property

@@ -93,3 +93,22 @@ def test_every_record_of_a_batch_has_its_own() -> None:
     alone = identify(both[0])
     assert result.jumps[0] == alone.jumps
     np.testing.assert_array_equal(result.stiffness[0], alone.stiffness)
+
+
+@pytest.mark.parametrize("pattern", ["constant", "slider"])
+@pytest.mark.parametrize("part", [0.05, 0.2, -0.3, 0.5])
+def test_a_jump_of_the_inertia_is_one_of_the_inertia(pattern: Any, part: float) -> None:
+    for seed in (0, 3):
+        at = 6.3 + 1.7 * seed
+
+        def inertia(t: Array, at: float = at) -> Array:
+            return np.asarray(0.0123 * (1 + part * (t >= at)))
+
+        recording = tvident.simulate_torsional_rig(20.0, seed=seed, pattern=pattern, angle_noise=1e-3, inertia=inertia)
+        result = identify(recording)
+        np.testing.assert_allclose(result.jumps, [at], atol=NEAR)
+        assert result.settings["kinds"]["inertia"] == "varying"
+        assert result.settings["kinds"]["damping"] == "constant"
+        inside = slice(500, -500)
+        assert np.sqrt(np.mean((result.inertia / recording.inertia - 1)[inside] ** 2)) < 0.01
+        assert not result.record_status & Status.KIND_CONTRADICTED

@@ -59,6 +59,8 @@ class Request:
         The same in samples, where an earlier result found it: seconds may round to other samples.
     angle_zero : sequence of float, optional
         The angle at which the spring of every record is relaxed, where an earlier result found it.
+    shown_noise : sequence of float, optional
+        Variances of the torque's noise that the equations of an earlier result showed.
     quantisation : float, optional
     period : float, optional
         Of a wrapped angle.
@@ -78,6 +80,7 @@ class Request:
     lag: Any
     lag_samples: Sequence[float] | None
     angle_zero: Sequence[float] | None
+    shown_noise: Sequence[float] | None
     quantisation: float | None
     period: float | None
     inner: Mapping[str, Any]
@@ -98,6 +101,11 @@ class Request:
             {"gravity"} if turns and turns.is_integer() else set()
         )
         return self.has_spring or not all(isinstance(name, str) and name in periodic for name in names)
+
+    def noise_of_equations(self, records: int) -> Sequence[float] | None:
+        """Return the variances that an earlier result of as many records showed."""
+        shown = self.shown_noise
+        return shown if shown is not None and len(shown) == records else None
 
     def each(self, name: str, records: int) -> Sequence[Any]:
         """Return a setting of every record: the same for all, or what an earlier result chose for each."""
@@ -161,6 +169,7 @@ def resolve(
         parameters={one: asked[one] for one in COEFFICIENTS},
         terms=asked["terms"],
         lag=lag,
+        shown_noise=earlier.get("shown_noise") if earlier is not None and isinstance(form, WeakForm) else None,
         lag_samples=earlier.get("lag_samples") if same_lag and earlier is not None else None,
         angle_zero=_angle_zero(earlier) if earlier is not None and isinstance(form, WeakForm) else None,
         quantisation=asked["quantisation"],
@@ -323,7 +332,8 @@ def _is_whole(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Mappi
         and all(isinstance(kinds[name], str) and (kinds[name] != "known" or name in known) for name in COEFFICIENTS)
         and all(one.name in earlier for one in fields(form))
         and isinstance(earlier["method"], str)
-        and all(_is_finite(one) for one in (*(earlier.get("lag_samples") or ()), *(_angle_zero(earlier) or ())))
+        and all(_is_finite(one) for name in ("lag_samples", "shown_noise") for one in earlier.get(name) or ())
+        and all(_is_finite(one) for one in _angle_zero(earlier) or ())
         and all(
             all(map(_is_finite, one)) if isinstance(one, list | tuple) else _is_finite(one)
             for one in dict(earlier.get("inner") or {}).values()

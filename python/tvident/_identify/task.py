@@ -17,7 +17,7 @@ from tvident._derivatives import SHORTEST_WINDOW, plan, quantisation_step
 from tvident._equation import COEFFICIENTS, Kind, Unknown, all_terms, parameter
 from tvident._identify.batch import estimates, with_inner
 from tvident._identify.channels import constants_of
-from tvident._identify.columns import Columns, Range, fixed, secant
+from tvident._identify.columns import WINDOW_OF_TERMS, Columns, Range, fixed, secant
 from tvident._identify.criterion import criterion_of
 from tvident._identify.data import Data
 from tvident._identify.improved import Improvement, is_to_be_tried
@@ -28,9 +28,6 @@ from tvident._identify.told import Told
 from tvident._results import Estimates, Identification, Recorded, Words, chosen, of_records, settings_of
 
 Numbers = npt.NDArray[np.float64]
-
-_WINDOW_OF_TERMS = 51
-"""Samples of the polynomials that terms of one's own get angle and velocity from in weak form."""
 
 
 class Task:
@@ -304,13 +301,14 @@ class Task:
     @cached_property
     def _columns(self) -> Columns:
         """The terms, evaluated with the polynomials of the strong form, or with short ones."""
-        form, data = self._request.form, self._data
+        data, weak = self._data, not isinstance(self._request.form, StrongForm)
+        return Columns(self._terms, data.angles, data.time, data.period, self._polynomials, weak, data.workers)
+
+    def _polynomials(self) -> _core.LocalPolynomials:
+        form, samples = self._request.form, self._data.time.size
         if isinstance(form, StrongForm):
-            core_plan = self._plan(self._length("window_length", form.window_length, least=SHORTEST_WINDOW), form)
-        else:
-            core_plan = self._plan(min(_WINDOW_OF_TERMS, (data.time.size - 1) // 2 * 2 + 1), StrongForm())
-        weak = not isinstance(form, StrongForm)
-        return Columns(self._terms, data.angles, data.time, data.period, core_plan, weak, data.workers)
+            return self._plan(self._length("window_length", form.window_length, least=SHORTEST_WINDOW), form)
+        return self._plan(min(WINDOW_OF_TERMS, (samples - 1) // 2 * 2 + 1), StrongForm())
 
     def _form(self) -> _core.WeakForm | _core.StrongForm:
         """Return the form as the core has it."""
@@ -331,8 +329,10 @@ class Task:
         ]
         rows_of = [None if value == "auto" else self._rows(value) for value in self._each("regression_window")]
         exponents = [None if value == "auto" else int(exponent_of(value)) for value in self._each("exponent")]
-        linear = form.variation != "constant"
-        return _core.WeakForm(lengths, exponents, rows_of, averaging=bool(form.averaging), linear=linear)
+        linear, shown = form.variation != "constant", self._request.noise_of_equations(self._data.records)
+        return _core.WeakForm(
+            lengths, exponents, rows_of, averaging=bool(form.averaging), linear=linear, shown_noise=shown
+        )
 
     def _each(self, name: str) -> Sequence[Any]:
         return self._request.each(name, self._data.records)
@@ -414,6 +414,7 @@ class Task:
         else:
             chosen = [name for name in names if "auto" in self._each(name)]
             used["angle_zero"] = by_record([0.0 if one.angle_zero is None else one.angle_zero[0] for one in found])
+            used["shown_noise"] = [one.shown_noise for one in found if one.shown_noise is not None] or None
             used["variation"] = "constant" if request.form.variation == "constant" else "linear"
             if request.lag == "auto":
                 chosen.append("lag")

@@ -12,7 +12,9 @@ import numpy.typing as npt
 from tvident._results.estimates import Estimates
 from tvident._status import Status
 
-_BY_RECORD = ("window_length", "exponent", "regression_window", "lag", "lag_stderr", "lag_samples", "angle_zero")
+_LISTS = ("lag_samples", "shown_noise")
+_ONE_EACH = ("window_length", "exponent", "regression_window", "lag", "lag_stderr", "angle_zero")
+_BY_RECORD = (*_ONE_EACH, *_LISTS)
 """Settings that are a list where there are several records."""
 
 
@@ -86,7 +88,7 @@ def settings_of(
     for name in _BY_RECORD:
         if isinstance(own.get(name), list):
             picked = [own[name][record] for record in records]
-            own[name] = picked[0] if alone and name != "lag_samples" else picked
+            own[name] = picked[0] if alone and name not in _LISTS else picked
     for name in ("inner", "earned"):
         parts = {key: [one[record] for record in records] for key, one in own[name].items()}
         own[name] = {key: one[0] if alone else one for key, one in parts.items()}

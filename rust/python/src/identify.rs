@@ -28,7 +28,7 @@ pub(crate) struct WeakForm {
 #[pymethods]
 impl WeakForm {
     #[new]
-    #[pyo3(signature = (window_length, exponent, regression_window, *, averaging=true, linear=true, noise=(None, None)))]
+    #[pyo3(signature = (window_length, exponent, regression_window, *, averaging=true, linear=true, noise=(None, None), shown_noise=None))]
     fn new(
         window_length: Vec<Option<usize>>,
         exponent: Vec<Option<usize>>,
@@ -36,15 +36,17 @@ impl WeakForm {
         averaging: bool,
         linear: bool,
         noise: (Option<f64>, Option<f64>),
+        shown_noise: Option<Vec<f64>>,
     ) -> Self {
-        let each = window_length.into_iter().zip(exponent).zip(regression_window);
-        let settings = each.map(|((window_length, exponent), regression_window)| Weak {
+        let each = window_length.into_iter().zip(exponent).zip(regression_window).enumerate();
+        let settings = each.map(|(record, ((window_length, exponent), regression_window))| Weak {
             window_length,
             exponent,
             regression_window,
             averaging,
             linear,
             noise: noise.into(),
+            shown_noise: shown_noise.as_ref().and_then(|each| each.get(record).copied()),
         });
         Self { settings: settings.collect() }
     }

@@ -38,6 +38,13 @@ impl Rows {
         self.rhs.len()
     }
 
+    /// The mean square of the right-hand side.
+    pub(crate) fn mean_square(&self) -> f64 {
+        let used = self.rhs.iter().zip(&self.usable).filter(|(_, usable)| **usable);
+        let (sum, count) = used.fold((0.0, 0.0_f64), |(sum, count), (rhs, _)| (sum + rhs * rhs, count + 1.0));
+        sum / count.max(1.0)
+    }
+
     /// Makes rows no equations.
     pub(crate) fn exclude(&mut self, rows: impl Iterator<Item = usize>) {
         for row in rows {

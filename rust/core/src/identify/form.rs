@@ -89,6 +89,7 @@ pub(crate) fn weak(
         linear: form.linear,
         kinds: in_weak_form(&options.kinds, &regressors, form.averaging),
         noise: form.noise,
+        shown_noise: form.shown_noise,
         lag: task.lag,
         angle_zero: task.angle_zero,
         quantisation: options.quantisation,
@@ -105,6 +106,7 @@ pub(crate) fn weak(
     });
     let details = WeakDetails {
         noise: found.noise,
+        shown_noise: found.shown_noise,
         lengths: found.lengths,
         prediction_error: found.prediction_error,
         weighted: found.weighted,

@@ -70,6 +70,8 @@ pub struct Covariance {
 pub struct WeakDetails {
     /// Variances of the noise of angle and torque.
     pub noise: [f64; 2],
+    /// The variance of the torque's noise that everything was chosen with: that of the channel, or what the equations leave if that is more.
+    pub shown_noise: f64,
     /// Lengths of windows that were tried, in samples, and the error of predicting a row with each, over the noise's.
     pub lengths: Vec<(usize, f64)>,
     /// Mean squared error of predicting a row from others, over the noise's.

@@ -30,6 +30,8 @@ pub struct WeakForm {
     pub linear: bool,
     /// Variances of the noise of angle and torque.
     pub noise: [Option<f64>; 2],
+    /// The variance of the torque's noise as equations show it; judged from the record where not given.
+    pub shown_noise: Option<f64>,
 }
 
 impl Default for WeakForm {
@@ -41,6 +43,7 @@ impl Default for WeakForm {
             averaging: true,
             linear: true,
             noise: [None; 2],
+            shown_noise: None,
         }
     }
 }

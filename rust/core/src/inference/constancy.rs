@@ -3,10 +3,14 @@
 //! Each constant is estimated separately in eight blocks of the record. If it does not change, the squared differences
 //! between the blocks, over the variances that the noise explains, follow a χ² distribution (Wald's test). Windows that are too long for a
 //! block are cut to it: each block is then a record of its own.
+//!
+//! Coloured noise scatters estimates more than its variance tells. Where blocks differ, short parts of them are compared with their
+//! neighbours as well: what changes slowly hardly differs there. If those scatter more than noise explains, the blocks have to differ by more
+//! than that (analysis of variance, Fisher's F).
 
 use std::ops::Range;
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use crate::error::Error;
 use crate::exec::pool::Piece;
@@ -21,6 +25,17 @@ use crate::simd::instructions::Instructions;
 /// Blocks that a record is cut into.
 const BLOCKS: usize = 8;
 
+/// Parts of a block that are compared with their neighbours.
+const PARTS: usize = 8;
+
+/// The median of a χ² variable with one degree of freedom.
+const MEDIAN: f64 = 0.454_936;
+
+/// The scatter of parts, over that which noise explains, from which on it is no chance, and the degrees of freedom that the median of all
+/// knows it with.
+const SCATTERED: f64 = 2.0;
+const FREEDOM: f64 = 10.0;
+
 /// Probability below which a difference is significant: once in 2000 records.
 pub const NO_CHANCE: f64 = 5e-4;
 
@@ -31,6 +46,26 @@ pub struct Test {
     pub probability: f64,
     /// Standard deviation between the blocks beyond what noise explains, over the mean.
     pub spread: f64,
+    /// The same in the units of the constant.
+    pub deviation: f64,
+    /// The χ² of the difference over its degrees of freedom, and those.
+    squares: f64,
+    freedom: usize,
+}
+
+/// The constants of some rows, and their variances; nothing where the rows do not determine them.
+type Estimate = Option<(Vec<f64>, Vec<f64>)>;
+
+impl Test {
+    /// The test again where estimates scatter more, by a factor of the variance, than noise explains.
+    fn beside_scatter(&mut self, factor: f64) {
+        if factor < SCATTERED {
+            return;
+        }
+        if let Ok(ratio) = FisherSnedecor::new(self.freedom as f64, FREEDOM) {
+            self.probability = self.probability.max(ratio.sf(self.squares / factor));
+        }
+    }
 }
 
 /// Tests every constant of a fit; the result is `None` if the blocks do not determine it. `inflation` multiplies the variances.
@@ -46,8 +81,7 @@ pub(crate) fn test(
     let rows = problem.rows();
     let constants = problem.layout.constant;
     let (step, span) = (fit.step, fit.span);
-    let estimate = |block: usize, (): &mut ()| {
-        let block = block * rows / BLOCKS..(block + 1) * rows / BLOCKS;
+    let estimate = |block: Range<usize>, (): &mut ()| {
         let windows = within(fit, block.clone(), step, span);
         let (values, variances) = if windows.is_empty() {
             alone(problem, block, expected, covariance, instructions)?
@@ -59,16 +93,24 @@ pub(crate) fn test(
         let variances: Vec<f64> = (0..constants).map(|i| inflation * variances[i * constants + i]).collect();
         Some((values, variances))
     };
-    let blocks = (0..BLOCKS).map(|block| Piece { size: rows.div_ceil(BLOCKS), content: block });
-    let estimates = stages.map(blocks.collect(), || (), estimate)?;
-    let estimates: Vec<_> = estimates.into_iter().flatten().collect();
-    let tests = (0..constants)
-        .map(|constant| {
-            let parts: Vec<(f64, f64)> =
-                estimates.iter().map(|(values, variances)| (values[constant], variances[constant])).collect();
-            compare(&parts)
-        })
-        .collect();
+    let pieces = |count: usize| {
+        let at = move |index: usize| index * rows / count;
+        (0..count).map(|index| at(index)..at(index + 1)).map(|rows| Piece { size: rows.len(), content: rows }).collect()
+    };
+    let estimates = stages.map(pieces(BLOCKS), || (), estimate)?;
+    let of = |estimates: &[Estimate], constant: usize| -> Vec<(f64, f64)> {
+        estimates.iter().flatten().map(|(values, variances)| (values[constant], variances[constant])).collect()
+    };
+    let mut tests: Vec<Option<Test>> = (0..constants).map(|constant| compare(&of(&estimates, constant))).collect();
+    let differs = |test: &Option<Test>| test.as_ref().is_some_and(|test| test.probability < NO_CHANCE);
+    if tests.iter().any(differs) {
+        let parts = stages.map(pieces(BLOCKS * PARTS), || (), estimate)?;
+        for (constant, test) in tests.iter_mut().enumerate() {
+            if let (Some(test), Some(factor)) = (test, scatter(&of(&parts, constant))) {
+                test.beside_scatter(factor);
+            }
+        }
+    }
     Ok(tests)
 }
 
@@ -81,29 +123,14 @@ fn alone(
     covariance: &RowCovariance,
     instructions: Instructions,
 ) -> Option<(Vec<f64>, Vec<f64>)> {
-    let jumps: Vec<usize> =
-        problem.jumps.iter().filter(|&&jump| rows.contains(&jump)).map(|jump| jump - rows.start).collect();
-    let part = Problem {
-        windowed: cut(&problem.windowed, &rows),
-        companions: cut(&problem.companions, &rows),
-        constants: cut(&problem.constants, &rows),
-        rhs: &problem.rhs[rows.clone()],
-        usable: &problem.usable[rows.clone()],
-        jumps: &jumps,
-        correlated: None,
-        ..problem.clone()
-    };
+    let jumps = problem.jumps_of(&rows);
+    let part = problem.part(&rows, &jumps);
     let shortened = [1, 2, 4].map(|part| rows.len() / part);
     let enough = shortened.into_iter().filter(|&length| length > problem.layout.regressors());
     let mut fits = enough.filter_map(|length| Fit::in_rows(&part, length, expected, instructions));
     let fit = fits.find(|fit| (0..fit.full.len()).any(|window| is_determined(&fit.full, window)))?;
     let covariance = fit.covariance_of(&part, 0..fit.full.len(), &fit.pooled, covariance);
     Some((fit.pooled.values, covariance))
-}
-
-/// Some rows of some columns.
-fn cut<'a>(columns: &[&'a [f64]], rows: &Range<usize>) -> Vec<&'a [f64]> {
-    columns.iter().map(|column| &column[rows.clone()]).collect()
 }
 
 /// Windows that lie within some rows.
@@ -115,6 +142,20 @@ fn within(fit: &Fit, rows: Range<usize>, step: usize, span: usize) -> Range<usiz
     let first = place((rows.start + step).cast_signed() - 1);
     let end = place(rows.end.cast_signed() - span.cast_signed() + step.cast_signed()).min(fit.full.len());
     first..end.max(first)
+}
+
+/// How much neighbouring parts scatter about lines through them, over what noise explains; nothing where few of them say something.
+fn scatter(parts: &[(f64, f64)]) -> Option<f64> {
+    let bend = |three: &[(f64, f64)]| {
+        let [(before, a), (here, b), (after, c)] = [three[0], three[1], three[2]];
+        (before - 2.0 * here + after).powi(2) / (a + 4.0 * b + c)
+    };
+    let mut bends: Vec<f64> = parts.windows(3).map(bend).filter(|bend| bend.is_finite()).collect();
+    if 2 * bends.len() < BLOCKS * PARTS {
+        return None;
+    }
+    let middle = bends.len() / 2;
+    Some(*bends.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN)
 }
 
 /// Compares estimates of the same number, each with its variance.
@@ -135,8 +176,10 @@ fn compare(parts: &[(f64, f64)]) -> Option<Test> {
     let freedom = usable.len() - 1;
     let scatter = usable.iter().map(|(value, _)| (value - mean).powi(2)).sum::<f64>() / freedom as f64;
     let noise = usable.iter().map(|(_, variance)| variance).sum::<f64>() / usable.len() as f64;
-    let spread = (scatter - noise).max(0.0).sqrt() / mean.abs();
-    Some(Test { probability: chi_squared_beyond(squares, freedom), spread })
+    let deviation = (scatter - noise).max(0.0).sqrt();
+    let spread = deviation / mean.abs();
+    let probability = chi_squared_beyond(squares, freedom);
+    Some(Test { probability, spread, deviation, squares: squares / freedom as f64, freedom })
 }
 
 /// The probability that a χ² variable is at least as large as a value.

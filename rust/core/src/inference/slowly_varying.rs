@@ -53,6 +53,8 @@ pub(crate) struct SlowSearch<'a> {
     pub(crate) scales: &'a [Scale],
     /// The first rows after places where they may jump.
     pub(crate) breaks: &'a [usize],
+    /// What errors of constants between jumps are multiplied by, in comparison with those of curves.
+    pub(crate) simpler: f64,
     pub(crate) instructions: Instructions,
 }
 
@@ -62,7 +64,7 @@ pub(crate) fn find(
     first: Scale,
     stages: &mut Stages<'_, '_>,
 ) -> Result<Option<SlowCoefficients>, Error> {
-    let &SlowSearch { rows, model, coefficients, noise, expected, scales, breaks, instructions } = search;
+    let &SlowSearch { rows, model, coefficients, noise, expected, scales, breaks, simpler, instructions } = search;
     let slow = &model.constant[..coefficients];
     let rest = Model { constant: model.constant[coefficients..].to_vec(), ..model.clone() };
     let whole = rows.len() as f64;
@@ -89,6 +91,7 @@ pub(crate) fn find(
         let equations = Slow { fit: &fit, coefficients, companions, current, weights, rows: rows.len(), breaks };
         let hole = (scale.span() / 2 + scale.reach) as f64;
         let mut best: Option<(f64, Varying, f64)> = None;
+        let mut least = f64::INFINITY;
         let reaches = REACHES.map(|multiple| multiple * hole).into_iter();
         let quadratics = reaches.take_while(|reach| 2.0 * reach <= whole).map(|reach| (QUADRATIC, reach));
         // Between jumps a coefficient may be constant.
@@ -97,7 +100,9 @@ pub(crate) fn find(
             let Some(leave_gap_out) = equations.fit(terms, reach, hole, instructions) else { continue };
             let Some(full) = equations.fit(terms, reach, 0.0, instructions) else { continue };
             let error = equations.error(&problem, &leave_gap_out, &full, scale, expected.variance);
-            if best.as_ref().is_none_or(|best| error < best.0) {
+            let counts = if terms == 1 { simpler * error } else { error };
+            if best.is_none() || counts < least {
+                least = counts;
                 best = Some((error, full, reach));
             }
         }
@@ -161,6 +166,7 @@ mod tests {
             expected: white(DEVIATION * DEVIATION),
             scales: &scales,
             breaks: &[],
+            simpler: 1.0,
             instructions: Instructions::Scalar,
         };
         let found = staged(|stages| find(&search, scales[2], stages)).expect("a curve");

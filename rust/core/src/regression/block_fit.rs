@@ -146,7 +146,7 @@ fn eliminate(mut products: Vec<f64>, count: usize, first: usize) -> Vec<f64> {
 }
 
 /// The inverse of a symmetric positive definite matrix, or `None` if it is not.
-fn inverse(matrix: &[f64], count: usize) -> Option<Vec<f64>> {
+pub(crate) fn inverse(matrix: &[f64], count: usize) -> Option<Vec<f64>> {
     let wide = 2 * count;
     let mut work = vec![0.0; count * wide];
     for i in 0..count {
@@ -206,6 +206,52 @@ pub(crate) fn fit_in_blocks(
         })
     };
     noises.iter().map(fit).collect()
+}
+
+/// What every block says of the constants, corrected for the angle's noise of some variance: products of the constants' columns and the
+/// right-hand side, which comes last, without the block's own unknowns.
+pub(crate) struct Parts {
+    pub(crate) products: Vec<Vec<f64>>,
+    /// What the columns were divided by.
+    pub(crate) scale: Vec<f64>,
+}
+
+impl Parts {
+    pub(crate) fn new(rows: &Rows, model: &Model, noise: f64, blocks: &[Range<usize>]) -> Self {
+        let products = Products { rows, model };
+        let moments: Vec<_> = blocks.iter().map(|block| products.of(block)).collect();
+        let scale = products.scale(&moments);
+        let (count, first) = (products.columns(), 2 * model.windowed.len());
+        let size = count - first;
+        let part = |(block, moments): (&Range<usize>, &(Vec<f64>, [f64; 3]))| {
+            if moments.1[0] <= (ROWS_OF_AN_UNKNOWN * first) as f64 {
+                return vec![0.0; size * size];
+            }
+            eliminate(products.corrected(moments, products.centre(block).0, noise, &scale), count, first)
+        };
+        let products = blocks.iter().zip(&moments).map(part).collect();
+        Self { products, scale: scale[first..].to_vec() }
+    }
+}
+
+/// The lines that windowed unknowns follow in a block for given constants: the value at its centre and the growth per second. `None` where
+/// the block does not determine them.
+pub(crate) fn lines(rows: &Rows, model: &Model, block: &Range<usize>, constants: &[f64]) -> Option<Vec<[f64; 2]>> {
+    let products = Products { rows, model };
+    let (count, first) = (products.columns(), 2 * model.windowed.len());
+    let (moments, times) = products.of(block);
+    if times[0] <= (ROWS_OF_AN_UNKNOWN * first) as f64 {
+        return None;
+    }
+    let entry = |i: usize, j: usize| moments[i.max(j) * count + i.min(j)];
+    let normal: Vec<f64> = (0..first * first).map(|place| entry(place / first, place % first)).collect();
+    let inverse = inverse(&normal, first)?;
+    let side = |i: usize| {
+        entry(i, count - 1) - constants.iter().enumerate().map(|(k, value)| entry(i, first + k) * value).sum::<f64>()
+    };
+    let value = |i: usize| (0..first).map(|j| inverse[i * first + j] * side(j)).sum::<f64>();
+    let half = products.centre(block).0;
+    Some((0..model.windowed.len()).map(|one| [value(2 * one), value(2 * one + 1) / half]).collect())
 }
 
 /// Whether the information on every constant is spread over so many blocks.

@@ -10,6 +10,12 @@ pub const HARDLY_TOLD_APART: f64 = 500.0;
 /// A cross-validation error beyond which the rows hold more than the noise of the channels explains.
 pub const NOISE_MODEL_FAILS: f64 = 4.0;
 
+/// The part of the torque's mean square that the equations must leave of it for its noise to be worth a word: two percent of its amplitude.
+pub(crate) const UNEXPLAINED: f64 = 4e-4;
+
+/// A smaller part of it is explained for every purpose.
+pub(crate) const NEGLIGIBLE: f64 = 1e-6;
+
 /// The flag of a condition number.
 pub(crate) fn status_of(condition: f64) -> Status {
     if condition.is_infinite() {

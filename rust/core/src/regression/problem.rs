@@ -47,6 +47,27 @@ impl Problem<'_> {
         first..self.usable.iter().rposition(|&usable| usable).map_or(first, |last| last + 1)
     }
 
+    /// Jumps in some rows, counted from the first of them.
+    pub(crate) fn jumps_of(&self, rows: &Range<usize>) -> Vec<usize> {
+        self.jumps.iter().filter(|&jump| rows.contains(jump)).map(|jump| jump - rows.start).collect()
+    }
+
+    /// Some rows as if there were no others, with the jumps in them.
+    pub(crate) fn part<'b>(&'b self, rows: &Range<usize>, jumps: &'b [usize]) -> Problem<'b> {
+        let cut =
+            |columns: &[&'b [f64]]| -> Vec<&'b [f64]> { columns.iter().map(|column| &column[rows.clone()]).collect() };
+        Problem {
+            windowed: cut(&self.windowed),
+            companions: cut(&self.companions),
+            constants: cut(&self.constants),
+            rhs: &self.rhs[rows.clone()],
+            usable: &self.usable[rows.clone()],
+            jumps,
+            correlated: None,
+            ..self.clone()
+        }
+    }
+
     /// Whether there is a jump after the first of some rows and not after the end of them.
     pub(crate) fn jumps_within(&self, rows: &Range<isize>) -> bool {
         let next = self.jumps.partition_point(|&jump| jump.cast_signed() <= rows.start);

@@ -7,6 +7,19 @@ use crate::regression::predictor::{Predictor, without_constants};
 use crate::regression::problem::Problem;
 use crate::regression::solved::is_determined;
 
+/// The median of squares of normal noise over their variance.
+const MEDIAN: f64 = 0.454_936;
+
+/// The variance of the usual one of some rows, whatever a few of them are like; nothing without rows.
+pub(crate) fn usual_variance(left: &[f64], rows: &[bool]) -> Option<f64> {
+    let mut squares: Vec<f64> = left.iter().zip(rows).filter(|(_, row)| **row).map(|(left, _)| left * left).collect();
+    if squares.is_empty() {
+        return None;
+    }
+    let middle = squares.len() / 2;
+    Some(*squares.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN)
+}
+
 /// The residual of every row and whether the fit determines it; zero where it does not.
 pub(crate) fn residuals(
     problem: &Problem<'_>,

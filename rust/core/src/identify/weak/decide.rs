@@ -20,6 +20,9 @@ use crate::regression::window_length::Scale;
 const BADLY: f64 = 1.5;
 const BETTER: f64 = 0.8;
 
+/// Where constants jump, those that do not change in between stand unless others predict so much better.
+const SIMPLER: f64 = 0.98;
+
 /// Rounds of looking for jumps and fitting again with windows that end there.
 const JUMP_ROUNDS: usize = 4;
 
@@ -28,8 +31,12 @@ impl Session<'_, '_, '_> {
     pub(crate) fn decide(&mut self, chosen: &mut Chosen, model: &Model) -> Result<Decided, Error> {
         let (mut jumps, mut whole, mut round) = (Vec::new(), None, 0);
         loop {
-            let mut decided = self.decide_kinds(chosen, model)?;
-            let found = if round < JUMP_ROUNDS {
+            let mut decided = self.decide_kinds(chosen, model, jumps.iter().any(|jump: &Jump| jump.of_constants))?;
+            let of_constants =
+                if round == 0 { self.jumps_of_constants(&chosen.weak, &decided, model)? } else { Vec::new() };
+            let found = if !of_constants.is_empty() {
+                of_constants
+            } else if round < JUMP_ROUNDS {
                 self.find_jumps(&chosen.weak, &decided, &jumps, whole.as_ref())?
             } else {
                 jumps.clone()
@@ -66,6 +73,7 @@ impl Session<'_, '_, '_> {
             covariance,
             correlated: None,
             expected,
+            constants_jump: false,
             jumps: Vec::new(),
             whole: None,
             spring: None,
@@ -79,11 +87,12 @@ impl Session<'_, '_, '_> {
     }
 
     /// Chooses the length of windows where it is not given, and tests what is constant.
-    fn decide_kinds(&mut self, chosen: &mut Chosen, model: &Model) -> Result<Decided, Error> {
+    fn decide_kinds(&mut self, chosen: &mut Chosen, model: &Model, constants_jump: bool) -> Result<Decided, Error> {
         let mut decided = match chosen.fitted.take() {
             Some(fitted) => fitted,
             None => self.fit_first(chosen, model)?,
         };
+        decided.constants_jump = constants_jump;
         let rows = &chosen.weak.rows;
         decided.slow = self.of_kind(Kind::Varying);
         let mut model = Cow::Borrowed(model);
@@ -166,16 +175,18 @@ impl Session<'_, '_, '_> {
             expected: decided.expected,
             scales: &decided.scales,
             breaks: &[],
+            simpler: 1.0,
             instructions,
         };
         let mut found = slowly_varying::find(&search, first, &mut self.stages)?;
         if !rows.jumps.is_empty() {
             // What jumps may be the inertia as well as the stiffness.
-            let jumping = slowly_varying::SlowSearch { breaks: &rows.jumps, ..search };
+            let simpler = if decided.constants_jump { SIMPLER } else { 1.0 };
+            let jumping = slowly_varying::SlowSearch { breaks: &rows.jumps, simpler, ..search };
             let jumping = slowly_varying::find(&jumping, first, &mut self.stages)?;
             let error =
                 |one: &Option<slowly_varying::SlowCoefficients>| one.as_ref().map_or(f64::INFINITY, |one| one.error);
-            found = if error(&jumping) < error(&found) { jumping } else { found };
+            found = if simpler * error(&jumping) < error(&found) { jumping } else { found };
         }
         decided.found = found;
         decided.fit = None;

@@ -40,7 +40,9 @@ pub(crate) struct Decided {
     /// What it makes of the windowed regressors, once a fit was made with it.
     pub(crate) correlated: Option<Arc<Correlated>>,
     pub(crate) expected: Expected,
-    /// Jumps of windowed coefficients.
+    /// Whether it is known where constants jump.
+    pub(crate) constants_jump: bool,
+    /// Jumps of windowed coefficients and of constants.
     pub(crate) jumps: Vec<Jump>,
     /// All rows, also those over jumps; nothing without jumps.
     pub(crate) whole: Option<Rows>,

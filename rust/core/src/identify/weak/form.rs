@@ -128,7 +128,8 @@ fn identify(
     let mut session = Session {
         record,
         options,
-        noise: [levels[0], levels[1]],
+        noise: [0.0; 2],
+        channel_noise: [levels[0], levels[1]],
         scan: Scan::default(),
         free_offset: FreeOffset::default(),
         stages,

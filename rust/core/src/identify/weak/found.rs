@@ -18,6 +18,8 @@ pub(crate) struct WeakIdentified {
     pub(crate) function: TestFunction,
     /// Variances of the noise of angle and torque.
     pub(crate) noise: [f64; 2],
+    /// The variance of the torque's noise that everything was chosen with.
+    pub(crate) shown_noise: f64,
     /// Samples spanned by the windows that windowed unknowns are eliminated in: those that predict best where none were given.
     pub(crate) regression_window: usize,
     /// Lengths of windows that were tried, in samples, and how well each predicts.

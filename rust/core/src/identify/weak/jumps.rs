@@ -66,7 +66,7 @@ impl Session<'_, '_, '_> {
 }
 
 /// The factors of the windowed unknowns, sample by sample, or `None` if there are none or jumps of one would act through a derivative.
-fn signals<'a>(record: &Record<'a>, model: &Model) -> Option<Vec<Box<dyn Samples + 'a>>> {
+pub(crate) fn signals<'a>(record: &Record<'a>, model: &Model) -> Option<Vec<Box<dyn Samples + 'a>>> {
     if model.windowed.is_empty() {
         return None;
     }

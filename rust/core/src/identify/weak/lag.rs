@@ -47,12 +47,6 @@ pub struct Lag {
 pub(crate) type Settled = (Chosen, Decided, Option<Lag>);
 
 impl Session<'_, '_, '_> {
-    /// Chooses the test function.
-    pub(crate) fn choose(&mut self, model: &Model) -> Result<Chosen, Error> {
-        let chosen = self.choose_test_function(model)?;
-        self.onto_plateau(chosen, model)
-    }
-
     /// Decides what is constant with the test function that was chosen, finds the lag where it is not given, and chooses again with it.
     pub(crate) fn decide_and_choose_again(&mut self, mut chosen: Chosen, model: &Model) -> Result<Settled, Error> {
         let mut lag = None;

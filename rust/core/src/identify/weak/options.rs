@@ -24,6 +24,8 @@ pub(crate) struct WeakOptions {
     pub(crate) kinds: Vec<Kind>,
     /// Variances of the noise of angle and torque; estimated where not given.
     pub(crate) noise: [Option<f64>; 2],
+    /// The variance of the torque's noise as equations show it; judged from the record where not given.
+    pub(crate) shown_noise: Option<f64>,
     /// By how many samples the torque comes late; estimated where not given.
     pub(crate) lag: Option<f64>,
     /// About which angle the spring is relaxed: zero, or another one that is estimated from there on; where not given zero, unless the record

@@ -66,16 +66,24 @@ impl Scans {
 }
 
 impl Session<'_, '_, '_> {
-    /// Scans the widths, moves to the plateau where the test function that the spectra suggest is off it, and on to wider ones where
+    /// Scans the widths unless that was done, moves to the plateau where the test function that the spectra suggest is off it, and on to wider ones where
     /// windows follow noise.
-    pub(crate) fn onto_plateau(&mut self, chosen: Chosen, model: &Model) -> Result<Chosen, Error> {
+    pub(crate) fn onto_plateau(
+        &mut self,
+        chosen: Chosen,
+        model: &Model,
+        scans: &mut Option<Scans>,
+    ) -> Result<Chosen, Error> {
         let given = self.options.half_width.is_some();
         // Without a coefficient of the motion among the unknowns there is nothing that widths could tell apart.
         let moves = self.unknowns().iter().any(|&unknown| unknown < 3);
         if given && !self.options.diagnose || !moves {
             return Ok(chosen);
         }
-        let scans = self.scan(model)?;
+        let scans = match scans {
+            Some(scans) => scans,
+            None => scans.insert(self.scan(model)?),
+        };
         let before = chosen.weak.function.half_width();
         let moved = if given { None } else { scans.believed(before) };
         let half_width = moved.unwrap_or(before);

@@ -25,7 +25,9 @@ const NUMBERS_OF_A_PAIR: usize = 12;
 pub(crate) struct Session<'a, 'b, 'c> {
     pub(crate) record: Record<'a>,
     pub(crate) options: &'a WeakOptions,
+    /// Variances of the noise of angle and torque that decisions are made with, and those that the channels show by themselves.
     pub(crate) noise: [f64; 2],
+    pub(crate) channel_noise: [f64; 2],
     /// Estimates by the width of the test function.
     pub(crate) scan: Scan,
     /// How much better an offset would predict that is free in every window, where the record contradicts a constant one.

@@ -33,6 +33,9 @@ impl Session<'_, '_, '_> {
     /// need not be where that noise is.
     pub(crate) fn whiten(&mut self, weak: &WeakRows, decided: &mut Decided) -> Result<(), Error> {
         let (rows, instructions) = (&weak.rows, self.options.instructions);
+        if self.noise != self.channel_noise {
+            return Ok(());
+        }
         if self.explained(weak, decided)?.is_none() {
             return Ok(());
         }

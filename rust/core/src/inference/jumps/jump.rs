@@ -9,7 +9,7 @@ use crate::simd::instructions::Instructions;
 /// Places of a jump that are less probable are ignored.
 pub(crate) const UNLIKELY: f64 = 1e-3;
 
-/// A jump of the windowed coefficients.
+/// A jump of the windowed coefficients, or of constants.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Jump {
     /// The first sample after it.
@@ -17,6 +17,8 @@ pub(crate) struct Jump {
     /// The probability that it has happened by each sample from `first` on.
     pub(crate) first: usize,
     pub(crate) happened: Vec<f64>,
+    /// Whether constants jump, beside which the windowed coefficients may, too.
+    pub(crate) of_constants: bool,
 }
 
 /// The data in which jumps are searched.

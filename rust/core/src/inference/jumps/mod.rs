@@ -1,5 +1,6 @@
-//! Jumps of windowed coefficients.
+//! Jumps of windowed coefficients and of constants.
 
+pub(crate) mod constants;
 pub(crate) mod jump;
 pub(crate) mod placement;
 pub(crate) mod search;

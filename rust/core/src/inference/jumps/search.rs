@@ -66,6 +66,10 @@ impl JumpSearch<'_> {
 
     /// Places a known jump again. It moves by less than a quarter of the least distance between jumps.
     fn again(&self, jump: &Jump, room: usize, shared: &SharedWindows<'_>) -> Jump {
+        if jump.of_constants {
+            // What the constants do is not seen in what they leave.
+            return jump.clone();
+        }
         let row = (jump.sample - self.first).div_ceil(self.stride);
         let solved = self.solve(&(row..row + 1), shared);
         let windows = around(&solved);
@@ -236,7 +240,7 @@ impl JumpSearch<'_> {
     }
 
     /// A jump with the probability of each of its places.
-    fn jump(&self, left: &[f64], best: usize, first: usize, count: f64) -> Jump {
+    pub(crate) fn jump(&self, left: &[f64], best: usize, first: usize, count: f64) -> Jump {
         let noise = self.noise(left[best], count);
         let weights: Vec<f64> = left.iter().map(|one| (-(one - left[best]) / (2.0 * noise)).exp()).collect();
         let total: f64 = weights.iter().sum();
@@ -244,7 +248,7 @@ impl JumpSearch<'_> {
             *sum += weight / total;
             Some(*sum)
         });
-        Jump { sample: first + best, first, happened: happened.collect() }
+        Jump { sample: first + best, first, happened: happened.collect(), of_constants: false }
     }
 }
 
@@ -331,7 +335,8 @@ mod tests {
     #[test]
     fn rows_over_a_jump_are_those_whose_test_function_reaches_it() {
         let function = spring(|_| 1.0).function;
-        let certain = |sample: usize| Jump { sample, first: sample - 1, happened: vec![0.0, 1.0, 1.0] };
+        let certain =
+            |sample: usize| Jump { sample, first: sample - 1, happened: vec![0.0, 1.0, 1.0], of_constants: false };
         let over: Vec<usize> = rows_over(&[certain(500)], &function, HALF, STRIDE, 400).collect();
         for row in 0..400 {
             // Row r reads the samples from 2 r to 2 r + 24; the jump lies between samples 499 and 500.
@@ -341,7 +346,8 @@ mod tests {
             assert!(less > UNNOTICED || !over.contains(&row), "{row}: {less}");
         }
         // Where the place is uncertain, all rows that may reach over it.
-        let uncertain = Jump { sample: 500, first: 480, happened: (0..40).map(|k| f64::from(k) / 39.0).collect() };
+        let happened = (0..40).map(|k| f64::from(k) / 39.0).collect();
+        let uncertain = Jump { sample: 500, first: 480, happened, of_constants: false };
         let wide: Vec<usize> = rows_over(&[uncertain], &function, HALF, STRIDE, 400).collect();
         assert!(wide.len() > over.len() + 15 && over.iter().all(|row| wide.contains(row)));
     }

@@ -19,7 +19,7 @@ const CONSPICUOUS: f64 = 5.0;
 const BADLY: f64 = 1.5;
 
 impl Session<'_, '_, '_> {
-    /// Whether a record whose rows are predicted badly, or in the shortest windows only, is predicted better with an offset that is free in
+    /// Whether a record whose rows are predicted badly, in the shortest windows only, or with more noise than its channels show, is predicted better with an offset that is free in
     /// every window.
     pub(crate) fn offset_is_missed(
         &mut self,
@@ -31,7 +31,8 @@ impl Session<'_, '_, '_> {
             Some(fitted) => fitted,
             None => self.fit_first(chosen, model)?,
         };
-        let (error, is_odd) = (fitted.error, fitted.error > BADLY || fitted.has_shortest_windows());
+        let is_raised = self.noise != self.channel_noise;
+        let (error, is_odd) = (fitted.error, fitted.error > BADLY || fitted.has_shortest_windows() || is_raised);
         chosen.fitted = Some(fitted);
         if !is_odd {
             return Ok(false);

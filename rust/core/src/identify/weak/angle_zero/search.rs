@@ -64,7 +64,7 @@ impl Session<'_, '_, '_> {
 
     /// Chooses and decides with an angle at which the spring is relaxed; `None`, with everything as it was, if it does not predict better.
     fn with_angle_zero(&mut self, model: &Model, offset: usize) -> Result<Option<Settled>, Error> {
-        let before = (self.scan.clone(), self.record.lag);
+        let before = (self.scan.clone(), self.record.lag, self.noise);
         if let Some(guess) = self.guess_angle_zero(model, offset)? {
             self.record.angle_zero = guess;
             if let Some(mut settled) = self.settle_around(model, Some(offset))?
@@ -74,7 +74,7 @@ impl Session<'_, '_, '_> {
             }
         }
         self.record.angle_zero = 0.0;
-        (self.scan, self.record.lag) = before;
+        (self.scan, self.record.lag, self.noise) = before;
         Ok(None)
     }
 

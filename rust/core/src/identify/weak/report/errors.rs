@@ -5,7 +5,7 @@ use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
-use crate::regression::limits::NOISE_MODEL_FAILS;
+use crate::regression::limits::{NEGLIGIBLE, NOISE_MODEL_FAILS, UNEXPLAINED};
 use crate::regression::row_covariance::RowCovariance;
 use crate::status::Status;
 use crate::weak_form::weak_rows::WeakRows;
@@ -18,6 +18,8 @@ pub(crate) struct Errors {
     pub(crate) inflation: f64,
     /// Mean squared error of predicting rows, or of what is left of them where nothing is windowed, over the noise's variance.
     pub(crate) error: f64,
+    /// The same over the variance of the noise that the channels show by themselves.
+    pub(crate) over_channels: f64,
     /// Variance of what is left of the rows.
     pub(crate) left: f64,
     /// What is wrong with the noise.
@@ -32,21 +34,28 @@ impl Session<'_, '_, '_> {
             expected: decided.expected,
             inflation: decided.error.max(1.0),
             error: decided.error,
+            over_channels: decided.error,
             left: f64::NAN,
             status: Status::GOOD,
         };
         let (shown, coloured) = self.shown(weak, decided, fit)?;
         errors.left = shown.variance();
-        if coloured {
-            errors.status |= Status::COLOURED;
-        }
         let whole = decided.model.windowed.is_empty();
         errors.error = if whole { shown.variance() / errors.expected.variance } else { decided.error };
         if whole {
             errors.inflation = errors.error.max(1.0);
         }
-        if errors.error > NOISE_MODEL_FAILS {
+        let fails = errors.error > NOISE_MODEL_FAILS;
+        let raised = self.raised(weak, decided);
+        let matters = errors.left > UNEXPLAINED * weak.rows.mean_square();
+        errors.over_channels = errors.error * raised;
+        if coloured && errors.left > NEGLIGIBLE * weak.rows.mean_square() {
+            errors.status |= Status::COLOURED;
+        }
+        if fails || matters && errors.over_channels > NOISE_MODEL_FAILS {
             errors.status |= Status::NOISE_MODEL;
+        }
+        if fails {
             errors.inflation = 1.0;
             errors.expected = Expected::new(&shown, shown.variance());
             errors.covariance = shown;

@@ -8,15 +8,18 @@ use crate::inference::cross_validation::left_of_rows;
 use crate::inference::explained::{Squares, inflation, is_no_chance};
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
-use crate::regression::residuals::residuals;
+use crate::regression::residuals::{residuals, usual_variance};
+use crate::regression::window_length::Scale;
 use crate::weak_form::weak_rows::{TermSamples, WeakRows};
 
-/// Squares of so many times the variance are outliers, and the median of squares of normal noise over their variance.
+/// Squares of so many times the variance are outliers.
 const MOST: f64 = 9.0;
-const MEDIAN: f64 = 0.455;
 
 /// A part of the rows that no normal noise makes outliers of: ten times what is expected.
 const OUTLIERS: f64 = 0.03;
+
+/// Windows shorter than so many test functions may follow noise.
+const SHORT: usize = 2;
 
 /// What is left of every row, and whether a fit says anything of it.
 type Left = (Vec<f64>, Vec<bool>);
@@ -109,7 +112,7 @@ impl Session<'_, '_, '_> {
     }
 
     /// Whether a regressor is the same whatever moves: that of an offset.
-    fn is_still(&self, regressor: usize) -> bool {
+    pub(crate) fn is_still(&self, regressor: usize) -> bool {
         let term = regressor.checked_sub(3).and_then(|term| self.record.terms.get(term));
         matches!(term, Some(TermSamples::One))
     }
@@ -126,7 +129,7 @@ impl Session<'_, '_, '_> {
         let rows = decided.rows(&weak.rows);
         let problem = decided.problem(rows, self.noise[0]);
         let windowed = problem.layout.windowed > 0;
-        let Some(scale) = fit.scale.filter(|_| windowed) else {
+        let Some(scale) = fit.scale.filter(|_| windowed).map(|scale| longer(scale, weak, decided)) else {
             let whole = if windowed {
                 fit.again(&problem, expected, instructions, &mut self.stages)?
             } else {
@@ -143,6 +146,12 @@ impl Session<'_, '_, '_> {
     }
 }
 
+/// A length of windows, or the longest of all where it is so short that windows follow noise that is correlated over a test function.
+fn longer(scale: Scale, weak: &WeakRows, decided: &Decided) -> Scale {
+    let follows = scale.span() * weak.stride < SHORT * (2 * weak.function.half_width() + 1);
+    decided.scales.last().copied().filter(|_| follows).unwrap_or(scale)
+}
+
 /// Unknowns that the fit of so many rows follows chance with: where windows are tested on what they do not hold, their own have none.
 fn unknowns(decided: &Decided, fit: &Fit, rows: usize) -> usize {
     let layout = decided.model.layout();
@@ -152,12 +161,8 @@ fn unknowns(decided: &Decided, fit: &Fit, rows: usize) -> usize {
 
 /// Which of some rows are not so far off that they would decide for all others, as a touch or a spike is.
 fn without_outliers(left: &[f64], mut rows: Vec<bool>) -> Vec<bool> {
-    let mut squares: Vec<f64> = left.iter().zip(&rows).filter(|(_, row)| **row).map(|(left, _)| left * left).collect();
-    if squares.is_empty() {
-        return rows;
-    }
-    let middle = squares.len() / 2;
-    let most = MOST * *squares.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN;
+    let Some(variance) = usual_variance(left, &rows) else { return rows };
+    let most = MOST * variance;
     rows.iter_mut().zip(left).for_each(|(row, left)| *row &= left * left <= most);
     rows
 }

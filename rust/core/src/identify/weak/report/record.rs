@@ -19,7 +19,7 @@ use crate::inference::identifiability::is_mostly_noise;
 use crate::inference::missing_terms::Missing;
 use crate::regression::constants::weakest;
 use crate::regression::fit::Fit;
-use crate::regression::limits::HARDLY_TOLD_APART;
+use crate::regression::limits::{HARDLY_TOLD_APART, NEGLIGIBLE, UNEXPLAINED};
 use crate::regression::problem::Problem;
 use crate::status::Status;
 use crate::weak_form::weak_rows::WeakRows;
@@ -40,7 +40,7 @@ impl Session<'_, '_, '_> {
         found.regression_window = given.unwrap_or(fit.span * stride).min(self.record.angle.len());
         let errors = self.errors(&weak, decided, fit)?;
         let explained = self.is_explained(&weak, decided, fit, errors.left)?;
-        found.prediction_error = errors.error;
+        found.prediction_error = errors.over_channels;
         let rows = decided.rows(&weak.rows);
         let correlated = match &decided.correlated {
             Some(correlated) if errors.covariance == decided.covariance => Arc::clone(correlated),
@@ -100,9 +100,28 @@ impl Session<'_, '_, '_> {
         let (results, pairs) = self.at_rows(&fitted, tracks)?;
         found.pairs = pairs;
         let rhs = decided.rhs(&weak.rows).to_vec();
-        found.suspects = self.suspects(&mut weak, decided, fit, &rhs, &errors)?;
+        // A term hardly matters where next to nothing is left for it to explain.
+        if errors.left > NEGLIGIBLE * weak.rows.mean_square() {
+            found.suspects = self.suspects(&mut weak, decided, fit, &rhs, &errors)?;
+        }
         found.record_status = errors.status | record_status(&found, decided, at_end);
+        if self.is_contradicted(&weak, &found.constants) {
+            found.record_status |= Status::KIND_CONTRADICTED;
+        }
         Ok((found, Some(results)))
+    }
+
+    /// Whether a constant differs between parts of the record. An offset that drifts by next to nothing of the torque, as noise of low
+    /// frequencies makes it, is constant enough.
+    fn is_contradicted(&self, weak: &WeakRows, constants: &[Constant]) -> bool {
+        let matters = |one: &Constant, deviation: f64| {
+            let value = weak.rows.regressors[one.unknown].value.iter().copied().fold(0.0, f64::max);
+            !self.is_still(one.unknown) || (deviation * value).powi(2) > UNEXPLAINED * weak.rows.mean_square()
+        };
+        let differs = |one: &Constant| {
+            one.test.as_ref().is_some_and(|test| test.probability < NO_CHANCE && matters(one, test.deviation))
+        };
+        constants.iter().any(differs)
     }
 
     /// What is known before anything is fitted.
@@ -110,7 +129,8 @@ impl Session<'_, '_, '_> {
         let stride = weak.stride;
         WeakIdentified {
             function: weak.function,
-            noise: self.noise,
+            noise: self.channel_noise,
+            shown_noise: self.noise[1],
             regression_window: 0,
             lengths: decided.lengths.clone(),
             prediction_error: decided.error,
@@ -181,10 +201,6 @@ fn constants(decided: &Decided, values: &[f64], covariance: &[f64]) -> Vec<Const
 /// Flags of the whole record, beside those of its noise.
 fn record_status(found: &WeakIdentified, decided: &Decided, at_end: bool) -> Status {
     let mut status = Status::GOOD;
-    let contradicted = |one: &Constant| one.test.as_ref().is_some_and(|test| test.probability < NO_CHANCE);
-    if found.constants.iter().any(contradicted) {
-        status |= Status::KIND_CONTRADICTED;
-    }
     if at_end || decided.has_shortest_windows() {
         status |= Status::WINDOW_LIMIT;
     }

@@ -1,0 +1,167 @@
+//! The noise of the torque as the equations show it, where they leave more than the noise of the channels explains.
+//!
+//! The noise of a channel is read where its signal does not reach: at the highest frequencies. Coloured noise is stronger where the motion
+//! is, and there are changes that no window follows. Both leave more of the equations than so weak a noise would. Test functions and windows
+//! that are chosen for it are too wide and too short, and tests take what is left for a change of the parameters. So what is left counts as
+//! noise of the torque, and everything is chosen again with it, unless it is so much that the equations are wrong.
+
+use crate::error::Error;
+use crate::identify::weak::choice::Chosen;
+use crate::identify::weak::decided::Decided;
+use crate::identify::weak::scan::Scans;
+use crate::identify::weak::session::Session;
+use crate::inference::cross_validation::left_of_rows;
+use crate::regression::constants::Expected;
+use crate::regression::fit::Fit;
+use crate::regression::limits::UNEXPLAINED;
+use crate::regression::model::Model;
+use crate::regression::problem::Problem;
+use crate::regression::residuals::{residuals, usual_variance};
+use crate::regression::row_covariance::RowCovariance;
+use crate::regression::window_length::Scale;
+use crate::weak_form::weak_rows::WeakRows;
+
+/// What is left of the equations, over the variance that is expected, from which on it is more than the noise of the channels.
+const MORE: f64 = 2.0;
+/// Rounds of choosing the test function with the noise that the last one showed.
+const ROUNDS: usize = 3;
+/// Steps towards the noise that one test function shows, and the part of it that the last may change it by.
+const STEPS: usize = 4;
+const SETTLED: f64 = 0.1;
+/// Windows shorter than so many test functions follow anything, and the part of the torque's mean square that they may leave.
+const SHORT: usize = 2;
+const LEFT_BY_SHORT: f64 = 1e-5;
+/// Parts of a record with constants of their own: what changes over the record is not noise.
+const PARTS: usize = 64;
+
+impl Session<'_, '_, '_> {
+    /// Chooses the test function, with the noise of the channels or with what the equations show of it.
+    pub(crate) fn choose(&mut self, model: &Model) -> Result<Chosen, Error> {
+        let mut scans = None;
+        self.noise = self.channel_noise;
+        if let Some(shown) = self.options.shown_noise {
+            self.noise[1] = shown;
+            return self.choose_once(model, &mut scans);
+        }
+        let mut chosen = self.choose_once(model, &mut scans)?;
+        if !self.show_noise(&mut chosen, model)? {
+            return Ok(chosen);
+        }
+        for _ in 0..ROUNDS {
+            let before = (self.noise, self.scan.clone());
+            let mut again = self.choose_once(model, &mut scans)?;
+            if again.weak.function == chosen.weak.function {
+                break;
+            }
+            self.show_noise(&mut again, model)?;
+            if self.is_no_noise(&mut again, model)? {
+                (self.noise, self.scan) = before;
+                break;
+            }
+            chosen = again;
+        }
+        if self.is_no_noise(&mut chosen, model)? {
+            (self.noise, chosen.fitted) = (self.channel_noise, None);
+        }
+        Ok(chosen)
+    }
+
+    fn choose_once(&mut self, model: &Model, scans: &mut Option<Scans>) -> Result<Chosen, Error> {
+        let chosen = self.choose_test_function(model)?;
+        self.onto_plateau(chosen, model, scans)
+    }
+
+    /// Takes what the equations leave for noise of the torque, if that is more than the noise of the channels. Returns whether it is.
+    fn show_noise(&mut self, chosen: &mut Chosen, model: &Model) -> Result<bool, Error> {
+        let gain =
+            RowCovariance::known(&chosen.weak.kernels, &chosen.weak.torque, [0.0; 3], [0.0, 1.0], chosen.weak.stride);
+        let raised = self.noise != self.channel_noise;
+        for step in 0..STEPS {
+            let fitted = match chosen.fitted.take() {
+                Some(fitted) => fitted,
+                None => self.fit_first(chosen, model)?,
+            };
+            let left = self.left_over_expected(&chosen.weak, &fitted)?;
+            let expected = fitted.expected.variance;
+            chosen.fitted = Some(fitted);
+            let Some(left) = left.filter(|left| left.is_finite() && (raised || step > 0 || *left > MORE)) else {
+                return Ok(raised || step > 0);
+            };
+            if (raised || step > 0) && (left - 1.0).abs() <= SETTLED {
+                break;
+            }
+            let shown = self.noise[1] + (left - 1.0) * expected / gain.variance();
+            self.noise[1] = shown.max(self.channel_noise[1]);
+            chosen.fitted = None;
+        }
+        Ok(true)
+    }
+
+    /// Whether so much is left of the equations that they are wrong rather than noisy: a term is missing, or the torque is late. Windows hardly
+    /// longer than the test function follow what is wrong as if it were motion: they must leave next to nothing.
+    fn is_no_noise(&mut self, chosen: &mut Chosen, model: &Model) -> Result<bool, Error> {
+        let fitted = match chosen.fitted.take() {
+            Some(fitted) => fitted,
+            None => self.fit_first(chosen, model)?,
+        };
+        let function = 2 * chosen.weak.function.half_width() + 1;
+        let follows = |fit: &Fit| fit.scale.is_some() && fit.span * chosen.weak.stride < SHORT * function;
+        let most = if fitted.fit.as_ref().is_some_and(follows) { LEFT_BY_SHORT } else { UNEXPLAINED };
+        let is_more = fitted.expected.torque > most * chosen.weak.rows.mean_square();
+        chosen.fitted = Some(fitted);
+        Ok(is_more)
+    }
+
+    /// What a fit leaves of rows that it did not see, over the variance that is expected: of the usual row, so that jumps, touches and spikes
+    /// do not count. Nothing where it cannot be more than that.
+    fn left_over_expected(&mut self, weak: &WeakRows, fitted: &Decided) -> Result<Option<f64>, Error> {
+        let Some(fit) = fitted.fit.as_ref().filter(|_| fitted.white.is_none()) else { return Ok(None) };
+        if self.noise[1] == self.channel_noise[1] && !fitted.model.windowed.is_empty() && fitted.error <= MORE {
+            return Ok(None);
+        }
+        let problem = fitted.problem(&weak.rows, self.noise[0]);
+        let longest = fit.scale.map_or(2 * weak.reach(), |scale| 2 * scale.span());
+        let parts = (problem.rows() / (2 * longest).max(1)).clamp(1, PARTS);
+        let mut left = Vec::new();
+        for part in 0..parts {
+            let rows = problem.rows() * part / parts..problem.rows() * (part + 1) / parts;
+            let jumps = problem.jumps_of(&rows);
+            left.extend(self.left_of_part(&problem.part(&rows, &jumps), fit.scale, fitted.expected)?);
+        }
+        let usable = vec![true; left.len()];
+        Ok(usual_variance(&left, &usable).map(|variance| variance / fitted.expected.variance))
+    }
+
+    /// What is left of some rows with constants of their own.
+    fn left_of_part(
+        &mut self,
+        part: &Problem<'_>,
+        scale: Option<Scale>,
+        expected: Expected,
+    ) -> Result<Vec<f64>, Error> {
+        let instructions = self.options.instructions;
+        let Some(scale) = scale else {
+            let Some(fit) = Fit::new(part, None, expected, instructions, &mut self.stages)? else {
+                return Ok(Vec::new());
+            };
+            let (left, usable) = residuals(part, &fit, &mut self.stages)?;
+            return Ok(left.into_iter().zip(usable).filter(|(_, usable)| *usable).map(|(left, _)| left).collect());
+        };
+        let fit = Fit::with_leave_gap_out(part, scale, expected, instructions, &mut self.stages)?;
+        let left = fit.as_ref().and_then(|fit| left_of_rows(part, scale, fit));
+        let Some(left) = left else { return Ok(Vec::new()) };
+        Ok((0..part.rows()).filter(|&row| part.usable[row]).filter_map(left).collect())
+    }
+
+    /// By how much more noise the equations were chosen with than the channels show.
+    pub(crate) fn raised(&self, weak: &WeakRows, decided: &Decided) -> f64 {
+        if self.noise == self.channel_noise || decided.white.is_some() {
+            return 1.0;
+        }
+        let of_torque = |noise: [f64; 2]| {
+            RowCovariance::known(&weak.kernels, &weak.torque, [0.0; 3], [0.0, noise[1]], weak.stride).variance()
+        };
+        let more = of_torque(self.noise) - of_torque(self.channel_noise);
+        decided.covariance.variance() / (decided.covariance.variance() - more).max(f64::MIN_POSITIVE)
+    }
+}
