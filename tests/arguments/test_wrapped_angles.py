@@ -89,8 +89,8 @@ def test_identification_of_a_wrapped_angle_is_that_of_the_angle() -> None:
     rig = tvident.simulate_torsional_rig(duration=4, sample_rate=500, seed=1)
     period = 0.4 * float(np.ptp(rig.angle))
     plain = tvident.identify(rig.angle, rig.torque, sample_rate=500)
-    given_wrapped = np.stack([wrapped(rig.angle, period), wrapped(rig.angle + 0.2 * period, period)])
-    torques = np.stack([rig.torque, rig.torque])
+    given_wrapped = np.stack([wrapped(rig.angle, period), wrapped(-rig.angle, period)])
+    torques = np.stack([rig.torque, -rig.torque])
     found = tvident.identify(given_wrapped, torques, sample_rate=500, period=period)
     np.testing.assert_allclose(found.stiffness[0], plain.stiffness, rtol=1e-9)
     assert not np.asarray(found.record_status)[0] & tvident.Status.CHANNEL_SUSPECTED

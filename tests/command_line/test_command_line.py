@@ -270,7 +270,7 @@ GOOD = ("--angle", "angle", "--torque", "torque", "--sample-rate", "1000")
         (("identify", "FILE", *GOOD, "--plot", "result.gif"), 2, "--plot must end in .png, .pdf or .svg"),
         (("identify", "FILE", *GOOD, "--method", "magic"), 2, "'magic' is not"),
         (("identify", "FILE", *GOOD, "--no-such-option"), 2, "No such option"),
-        (("identify", "FILE", *GOOD, "--settings", "broken.npz"), 1, "broken.npz: holds no settings"),
+        (("identify", "FILE", *GOOD, "--settings", "broken.npz"), 1, "broken.npz: must be whole"),
         (("identify", "FILE", *GOOD, "--settings", "few.npz", "--method", "paper"), 2, "--settings hold a method"),
         (("identify", "FILE", *GOOD, "--settings-output", "no/such/s.json"), 1, "no/such: there is no such folder"),
         (
@@ -372,9 +372,11 @@ def test_a_reader_that_has_had_enough_is_no_error(recording: Path) -> None:
 
 
 def long_recording(folder: Path, samples: int) -> None:
-    generator = np.random.default_rng(0)
-    np.save(folder / "a.npy", generator.standard_normal(samples))
-    np.save(folder / "t.npy", generator.standard_normal(samples))
+    t = np.arange(samples) / 1000
+    noise = np.random.default_rng(0).standard_normal((2, samples))
+    waves = [(0.3 * np.sin(w * t), w) for w in (9.0, 23.0, 41.0)]
+    np.save(folder / "a.npy", sum(wave for wave, _ in waves) + 1e-3 * noise[0])
+    np.save(folder / "t.npy", sum((13 - 0.0123 * w**2) * wave for wave, w in waves) + 0.1 * noise[1])
 
 
 def test_progress_is_shown_on_a_terminal_and_not_in_a_pipe(tmp_path: Path) -> None:

@@ -58,6 +58,9 @@ def case(seed: int) -> None:
     torque = np.asarray(15 * angle + 0.01 * np.gradient(np.gradient(angle, t), t) + 0.01 * generator.standard_normal(n))
     calls = works(angle, torque, int(generator.integers(1, 4)))
     work = calls[seed % len(calls)]
+    # Rooms are entered when they are asked for, and their libraries need memory of their own.
+    for name in tvident.__all__:
+        getattr(tvident, name)
     hard = resource.getrlimit(resource.RLIMIT_AS)[1]
     # A record of a few hundred bytes a sample is the most that any call needs.
     most = 100 * _MIB + 300 * n

@@ -133,16 +133,23 @@ def period_of_times(t: npt.ArrayLike, samples: int) -> float:
     shortest, longest = bounds
     rate = _plainest(1 / longest, 1 / shortest)
     if quantum >= 1 / rate:
-        raise ValueError(
-            f"t must tell samples apart; it was printed in steps of {quantum:g} s, which several samples share; "
-            f"give sample_rate={rate:.9g} instead of t"
-        )
+        raise _too_coarse(seconds, distance, period, quantum, rate)
     if longest / shortest - 1 > _JITTER:
         raise ValueError(
             f"t must tell the sample rate to a thousandth; printed in steps of {quantum:g} s it may be {1 / longest:.6g} to "
             f"{1 / shortest:.6g} Hz; give sample_rate={rate:.9g}, or what the recorder was set to, instead of t"
         )
     return 1 / rate
+
+
+def _too_coarse(seconds: Array, distance: Array, period: float, quantum: float, rate: float) -> ValueError:
+    """Return what to say of times whose digits are no finer than their steps."""
+    if (np.diff(seconds) > 0).all():
+        return _not_uniform(seconds, distance, period)
+    return ValueError(
+        f"t must tell samples apart; it was printed in steps of {quantum:g} s, which several samples share; "
+        f"give sample_rate={rate:.9g} instead of t"
+    )
 
 
 def _not_uniform(seconds: Seconds, distance: Seconds, period: float) -> ValueError:
