@@ -142,7 +142,7 @@ def period_of_times(t: npt.ArrayLike, samples: int) -> float:
     return 1 / rate
 
 
-def _too_coarse(seconds: Array, distance: Array, period: float, quantum: float, rate: float) -> ValueError:
+def _too_coarse(seconds: Seconds, distance: Seconds, period: float, quantum: float, rate: float) -> ValueError:
     """Return what to say of times whose digits are no finer than their steps."""
     if (np.diff(seconds) > 0).all():
         return _not_uniform(seconds, distance, period)
