@@ -96,6 +96,20 @@ impl Products<'_> {
         products
     }
 
+    /// Corrected products of the constants and the right-hand side, without the block's own unknowns. A block that does not determine those
+    /// says nothing of the constants.
+    fn of_constants(
+        &self,
+        block: &Range<usize>,
+        moments: &(Vec<f64>, [f64; 3]),
+        noise: f64,
+        scale: &[f64],
+    ) -> Option<Vec<f64>> {
+        let first = 2 * self.model.windowed.len();
+        let enough = moments.1[0] > (ROWS_OF_AN_UNKNOWN * first) as f64;
+        enough.then(|| eliminate(self.corrected(moments, self.centre(block).0, noise, scale), self.columns(), first))
+    }
+
     /// The kernels that the angle's noise enters each column by: one that counts alike, one in proportion to time.
     fn kernels(&self, half: f64) -> Vec<[Vec<f64>; 2]> {
         let mut kernels = Vec::new();
@@ -188,12 +202,11 @@ pub(crate) fn fit_in_blocks(
     let fit = |&noise: &f64| {
         let (mut used, mut unknowns) = (0.0, constants);
         let part = |(block, moments): (&Range<usize>, &(Vec<f64>, [f64; 3]))| {
-            // A block that does not determine its own unknowns says nothing of the constants.
-            if moments.1[0] <= (ROWS_OF_AN_UNKNOWN * first) as f64 {
+            let Some(part) = products.of_constants(block, moments, noise, &scale) else {
                 return vec![0.0; size * size];
-            }
+            };
             (used, unknowns) = (used + moments.1[0], unknowns + first);
-            eliminate(products.corrected(moments, products.centre(block).0, noise, &scale), count, first)
+            part
         };
         let parts: Vec<Vec<f64>> = blocks.iter().zip(&moments).map(part).collect();
         let spread = if first == 0 { SPREAD } else { SPREAD_BESIDE_WINDOWED };
@@ -221,13 +234,9 @@ impl Parts {
         let products = Products { rows, model };
         let moments: Vec<_> = blocks.iter().map(|block| products.of(block)).collect();
         let scale = products.scale(&moments);
-        let (count, first) = (products.columns(), 2 * model.windowed.len());
-        let size = count - first;
+        let (size, first) = (model.constant.len() + 1, 2 * model.windowed.len());
         let part = |(block, moments): (&Range<usize>, &(Vec<f64>, [f64; 3]))| {
-            if moments.1[0] <= (ROWS_OF_AN_UNKNOWN * first) as f64 {
-                return vec![0.0; size * size];
-            }
-            eliminate(products.corrected(moments, products.centre(block).0, noise, &scale), count, first)
+            products.of_constants(block, moments, noise, &scale).unwrap_or_else(|| vec![0.0; size * size])
         };
         let products = blocks.iter().zip(&moments).map(part).collect();
         Self { products, scale: scale[first..].to_vec() }

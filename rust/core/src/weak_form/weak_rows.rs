@@ -20,6 +20,9 @@ use crate::weak_form::angle_noise::entered;
 use crate::weak_form::filter_bank::{FilterBank, FilterScratch};
 use crate::weak_form::test_function::{Kernels, TestFunction};
 
+/// Windows shorter than so many test functions are hardly longer than one.
+const SHORT: usize = 2;
+
 /// Rows in a piece of work.
 const PIECE: usize = 32 * BLOCK;
 
@@ -196,6 +199,11 @@ impl WeakRows {
     pub(crate) fn move_zero(&mut self, by: f64) {
         let angle = &mut self.rows.regressors[2].value;
         angle.iter_mut().zip(&self.rows.usable).filter(|(_, usable)| **usable).for_each(|(angle, _)| *angle -= by);
+    }
+
+    /// Whether windows of so many rows are hardly longer than the test function: they follow anything as if it were motion.
+    pub(crate) fn follow_anything(&self, rows: usize) -> bool {
+        rows * self.stride < SHORT * self.function.window_length()
     }
 
     /// Rows that a test function reaches on either side.

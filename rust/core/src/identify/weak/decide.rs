@@ -86,12 +86,17 @@ impl Session<'_, '_, '_> {
         Ok(decided)
     }
 
+    /// The fit that was made with a test function, or else the first.
+    pub(crate) fn take_fitted(&mut self, chosen: &mut Chosen, model: &Model) -> Result<Decided, Error> {
+        match chosen.fitted.take() {
+            Some(fitted) => Ok(fitted),
+            None => self.fit_first(chosen, model),
+        }
+    }
+
     /// Chooses the length of windows where it is not given, and tests what is constant.
     fn decide_kinds(&mut self, chosen: &mut Chosen, model: &Model, constants_jump: bool) -> Result<Decided, Error> {
-        let mut decided = match chosen.fitted.take() {
-            Some(fitted) => fitted,
-            None => self.fit_first(chosen, model)?,
-        };
+        let mut decided = self.take_fitted(chosen, model)?;
         decided.constants_jump = constants_jump;
         let rows = &chosen.weak.rows;
         decided.slow = self.of_kind(Kind::Varying);

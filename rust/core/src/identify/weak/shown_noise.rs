@@ -28,8 +28,7 @@ const ROUNDS: usize = 3;
 /// Steps towards the noise that one test function shows, and the part of it that the last may change it by.
 const STEPS: usize = 4;
 const SETTLED: f64 = 0.1;
-/// Windows shorter than so many test functions follow anything, and the part of the torque's mean square that they may leave.
-const SHORT: usize = 2;
+/// The part of the torque's mean square that windows hardly longer than the test function may leave: they follow anything.
 const LEFT_BY_SHORT: f64 = 1e-5;
 /// Parts of a record with constants of their own: what changes over the record is not noise.
 const PARTS: usize = 64;
@@ -77,10 +76,7 @@ impl Session<'_, '_, '_> {
             RowCovariance::known(&chosen.weak.kernels, &chosen.weak.torque, [0.0; 3], [0.0, 1.0], chosen.weak.stride);
         let raised = self.noise != self.channel_noise;
         for step in 0..STEPS {
-            let fitted = match chosen.fitted.take() {
-                Some(fitted) => fitted,
-                None => self.fit_first(chosen, model)?,
-            };
+            let fitted = self.take_fitted(chosen, model)?;
             let left = self.left_over_expected(&chosen.weak, &fitted)?;
             let expected = fitted.expected.variance;
             chosen.fitted = Some(fitted);
@@ -100,12 +96,8 @@ impl Session<'_, '_, '_> {
     /// Whether so much is left of the equations that they are wrong rather than noisy: a term is missing, or the torque is late. Windows hardly
     /// longer than the test function follow what is wrong as if it were motion: they must leave next to nothing.
     fn is_no_noise(&mut self, chosen: &mut Chosen, model: &Model) -> Result<bool, Error> {
-        let fitted = match chosen.fitted.take() {
-            Some(fitted) => fitted,
-            None => self.fit_first(chosen, model)?,
-        };
-        let function = 2 * chosen.weak.function.half_width() + 1;
-        let follows = |fit: &Fit| fit.scale.is_some() && fit.span * chosen.weak.stride < SHORT * function;
+        let fitted = self.take_fitted(chosen, model)?;
+        let follows = |fit: &Fit| fit.scale.is_some() && chosen.weak.follow_anything(fit.span);
         let most = if fitted.fit.as_ref().is_some_and(follows) { LEFT_BY_SHORT } else { UNEXPLAINED };
         let is_more = fitted.expected.torque > most * chosen.weak.rows.mean_square();
         chosen.fitted = Some(fitted);

@@ -27,10 +27,7 @@ impl Session<'_, '_, '_> {
         model: &Model,
         offset: usize,
     ) -> Result<bool, Error> {
-        let fitted = match chosen.fitted.take() {
-            Some(fitted) => fitted,
-            None => self.fit_first(chosen, model)?,
-        };
+        let fitted = self.take_fitted(chosen, model)?;
         let is_raised = self.noise != self.channel_noise;
         let (error, is_odd) = (fitted.error, fitted.error > BADLY || fitted.has_shortest_windows() || is_raised);
         chosen.fitted = Some(fitted);

@@ -30,10 +30,7 @@ impl Session<'_, '_, '_> {
     pub(crate) fn guess_angle_zero(&mut self, model: &Model, offset: usize) -> Result<Option<f64>, Error> {
         let free = with_free_offset(model, offset);
         let mut chosen = self.choose(&free)?;
-        let decided = match chosen.fitted.take() {
-            Some(fitted) => fitted,
-            None => self.fit_first(&chosen, &free)?,
-        };
+        let decided = self.take_fitted(&mut chosen, &free)?;
         Ok(decided.fit.as_ref().and_then(|fit| slope(&windows(&decided.model, fit)?)))
     }
 }

@@ -128,10 +128,7 @@ impl Session<'_, '_, '_> {
     /// Moves the angle until next to nothing remains while everything that is not windowed is constant; whether it comes to rest.
     fn approach(&mut self, chosen: &mut Chosen, model: &Model) -> Result<bool, Error> {
         for _ in 0..STEPS {
-            let fitted = match chosen.fitted.take() {
-                Some(fitted) => fitted,
-                None => self.fit_first(chosen, model)?,
-            };
+            let fitted = self.take_fitted(chosen, model)?;
             let Some((left, error)) = self.left_of_zero(chosen, &fitted)? else { return Ok(false) };
             if left.abs() <= CHOSEN * error {
                 chosen.fitted = Some(fitted);

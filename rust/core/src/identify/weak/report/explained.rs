@@ -18,9 +18,6 @@ const MOST: f64 = 9.0;
 /// A part of the rows that no normal noise makes outliers of: ten times what is expected.
 const OUTLIERS: f64 = 0.03;
 
-/// Windows shorter than so many test functions may follow noise.
-const SHORT: usize = 2;
-
 /// What is left of every row, and whether a fit says anything of it.
 type Left = (Vec<f64>, Vec<bool>);
 
@@ -148,8 +145,7 @@ impl Session<'_, '_, '_> {
 
 /// A length of windows, or the longest of all where it is so short that windows follow noise that is correlated over a test function.
 fn longer(scale: Scale, weak: &WeakRows, decided: &Decided) -> Scale {
-    let follows = scale.span() * weak.stride < SHORT * (2 * weak.function.half_width() + 1);
-    decided.scales.last().copied().filter(|_| follows).unwrap_or(scale)
+    decided.scales.last().copied().filter(|_| weak.follow_anything(scale.span())).unwrap_or(scale)
 }
 
 /// Unknowns that the fit of so many rows follows chance with: where windows are tested on what they do not hold, their own have none.
