@@ -22,8 +22,7 @@ demo: $(BUILT)  ## identify a simulated recording, print what was found against 
 .PHONY: test
 test: test-rust  ## every test and every lint; the last line says which tests had no recordings
 	$(MAKE) $(BUILT)
-	# The Python tests are one process: linters use the other processor meanwhile. What each prints stays together.
-	$(MAKE) --no-print-directory --jobs=2 --output-sync=target lint test-python
+	$(MAKE) --no-print-directory lint test-python
 
 .PHONY: test-rust
 test-rust:  ## tests of the core
@@ -31,7 +30,8 @@ test-rust:  ## tests of the core
 
 .PHONY: test-python
 test-python: $(BUILT)  ## tests of the Python package
-	$(BIN)/python -m pytest --quiet
+	# Two processes on neighbouring tests: what tests of one file share is made once. Whoever is done first takes over from the other.
+	$(BIN)/python -m pytest --quiet --numprocesses=2 --dist=worksteal
 
 .PHONY: lint
 lint: $(BUILT)  ## formatters, linters, type checkers
