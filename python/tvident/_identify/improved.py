@@ -17,6 +17,9 @@ from tvident._identify.settings import Request, resolve
 from tvident._results import Identification, Words
 from tvident._status import Status
 
+_LENGTHS = ("window_length", "exponent", "regression_window")
+"""Arguments of the form that a trial may keep."""
+
 _DOUBTED = (
     Status.TERM_SUSPECTED | Status.LAG_SUSPECTED | Status.NOISE_MODEL | Status.WINDOW_LIMIT | Status.SCALES_DISAGREE
 )
@@ -94,7 +97,7 @@ class Improvement:
         return suspects + [name for name in dict.fromkeys(others) if name not in present]
 
     def _identify(self, *, lag: Any, terms: Any, diagnose: bool = False, **given: Any) -> Identification:
-        form = WeakForm(**{name: given.pop(name) for name in ("window_length", "exponent") if name in given})
+        form = WeakForm(**{name: given.pop(name) for name in _LENGTHS if name in given})
         asked = {**given, "terms": terms, "lag": lag, "quantisation": self.request.quantisation}
         # An angle that turns is unwrapped by now.
         request = replace(resolve(form, asked, None, 1 / self.data.period), period=self.request.period)

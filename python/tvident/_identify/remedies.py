@@ -89,14 +89,16 @@ class Trial:
         for one in self.suspects:
             changed = self._with(call, one)
             changed_by[one] = {"terms": changed["terms"], "lag": changed["lag"]}
-            result = self.identify(**kinds, **changed_by[one])
-            found[one] = (_unexplained(result) if _is_there(one, result) else np.inf, result)
-        best = min(found, key=lambda one: found[one][0])
-        least, result = found[best]
+            # Which one is found with the lengths that were chosen; what it is worth, with lengths of its own: choosing takes most of the time.
+            result = self.identify(**kinds, **changed_by[one], **self._lengths)
+            found[one] = _unexplained(result) if _is_there(one, result) else np.inf
+        best = min(found, key=found.__getitem__)
         now = _unexplained(self.result)
-        if not least <= _BETTER * now or not _holds(
-            least, lambda: self.identify(**kinds, **changed_by[best], diagnose=True)
-        ):
+        if not found[best] <= _WORTH * now:
+            return None
+        result = self.identify(**kinds, **changed_by[best], diagnose=True)
+        least = _unexplained(result)
+        if not (_is_there(best, result) and least <= _BETTER * now and _holds(least, lambda: result)):
             return None
         terms = [term if isinstance(term, str) else term.name for term in self._with(call, best)["terms"]]
         change = f"lag={result.settings['lag']:.4g}" if best == "lag" else f"terms={terms}"
@@ -124,9 +126,13 @@ class Trial:
     def _with(self, call: Call, change: str) -> Call:
         return call | ({"lag": "auto"} if change == "lag" else {"terms": [*call["terms"], change]})
 
+    @property
+    def _lengths(self) -> Call:
+        """Lengths of the test function and of windows, as they were chosen."""
+        return {name: self.result.settings[name] for name in ("window_length", "exponent", "regression_window")}
+
     def _identified(self, call: Call, *, diagnose: bool = False) -> Identification:
-        settings = self.result.settings
-        window = {name: settings[name] for name in ("window_length", "exponent")}
+        window = {name: self.result.settings[name] for name in ("window_length", "exponent")}
         return self.identify(
             **(call | {"terms": [(term, "constant") for term in call["terms"]]}), **window, diagnose=diagnose
         )
