@@ -89,7 +89,7 @@ class Trial:
         for one in self.suspects:
             changed = self._with(call, one)
             changed_by[one] = {"terms": changed["terms"], "lag": changed["lag"]}
-            # Which one is found with the lengths that were chosen; what it is worth, with lengths of its own: choosing takes most of the time.
+            # Which one is found with the lengths that were chosen, what it is worth with its own: choosing takes most of the time.
             result = self.identify(**kinds, **changed_by[one], **self._lengths)
             found[one] = _unexplained(result) if _is_there(one, result) else np.inf
         best = min(found, key=found.__getitem__)
