@@ -75,6 +75,16 @@ def test_coloured_noise_of_the_torque_is_no_change_of_the_parameters(kind: str) 
     assert np.mean([one[INTERIOR] for one in within]) > 0.8
 
 
+@pytest.mark.parametrize(("kind", "seed"), [("0.95", 0), ("0.95", 8), ("0.95", 16), ("pink", 16)])
+def test_noise_that_lasts_longer_than_a_test_function_is_no_change_either(kind: str, seed: int) -> None:
+    rig = tvident.simulate_torsional_rig(20.0, seed=seed, torque_snr_db=40.0)
+    torque = rig.torque + 0.01 * rig.torque.std() * coloured(kind, rig.torque.size, seed)
+    result = tvident.identify(rig.angle, torque, sample_rate=rig.sample_rate)
+    assert result.settings["kinds"]["inertia"] == result.settings["kinds"]["damping"] == "constant"
+    assert result.jumps == ()
+    assert error(result.inertia, rig.inertia) < 2e-3
+
+
 def test_what_the_channels_do_not_explain_is_said_as_before() -> None:
     rig = tvident.simulate_torsional_rig(12.0, seed=0, pattern="constant")
     torque = rig.torque + 0.3 * rig.torque.std() * np.sign(rig.true_velocity)

@@ -53,28 +53,47 @@ pub struct Test {
     freedom: usize,
 }
 
+/// Where the variance of the noise is known from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NoiseFrom {
+    /// The highest frequencies of the channels.
+    Channels,
+    /// What the equations leave.
+    Equations,
+}
+
 /// The constants of some rows, and their variances; nothing where the rows do not determine them.
 type Estimate = Option<(Vec<f64>, Vec<f64>)>;
 
 impl Test {
-    /// The test again where estimates scatter more, by a factor of the variance, than noise explains.
-    fn beside_scatter(&mut self, factor: f64) {
-        if factor < SCATTERED {
+    /// The test again where estimates scatter more, by a factor of the variance, than noise explains, or where that noise is known from the
+    /// equations alone: it is coloured, and stronger the longer the parts that are compared.
+    fn beside_scatter(&mut self, factor: f64, noise: NoiseFrom) {
+        if factor < SCATTERED && noise == NoiseFrom::Channels {
             return;
         }
+        let factor = factor.max(1.0);
         if let Ok(ratio) = FisherSnedecor::new(self.freedom as f64, FREEDOM) {
             self.probability = self.probability.max(ratio.sf(self.squares / factor));
         }
     }
 }
 
-/// Tests every constant of a fit; the result is `None` if the blocks do not determine it. `inflation` multiplies the variances.
+/// The noise that a test compares with.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TestNoise<'a> {
+    pub(crate) expected: Expected,
+    pub(crate) covariance: &'a RowCovariance,
+    /// What variances are multiplied by.
+    pub(crate) inflation: f64,
+    pub(crate) from: NoiseFrom,
+}
+
+/// Tests every constant of a fit; the result is `None` if the blocks do not determine it.
 pub(crate) fn test(
     problem: &Problem<'_>,
     fit: &Fit,
-    expected: Expected,
-    covariance: &RowCovariance,
-    inflation: f64,
+    TestNoise { expected, covariance, inflation, from }: TestNoise<'_>,
     instructions: Instructions,
     stages: &mut Stages<'_, '_>,
 ) -> Result<Vec<Option<Test>>, Error> {
@@ -107,7 +126,7 @@ pub(crate) fn test(
         let parts = stages.map(pieces(BLOCKS * PARTS), || (), estimate)?;
         for (constant, test) in tests.iter_mut().enumerate() {
             if let (Some(test), Some(factor)) = (test, scatter(&of(&parts, constant))) {
-                test.beside_scatter(factor);
+                test.beside_scatter(factor, from);
             }
         }
     }
@@ -225,7 +244,7 @@ mod tests {
     }
 
     /// What is said of two constants, the first of which grows by some part over the record.
-    fn tests_of(growth: f64) -> Vec<Option<Test>> {
+    fn tests_of(growth: f64, from: NoiseFrom) -> Vec<Option<Test>> {
         use crate::regression::simulated::{CONSTANTS, model, rows, staged, white};
         let (count, deviation) = (1600, 0.1);
         let mut rows = rows(count, |time| [1.0 + 0.01 * time, 0.01], deviation);
@@ -235,16 +254,18 @@ mod tests {
         }
         let problem = model().problem(&rows, &rows.rhs, 0.0, None);
         let variance = deviation * deviation;
-        let covariance = RowCovariance { lags: vec![variance] };
+        let covariance = &RowCovariance { lags: vec![variance] };
         let fit = Fit::in_rows(&problem, 64, white(variance), Instructions::Scalar).expect("constants");
         let expected = white(variance);
-        staged(|stages| test(&problem, &fit, expected, &covariance, 1.0, Instructions::Scalar, stages))
+        let noise = TestNoise { expected, covariance, inflation: 1.0, from };
+        staged(|stages| test(&problem, &fit, noise, Instructions::Scalar, stages))
     }
 
     #[test]
     fn a_constant_that_grows_is_no_chance_and_one_that_does_not_is() {
         for (growth, differs) in [(0.0, false), (0.05, true), (0.3, true)] {
-            let tests: Vec<Test> = tests_of(growth).into_iter().map(|one| one.expect("eight blocks")).collect();
+            let tests: Vec<Test> =
+                tests_of(growth, NoiseFrom::Channels).into_iter().map(|one| one.expect("eight blocks")).collect();
             assert_eq!(tests[0].probability < NO_CHANCE, differs, "{growth}: {:?}", tests[0]);
             assert!(tests[1].probability > 1e-3, "{:?}", tests[1]);
             if growth == 0.3 {
@@ -252,6 +273,18 @@ mod tests {
                 let line = growth / 12.0_f64.sqrt() * (1.0_f64 - 1.0 / 64.0).sqrt() * (8.0_f64 / 7.0).sqrt();
                 assert!((tests[0].spread / line - 1.0).abs() < 0.15, "{}, {line}", tests[0].spread);
             }
+        }
+    }
+
+    #[test]
+    fn noise_that_equations_show_asks_for_more_than_chance() {
+        let probability = |growth: f64, from: NoiseFrom| {
+            let first = tests_of(growth, from).into_iter().next().flatten();
+            first.expect("eight blocks").probability
+        };
+        for (growth, found) in [(0.03, false), (0.3, true)] {
+            assert!(probability(growth, NoiseFrom::Channels) < NO_CHANCE, "{growth}");
+            assert_eq!(probability(growth, NoiseFrom::Equations) < NO_CHANCE, found, "{growth}");
         }
     }
 }

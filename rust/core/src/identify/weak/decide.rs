@@ -8,9 +8,10 @@ use crate::identify::kinds::Kind;
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
+use crate::inference::constancy::{self, NoiseFrom, TestNoise};
 use crate::inference::jumps::jump::Jump;
 use crate::inference::jumps::search;
-use crate::inference::{constancy, slowly_varying};
+use crate::inference::slowly_varying;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
 use crate::regression::window_length::Scale;
@@ -130,10 +131,14 @@ impl Session<'_, '_, '_> {
     fn test(&mut self, rows: &Rows, decided: &mut Decided) -> Result<Option<usize>, Error> {
         let Some(fit) = &decided.fit else { return Ok(None) };
         let problem = decided.problem(decided.rows(rows), self.noise[0]);
-        let (expected, inflation) = (decided.expected, decided.error.max(1.0));
-        let instructions = self.options.instructions;
-        let results =
-            constancy::test(&problem, fit, expected, &decided.covariance, inflation, instructions, &mut self.stages)?;
+        let is_raised = self.noise != self.channel_noise;
+        let noise = TestNoise {
+            expected: decided.expected,
+            covariance: &decided.covariance,
+            inflation: decided.error.max(1.0),
+            from: if is_raised { NoiseFrom::Equations } else { NoiseFrom::Channels },
+        };
+        let results = constancy::test(&problem, fit, noise, self.options.instructions, &mut self.stages)?;
         // Tests of what was set free before stand as they were.
         decided.tests.retain(|(one, _)| decided.slow.contains(one));
         let constants = decided.model.constant.iter().zip(results);

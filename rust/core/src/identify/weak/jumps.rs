@@ -18,6 +18,9 @@ use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows};
 /// Lengths of windows, from the best one on and each twice the last, that jumps are looked for with.
 const JUMP_SCALES: usize = 3;
 
+/// What the variance is multiplied by where it is known from the equations alone: coloured noise wanders for as long as a jump is looked for.
+const COLOURED: f64 = 2.0;
+
 impl Session<'_, '_, '_> {
     /// Finds jumps of windowed coefficients beside the known ones. `whole` holds all rows where some are over jumps.
     pub(crate) fn find_jumps(
@@ -56,7 +59,7 @@ impl Session<'_, '_, '_> {
             first: weak.first,
             stride: weak.stride,
             expected: decided.expected,
-            inflation: decided.error.max(1.0),
+            inflation: decided.error.max(1.0) * if self.noise == self.channel_noise { 1.0 } else { COLOURED },
             scales: &decided.scales,
             lengths: &lengths,
             instructions: self.options.instructions,
