@@ -73,12 +73,15 @@ class Trial:
             chosen.append(next_one)
             call, best = self._with(call, next_one), left[next_one]
         without = call | {"stiffness": 0.0}
-        if not chosen and "windowed" in self.result.settings["kinds"].values():
+        # What explains nothing with parameters that change is not explained by one term more either.
+        if not chosen and not self._explains_nothing and "windowed" in self.result.settings["kinds"].values():
             # Where a parameter changes constants explain too little to tell what is missing.
             advice = self._beside_changes(call)
             if advice is not None:
                 return advice
         is_none = isinstance(self.given["stiffness"], str) and bool(self._left(without) <= _NOTHING * best < np.inf)
+        if self._explains_nothing and not chosen and not is_none:
+            return None
         return self._compared(call, without if is_none else call, chosen)
 
     def _beside_changes(self, call: Call) -> str | None:
@@ -125,6 +128,11 @@ class Trial:
 
     def _with(self, call: Call, change: str) -> Call:
         return call | ({"lag": "auto"} if change == "lag" else {"terms": [*call["terms"], change]})
+
+    @property
+    def _explains_nothing(self) -> bool:
+        is_lost = bool(self.result.record_status & Status.RANK_DEFICIENT)
+        return is_lost and not any(np.isfinite(getattr(self.result, name)).any() for name in COEFFICIENTS)
 
     @property
     def _lengths(self) -> Call:
