@@ -22,6 +22,7 @@ ROOMS = (
     "_status",
     "_formats",
     "_files",
+    "_huber",
     "_derivatives",
     "_regression",
     "_simulate",

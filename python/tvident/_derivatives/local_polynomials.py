@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, get_args
+from functools import partial
+from typing import Any, Literal, get_args
 
+import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
@@ -12,7 +14,14 @@ from tvident._derivatives.automatic import choose
 from tvident._derivatives.fit import LocalPolynomialFit, Sampled
 from tvident._derivatives.found import Found
 from tvident._derivatives.plans import HIGHEST_ORDER, SHORTEST_WINDOW, Criterion, Selection, plan, quantisation_step
+from tvident._huber import pseudo_values
 from tvident._tables import shaped
+
+_CHOICES = 2
+"""Times that windows are chosen before residuals are clipped: spikes make the first choice too short."""
+
+_USUAL_PARAMETERS = 5
+"""Coefficients of a polynomial of order 4, for the correction of standard errors, which hardly depends on it."""
 
 
 # All but the data are options, as users call it.
@@ -27,6 +36,7 @@ def fit_local_polynomials(
     order: int | None = None,
     criterion: Criterion = "aicc",
     selection: Selection = "window",
+    loss: Literal["squares", "huber"] = "squares",
     max_deriv: int = 2,
     axis: int = -1,
     step: int = 1,
@@ -71,6 +81,9 @@ def fit_local_polynomials(
         ``"window"``: every window has the order with the smallest criterion in it, as in the paper. ``"pooled"``: the criterion is summed
         over the neighbouring windows, those that share a sample with the window, and the sum chooses the order. ``"average"``: the
         estimates of all orders are averaged with Akaike weights :math:`w_n ∝ \exp(-AICc_n/2)`.
+    loss : {"squares", "huber"}, optional
+        ``"huber"``: residuals of the value beyond 1.345 standard deviations count linearly, so that spikes move estimates by little,
+        however large they are (Huber 1981, modified residuals). Some 10 to 40 fits are made.
     max_deriv : int, optional
         Highest derivative wanted, at most 15.
     axis : int, optional
@@ -141,6 +154,7 @@ def fit_local_polynomials(
     ----------
     M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
     K. P. Burnham, D. R. Anderson: Model Selection and Multimodel Inference, 2002.
+    P. J. Huber: Robust statistics, Wiley 1981.
 
     Examples
     --------
@@ -204,20 +218,25 @@ def fit_local_polynomials(
             quantisation=step_of_rounding,
         )
 
+    choose_automatically = partial(
+        choose,
+        plan_of_window=plan_of_window,
+        max_order=max_order,
+        order=order,
+        delta=seconds,
+        quantisation=None if quantisation is None and turned is None else step_of_rounding,
+        workers=threads,
+    )
+    if arguments.one_of("loss", loss, ("squares", "huber")) == "huber":
+        for _ in range(_CHOICES if automatic else 1):
+            if automatic:
+                value = choose_automatically(samples, max_deriv=0, step=count, progress=None)
+                length = int(np.median(np.asarray(value.window_length)))
+            samples = _with_clipped_residuals(samples, plan_of_window(max(length, SHORTEST_WINDOW)), length, threads)
     with arguments.reporter(progress, "local polynomials") as report:
         if automatic:
-            found = choose(
-                samples,
-                plan_of_window,
-                max_deriv=max_deriv,
-                max_order=max_order,
-                order=order,
-                delta=seconds,
-                quantisation=None if quantisation is None and turned is None else step_of_rounding,
-                step=every,
-                workers=threads,
-                progress=report,
-            )
+            found = choose_automatically(samples, max_deriv=max_deriv, step=every, progress=report)
+            found.settings["loss"] = loss
             found.settings.update(_of_wrapped(turned, period))
             return LocalPolynomialFit(samples, axis, found, sampled)
         core_plan = plan_of_window(length)
@@ -234,6 +253,7 @@ def fit_local_polynomials(
             "max_order": max_order,
             "criterion": criterion,
             "selection": selection,
+            "loss": loss,
             "quantisation": step_of_rounding,
             **_of_wrapped(turned, period),
         },
@@ -241,6 +261,19 @@ def fit_local_polynomials(
         plan_of=lambda _: core_plan,
     )
     return LocalPolynomialFit(samples, axis, found, sampled)
+
+
+def _with_clipped_residuals(
+    samples: npt.NDArray[Any], core_plan: _core.LocalPolynomials, length: int, workers: int | None
+) -> npt.NDArray[np.float64]:
+    """Return samples whose least squares in windows are those of Huber's loss."""
+    sides = samples.reshape(-1, samples.shape[-1]).T.astype(np.float64)
+
+    def value(sides: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        return np.asarray(core_plan.estimate(np.ascontiguousarray(sides.T), step=1, workers=workers).derivatives[0].T)
+
+    clipped = pseudo_values(value, sides, np.ones(sides.shape[0], bool), length, _USUAL_PARAMETERS)
+    return np.asarray(clipped.T.reshape(samples.shape))
 
 
 def _of_wrapped(turned: arguments.Unwrapped | None, period: float | None) -> dict[str, Any]:

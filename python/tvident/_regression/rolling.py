@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
-from tvident._regression.huber import pseudo_values
+from tvident._huber import pseudo_values
 from tvident._status import Status
 
 MOST_REGRESSORS = 16

@@ -1,4 +1,4 @@
-"""Huber's loss: residuals beyond a limit count linearly, so that spikes move an estimate by little, however large they are."""
+"""Right-hand sides whose least squares in windows are those of Huber's loss: residuals beyond a limit count linearly."""
 
 from __future__ import annotations
 
