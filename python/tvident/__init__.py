@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from tvident._files import FileRecording, read_recording
     from tvident._identify import StrongForm, WeakForm, identify
     from tvident._regression import RollingRegression, rolling_least_squares
-    from tvident._results import Identification, Scan, load
+    from tvident._results import Identification, IdentifiedRecords, Scan, load
     from tvident._simulate import Recording, simulate_torsional_rig
     from tvident._status import Status
     from tvident._units import Channel
@@ -21,6 +21,7 @@ __all__ = [
     "Channel",
     "FileRecording",
     "Identification",
+    "IdentifiedRecords",
     "LocalPolynomialFit",
     "ModelComparison",
     "Recording",
@@ -47,7 +48,7 @@ _ROOMS = {
     "_files": ("FileRecording", "read_recording"),
     "_identify": ("StrongForm", "WeakForm", "identify"),
     "_regression": ("RollingRegression", "rolling_least_squares"),
-    "_results": ("Identification", "Scan", "load"),
+    "_results": ("Identification", "IdentifiedRecords", "Scan", "load"),
     "_simulate": ("Recording", "simulate_torsional_rig"),
     "_status": ("Status",),
     "_units": ("Channel",),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,7 @@ from tvident._equation import LINEAR_UNITS, UNITS, GivenTerm, Parameter
 from tvident._identify.channels import motion_channels
 from tvident._identify.data import Data
 from tvident._identify.methods import Method
+from tvident._identify.records import calls_of_records, identify_records, names_shared
 from tvident._identify.settings import resolve
 from tvident._identify.task import Task
 from tvident._results import Identification
@@ -44,6 +45,7 @@ def identify(
     quantisation: float | None = None,
     mask: npt.ArrayLike | None = None,
     period: float | None = None,
+    share: str | Sequence[str] = (),
     nan_policy: arguments.RowPolicy = "omit",
     step: int = 1,
     settings: Mapping[str, Any] | None = None,
@@ -65,11 +67,12 @@ def identify(
 
     Parameters
     ----------
-    angle : array_like, shape (\*, n), or None
-        Angle in rad; None where `velocity` or `acceleration` was measured in its place. Time is the last axis; any others are a batch of
-        records. Masked samples are missing, as NaN is. Tables of pandas and polars have time along their rows, arrays of xarray along
-        ``time``; their labels come back with ``to_pandas()``, ``to_polars()`` and ``to_xarray()`` of the result. A column, shape (n, 1),
-        is one record.
+    angle : array_like, shape (\*, n), or list of them, or None
+        Angle in rad; a list of records of different lengths gives a result for each, the same as calls one by one, and then `mask`, `t`,
+        `sample_rate` and whatever has a value for every sample may be lists too; None where `velocity` or `acceleration` was measured in
+        its place. Time is the last axis; any others are a batch of records. Masked samples are missing, as NaN is. Tables of pandas and
+        polars have time along their rows, arrays of xarray along ``time``; their labels come back with ``to_pandas()``, ``to_polars()`` and
+        ``to_xarray()`` of the result. A column, shape (n, 1), is one record.
     torque : array_like, same shape
         Torque in N m.
     sample_rate : float
@@ -132,6 +135,10 @@ def identify(
         sample after a step of 0.4 to 0.6 periods, which may go either way, counts as missing. Across a gap the angle goes the shortest
         way or on with the velocity, whichever does better elsewhere in the record. Where both may be wrong by half a period the longest
         part between such gaps is used and the advice says so, unless the equation does not ask how often the angle went round.
+    share : str or sequence of str, optional
+        What all records of a list (or of a batch) have in common: ``"inertia"``, ``"damping"``, ``"stiffness"``, unknown and constant. It
+        is estimated from all of them, each with the weight of its information, and the rest from each with that known, and its error.
+        KIND_CONTRADICTED in ``record_status`` says that records differ more than their errors explain (Cochran's test, 1 in 1000).
     step : int, optional
         Every how many samples a result is wanted.
     nan_policy : {"omit", "propagate", "raise"}, optional
@@ -149,8 +156,9 @@ def identify(
 
     Returns
     -------
-    Identification
-        ``inertia``, ``damping``, ``stiffness``, ``stderr``, ``status``, ``trusted`` and more; ``summary()`` says it in words.
+    Identification or IdentifiedRecords
+        ``inertia``, ``damping``, ``stiffness``, ``stderr``, ``status``, ``trusted`` and more; ``summary()`` says it in words. For records
+        of different lengths, or with `share`, a sequence of these.
 
     Raises
     ------
@@ -171,7 +179,8 @@ def identify(
 
     In strong form with unknowns of one kind, the cost is about 60 ns a sample and thread for windows of any length, and memory is
     that of the results, except with terms of your own, which need the derivatives of the whole record. In weak form and with mixed
-    kinds it is about 1 to 15 µs a sample, the most if parameters jump, and the equations of the whole record are kept.
+    kinds it is about 1 to 15 µs a sample, the most if parameters jump, and the equations of the whole record are kept. With `share` every
+    record is identified twice, and once more for each that is shared to see what its error does to the rest.
 
     See Also
     --------
@@ -198,6 +207,11 @@ def identify(
     >>> bool(abs(paper.stiffness[2000] - 15) < 0.01)
     True
     """
+    call = {name: value for name, value in locals().items() if name != "share"}
+    records = calls_of_records(call, names := names_shared(share))
+    if records is not None:
+        # A type for either would ask everyone who identifies one record which it is.
+        return cast("Identification", identify_records(identify, records, names, progress))
     motion = {"angle": angle, "velocity": velocity, "acceleration": acceleration}
     measured = {name: values for name, values in motion.items() if values is not None}
     if not measured:

@@ -5,6 +5,7 @@ from tvident._results.explained import explained_steps
 from tvident._results.loaded import load
 from tvident._results.parts import chosen, of_records, settings_of
 from tvident._results.recorded import Recorded
+from tvident._results.records import IdentifiedRecords, Shared, covariance_between, with_shared
 from tvident._results.result import Identification
 from tvident._results.scan import Scan
 from tvident._results.words import Words, of_batch
@@ -12,13 +13,17 @@ from tvident._results.words import Words, of_batch
 __all__ = [
     "Estimates",
     "Identification",
+    "IdentifiedRecords",
     "Recorded",
     "Scan",
+    "Shared",
     "Words",
     "chosen",
+    "covariance_between",
     "explained_steps",
     "load",
     "of_batch",
     "of_records",
     "settings_of",
+    "with_shared",
 ]

@@ -1,0 +1,194 @@
+"""Many records of different lengths: each is identified, and what they share is estimated from all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident._equation import COEFFICIENTS
+from tvident._results import Identification, IdentifiedRecords, Shared, covariance_between, with_shared
+from tvident._status import Status
+
+Array = npt.NDArray[np.float64]
+Single = Callable[..., Identification]
+
+_CHANNELS = ("angle", "velocity", "acceleration", "torque", "instrument", "mask", "t")
+"""Arguments that have a value for every sample, and so one array a record."""
+
+_OTHERS = ("sample_rate", "delta", "inertia", "damping", "stiffness", "settings")
+"""Arguments that may be given for every record."""
+
+_MOST_CORRELATED = 0.9999
+"""Constants of one record are taken for no more correlated than this, so that rounding makes no variance negative."""
+
+_CHANCE = 3.09
+"""Standard deviations that one of a thousand normal numbers exceeds."""
+
+
+def names_shared(share: str | Sequence[str]) -> tuple[str, ...]:
+    """Return what records share, by name, each once."""
+    names = (share,) if isinstance(share, str) else tuple(share)
+    return tuple(dict.fromkeys(arguments.one_of("share", name, COEFFICIENTS) for name in names))
+
+
+def calls_of_records(call: Mapping[str, Any], share: Sequence[str]) -> list[dict[str, Any]] | None:
+    """Return one call for every record; None where records are of one length and nothing is shared, or there is one alone.
+
+    Raises
+    ------
+    ValueError
+        If channels have different numbers of records, or what is to be shared cannot be.
+    """
+    motion = next((name for name in _CHANNELS if call[name] is not None), "torque")
+    count = _records(call[motion])
+    if share:
+        count = count or _records_of_batch(motion, call[motion])
+        _check_shared(share, call)
+    elif count is None or len({np.shape(one)[-1] for one in call[motion]}) == 1:
+        return None
+    calls: list[dict[str, Any]] = [{} for _ in range(count)]
+    for name, value in call.items():
+        for place, one in enumerate(_each(name, value, count)):
+            calls[place][name] = one
+    return calls
+
+
+def identify_records(
+    single: Single, calls: Sequence[Mapping[str, Any]], share: Sequence[str], progress: arguments.Progress
+) -> IdentifiedRecords:
+    """Identify every record, and what they share from all of them."""
+    sizes = [int(np.shape(call["torque"])[-1]) for call in calls]
+    rounds = 2 + len(share) if share else 1
+    total, before = rounds * sum(sizes), 0
+    with arguments.reporter(progress, "identification") as report:
+
+        def every(change: Callable[[int], Mapping[str, Any]]) -> list[Identification]:
+            nonlocal before
+            found = []
+            for place, call in enumerate(calls):
+                begin = before
+                tell = None if report is None else lambda done, _, begin=begin: report(begin + done, total)
+                found.append(single(**{**call, **change(place), "progress": tell}))
+                before += sizes[place]
+            return found
+
+        alone = every(lambda _: dict.fromkeys(share, "constant"))
+        if not share:
+            return IdentifiedRecords(alone)
+        shared = _merged(alone, share)
+        if not np.isfinite(shared.covariance).all():
+            return IdentifiedRecords(alone, shared)
+        known = every(lambda _: shared.values)
+        errors = {name: error for name, (_, error) in shared.constants.items()}
+        moved = {
+            name: every(
+                lambda place, name=name: {  # type: ignore[misc]
+                    **shared.values,
+                    name: shared.values[name] + errors[name],
+                    "settings": known[place].settings,
+                }
+            )
+            for name in share
+        }
+    together = [
+        with_shared(one, shared, {name: moved[name][place] for name in share}) for place, one in enumerate(known)
+    ]
+    return IdentifiedRecords(together, shared)
+
+
+def _records(values: Any) -> int | None:
+    """Return how many records a list holds; None where it is none, or one record of numbers."""
+    if not isinstance(values, list | tuple) or not values or any(np.ndim(one) == 0 for one in values):
+        return None
+    return len(values)
+
+
+def _records_of_batch(name: str, values: Any) -> int:
+    """Return how many records there are along the first axis of an array."""
+    shape = arguments.channel(name, values).shape
+    if len(shape) != 2:  # noqa: PLR2004 - records and samples
+        raise ValueError(
+            f"share= must have several records to share among; got {name} of shape {shape}; give a list of records"
+        )
+    return int(shape[0])
+
+
+def _check_shared(share: Sequence[str], call: Mapping[str, Any]) -> None:
+    """Check that what is shared is unknown and constant."""
+    for name in share:
+        value = call[name]
+        if value is not None and not (isinstance(value, str) and value in {"auto", "constant"}):
+            raise ValueError(
+                f"share must name what is unknown and constant in every record; got {name!r}, which is {arguments.shown(value)}; "
+                f"let {name} be 'constant', or share something else"
+            )
+
+
+def _each(name: str, value: Any, count: int) -> Sequence[Any]:
+    """Return an argument of every record."""
+    if value is None or name not in (*_CHANNELS, *_OTHERS):
+        return [value] * count
+    if name in _CHANNELS:
+        several = _records(value)
+        if several is None and name != "t" and np.ndim(value) > 1:
+            several, value = len(value), list(value)
+        if several is None and name == "t":
+            return [value] * count
+    else:
+        several = len(value) if isinstance(value, list | tuple) else None
+        if several is None or (several != count and name not in {"settings", "sample_rate", "delta"}):
+            return [value] * count
+    if several != count:
+        raise ValueError(
+            f"every channel must have as many records as the others; got {several or 1} of {name} for {count}; give one a record"
+        )
+    return list(value)
+
+
+def _merged(results: Sequence[Identification], share: Sequence[str]) -> Shared:
+    """Return what all records say of what they share, each weighted by its information."""
+    count = len(share)
+    information, pull = np.zeros((count, count)), np.zeros(count)
+    told = []
+    for result in results:
+        values = np.array([result.constants[name][0] for name in share])
+        covariance = _covariance(result, share)
+        there = np.flatnonzero(np.isfinite(values) & (np.diagonal(covariance) > 0))
+        if Status(int(result.record_status)) & Status.RANK_DEFICIENT or not there.size:
+            continue
+        weight = np.zeros((count, count))
+        weight[np.ix_(there, there)] = np.linalg.inv(covariance[np.ix_(there, there)])
+        information += weight
+        pull += weight @ np.nan_to_num(values)
+        told.append((np.nan_to_num(values), weight, there.size))
+    names = dict.fromkeys(share, float("nan"))
+    if not told or (np.diagonal(information) <= 0).any():
+        return Shared(names, np.full((count, count), np.nan), float("nan"), 0, float("inf"))
+    together: Array = np.asarray(np.linalg.inv(information), dtype=np.float64)
+    merged = together @ pull
+    agreement = sum(float((values - merged) @ weight @ (values - merged)) for values, weight, _ in told)
+    freedom = sum(size for *_, size in told) - count
+    return Shared(dict(zip(share, merged.tolist(), strict=True)), together, agreement, freedom, _limit(freedom))
+
+
+def _covariance(result: Identification, share: Sequence[str]) -> Array:
+    """Return the covariance of constants of one record."""
+    errors = np.array([result.constants[name][1] for name in share])
+    covariance = np.diag(np.square(errors))
+    for i, one in enumerate(share):
+        for k, other in enumerate(share[:i]):
+            most = _MOST_CORRELATED * errors[i] * errors[k]
+            covariance[i, k] = covariance[k, i] = np.clip(covariance_between(result, one, other), -most, most)
+    return covariance
+
+
+def _limit(freedom: int) -> float:
+    """Return what a sum of so many squares exceeds in one of a thousand cases (Wilson and Hilferty 1931)."""
+    if freedom < 1:
+        return float("inf")
+    part = 2 / (9 * freedom)
+    return float(freedom * (1 - part + _CHANCE * np.sqrt(part)) ** 3)

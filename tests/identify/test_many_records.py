@@ -1,0 +1,144 @@
+"""Records of different lengths: each as on its own, and what they share from all of them, with errors that hold."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import tvident
+from tvident import IdentifiedRecords, Status
+
+Array = npt.NDArray[np.float64]
+
+RATE = 500.0
+INERTIA = 0.012
+SYSTEMS = [(10.0, 0.05, 700), (15.0, 0.1, 900), (20.0, 0.05, 1100), (30.0, 0.2, 800)]
+"""Stiffness, damping and samples of each record."""
+
+
+def record(generator: np.random.Generator, stiffness: float, damping: float, samples: int) -> tuple[Array, Array]:
+    """Return an angle of six sines and the torque of a system with this inertia, both with noise."""
+    t = np.arange(samples) / RATE
+    omega, phase = 2 * np.pi * generator.uniform(1, 9, (6, 1)), generator.uniform(0, 2 * np.pi, (6, 1))
+    size = generator.uniform(0.05, 0.15, (6, 1))
+    angle = (size * np.sin(omega * t + phase)).sum(axis=0)
+    velocity = (size * omega * np.cos(omega * t + phase)).sum(axis=0)
+    acceleration = -(size * omega**2 * np.sin(omega * t + phase)).sum(axis=0)
+    torque = INERTIA * acceleration + damping * velocity + stiffness * angle
+    return angle + 3e-4 * generator.standard_normal(samples), torque + 0.1 * generator.standard_normal(samples)
+
+
+def records(seed: int) -> tuple[list[Array], list[Array]]:
+    generator = np.random.default_rng(seed)
+    made = [record(generator, *system) for system in SYSTEMS]
+    return [angle for angle, _ in made], [torque for _, torque in made]
+
+
+def identified(angles: Any, torques: Any, **options: Any) -> IdentifiedRecords:
+    return cast("IdentifiedRecords", tvident.identify(angles, torques, **{"sample_rate": RATE, **options}))
+
+
+def test_a_list_gives_what_single_calls_give() -> None:
+    angles, torques = records(0)
+    masks = [np.arange(angle.size) > 100 for angle in angles]
+    done: list[tuple[int, int]] = []
+    found = identified(angles, torques, mask=masks, step=3, progress=lambda *of: done.append(of))
+    assert isinstance(found, IdentifiedRecords)
+    assert done[-1] == (3500, 3500)
+    assert found.constants == {}
+    for one, angle, torque, mask in zip(found, angles, torques, masks, strict=True):
+        alone = tvident.identify(angle, torque, sample_rate=RATE, mask=mask, step=3)
+        for name in ("inertia", "damping", "stiffness", "status"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(alone, name))
+        np.testing.assert_array_equal(one.stderr["stiffness"], alone.stderr["stiffness"])
+        assert one.settings == alone.settings
+    assert "record 3" in found.summary()
+    assert len(found[1:]) == 3
+    rates = identified(angles, torques, sample_rate=[RATE, RATE, 2 * RATE, RATE])
+    np.testing.assert_array_equal(rates[1].stiffness, identified(angles, torques)[1].stiffness)
+    assert rates[2].time[1] == 1 / (2 * RATE)
+
+
+def test_records_of_one_length_stay_a_batch() -> None:
+    angles, torques = (np.stack([one[:700] for one in channel]) for channel in records(1))
+    batch = tvident.identify(list(angles), list(torques), sample_rate=RATE)
+    assert batch.stiffness.shape == (4, 700)
+    shared = identified(angles, torques, share="inertia")
+    assert [one.stiffness.shape for one in shared] == [(700,)] * 4
+    assert (
+        shared.constants["inertia"] == identified(list(angles), list(torques), share=["inertia"]).constants["inertia"]
+    )
+
+
+@pytest.mark.parametrize("stiffness", ["constant", "windowed"])
+def test_what_is_shared_and_the_rest_have_errors_that_hold(stiffness: str) -> None:
+    form = tvident.WeakForm(
+        window_length=61, exponent=6, regression_window="auto" if stiffness == "constant" else 300, averaging=None
+    )
+    over: dict[str, list[float]] = {"inertia": [], "damping": [], "stiffness": [], "natural_frequency": []}
+    smaller = []
+    for seed in range(15):
+        angles, torques = records(seed)
+        options = {"method": form, "stiffness": stiffness, "damping": "constant", "terms": ()}
+        found = identified(angles, torques, share=("inertia",), **options)
+        value, error = found.constants["inertia"]
+        over["inertia"].append((value - INERTIA) / error)
+        for one, (spring, damper, _) in zip(found, SYSTEMS, strict=True):
+            assert one.constants["inertia"] == (value, error)
+            middle = one.time.size // 2
+            truth = {"stiffness": spring, "damping": damper, "natural_frequency": np.sqrt(spring / INERTIA) / 2 / np.pi}
+            for name, expected in truth.items():
+                over[name].append((getattr(one, name)[middle] - expected) / one.stderr[name][middle])
+        if seed == 0:
+            alone = identified(angles, torques, inertia="constant", **options)
+            smaller = [error / one.constants["inertia"][1] for one in alone]
+            assert not found.record_status & Status.KIND_CONTRADICTED
+    assert max(smaller) < 1
+    # Mean squares of 15 and 60 normal numbers scatter by 0.37 and 0.18: within four times that.
+    assert np.mean(np.square(over.pop("inertia"))) < 1 + 4 * 0.37
+    for name, scores in over.items():
+        assert 1 - 4 * 0.18 < np.mean(np.square(scores)) < 1 + 4 * 0.18, name
+
+
+def test_records_that_differ_in_what_they_share_are_flagged() -> None:
+    angles, torques = records(2)
+    found = identified(angles, [*torques[:3], 1.3 * torques[3]], share=("inertia",))
+    assert found.record_status & Status.KIND_CONTRADICTED
+    assert all(one.record_status & Status.KIND_CONTRADICTED for one in found)
+    assert found.advice[0].startswith("records differ in inertia by more than their errors explain")
+    still = identified([np.zeros(700), np.zeros(800)], [np.zeros(700), np.zeros(800)], share=("inertia",))
+    assert np.isnan(still.constants["inertia"]).all()
+    assert still.advice[0].startswith("no record determines inertia")
+
+
+def test_several_parameters_are_shared_at_once() -> None:
+    generator = np.random.default_rng(3)
+    made = [record(generator, stiffness, 0.1, samples) for stiffness, _, samples in SYSTEMS]
+    angles, torques = [angle for angle, _ in made], [torque for _, torque in made]
+    found = identified(angles, torques, share=("inertia", "damping"), terms=())
+    for name, truth in (("inertia", INERTIA), ("damping", 0.1)):
+        value, error = found.constants[name]
+        assert abs(value - truth) < 4 * error
+        np.testing.assert_array_equal(getattr(found[2], name), value)
+        np.testing.assert_allclose(found[2].stderr[name], error, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        ({"share": ("mass",)}, "share must be 'inertia', 'damping' or 'stiffness'; got 'mass'"),
+        ({"share": ("inertia",), "inertia": 0.1}, "unknown and constant in every record; got 'inertia', which is 0.1"),
+        ({"share": ("stiffness",), "stiffness": "windowed"}, "got 'stiffness', which is 'windowed'; let stiffness be"),
+        ({"torque": [np.ones(700)] * 3}, "as many records as the others; got 3 of torque for 4"),
+        ({"torque": np.ones(700)}, "as many records as the others; got 1 of torque for 4"),
+        ({"angle": np.ones(700), "torque": np.ones(700), "share": ("inertia",)}, "several records to share among"),
+        ({"sample_rate": [RATE, RATE]}, "as many records as the others; got 2 of sample_rate for 4"),
+    ],
+)
+def test_records_that_do_not_go_together_are_refused(call: dict[str, Any], message: str) -> None:
+    angles, torques = records(4)
+    with pytest.raises(ValueError, match=message):
+        tvident.identify(**{"angle": angles, "torque": torques, "sample_rate": RATE, **call})
