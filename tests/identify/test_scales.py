@@ -175,6 +175,18 @@ def recording(folder: Path, name: str) -> dict[str, Array]:
     return {one: np.asarray(values) for one, values in recordings.read(path).items()}
 
 
+@pytest.mark.parametrize(
+    ("pattern", "angle_noise", "seed"), [("ramp", 0.1, 44), ("square", 0.03, 33), ("constant", 0.1, 43)]
+)
+def test_narrow_widths_that_are_drowned_in_noise_agree_about_nothing(
+    pattern: Any, angle_noise: float, seed: int
+) -> None:
+    rig = tvident.simulate_torsional_rig(40.0, 1000.0, 20_000 + seed, pattern, angle_noise=angle_noise)
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=RATE)
+    assert result.record_status == 0
+    assert result.inertia[0] == pytest.approx(rig.inertia[0], rel=0.01)
+
+
 def test_a_pendulum_under_feedback(folder_of_recordings: Path) -> None:
     channels = recording(folder_of_recordings, "pendulum.csv")
     rate = 1 / float(np.diff(channels["time"]).mean())

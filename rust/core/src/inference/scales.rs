@@ -13,6 +13,9 @@ const AGREE: f64 = 2.0;
 /// Widths that agree span at least this factor, or they agree by chance.
 pub(crate) const LEAST_PLATEAU: f64 = 2.0;
 
+/// A scale whose error is so many times that of a wider one is drowned in noise: it agrees with anything.
+const DROWNED: f64 = 10.0;
+
 /// Constants by one test function.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AtScale {
@@ -66,14 +69,21 @@ impl Plateau {
     }
 }
 
-/// The longest range of scales of which every one agrees with the narrowest, the narrower of equals. Scales go from narrow to wide.
+/// The longest range of scales of which every one agrees with the narrowest, the narrower of equals, and which does not begin where wider
+/// ones tell far more. Scales go from narrow to wide.
 pub(crate) fn plateau(scales: &[AtScale]) -> Option<Plateau> {
+    let drowned = |place: usize| {
+        let tells_more = |wider: &AtScale| {
+            scales[place].errors.iter().zip(&wider.errors).any(|(error, wider)| *error > DROWNED * wider)
+        };
+        scales[place + 1..].iter().any(tells_more)
+    };
     let from = |first: usize| {
         let beyond = scales[first + 1..].iter().position(|one| !scales[first].agrees(one, AGREE));
         Plateau { first, last: beyond.map_or(scales.len() - 1, |beyond| first + beyond) }
     };
     let mut best: Option<Plateau> = None;
-    for found in (0..scales.len()).map(from) {
+    for found in (0..scales.len()).filter(|&first| !drowned(first)).map(from) {
         if best.is_none_or(|best| found.factor(scales) > best.factor(scales) * (1.0 + 1e-9)) {
             best = Some(found);
         }
@@ -101,6 +111,12 @@ mod tests {
         let found = plateau(&scales).unwrap();
         assert_eq!(found, Plateau { first: 3, last: 5 });
         assert!((found.factor(&scales) - 257.0 / 65.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn widths_that_are_drowned_in_noise_are_no_plateau() {
+        let scales = scales(&[(9.0, 20.0), (-5.0, 30.0), (3.0, 10.0), (1.1, 0.1), (1.0, 0.1)]);
+        assert_eq!(plateau(&scales), Some(Plateau { first: 3, last: 4 }));
     }
 
     #[test]
