@@ -13,10 +13,13 @@ import numpy.typing as npt
 import pyuff
 from asammdf import MDF, Signal
 from nptdms import ChannelObject, TdmsWriter
+from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 import tvident
+
+Array = npt.NDArray[np.float64]
 
 T = np.arange(300) / 250
 ANGLE, TORQUE = 20 * np.sin(9 * T), np.cos(5 * T) + 0.1
@@ -131,31 +134,57 @@ def xdf(path: Path) -> None:
     )
 
 
-def mcap(
-    path: Path,
-    times: npt.NDArray[np.float64] = T,
-    angle: npt.NDArray[np.float64] = ANGLE * np.pi / 180,
-    torque: npt.NDArray[np.float64] = TORQUE,
+def _joint_states(
+    writer: Any,
+    store: Any,
+    motion: tuple[Array, Array, Array],
+    velocity: Array | None,
 ) -> None:
-    store = get_typestore(Stores.ROS2_HUMBLE)
+    """Write messages of two joints, of which one moves: times, angle and torque; without a velocity where nothing measured it."""
+    is_ros1 = isinstance(writer, Ros1Writer)
     types: Any = store.types
     joints, header, time = (
         types[name] for name in ("sensor_msgs/msg/JointState", "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
     )
+    connection = writer.add_connection("/joint_states", joints.__msgtype__, typestore=store)
+    speeds = [np.array([])] * motion[0].size if velocity is None else [np.array([0.0, one]) for one in velocity]
+    for at, angle, torque, speed in zip(*motion, speeds, strict=True):
+        stamp = round(1e9 * at) + 10**18
+        message = joints(
+            header=header(
+                stamp=time(sec=stamp // 10**9, nanosec=stamp % 10**9), frame_id="", **({"seq": 0} if is_ros1 else {})
+            ),
+            name=["shoulder", "elbow"],
+            position=np.array([0.0, angle]),
+            velocity=speed,
+            effort=np.array([0.0, torque]),
+        )
+        serialize = store.serialize_ros1 if is_ros1 else store.serialize_cdr
+        writer.write(connection, stamp + 5000, serialize(message, joints.__msgtype__))
+
+
+def mcap(
+    path: Path,
+    times: Array = T,
+    angle: Array = ANGLE * np.pi / 180,
+    torque: Array = TORQUE,
+    velocity: Array | None = None,
+) -> None:
     folder = path.parent / "bag"
     with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connection = writer.add_connection("/joint_states", joints.__msgtype__, typestore=store)
-        for at, *values in zip(times, angle, torque, strict=True):
-            stamp = round(1e9 * at) + 10**18
-            message = joints(
-                header=header(stamp=time(sec=stamp // 10**9, nanosec=stamp % 10**9), frame_id=""),
-                name=["shoulder", "elbow"],
-                position=np.array([0.0, values[0]]),
-                velocity=np.array([]),
-                effort=np.array([0.0, values[1]]),
-            )
-            writer.write(connection, stamp + 5000, store.serialize_cdr(message, joints.__msgtype__))
+        _joint_states(writer, get_typestore(Stores.ROS2_HUMBLE), (times, angle, torque), velocity)
     next(folder.glob("*.mcap")).rename(path)
+
+
+def bag(
+    path: Path,
+    times: Array = T,
+    angle: Array = ANGLE * np.pi / 180,
+    torque: Array = TORQUE,
+    velocity: Array | None = None,
+) -> None:
+    with Ros1Writer(path) as writer:
+        _joint_states(writer, get_typestore(Stores.ROS1_NOETIC), (times, angle, torque), velocity)
 
 
 WRITTEN: dict[str, Callable[[Path], None]] = {
@@ -166,5 +195,6 @@ WRITTEN: dict[str, Callable[[Path], None]] = {
     ".c3d": c3d,
     ".xdf": xdf,
     ".mcap": mcap,
+    ".bag": bag,
 }
 """How to write a file of each ending."""

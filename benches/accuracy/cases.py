@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 import tvident
-from tvident._simulate import Excitation
-from tvident._simulate import Pattern as Movement
+from tvident._choices import Excitation
+from tvident._choices import Pattern as Movement
 
 Array = npt.NDArray[np.float64]
 Pattern = Literal["slider", "ramp", "square", "constant", "I and C vary", "I varies by 5 %", "I ramps by 5 %"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,27 @@ def test_a_joint_of_a_bag_is_all_that_is_named(tmp_path: Path) -> None:
     neither = CliRunner().invoke(main, ["identify", "x.csv", "--angle", "angle"])
     assert neither.exit_code == 2
     assert "Missing option '--torque'" in neither.output
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+@pytest.mark.parametrize("write", [recorded_files.mcap, recorded_files.bag])
+def test_the_velocity_of_a_joint_is_used_where_something_measured_it(
+    tmp_path: Path, write: Callable[..., None]
+) -> None:
+    generator = np.random.default_rng(1)
+    velocity = RIG.true_velocity + 0.001 * RIG.true_velocity.std() * generator.standard_normal(RIG.time.size)
+    expected = tvident.identify(RIG.angle, RIG.torque, velocity=velocity, sample_rate=1000, stiffness="constant")
+    for name, measured, constants in (
+        ("run", velocity, expected.constants),
+        ("at-rest", np.zeros_like(velocity), EXPECTED.constants),
+    ):
+        (tmp_path / name).mkdir()
+        place = tmp_path / name / f"run{'.bag' if write is recorded_files.bag else '.mcap'}"
+        write(place, RIG.time, RIG.angle, RIG.torque, measured)
+        done = CliRunner().invoke(main, ["identify", str(place), "--joint", "elbow", "--stiffness", "constant"])
+        assert done.exit_code == 0, done.output
+        assert ("velocity_bias" in done.output) == (name == "run")
+        assert constant(done.output, "inertia") == pytest.approx(constants["inertia"][0], rel=1e-6)
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")

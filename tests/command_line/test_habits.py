@@ -32,14 +32,18 @@ def invoke(*arguments: str) -> Any:
     return CliRunner().invoke(main, arguments)
 
 
-@pytest.mark.parametrize("option", ["--help", "--version"])
-def test_help_and_version_do_not_wait_for_numpy(option: str) -> None:
-    code = f"import sys; from tvident._command_line import main\ntry: main([{option!r}])\nfinally: print('numpy' in sys.modules)"
+def test_help_and_version_do_not_wait_for_numpy() -> None:
+    calls = [["--version"], ["--help"], *([name, "--help"] for name in COMMANDS)]
+    code = (
+        f"import sys; from tvident._command_line import main\nfor call in {calls}: main(call, standalone_mode=False)\n"
+        "print(sorted({'numpy', 'tvident._core', 'pandas', 'matplotlib'} & set(sys.modules)))"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "False"
-    if option == "--version":
-        assert done.stdout.splitlines()[0] == tvident.__version__
-    assert max(map(len, done.stdout.splitlines())) <= 80
+    lines = done.stdout.splitlines()
+    assert lines[0] == tvident.__version__
+    assert lines[-1] == "[]"
+    assert sum(line.startswith("Usage: ") for line in lines) == len(calls) - 1
+    assert max(map(len, lines)) <= 80
 
 
 def test_every_command_is_listed_with_what_it_says_of_itself() -> None:
@@ -98,6 +102,34 @@ def test_a_run_is_repeated_from_its_result_and_from_toml(folder: Path) -> None:
     assert "must hold options of tvident identify, without dashes before them; got 'stifness'; use" in wrong.output
 
 
+@pytest.mark.parametrize("ending", [".csv", ".xlsx"])
+def test_a_table_is_repeated_from_the_settings_beside_it(folder: Path, ending: str) -> None:
+    options = ["--inertia", "0.0123", "--term", "coulomb"]
+    assert invoke(*IDENTIFY, *options, "-o", f"first{ending}").exit_code == 0
+    again = invoke(*IDENTIFY, "--settings", f"first{ending}", "-o", f"again{ending}")
+    assert again.exit_code == 0, again.output
+    first, second = (tvident.read_recording(folder / f"{name}{ending}") for name in ("first", "again"))
+    for name in first:
+        np.testing.assert_array_equal(second[name], first[name])
+    # Whoever changes the table may still repeat the run, and hears of it; settings themselves do as well.
+    (folder / "first.csv").write_text("a,b\n1,2\n")
+    if ending == ".csv":
+        changed = invoke(*IDENTIFY, "--settings", "first.csv", "-o", "changed.csv")
+        assert changed.exit_code == 0
+        assert "first.csv: was changed after its settings were written beside it" in changed.stderr
+        assert (folder / "changed.csv").read_bytes() == (folder / "again.csv").read_bytes()
+        direct = invoke(*IDENTIFY, "--settings", "first.csv.settings.json", "-o", "direct.csv")
+        assert direct.exit_code == 0
+        assert "changed after" not in direct.output
+        (folder / "first.csv.settings.json").unlink()
+        none = invoke(*IDENTIFY, "--settings", "first.csv")
+        assert none.exit_code == 1
+        assert "its settings stand in 'first.csv.settings.json' beside it; there is no such file" in none.output
+        own = invoke(*IDENTIFY, "--settings", "again.csv.settings.json", "-o", "again.csv")
+        assert own.exit_code == 2
+        assert "the settings beside results must not replace earlier settings" in own.output
+
+
 def test_exit_codes(folder: Path) -> None:
     assert invoke(*IDENTIFY).exit_code == 0
     np.savez(folder / "rig.npz", angle=np.zeros(500), torque=np.zeros(500))
@@ -121,7 +153,7 @@ def test_derivatives_behave_as_identify_does(folder: Path) -> None:
 
 @pytest.mark.usefixtures("folder")
 def test_the_demo_says_at_once_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tvident._command_line.demo.find_spec", lambda _: None)
+    monkeypatch.setattr(sys.modules["tvident._commands.demo"], "find_spec", lambda _: None)
     done = invoke("demo")
     assert done.exit_code == 0
     assert done.stderr.startswith("Pictures need matplotlib, which is not installed: pip install 'tvident[plot]'")

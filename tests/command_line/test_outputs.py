@@ -24,7 +24,7 @@ from click.testing import CliRunner
 import tvident
 from tvident import recordings
 from tvident._command_line import main
-from tvident._command_line.own_files import check_own, note_own
+from tvident._commands.own_files import check_own, note_own
 from tvident._files import check_apart, printable, replaced, write_csv, write_table
 
 TVIDENT = str(Path(sys.executable).with_name("tvident"))

@@ -19,7 +19,7 @@ from tvident import recordings
 from tvident._files import read
 from tvident._formats import FORMATS, matlab
 
-JOINTS = {".mcap"}
+JOINTS = {".mcap", ".bag"}
 """Rad, and no units in the file."""
 
 

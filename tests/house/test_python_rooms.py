@@ -15,6 +15,7 @@ CORE = "tvident._core"
 """Everything may call it, and it calls nothing of the package."""
 
 ROOMS = (
+    "_choices",
     "_units",
     "_arguments",
     "_tables",
@@ -35,6 +36,7 @@ ROOMS = (
     "recordings",  # doors: what users import by the room's name
     "figures",
     "tvident",  # the front door
+    "_commands",
     "_command_line",
 )
 """Every room may import from those above it."""

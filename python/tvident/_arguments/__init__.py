@@ -1,6 +1,6 @@
 """Checks what users pass: every message states the rule, the value that broke it and the cure."""
 
-from tvident._arguments.arrays import NanPolicy, RowPolicy, along_axis, any_array, check_nan, mask, real_array, weights
+from tvident._arguments.arrays import along_axis, any_array, check_nan, mask, real_array, weights
 from tvident._arguments.channels import as_record, channel, channels
 from tvident._arguments.containers import fields_of, is_table, package_of, plain, time_axis
 from tvident._arguments.digits import own_digits, percent, to_digits_of, with_error
@@ -21,6 +21,7 @@ from tvident._arguments.shown import shown
 from tvident._arguments.times import begin_of, implied_times, times_of
 from tvident._arguments.workers import worker_count
 from tvident._arguments.wrapped import Unwrapped, unwrapped
+from tvident._choices import NanPolicy, RowPolicy
 
 __all__ = [
     "LARGEST",

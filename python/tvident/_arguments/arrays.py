@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Any, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -10,11 +10,7 @@ import numpy.typing as npt
 from tvident._arguments.containers import plain, time_last
 from tvident._arguments.numbers import one_of, whole_number
 from tvident._arguments.shown import shown
-
-NanPolicy: TypeAlias = Literal["propagate", "raise"]
-
-RowPolicy: TypeAlias = Literal["omit", "propagate", "raise"]
-"""What to do about values that are no number, where windows may do without some of their rows."""
+from tvident._choices import NanPolicy
 
 _READ_AS_THEY_ARE = frozenset(np.dtype(code) for code in ("f8", "f4", "i8", "i4", "i2", "i1", "u8", "u4", "u2", "u1"))
 

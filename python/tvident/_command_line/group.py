@@ -62,6 +62,14 @@ def _let_go_of_output() -> None:
         os.close(nowhere)
 
 
+def commands() -> Any:
+    """Return the room in which commands are carried out, which takes NumPy and the whole package."""
+    room = import_module("tvident._commands")
+    # An error elsewhere is a word here.
+    warnings.simplefilter("always", import_module("tvident.recordings").FileWarning)
+    return room
+
+
 # Rooms of the package take NumPy, which help and version need not wait for: they are entered when something goes wrong or is done.
 def _line(message: object) -> str:
     text: str = import_module("tvident._files").printable(message, _LONGEST_LINE)
@@ -113,8 +121,6 @@ class _Command(click.Group):
             if isinstance(stream, TextIOWrapper):
                 stream.reconfigure(errors="backslashreplace")
         with _in_plain_words(), warnings.catch_warnings():
-            # An error elsewhere is a word here.
-            warnings.simplefilter("always", import_module("tvident.recordings").FileWarning)
             warnings.showwarning = _show_warning
             return super().invoke(ctx)
 

@@ -1,33 +1,25 @@
-"""Options of ``tvident identify`` and of ``tvident report``, and the identification that they stand for."""
+"""Options of every command that identifies: what decides what is identified."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, get_args
+from pathlib import Path
+from typing import get_args
 
 import click
-import numpy as np
 
-import tvident
-from tvident import _arguments as arguments
-from tvident import recordings
-from tvident._command_line.channels import at_even_times, mask_of, scaled, source_of, times_of
-from tvident._command_line.equation import lag_of, parameter_of, terms_of
-from tvident._command_line.method import METHOD, NAMES, method_of
-from tvident._command_line.options import (
-    BESIDE,
-    CHANNELS,
-    PERIOD,
-    RECORDING,
-    TIME,
-    check_time,
-    given,
-    options_of,
-    period_of,
-    wanted_progress,
-)
-from tvident._command_line.settings import options_from_toml, read_settings
-from tvident._equation import COEFFICIENTS, TERM_NAMES
+from tvident._choices import TERM_NAMES, RowPolicy
+from tvident._command_line.group import commands
+from tvident._command_line.method import METHOD
+from tvident._command_line.options import BESIDE, CHANNELS, PERIOD, TIME, options_of
+
+
+def _options_from_toml(ctx: click.Context, _: click.Parameter, path: str | None) -> str | None:
+    """Take what a TOML file holds for the options that are not given; return the path of settings of an earlier result."""
+    if path is None or Path(path).suffix.lower() != ".toml":
+        return path
+    remaining: str | None = commands().options_from_toml(ctx, path)
+    return remaining
+
 
 IDENTIFICATION = options_of(
     CHANNELS,
@@ -59,92 +51,15 @@ IDENTIFICATION = options_of(
         "--settings",
         type=click.Path(),
         is_eager=True,
-        callback=options_from_toml,
-        help="Settings of an earlier run: its result (NPZ, Parquet), or what --settings-output wrote; or a TOML file of options.",
+        callback=_options_from_toml,
+        help="Settings of an earlier run: its result, or what --settings-output wrote; or a TOML file of options.",
     ),
     click.option(
         "--nan-policy",
-        type=click.Choice(get_args(arguments.RowPolicy)),
+        type=click.Choice(get_args(RowPolicy)),
         default="omit",
         show_default=True,
         help="Missing values: omit their equations, propagate to all windows that contain one, or raise.",
     ),
 )
 """Everything that decides what is identified; the file comes before it."""
-
-
-def inputs(file: str | None, options: Mapping[str, Any]) -> dict[str, str | None]:
-    """Return the files that are read, by what messages call them."""
-    named = {
-        "the velocity": "velocity",
-        "the acceleration": "acceleration",
-        "the mask": "mask",
-        "the instrument": "instrument",
-        "earlier settings": "settings",
-    }
-    return {
-        RECORDING: file,
-        "the angle": options["angle"],
-        "the torque": options["torque"],
-        **{words: options[name] for words, name in named.items()},
-    }
-
-
-# Options that need work before they are passed on are parameters of their own.
-def identified(
-    channels: recordings.Channels,
-    file: str | None,
-    *,
-    angle: str | None,
-    velocity: str | None,
-    acceleration: str | None,
-    torque: str,
-    angle_scale: str | None,
-    torque_scale: str | None,
-    period: str | None,
-    time_channel: str | None,
-    method: str | None,
-    terms: tuple[str, ...],
-    instrument: str | None,
-    lag: str | None,
-    mask: str | None,
-    settings: str | None,
-    progress: bool | None,
-    **options: Any,
-) -> tvident.Identification:
-    """Return what is identified from the channels of a file with these options."""
-    if not check_time(options["sample_rate"], options["delta"], time_channel):
-        raise click.UsageError(
-            "an identification needs the sample period; got none; give --sample-rate, --delta or --time"
-        )
-    of_method = {name: value for name, value in given(options).items() if name in NAMES}
-    turn = None if period is None else scaled(np.asarray(period_of(period)), angle_scale, channels, file)
-    motion = {"angle": angle, "velocity": velocity, "acceleration": acceleration}
-    named = {name: channel for name, channel in motion.items() if channel is not None}
-    recorded = [source_of(channels, name, file) for name in (*named.values(), torque)]
-    times = times_of(channels, time_channel, next(iter(named.values())), file)
-    if times is not None:
-        times, recorded = at_even_times(times, recorded, file)
-    signals = dict(zip(named, recorded, strict=False))
-    if "angle" in signals:
-        signals["angle"] = scaled(signals["angle"], angle_scale, channels, file)
-    return tvident.identify(
-        signals.get("angle"),
-        scaled(recorded[-1], torque_scale, channels, file),
-        velocity=signals.get("velocity"),
-        acceleration=signals.get("acceleration"),
-        method=method_of(method, of_method, has_settings=settings is not None),
-        t=times,
-        instrument=None if instrument is None else source_of(channels, instrument, file),
-        period=None if turn is None else abs(float(turn)),
-        lag=None if lag is None else lag_of(lag),
-        mask=None if mask is None else mask_of(source_of(channels, mask, file)),
-        settings=None if settings is None else read_settings(settings),
-        terms=terms_of(terms),
-        progress=wanted_progress(progress),
-        **{
-            name: parameter_of(value, channels, file) if name in COEFFICIENTS else value
-            for name, value in given(options).items()
-            if name not in NAMES
-        },
-    )

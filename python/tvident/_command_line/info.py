@@ -5,52 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import click
-import numpy as np
-import numpy.typing as npt
 
-from tvident._command_line.channels import channels_in
-from tvident._command_line.group import main
-from tvident._files import aligned, printable
+from tvident._command_line.group import commands, main
 
 
 @main.command()
 @click.argument("file", type=click.Path())
-def info(file: str) -> None:
+def info(**options: Any) -> None:
     """List the channels of FILE: how many samples, their range, and what is missing."""
-    channels = channels_in(file)
-    rows: list[tuple[str, ...]] = [
-        ("channel", "type", "samples", "mean", "std", "least", "greatest", "missing", "remark")
-    ]
-    for name, recorded in channels.items():
-        # Half and integer types are too narrow for sums of squares.
-        values = recorded.astype(np.float64)
-        finite = values[np.isfinite(values)]
-        with np.errstate(over="ignore", invalid="ignore"):
-            numbers = (finite.mean(), finite.std(), finite.min(), finite.max()) if finite.size else (np.nan,) * 4
-        shown = [f"{float(number):.5g}" for number in numbers]
-        rows.append(
-            (
-                printable(name, 60),
-                str(recorded.dtype),
-                str(values.size),
-                *shown,
-                str(values.size - finite.size),
-                _remark(values),
-            )
-        )
-    click.echo("\n".join(aligned(rows)))
-
-
-def _remark(values: npt.NDArray[Any]) -> str:
-    """Return what a channel looks like: uniform time, a single number, a constant."""
-    if values.ndim == 0:
-        return "a number"
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        steps = np.diff(values)
-        if steps.size and (steps > 0).all():
-            period = (values[-1] - values[0]) / steps.size
-            grid = values[0] + period * np.arange(values.size)
-            if np.abs(values - grid).max() <= 1e-3 * period:
-                return f"uniform: {1 / period:.6g} per unit"
-            return "increasing"
-    return "constant" if steps.size and not steps.any() else ""
+    commands().info(**options)

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import click
 
-from tvident import _report, recordings
-from tvident._command_line.channels import channels_in, source_of
-from tvident._command_line.group import main
-from tvident._command_line.identification import IDENTIFICATION, identified, inputs
-from tvident._command_line.options import REPORT, WORK, check_outputs
-from tvident._files import full_name, printable
-
-_MOST_CHANNELS = 40
-"""Of a file that are shown beside angle and torque: the first ones."""
+from tvident._command_line.group import commands, main
+from tvident._command_line.identification import IDENTIFICATION
+from tvident._command_line.options import WORK
 
 
 @main.command(epilog="Example: tvident report rig.csv --angle angle --torque torque --time time -o report.html")
@@ -30,35 +23,10 @@ _MOST_CHANNELS = 40
     show_default=True,
     help="The page: a name that ends in .html.",
 )
-def report(file: str | None, output: str, **options: Any) -> None:
+def report(**options: Any) -> None:
     """Identify as identify does, and write a page that shows the recording and the result.
 
     The page opens in any browser without a network: verdict, warnings with their times, settings, and plots of all channels of FILE and
     of all results that can be zoomed down to the sample.
     """
-    if Path(output).suffix.lower() not in {".html", ".htm"}:
-        raise click.UsageError(f"-o must end in .html; got '{printable(output)}'; rename it")
-    _report.check_plotly()
-    check_outputs({REPORT: output}, inputs(file, options))
-    channels = channels_in(file)
-    result = identified(channels, file, **options)
-    used = {
-        full_name(channels, options[name], "")
-        for name in ("angle", "velocity", "acceleration", "torque", "time_channel")
-        if _is_in(channels, options[name])
-    }
-    samples = source_of(channels, options["torque"], file).shape
-    others = {name: values for name, values in channels.items() if values.shape == samples and name not in used}
-    for name in list(others)[_MOST_CHANNELS:]:
-        del others[name]
-    result.report(output, channels=others, title=None if file is None else Path(file).name)
-    click.echo(result.summary())
-    click.echo(f"\nWritten: {printable(output)}")
-
-
-def _is_in(channels: recordings.Channels, name: str | None) -> bool:
-    """Return whether a name is that of a channel, and not of a file of its own."""
-    try:
-        return name is not None and bool(full_name(channels, name, ""))
-    except KeyError:
-        return False
+    commands().report(**options)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, get_args
 
 import click
 
-import tvident
-from tvident._command_line.group import main
-from tvident._files import check_place, printable
-from tvident._simulate import Excitation, Pattern
+from tvident._choices import Excitation, Pattern
+from tvident._command_line.group import commands, main
 
 
 @main.command()
@@ -29,9 +26,6 @@ from tvident._simulate import Excitation, Pattern
     "--angle-noise", type=float, default=1e-4, show_default=True, help="Noise over the angle's standard deviation."
 )
 @click.option("--encoder-counts", type=int, help="Counts a turn, instead of noise.")
-def simulate(output: str, **options: Any) -> None:
+def simulate(**options: Any) -> None:
     """Write a simulated recording of the paper's rig, with its truth, to OUTPUT: a CSV file, or of another kind by its ending."""
-    check_place(Path(output))
-    recording = tvident.simulate_torsional_rig(**options)
-    recording.save(output)
-    click.echo(f"{recording.time.size} samples written to {printable(output)}", err=True)
+    commands().simulate(**options)

@@ -2,15 +2,13 @@
 
 from tvident._derivatives.fit import LocalPolynomialFit
 from tvident._derivatives.local_polynomials import fit_local_polynomials
-from tvident._derivatives.plans import HIGHEST_ORDER, SHORTEST_WINDOW, Criterion, Selection, plan, quantisation_step
+from tvident._derivatives.plans import HIGHEST_ORDER, SHORTEST_WINDOW, plan, quantisation_step
 from tvident._derivatives.savitzky_golay import savgol_filter
 
 __all__ = [
     "HIGHEST_ORDER",
     "SHORTEST_WINDOW",
-    "Criterion",
     "LocalPolynomialFit",
-    "Selection",
     "fit_local_polynomials",
     "plan",
     "quantisation_step",

@@ -10,10 +10,11 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
+from tvident._choices import Criterion, Selection
 from tvident._derivatives.automatic import choose
 from tvident._derivatives.fit import LocalPolynomialFit, Sampled
 from tvident._derivatives.found import Found
-from tvident._derivatives.plans import HIGHEST_ORDER, SHORTEST_WINDOW, Criterion, Selection, plan, quantisation_step
+from tvident._derivatives.plans import HIGHEST_ORDER, SHORTEST_WINDOW, plan, quantisation_step
 from tvident._huber import pseudo_values
 from tvident._tables import shaped
 

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
-
-Criterion: TypeAlias = Literal["aicc", "aicc-textbook", "aic", "bic"]
-
-Selection: TypeAlias = Literal["window", "pooled", "average"]
 
 HIGHEST_ORDER = 15
 """No polynomial order above this is offered."""

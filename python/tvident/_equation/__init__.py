@@ -1,8 +1,8 @@
 """Describes the equation of motion: kinds of parameters, terms with a name, terms of one's own, units."""
 
-from tvident._equation.built_in import BUILT_IN, TERM_NAMES
+from tvident._choices import BUILT_IN, TERM_NAMES, Kind
 from tvident._equation.inner import InnerParameter, expected_stribeck
-from tvident._equation.kinds import COEFFICIENTS, Kind, Parameter, parameter
+from tvident._equation.kinds import COEFFICIENTS, Parameter, parameter
 from tvident._equation.terms import FixedTerm, GivenTerm, Term, Unknown, all_terms
 from tvident._equation.units import LINEAR_UNITS, UNITS
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal, TypeAlias, get_args
+from typing import TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-
-Kind: TypeAlias = Literal["windowed", "constant", "auto", "varying"]
+from tvident._choices import Kind
 
 Parameter: TypeAlias = Kind | float | npt.ArrayLike
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from tvident import _arguments as arguments
-from tvident._equation.built_in import TERM_NAMES
+from tvident._choices import TERM_NAMES
 from tvident._equation.kinds import COEFFICIENTS
 
 _MOST_LETTERS = 60

@@ -10,9 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._equation.built_in import BUILT_IN, TERM_NAMES
+from tvident._choices import BUILT_IN, TERM_NAMES, Kind
 from tvident._equation.inner import InnerParameter, ranges
-from tvident._equation.kinds import Kind
 from tvident._equation.names import name_of_term
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tvident._equation.built_in import BUILT_IN
+from tvident._choices import BUILT_IN
 
 UNITS = {
     "time": "s",

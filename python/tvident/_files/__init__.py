@@ -1,7 +1,9 @@
 """Reads recordings from files and writes tables to them."""
 
+from tvident._files.beside import place_beside, settings_beside, write_settings
 from tvident._files.channels import Channels, FileError, FileWarning, channel, full_name
 from tvident._files.names import listed, printable
+from tvident._files.places import ENDINGS as TABLE_ENDINGS
 from tvident._files.places import check_apart, check_folder, check_place
 from tvident._files.recorded import FileRecording, read_recording
 from tvident._files.recordings import read
@@ -12,6 +14,7 @@ from tvident._files.table import aligned, write_csv, write_table
 
 __all__ = [
     "RESULT_ENDINGS",
+    "TABLE_ENDINGS",
     "Channels",
     "FileError",
     "FileRecording",
@@ -23,12 +26,15 @@ __all__ = [
     "check_place",
     "full_name",
     "listed",
+    "place_beside",
     "printable",
     "read",
     "read_recording",
     "read_result",
     "replaced",
+    "settings_beside",
     "write_csv",
     "write_result",
+    "write_settings",
     "write_table",
 ]

@@ -7,7 +7,6 @@ import os
 import shutil
 import signal
 import stat
-import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -99,6 +98,8 @@ def _gone_when_terminated(path: Path) -> Iterator[None]:
 @contextmanager
 def _at_the_end(path: Path) -> Iterator[IO[bytes]]:
     """Give a file without a name whose content goes to a pipe or a device when it is whole."""
+    import tempfile  # noqa: PLC0415 - the library loads without
+
     with os.fdopen(_descriptor(path), "wb") as end, tempfile.TemporaryFile() as file:
         yield file
         file.seek(0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -39,6 +38,8 @@ def write_result(path: Path, arrays: Arrays, units: Mapping[str, str], facts: st
     check_folder(path)
     named = {header(name, units): values for name, values in arrays.items()}
     if path.suffix == ".npz":
+        import zipfile  # noqa: PLC0415 - the library loads without
+
         with replaced(path) as file, zipfile.ZipFile(file, "w", allowZip64=True) as archive:
             for name, values in named.items():
                 with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
@@ -66,8 +67,8 @@ def read_result(path: Path) -> tuple[dict[str, npt.NDArray[Any]], str]:
     place = printable(path)
     if path.suffix not in ENDINGS:
         raise FileError(
-            f"{place}: a result comes back from {' or '.join(ENDINGS)}; got '{printable(path.suffix)}'; other files keep columns only: "
-            "read them with tvident.recordings.read"
+            f"{place}: a result comes back from {' or '.join(ENDINGS)}; got '{printable(path.suffix)}'; other files keep columns only, "
+            "and their settings beside them: read them with tvident.read_recording"
         )
     if not path.is_file():
         raise FileError(f"{place}: there is no such file; check the name and the folder")
@@ -86,6 +87,8 @@ def read_result(path: Path) -> tuple[dict[str, npt.NDArray[Any]], str]:
 
 def _from_npz(path: Path) -> tuple[dict[str, npt.NDArray[Any]], str]:
     arrays: dict[str, npt.NDArray[Any]] = {}
+    import zipfile  # noqa: PLC0415 - the library loads without
+
     with zipfile.ZipFile(path) as archive:
         if _MEMBER not in archive.namelist():
             return {}, ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
@@ -63,6 +62,8 @@ def _check_lengths(columns: Mapping[str, npt.NDArray[Any]]) -> None:
 
 def _write_npz(file: IO[bytes], columns: Mapping[str, npt.NDArray[Any]]) -> None:
     """Write what ``np.savez`` would, whose own arguments are no names for columns."""
+    import zipfile  # noqa: PLC0415 - the library loads without
+
     with zipfile.ZipFile(file, "w", allowZip64=True) as archive:
         for name, values in columns.items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as member:

@@ -2,6 +2,6 @@
 
 from tvident._identify.call import identify
 from tvident._identify.criterion import aicc, effective_observations
-from tvident._identify.methods import Method, StrongForm, Variation, WeakForm
+from tvident._identify.methods import Method, StrongForm, WeakForm
 
-__all__ = ["Method", "StrongForm", "Variation", "WeakForm", "aicc", "effective_observations", "identify"]
+__all__ = ["Method", "StrongForm", "WeakForm", "aicc", "effective_observations", "identify"]

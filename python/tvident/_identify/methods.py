@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias, get_args
 
 from tvident import _arguments as arguments
-from tvident._derivatives import HIGHEST_ORDER, SHORTEST_WINDOW, Criterion, Selection
-
-Variation: TypeAlias = Literal["constant", "linear"]
+from tvident._choices import Criterion, Selection, Variation
+from tvident._derivatives import HIGHEST_ORDER, SHORTEST_WINDOW
 
 SHORTEST_TEST_FUNCTION = 9
 """Samples."""

@@ -12,13 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._files import RESULT_ENDINGS, write_table
+from tvident._files import RESULT_ENDINGS, write_settings, write_table
 from tvident._results.estimates import Estimates
 from tvident._results.held_back import HeldBack
 from tvident._results.oscillator import Oscillator
 from tvident._results.parts import chosen, of_records, of_samples, settings_of
 from tvident._results.recorded import Recorded
-from tvident._results.reported import report
 from tvident._results.scan import Scan
 from tvident._results.short import as_html, short
 from tvident._results.simulated import Simulated
@@ -264,7 +263,8 @@ class Identification(Simulated, Valued):
         ----------
         path : str or Path
             A name that ends in ``.npz`` or ``.parquet`` (needs pyarrow: ``tvident[io]``), from which the result comes back as it is, or
-            in ``.csv``, for columns alone. The file appears whole or not at all.
+            in ``.csv`` and others, for columns alone: then the settings stand beside it, in a file with ``.settings.json`` behind its
+            name. The file appears whole or not at all.
 
         Raises
         ------
@@ -278,6 +278,7 @@ class Identification(Simulated, Valued):
             store(Path(path), self._table(), self._found, rest)
         else:
             write_table(path, self.columns(), self.units)
+            write_settings(Path(path), self.settings)
 
     def between(self, begin: float | None = None, end: float | None = None) -> Identification:
         """Return the part of the result from one time to another.
@@ -426,6 +427,8 @@ class Identification(Simulated, Valued):
         OSError
             If there is no such folder, or the file cannot be written.
         """
+        from tvident._results.reported import report  # noqa: PLC0415 - pages are rarely asked for, and take long to load
+
         report(self, path, recorded=self._recorded, channels=channels, title=title)
 
     def __repr__(self) -> str:

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Literal, TypeAlias, get_args
+from typing import TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident._choices import Excitation, Pattern
 from tvident._simulate.drive import Drive
 from tvident._simulate.functions import Function, function_of_time
 from tvident._simulate.motion import integrate
 from tvident._simulate.recording import Recording
 
 Array: TypeAlias = npt.NDArray[np.float64]
-Pattern: TypeAlias = Literal["slider", "ramp", "square", "constant"]
-
-Excitation: TypeAlias = Literal["multisine", "chirp", "random"]
-
 _LEAST_SNR, _MOST_NOISE = -200.0, 1e10
 """In decibels for the torque, as a ratio for the angle: noise of ten thousand million times the signal."""
 

@@ -12,7 +12,7 @@ import click
 
 import tvident
 from tvident import recordings
-from tvident._files import RESULT_ENDINGS, printable
+from tvident._files import RESULT_ENDINGS, TABLE_ENDINGS, printable, settings_beside
 
 _MOST_BYTES = 100_000_000
 """Of settings, which are some lines for every record of a batch."""
@@ -21,11 +21,13 @@ _MOST_BYTES = 100_000_000
 def read_settings(path: str) -> dict[str, Any]:
     """Return what an earlier run chose, or what a TOML file holds."""
     place = printable(path)
-    cure = f"give a file that --settings-output wrote, a result ({', '.join(RESULT_ENDINGS)}), or options as TOML"
+    cure = "give a result, a file that --settings-output wrote, or options as TOML"
     ending = Path(path).suffix.lower()
     if ending in RESULT_ENDINGS:
         return tvident.load(path).settings
     kind = Path(path).stat()
+    if ending in TABLE_ENDINGS and not _begins_as_json(path):
+        return settings_beside(Path(path))
     if not stat.S_ISREG(kind.st_mode) or kind.st_size > _MOST_BYTES:
         raise recordings.FileError(f"{place}: settings must be a file of at most {_MOST_BYTES} bytes; {cure}")
     try:
@@ -35,13 +37,19 @@ def read_settings(path: str) -> dict[str, Any]:
         raise recordings.FileError(f"{place}: holds no settings ({error}); {cure}") from None
     if not isinstance(content, dict):
         raise recordings.FileError(f"{place}: holds no settings; {cure}")
+    if content.keys() == {"table", "sha256", "settings"}:
+        return settings_beside(Path(path))
     return content
 
 
-def options_from_toml(ctx: click.Context, _: click.Parameter, path: str | None) -> str | None:
-    """Take what a TOML file holds for the options that are not given; return the path of settings of an earlier result."""
-    if path is None or Path(path).suffix.lower() != ".toml":
-        return path
+def _begins_as_json(path: str) -> bool:
+    """Return whether a file that is called a table is what --settings-output wrote."""
+    with Path(path).open("rb") as file:
+        return file.read(64).lstrip().startswith(b"{")
+
+
+def options_from_toml(ctx: click.Context, path: str) -> str | None:
+    """Take what a TOML file holds for the options that are not given; return its path if it holds settings of an earlier result."""
     content = read_settings(path)
     if {"form", "kinds"} <= content.keys():
         return path

@@ -1,0 +1,26 @@
+"""Names what can be chosen: words for settings, and built-in terms. Without NumPy, for which help need not wait."""
+
+from tvident._choices.built_in import BUILT_IN, TERM_NAMES
+from tvident._choices.literals import (
+    Criterion,
+    Excitation,
+    Kind,
+    NanPolicy,
+    Pattern,
+    RowPolicy,
+    Selection,
+    Variation,
+)
+
+__all__ = [
+    "BUILT_IN",
+    "TERM_NAMES",
+    "Criterion",
+    "Excitation",
+    "Kind",
+    "NanPolicy",
+    "Pattern",
+    "RowPolicy",
+    "Selection",
+    "Variation",
+]

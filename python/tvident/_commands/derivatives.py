@@ -1,0 +1,71 @@
+"""The command ``tvident derivatives``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+import numpy.typing as npt
+
+import tvident
+from tvident import _arguments as arguments
+from tvident._commands.channels import channel_of, channels_in
+from tvident._commands.given import check_time, given, length, period_of, wanted_progress
+from tvident._commands.output import PICTURE, RECORDING, RESULTS, check_outputs, figures_on_file, give, save_figure
+from tvident._status import describe
+from tvident._units import times_in_seconds
+
+
+# Options that need work before they are passed on are parameters of their own.
+def derivatives(
+    file: str,
+    channel: str,
+    window_length: str,
+    sample_rate: float | None,
+    delta: float | None,
+    time_channel: str | None,
+    period: str | None,
+    output: str | None,
+    plot: str | None,
+    progress: bool | None,  # noqa: FBT001 - click passes options by name
+    **options: Any,
+) -> None:
+    """Differentiate a channel of FILE with a polynomial order chosen in every window."""
+    check_outputs({RESULTS: output, PICTURE: plot}, {RECORDING: file})
+    if not check_time(sample_rate, delta, time_channel):
+        raise click.UsageError("derivatives need the sample period; got none; give --sample-rate, --delta or --time")
+    channels = channels_in(file)
+    samples = channel_of(channels, channel, file)
+    times = None if time_channel is None else times_in_seconds(channel_of(channels, time_channel, file))
+    fit = tvident.fit_local_polynomials(
+        samples,
+        length(window_length),
+        delta=delta,
+        sample_rate=sample_rate,
+        t=times,
+        period=period_of(period),
+        progress=wanted_progress(progress),
+        **given(options),
+    )
+    seconds = arguments.sample_period(samples.size, delta=delta, sample_rate=sample_rate, t=times)
+    start = 0.0 if times is None else float(times[0])
+    step = int(options["step"])
+    names = ["value", *(f"derivative_{d}" for d in range(1, fit.derivatives.shape[0]))]
+    columns: dict[str, npt.NDArray[Any]] = {"time": start + np.arange(0, samples.size, step) * seconds}
+    for name, values, errors in zip(names, fit.derivatives, fit.stderr, strict=True):
+        columns |= {name: values, f"{name}_stderr": errors}
+    columns |= {"sigma": fit.sigma, "order": fit.order, "status": fit.status}
+    counts = np.bincount(fit.order.ravel())
+    orders = ", ".join(f"{order}: {count / fit.order.size:.0%}" for order, count in enumerate(counts) if count)
+    windows = ", ".join(str(length) for length in np.atleast_1d(fit.window_length))
+    words = [f"{samples.size} samples, windows of {windows}; orders {orders}", "", *describe(fit.status)]
+    if splits := fit.settings.get("splits"):
+        words.append(
+            f"{len(splits)} gaps do not say how often the angle went round in them, the first before sample {splits[0]}: from there on "
+            "the value may be wrong by whole periods"
+        )
+    give(columns, {"time": "s"}, "\n".join(words), output)
+    if plot is not None:
+        save_figure(figures_on_file().plot_derivatives(columns["time"], fit, channel), Path(plot))

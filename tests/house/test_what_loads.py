@@ -1,0 +1,42 @@
+"""What a program waits for that takes the package: rooms are entered when they are needed, and so are libraries."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+SLOW = {
+    "asyncio",
+    "concurrent.futures",
+    "hashlib",
+    "importlib.metadata",
+    "inspect",
+    "logging",
+    "multiprocessing",
+    "subprocess",
+    "tempfile",
+    "unittest",
+    "zipfile",
+}
+"""Of the standard library, by half a millisecond to thirty each; NumPy takes some of them itself."""
+
+OPTIONAL = {"click", "matplotlib", "pandas", "plotly", "polars", "pyarrow", "scipy", "tqdm", "xarray"}
+
+
+@pytest.mark.parametrize(
+    ("code", "forbidden"),
+    [
+        ("import tvident", {"numpy", "tvident._core", *SLOW, *OPTIONAL}),
+        ("import numpy; before |= set(sys.modules); import tvident; tvident.identify", {*SLOW, *OPTIONAL}),
+        ("import numpy; before |= set(sys.modules); import tvident; tvident.read_recording", {*SLOW, *OPTIONAL}),
+    ],
+)
+def test_nothing_is_loaded_that_is_not_needed(code: str, forbidden: set[str]) -> None:
+    # What the interpreter itself takes at its start does not count.
+    program = f"import sys; before = set(sys.modules); {code}; print(*set(sys.modules) - before)"
+    loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
+    assert not forbidden & set(loaded)
+    rooms = {name for name in loaded if name in {"tvident._report", "tvident._figures", "tvident._commands"}}
+    assert not rooms
