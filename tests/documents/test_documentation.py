@@ -181,7 +181,7 @@ def test_files_that_the_design_names_exist() -> None:
 @pytest.mark.parametrize(
     ("function", "command", "without"),
     [
-        (tvident.identify, "identify", set()),
+        (tvident.identify, "identify", {"share"}),
         (tvident.fit_local_polynomials, "derivatives", {"y", "axis"}),
         (tvident.simulate_torsional_rig, "simulate", {"inertia", "damping", "torsional_rigidity"}),
     ],

@@ -12,6 +12,8 @@ Selection: TypeAlias = Literal["window", "pooled", "average"]
 
 Variation: TypeAlias = Literal["constant", "linear"]
 
+Loss: TypeAlias = Literal["squares", "huber"]
+
 NanPolicy: TypeAlias = Literal["propagate", "raise"]
 
 RowPolicy: TypeAlias = Literal["omit", "propagate", "raise"]

@@ -6,7 +6,7 @@ from typing import Any, get_args
 
 import click
 
-from tvident._choices import NanPolicy, Selection
+from tvident._choices import Loss, NanPolicy, Selection
 from tvident._command_line.group import commands, main
 from tvident._command_line.options import CRITERION, PERIOD, RUN, TIME
 
@@ -26,6 +26,13 @@ from tvident._command_line.options import CRITERION, PERIOD, RUN, TIME
 @CRITERION
 @click.option(
     "--selection", type=click.Choice(get_args(Selection)), help="Whose criterion: the window's, or its neighbours' too."
+)
+@click.option(
+    "--loss",
+    type=click.Choice(get_args(Loss)),
+    default="squares",
+    show_default=True,
+    help="huber: spikes move derivatives by little.",
 )
 @PERIOD
 @click.option("--quantisation", type=float, help="Step that the channel was rounded to; looked for if not given.")

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
-from tvident._choices import Criterion, Selection
+from tvident._choices import Criterion, Loss, Selection
 from tvident._derivatives.automatic import choose
 from tvident._derivatives.fit import LocalPolynomialFit, Sampled
 from tvident._derivatives.found import Found
@@ -37,7 +37,7 @@ def fit_local_polynomials(
     order: int | None = None,
     criterion: Criterion = "aicc",
     selection: Selection = "window",
-    loss: Literal["squares", "huber"] = "squares",
+    loss: Loss = "squares",
     max_deriv: int = 2,
     axis: int = -1,
     step: int = 1,
@@ -228,7 +228,7 @@ def fit_local_polynomials(
         quantisation=None if quantisation is None and turned is None else step_of_rounding,
         workers=threads,
     )
-    if arguments.one_of("loss", loss, ("squares", "huber")) == "huber":
+    if arguments.one_of("loss", loss, get_args(Loss)) == "huber":
         for _ in range(_CHOICES if automatic else 1):
             if automatic:
                 value = choose_automatically(samples, max_deriv=0, step=count, progress=None)
