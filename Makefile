@@ -2,13 +2,16 @@
 
 PYTHON ?= python3
 VENV := .venv
-BIN := $(VENV)/bin
+# Where an environment keeps its programs.
+PROGRAMS := $(if $(filter Windows_NT,$(OS)),Scripts,bin)
+BIN := $(VENV)/$(PROGRAMS)
 RUST := $(shell find rust -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 READY := $(VENV)/.ready
 BUILT := $(VENV)/.built
 BENCH := .venv-bench
 BENCH_BUILT := $(BENCH)/.built
 ACCURACY := .venv-accuracy
+WHEELS := .venv-wheels
 export CARGO_TERM_COLOR ?= auto
 
 .PHONY: help
@@ -83,15 +86,19 @@ format: $(READY)  ## format all sources
 
 .PHONY: accuracy
 accuracy: $(ACCURACY)/.built  ## measure accuracy against truth, bound and other libraries, into benches/accuracy.md; hours: ARGUMENTS=--help
-	PYTHONPATH=benches $(ACCURACY)/bin/python -m accuracy $(ARGUMENTS)
+	PYTHONPATH=benches $(ACCURACY)/$(PROGRAMS)/python -m accuracy $(ARGUMENTS)
 
 .PHONY: wheel
 wheel: $(READY)  ## build the wheel that users install, in dist/
 	$(BIN)/maturin build --release --locked --out dist
 
+.PHONY: wheels
+wheels: $(WHEELS)/.ready  ## what is published, in dist/: sources, and from them a wheel for each system; audited, installed, tried
+	$(WHEELS)/$(PROGRAMS)/python .ci/wheels.py $(ARGUMENTS)
+
 .PHONY: bench
 bench: $(BENCH_BUILT)  ## how fast it is beside its peers: BENCH_OPTIONS="--quick", "--only identify", "--store", "--help"
-	PYTHONPATH=benches:tests $(BENCH)/bin/python -m speed $(BENCH_OPTIONS)
+	PYTHONPATH=benches:tests $(BENCH)/$(PROGRAMS)/python -m speed $(BENCH_OPTIONS)
 
 .PHONY: record-instructions
 record-instructions: $(READY)  ## write down the instructions that a window costs, for the tests to compare with (needs valgrind)
@@ -99,7 +106,7 @@ record-instructions: $(READY)  ## write down the instructions that a window cost
 
 .PHONY: clean
 clean:  ## remove everything that was made
-	rm -rf $(VENV) $(BENCH) $(ACCURACY) target dist tvident-demo docs/site docs/built docs/shown
+	rm -rf $(VENV) $(BENCH) $(ACCURACY) $(WHEELS) target dist tvident-demo docs/site docs/built docs/shown
 
 $(READY): requirements-development.txt
 	$(PYTHON) -m venv $(VENV)
@@ -113,21 +120,26 @@ $(BUILT): $(READY) $(RUST) pyproject.toml
 
 $(BENCH)/.ready: requirements-bench.txt
 	$(PYTHON) -m venv $(BENCH)
-	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --requirement requirements-bench.txt
+	$(BENCH)/$(PROGRAMS)/python -m pip install --quiet --disable-pip-version-check --requirement requirements-bench.txt
 	@touch $@
 
 # A wheel as users install it, in an environment of its own: the checked build of the tests stays where it is.
 $(BENCH_BUILT): $(BENCH)/.ready $(RUST) pyproject.toml $(shell find python/tvident -name "*.py")
 	rm -rf target/bench-wheel
-	$(BENCH)/bin/maturin build --release --locked --quiet --out target/bench-wheel
-	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bench-wheel/*.whl
+	$(BENCH)/$(PROGRAMS)/maturin build --release --locked --quiet --out target/bench-wheel
+	$(BENCH)/$(PROGRAMS)/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bench-wheel/*.whl
+	@touch $@
+
+$(WHEELS)/.ready: requirements-wheels.txt
+	$(PYTHON) -m venv $(WHEELS)
+	$(WHEELS)/$(PROGRAMS)/python -m pip install --quiet --disable-pip-version-check --requirement requirements-wheels.txt
 	@touch $@
 
 $(ACCURACY)/.ready: requirements-accuracy.txt
 	$(PYTHON) -m venv $(ACCURACY)
-	$(ACCURACY)/bin/python -m pip install --quiet --disable-pip-version-check --requirement requirements-accuracy.txt
+	$(ACCURACY)/$(PROGRAMS)/python -m pip install --quiet --disable-pip-version-check --requirement requirements-accuracy.txt
 	@touch $@
 
 $(ACCURACY)/.built: $(ACCURACY)/.ready $(RUST) pyproject.toml
-	VIRTUAL_ENV=$(abspath $(ACCURACY)) $(ACCURACY)/bin/maturin develop --profile checked --locked --quiet
+	VIRTUAL_ENV=$(abspath $(ACCURACY)) $(ACCURACY)/$(PROGRAMS)/maturin develop --profile checked --locked --quiet
 	@touch $@
