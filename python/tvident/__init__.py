@@ -7,10 +7,11 @@ if TYPE_CHECKING:
     from tvident._compare import ModelComparison, compare_models
     from tvident._derivatives import LocalPolynomialFit, fit_local_polynomials, savgol_filter
     from tvident._equation import Term
+    from tvident._expansion import Expansion
     from tvident._files import FileRecording, read_recording
     from tvident._identify import StrongForm, WeakForm, identify
     from tvident._regression import RollingRegression, rolling_least_squares
-    from tvident._results import Identification, IdentifiedRecords, Scan, load
+    from tvident._results import ExpandedParameter, Identification, IdentifiedRecords, Scan, load
     from tvident._simulate import Recording, simulate_torsional_rig
     from tvident._status import Status
     from tvident._units import Channel
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Channel",
+    "ExpandedParameter",
+    "Expansion",
     "FileRecording",
     "Identification",
     "IdentifiedRecords",
@@ -43,12 +46,13 @@ __all__ = [
 
 _ROOMS = {
     "_compare": ("ModelComparison", "compare_models"),
+    "_expansion": ("Expansion",),
     "_derivatives": ("LocalPolynomialFit", "fit_local_polynomials", "savgol_filter"),
     "_equation": ("Term",),
     "_files": ("FileRecording", "read_recording"),
     "_identify": ("StrongForm", "WeakForm", "identify"),
     "_regression": ("RollingRegression", "rolling_least_squares"),
-    "_results": ("Identification", "IdentifiedRecords", "Scan", "load"),
+    "_results": ("ExpandedParameter", "Identification", "IdentifiedRecords", "Scan", "load"),
     "_simulate": ("Recording", "simulate_torsional_rig"),
     "_status": ("Status",),
     "_units": ("Channel",),

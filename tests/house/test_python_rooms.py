@@ -19,6 +19,7 @@ ROOMS = (
     "_units",
     "_arguments",
     "_tables",
+    "_expansion",
     "_equation",
     "_status",
     "_formats",

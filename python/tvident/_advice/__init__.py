@@ -1,5 +1,6 @@
 """Puts into words what was chosen, why, and what to do next."""
 
+from tvident._advice.expansion import FoundExpansion, words_of_expansions
 from tvident._advice.instrument import words_with_instrument
 from tvident._advice.plausible import Plausible
 from tvident._advice.search import FoundBySearch, words_of_search
@@ -10,7 +11,9 @@ __all__ = [
     "Explained",
     "ExplainedStrong",
     "FoundBySearch",
+    "FoundExpansion",
     "Plausible",
+    "words_of_expansions",
     "words_of_search",
     "words_with_instrument",
 ]

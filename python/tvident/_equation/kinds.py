@@ -9,8 +9,9 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._choices import Kind
+from tvident._expansion import Expansion
 
-Parameter: TypeAlias = Kind | float | npt.ArrayLike
+Parameter: TypeAlias = Kind | Expansion | float | npt.ArrayLike
 
 
 COEFFICIENTS = ("inertia", "damping", "stiffness")

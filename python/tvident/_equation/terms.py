@@ -13,6 +13,7 @@ from tvident import _arguments as arguments
 from tvident._choices import BUILT_IN, TERM_NAMES, Kind
 from tvident._equation.inner import InnerParameter, ranges
 from tvident._equation.names import name_of_term
+from tvident._expansion import Expansion
 
 
 @dataclass(frozen=True)
@@ -137,7 +138,7 @@ class FixedTerm:
         return found
 
 
-GivenTerm: TypeAlias = str | Term | tuple[str | Term, Kind]
+GivenTerm: TypeAlias = str | Term | tuple[str | Term, Kind | Expansion]
 """The name of a built-in term, a term of one's own, or a pair of one of these and its kind."""
 
 

@@ -8,6 +8,7 @@ except ImportError as error:  # pragma: no cover - the extra is installed where 
     ) from error
 
 from tvident._figures.derivatives import plot_derivatives
+from tvident._figures.expansion import plot_expansion
 from tvident._figures.models import plot_models
 from tvident._figures.paper import paper_figure_2, paper_figure_4, paper_figure_5, paper_figure_6
 from tvident._figures.parameters import plot_identification, plot_over_position
@@ -24,6 +25,7 @@ __all__ = [
     "paper_figure_5",
     "paper_figure_6",
     "plot_derivatives",
+    "plot_expansion",
     "plot_identification",
     "plot_models",
     "plot_over_position",

@@ -14,6 +14,7 @@ from tvident._derivatives import quantisation_step
 from tvident._equation import LINEAR_UNITS, UNITS, GivenTerm, Parameter
 from tvident._identify.channels import motion_channels
 from tvident._identify.data import Data
+from tvident._identify.expanded import ExpandedTask, expansions_of
 from tvident._identify.methods import Method
 from tvident._identify.records import calls_of_records, identify_records, names_shared
 from tvident._identify.settings import resolve
@@ -274,7 +275,7 @@ def identify(
         labels=arguments.labels_of(first),
         axis=axis,
     )
-    return Task(data, request).run(progress)
+    return (ExpandedTask if expansions_of(request) else Task)(data, request).run(progress)
 
 
 def _in_units_of_results(name: str, value: float | None, factor: float) -> float | None:

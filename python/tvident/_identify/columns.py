@@ -27,6 +27,13 @@ _WITHIN_NOISE = 2.0
 _SPECK = 1e-30
 """Values of a term smaller than this part of its largest are none."""
 
+_OF_ANGLE: dict[str, Callable[[Array], Array]] = {
+    "offset": np.ones_like,
+    "cubic": lambda angle: angle**3,
+    "gravity": np.sin,
+}
+"""Built-in terms that need no velocity."""
+
 WINDOW_OF_TERMS = 51
 """Samples of the polynomials that terms of one's own get angle and velocity from in weak form."""
 
@@ -164,6 +171,21 @@ class Columns:
         if repeated and self.weak and any(term.inner and term.own is None for term in self.terms):
             columns = [self._direction if isinstance(one, str) and one == "coulomb" else one for one in columns]
         return columns
+
+    def all_samples(self, inner: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the samples of every term by name, those of built-in terms too, with the inner parameters of every record."""
+        found: dict[str, Array] = {}
+        for term in self.terms:
+            given = self._term(term, inner)
+            if not isinstance(given, str):
+                found[term.name] = np.asarray(given, np.float64)
+            elif given == "coulomb":
+                found[given] = self._direction
+            elif given == "viscous_asymmetric":
+                found[given] = np.abs(self._sliding[0]).reshape(self.angles.shape)
+            else:
+                found[given] = _OF_ANGLE[given](np.asarray(self.angles, np.float64))
+        return found
 
     def slope(self, one: InnerParameter, ends: tuple[Array, Array], inner: Mapping[str, Array]) -> Array:
         """Return by how much a term changes with an inner parameter between two values of it, shape (records, n)."""

@@ -309,6 +309,10 @@ def _of_result(earlier: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str
         )
     for name in COEFFICIENTS:
         asked[name] = known[name] if kinds[name] == "known" else kinds[name]
+        if asked[name] == "expanded" and name not in given:
+            raise ValueError(
+                f"settings hold no channel, and {name} is an expansion; got none; pass {name}=Expansion(…) again"
+            )
         if asked[name] is None and name not in given:
             raise ValueError(
                 f"settings hold no {name}, since it was known at every sample; got None; pass {name}= again"

@@ -94,7 +94,7 @@ class Task:
                 without = self.found(inner)
                 factors = {one.term: factor_of(without, self.place_of(one.term)) for one in self.inner}
             moving = self._slopes(inner, factors)
-        motions = self._motions([*self._columns.samples(inner, repeated=not diagnose), *moving])
+        motions = self._motions([*self.columns.samples(inner, repeated=not diagnose), *moving])
         return _core.identify(
             motions,
             [*(one.kind for one in self._unknowns), *("constant" for _ in moving)],
@@ -119,7 +119,7 @@ class Task:
     @cached_property
     def ranges(self) -> dict[str, Range]:
         """Where inner parameters are searched."""
-        return {one.full_name: self._columns.range_of(one) for one in self.inner}
+        return {one.full_name: self.columns.range_of(one) for one in self.inner}
 
     def frozen(self, found: Sequence[_core.Identification], inner: Mapping[str, Numbers]) -> Task:
         """Return the same task with what was chosen; where something is windowed in windows of one length, which cost less."""
@@ -167,7 +167,7 @@ class Task:
         """Return what a unit more of each inner parameter does to the torque; nothing if one of them does nothing anywhere."""
         slopes = []
         for one in self.inner:
-            slope = self._columns.slope(one, secant(self.ranges[one.full_name], inner[one.full_name]), inner)
+            slope = self.columns.slope(one, secant(self.ranges[one.full_name], inner[one.full_name]), inner)
             for record, factor in enumerate(factors[one.term]):
                 slope[record] *= np.repeat(factor, self._data.step)[: slope.shape[1]] if factor.size > 1 else factor
             if not np.any(np.nan_to_num(slope)):
@@ -272,7 +272,7 @@ class Task:
                     error=float(np.ravel(batch.constants[one.full_name][1])[record]),
                     limits=self.ranges[one.full_name].of(record),
                     factor=middle(factors[one.term][record]),
-                    lasts=float(self._columns.samples_of_fading(searched.values[one.full_name])[record])
+                    lasts=float(self.columns.samples_of_fading(searched.values[one.full_name])[record])
                     if one.limits is None
                     else np.inf,
                     **searched.of(one, record),
@@ -299,7 +299,7 @@ class Task:
         return Task(data, request)
 
     @cached_property
-    def _columns(self) -> Columns:
+    def columns(self) -> Columns:
         """The terms, evaluated with the polynomials of the strong form, or with short ones."""
         data, weak = self._data, not isinstance(self._request.form, StrongForm)
         return Columns(self._terms, data.angles, data.time, data.period, self._polynomials, weak, data.workers)

@@ -1,5 +1,6 @@
 """Holds the result of an identification: parameters by name, standard errors, natural frequency, the summary."""
 
+from tvident._results.curve import ExpandedParameter, of_powers
 from tvident._results.estimates import Estimates
 from tvident._results.explained import explained_steps
 from tvident._results.loaded import load
@@ -12,6 +13,7 @@ from tvident._results.words import Words, of_batch
 
 __all__ = [
     "Estimates",
+    "ExpandedParameter",
     "Identification",
     "IdentifiedRecords",
     "Recorded",
@@ -23,6 +25,7 @@ __all__ = [
     "explained_steps",
     "load",
     "of_batch",
+    "of_powers",
     "of_records",
     "settings_of",
     "with_shared",

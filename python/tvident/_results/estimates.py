@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._equation import UNITS
+from tvident._results.curve import ExpandedParameter
 from tvident._results.scan import Scan
 from tvident._status import Status
 
@@ -43,6 +44,8 @@ class Estimates:
         How every unknown of every record turned out.
     units : mapping of str to str
         Of everything by name.
+    expansions : mapping of str to ExpandedParameter
+        Curves of parameters that are expansions.
     """
 
     values: Mapping[str, Array]
@@ -59,3 +62,4 @@ class Estimates:
     labels: arguments.Labels | None = None
     kinds: Mapping[str, npt.NDArray[np.str_]] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=lambda: UNITS)
+    expansions: Mapping[str, ExpandedParameter] = field(default_factory=dict)

@@ -53,6 +53,7 @@ def _kinds(result: Any) -> list[str]:
         "known": "known: it was given",
         "constant": "one value for the record",
         "windowed": "one value at every sample, from the equations around it",
+        "expanded": "a sum of functions: one value at every sample",
         "varying": "changes slowly: one value at every sample",
         "auto": "constant in some records, changing in others",
     }

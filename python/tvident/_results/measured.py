@@ -25,7 +25,7 @@ class Measured(NamedTuple):
         Of a constant; 0 is the error of what was known. Of a parameter that changes the median of its values and of their errors.
     unit : str
     kind : str
-        ``"constant"``, ``"windowed"``, ``"varying"`` or ``"known"``.
+        ``"constant"``, ``"windowed"``, ``"varying"``, ``"expanded"`` or ``"known"``.
     least, greatest : float
         Between them are nine tenths of the values.
     """

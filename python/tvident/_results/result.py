@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._files import RESULT_ENDINGS, write_settings, write_table
+from tvident._results.curve import ExpandedParameter
 from tvident._results.estimates import Estimates
 from tvident._results.held_back import HeldBack
 from tvident._results.oscillator import Oscillator
@@ -78,6 +79,9 @@ class Identification(Simulated, Valued):
     jumps : tuple of float
         Times in seconds at which parameters jump (``reasons`` says which), found if windows of all lengths are averaged; one such
         tuple per record in a batch.
+    expansions : dict of str to ExpandedParameter
+        Parameters that were asked for as an :class:`Expansion`: the curve over what each is a function of, its error, and the sizes that
+        were tried. Empty otherwise, and of a result that was loaded from a file.
     units : mapping of str to str
         Units of the parameters and of the columns by name: those of a rotary axis, or of a linear one (m, N).
     settings : dict
@@ -117,6 +121,7 @@ class Identification(Simulated, Valued):
         recorded: Recorded | None = None,
     ) -> None:
         super().__init__(recorded)
+        self.expansions: dict[str, ExpandedParameter] = dict(found.expansions)
         self.units = found.units
         self.time = time
         self.inertia = found.values["inertia"]

@@ -64,7 +64,7 @@ def _rows(result: Any) -> Iterator[tuple[str, ...]]:
         error = error[np.isfinite(error)]
         middle = float(np.median(error)) if error.size else np.nan
         shown = [to_digits_of(number, middle) for number in numbers]
-        if kind not in {"windowed", "varying"}:
+        if kind not in {"windowed", "varying", "expanded"}:
             shown[1] = shown[2] = ""
         yield name, kind, *shown, own_digits(middle), result.units.get(name, "")
     if "angle_zero" in result.constants:

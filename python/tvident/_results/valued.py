@@ -72,7 +72,9 @@ class Valued(Tabular):
         table, trusted = self._table(), self.trusted.reshape(-1, self.time.size)[record]
         kinds = self.settings["kinds"]
         kinds = kinds | {name: str(kind.reshape(-1)[record]) for name, kind in self._found.kinds.items()}
-        changing = [kinds[name] for name in ("inertia", "stiffness") if kinds[name] in {"windowed", "varying"}]
+        changing = [
+            kinds[name] for name in ("inertia", "stiffness") if kinds[name] in {"windowed", "varying", "expanded"}
+        ]
         kinds |= dict.fromkeys(("natural_frequency", "damping_ratio"), changing[0] if changing else "constant")
         each = {name: values.reshape(-1, self.time.size)[record] for name, values in table.columns.items()}
         return {

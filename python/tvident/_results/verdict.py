@@ -143,7 +143,7 @@ def _errors(result: Any) -> str:
             warnings.simplefilter("ignore")  # a record of which nothing can be trusted has no median
             middles = (np.nanmedian(np.where(there, one, np.nan), axis=-1) for one in (error, np.abs(value)))
             relative = float(np.nanmedian(np.divide(*middles)))
-        changes = "(t)" if kind in {"windowed", "varying"} else ""
+        changes = "(t)" if kind in {"windowed", "varying", "expanded"} else ""
         found.append((f"{symbol}{changes}", relative))
     return _sentence(found)
 

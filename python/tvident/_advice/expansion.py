@@ -1,0 +1,136 @@
+"""Reasons and advice of expanded parameters, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _core
+from tvident._advice.lists import listed
+from tvident._results import Words
+
+_DIFFERS = 2.0
+"""Windows contradict a schedule where the mean squared difference, over its variance, is above this and chance."""
+
+_STANDARD = 4.0
+"""Standard deviations of chance."""
+
+_EQUIVALENT = 4.0
+"""Sizes whose criterion is at most so much higher are told from the best by chance."""
+
+
+@dataclass(frozen=True)
+class FoundExpansion:
+    """What was found of an expanded parameter.
+
+    Parameters
+    ----------
+    name, family : str
+    size : int or (int, int)
+    sizes : mapping of str to ndarray
+        Those that were tried, with their criterion.
+    largest : int
+        The largest that may be.
+    is_of_time : bool
+    chosen : bool
+        Whether the record chose the size.
+    against_windows : (float, int)
+        The mean squared difference from windows over its variance, and at how many.
+    """
+
+    name: str
+    family: str
+    size: Any
+    sizes: Mapping[str, npt.NDArray[Any]]
+    largest: int
+    is_of_time: bool
+    chosen: bool
+    against_windows: tuple[float, int]
+
+
+def words_of_expansions(
+    found: Sequence[FoundExpansion], observations: float, ratio: float, changing: Sequence[str]
+) -> Words:
+    """Return how sizes were chosen, whether windows agree, and what to do where they do not.
+
+    Parameters
+    ----------
+    found : sequence of FoundExpansion
+    observations : float
+        Independent equations.
+    ratio : float
+        What is left of the equations over their noise.
+    changing : sequence of str
+        Parameters that were to be constant unless a test rejects it, which windows reject.
+    """
+    reasons, advice = [], []
+    for one in found:
+        reasons.append(_size(one, observations))
+        advice += _at_end(one)
+        said, contradicts = _against_windows(one)
+        (advice if contradicts else reasons).extend(said)
+    if np.isfinite(ratio):
+        reasons.append(
+            f"weighted by their noise and corrected for that of the angle, the equations leave {ratio:.2f} times what the noise explains"
+        )
+    if ratio > _core.NOISE_MODEL_FAILS:
+        advice.append(
+            "the equations leave more than the noise of the channels: a term may be missing, or parameters change otherwise; "
+            "standard errors follow from what is left"
+        )
+    if changing:
+        advice.append(
+            f"windows find changes of {listed(changing)}, taken as constant beside the expansion: expand it in time too, and compare"
+        )
+    return Words(tuple(reasons), tuple(advice))
+
+
+def _size(one: FoundExpansion, observations: float) -> str:
+    size = " x ".join(str(each) for each in np.atleast_1d(one.size))
+    what = f"{one.name}: {size} functions ({one.family}) of {'time' if one.is_of_time else 'the channel'}"
+    if not one.chosen:
+        return f"{what}, as given"
+    criterion = one.sizes["criterion"]
+    lowest = float(np.min(criterion))
+    others = int(np.sum(criterion <= lowest + _EQUIVALENT)) - 1
+    return (
+        f"{what}: of {criterion.size} sizes the smallest whose criterion (AICc, {observations:.0f} independent equations) is within "
+        f"{_EQUIVALENT:g} of the lowest; {others} larger ones are as good"
+    )
+
+
+def _at_end(one: FoundExpansion) -> list[str]:
+    """Return what to do where the largest size was taken: more may be better."""
+    largest = int(np.max(np.atleast_1d(one.size)))
+    if not one.chosen or 2 * largest <= one.largest:
+        return []
+    tried = np.asarray(one.sizes["size"])
+    if largest < int(tried.max()) * 0.9:
+        return []
+    return [f"{one.name} takes nearly the largest size of {one.largest}: raise largest=, or let it be windowed"]
+
+
+def _against_windows(one: FoundExpansion) -> tuple[list[str], bool]:
+    squares, count = one.against_windows
+    if count < 2 or not np.isfinite(squares):  # noqa: PLR2004 - one window tells nothing
+        return [f"{one.name}: not compared with windows"], False
+    # A mean of squares of so many standard normal numbers scatters by this.
+    limit = max(_DIFFERS, 1 + _STANDARD * np.sqrt(2 / count))
+    ratio = np.sqrt(squares)
+    if squares <= limit:
+        return [
+            f"{one.name}: the expansion and {count} windows agree: they differ by {ratio:.2g} standard errors rms"
+        ], False
+    said = f"it and {count} windows differ by {ratio:.2g} standard errors rms"
+    if one.is_of_time:
+        too_few = f"the functions do not follow how {one.name} changes: {said}; take more, or another family, or let it be windowed"
+        return [too_few], True
+    unexplained = (
+        f"the schedule does not explain how {one.name} changes: {said}; {one.name} depends on something else too (add it as a second "
+        "channel of the Expansion), or these functions are too coarse for it (try another family); otherwise let it be windowed"
+    )
+    return [unexplained], True

@@ -1,0 +1,127 @@
+"""Families of functions on the interval from 0 to 1: their values and derivatives, and which sizes they come in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from numpy.polynomial import chebyshev, laguerre, legendre
+
+from tvident._expansion.splines import spline_values
+from tvident._expansion.wavelets import haar_values, scaling_values
+
+Array: TypeAlias = npt.NDArray[np.float64]
+
+Values: TypeAlias = Callable[[Array, int, int], Array]
+"""Of places, a size and the order of a derivative: an array of shape (places, size)."""
+
+LAGUERRE_LENGTH = 5.0
+"""The interval in units of the argument of Laguerre functions, whose first has faded to a twelfth at its end."""
+
+
+@dataclass(frozen=True)
+class Family:
+    """Functions on the interval from 0 to 1, as many as wanted.
+
+    Parameters
+    ----------
+    values : callable
+    sizes : callable
+        Gives the sizes from the smallest on.
+    smooth : int
+        How many derivatives are continuous, of those that equations need.
+    """
+
+    values: Values
+    sizes: Callable[[], Iterator[int]]
+    smooth: int = 2
+
+
+def every(first: int = 1, step: int = 1) -> Iterator[int]:
+    """Give sizes from the first on."""
+    size = first
+    while True:
+        yield size
+        size += step
+
+
+def _doubled() -> Iterator[int]:
+    size = 1
+    while True:
+        yield size
+        size *= 2
+
+
+def _chebyshev(places: Array, size: int, derivative: int) -> Array:
+    """Return Chebyshev polynomials of the first kind."""
+    change = chebyshev.chebder(np.eye(size), derivative) if derivative else np.eye(size)
+    return np.asarray(chebyshev.chebvander(2 * places - 1, len(change) - 1) @ change * 2.0**derivative)
+
+
+def _second_chebyshev(places: Array, size: int, derivative: int) -> Array:
+    """Return Chebyshev polynomials of the second kind: U_k = T'_{k+1} / (k+1)."""
+    first = _chebyshev(places, size + 1, derivative + 1)[:, 1:] / 2
+    return np.asarray(first / np.arange(1, size + 1))
+
+
+def _legendre(places: Array, size: int, derivative: int) -> Array:
+    change = legendre.legder(np.eye(size), derivative) if derivative else np.eye(size)
+    return np.asarray(legendre.legvander(2 * places - 1, len(change) - 1) @ change * 2.0**derivative)
+
+
+def _laguerre(places: Array, size: int, derivative: int) -> Array:
+    """Return Laguerre functions exp(-x/2) L_k(x); (exp(-x/2) L)′ = exp(-x/2) (L′ - L/2)."""
+    change = np.eye(size)
+    for _ in range(derivative):
+        slope = np.zeros_like(change)
+        slope[: max(1, size - 1)] = laguerre.lagder(change)
+        change = slope - change / 2
+    x = LAGUERRE_LENGTH * places
+    functions = laguerre.lagvander(x, size - 1) @ change
+    return np.asarray(np.exp(-x / 2)[:, np.newaxis] * functions * LAGUERRE_LENGTH**derivative)
+
+
+def _fourier(places: Array, size: int, derivative: int) -> Array:
+    """Return one, then cosine and sine of every harmonic of the interval."""
+    number = np.arange(size)
+    harmonic = 2 * np.pi * ((number + 1) // 2)
+    # A sine is a cosine a quarter of a turn late, a derivative one that is early.
+    phase = np.where(number % 2 == 1, 0.0, -np.pi / 2) + derivative * np.pi / 2
+    phase[0] = 0.0
+    values = np.cos(places[:, np.newaxis] * harmonic + phase) * harmonic**derivative
+    return np.asarray(values)
+
+
+def _block_pulse(places: Array, size: int, derivative: int) -> Array:
+    if derivative:
+        raise ValueError("block pulses have no derivatives")
+    block = np.clip((places * size).astype(np.int64), 0, size - 1)
+    return np.asarray((block[:, np.newaxis] == np.arange(size)).astype(np.float64))
+
+
+FAMILIES: dict[str, Family] = {
+    "chebyshev": Family(_chebyshev, every),
+    "chebyshev2": Family(_second_chebyshev, every),
+    "legendre": Family(_legendre, every),
+    "powers": Family(_legendre, every),
+    "fourier": Family(_fourier, partial(every, 1, 2)),
+    "laguerre": Family(_laguerre, every),
+    "block_pulse": Family(_block_pulse, every, smooth=-1),
+    "haar": Family(haar_values, _doubled, smooth=-1),
+    **{
+        f"db{order}": Family(partial(scaling_values, order), partial(every, 2 * order), smooth=0)
+        for order in range(2, 6)
+    },
+}
+"""By name; B-splines depend on a degree: :func:`family_of`."""
+
+
+def family_of(name: str, degree: int) -> Family:
+    """Return a family by its name, B-splines of a degree."""
+    if name == "bspline":
+        return Family(partial(spline_values, degree), every, smooth=degree - 1)
+    return FAMILIES[name]

@@ -1,0 +1,189 @@
+"""Identification with expanded parameters: windows tell noise, lag and test function, then sums of functions take their place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NoReturn
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident._advice import FoundExpansion, words_of_expansions
+from tvident._equation import Term
+from tvident._expansion import DERIVATIVES, Expansion, Search
+from tvident._identify.data import Data
+from tvident._identify.expanded_inputs import ExpandedInputs, role_of
+from tvident._identify.expanded_result import ExpandedOutcome
+from tvident._identify.methods import WeakForm
+from tvident._identify.settings import Request, plain
+from tvident._identify.task import Task
+from tvident._results import ExpandedParameter, Identification, Recorded
+
+_PAIR = 2
+"""A term and its kind."""
+
+
+def expansions_of(request: Request) -> dict[str, Expansion]:
+    """Return the expansions that are asked for, by the names of parameters and terms."""
+    found = {name: one for name, one in request.parameters.items() if isinstance(one, Expansion)}
+    terms = request.terms if isinstance(request.terms, tuple | list) else ()
+    for term in terms:
+        if isinstance(term, tuple | list) and len(term) == _PAIR and isinstance(term[1], Expansion):
+            found[term[0].name if isinstance(term[0], Term) else str(term[0])] = term[1]
+    return found
+
+
+class ExpandedTask:
+    """One call in which parameters are expansions.
+
+    Parameters
+    ----------
+    data : Data
+    request : Request
+    """
+
+    def __init__(self, data: Data, request: Request) -> None:
+        self._data, self._request = data, request
+        self._expansions = expansions_of(request)
+        self._check()
+
+    def run(self, progress: arguments.Progress) -> Identification:
+        """Identify windows, then the factors of the expansions."""
+        whole = replace(self._data, step=1, labels=None)
+        task = Task(whole, self._pilot_request())
+        pilot = task.run(progress, diagnose=False)
+        if not isinstance(pilot.settings["window_length"], int) or not isinstance(pilot.settings["exponent"], int):
+            return pilot  # nothing could be determined, and its status says so
+        given = ExpandedInputs(self._data, self._request, self._expansions, task, pilot)
+        search = Search(given.record, given.parts, given.noise, given.known)
+        unknowns, fitted, around = search.run(given.start, given.start_of_terms)
+        tried = sorted(search.tried.values(), key=lambda one: one.parameters)
+        return self._result(ExpandedOutcome(given, unknowns, fitted, around, tried).with_errors_of_residuals())
+
+    def _result(self, outcome: ExpandedOutcome) -> Identification:
+        data, pilot, curves = self._data, outcome.given.pilot, outcome.curves
+        found = outcome.estimates()
+        told = [
+            FoundExpansion(
+                one.name,
+                one.family,
+                one.size,
+                one.sizes,
+                self._expansions[one.name].largest,
+                is_of_time=self._expansions[one.name].is_of_time,
+                chosen=None in self._expansions[one.name].given_sizes,
+                against_windows=outcome.against_windows(one.name, found),
+            )
+            for one in curves.values()
+        ]
+        kinds = {name: str(kind) for name, kind in pilot.settings["kinds"].items() if name not in curves}
+        changing = [
+            name
+            for name, kind in kinds.items()
+            if arguments.is_word(self._request.parameters.get(name), "auto") and kind not in {"constant", "known"}
+        ]
+        words = words_of_expansions(told, outcome.fitted.observations, outcome.ratio, changing)
+        if data.labels is not None:
+            found = replace(found, labels=data.labels.at(slice(None, None, data.step)))
+        return Identification(
+            found,
+            time=data.time[:: data.step],
+            terms=list(pilot.terms),
+            jumps=(),
+            words=replace(words, advice=(*(line for _, line in data.doubts), *words.advice)),
+            settings=plain(outcome.settings(self._request.name)),
+            recorded=self._recorded(pilot._recorded, curves),  # noqa: SLF001 - parts of this package
+        )
+
+    def _recorded(self, recorded: Recorded | None, curves: Mapping[str, ExpandedParameter]) -> Recorded | None:
+        """Return the record, which can be identified once more with functions as many as were found."""
+        if recorded is None:
+            return None
+        fixed = {name: replace(one, size=curves[name].size) for name, one in self._expansions.items()}
+
+        def again(angles: npt.NDArray[np.number]) -> Identification:
+            request = with_expansions(self._request, fixed)
+            data = replace(self._data, angles=angles, propagate=False, step=1, labels=None)
+            return ExpandedTask(data, request).run(progress=None)
+
+        return replace(recorded, again=again, improve=None)
+
+    def _pilot_request(self) -> Request:
+        """Return the request with windows, or what the record decides, in the place of expansions."""
+        given = self._request.parameters
+        windows = {
+            name: ("windowed" if name == "stiffness" else "auto") if isinstance(one, Expansion) else one
+            for name, one in given.items()
+        }
+        terms = [
+            (term[0], "windowed")
+            if isinstance(term, tuple | list) and len(term) == _PAIR and isinstance(term[1], Expansion)
+            else term
+            for term in self._request.terms
+        ]
+        # Without a windowed parameter terms without a kind are constant, as they are beside an expansion.
+        terms = [term if isinstance(term, tuple | list) else (term, "constant") for term in terms]
+        return replace(self._request, parameters=windows, terms=terms)
+
+    def _check(self) -> None:
+        """Refuse what an expansion cannot stand beside."""
+        data = self._data
+        if data.batch:
+            _refuse("an Expansion is for one record at a time", f"shape {data.angles.shape}", "identify each in turn")
+        if not isinstance(self._request.form, WeakForm):
+            _refuse("an Expansion needs the weak form", "the strong form", "leave method= out, or give a WeakForm")
+        if data.instruments is not None:
+            _refuse("an Expansion has no instruments", "instrument=", "leave one of them out")
+        if data.motion.recorded:
+            channels = " and ".join(data.motion.recorded)
+            _refuse("an Expansion needs the angle alone", channels, "leave the other channels out")
+        self._check_others()
+        for name, one in self._expansions.items():
+            self._check_functions(name, one)
+
+    def _check_others(self) -> None:
+        """Refuse windows beside an expansion."""
+        for name, one in self._request.parameters.items():
+            if isinstance(one, str) and one in {"windowed", "varying"}:
+                _refuse(
+                    f"beside an Expansion of {next(iter(self._expansions))} all others are constant, known or expansions",
+                    f"{name}={one!r}",
+                    f"say {name}='constant', or give an Expansion of time",
+                )
+        for term in self._request.terms:
+            if isinstance(term, tuple | list) and arguments.is_word(term[1], "windowed"):
+                called = getattr(term[0], "name", term[0])
+                _refuse(
+                    "beside an Expansion terms are constant or expansions", f"{called!r} windowed", "make it constant"
+                )
+
+    def _check_functions(self, name: str, one: Expansion) -> None:
+        """Refuse functions that have not the derivatives that rows need, and channels of another length."""
+        # The second derivative of an inertia may jump.
+        needed = min(DERIVATIVES.get(role_of(name, one), 0), 1)
+        if any(family.smooth < needed for family in one.families):
+            _refuse(f"{name} needs functions with continuous derivatives", one.called, "use 'bspline'")
+        for channel in one.channels:
+            if channel.shape != self._data.time.shape:
+                _refuse(
+                    "the channel of an Expansion must have a value for every sample",
+                    f"shape {channel.shape} for {self._data.time.size} samples",
+                    "resample it",
+                )
+
+
+def _refuse(rule: str, got: str, cure: str) -> NoReturn:
+    raise ValueError(f"{rule}; got {got}; {cure}")
+
+
+def with_expansions(request: Request, expansions: Mapping[str, Expansion]) -> Request:
+    """Return a request with other expansions of the same parameters and terms."""
+    parameters = {name: expansions.get(name, one) for name, one in request.parameters.items()}
+    terms = []
+    for term in request.terms:
+        pair = isinstance(term, tuple | list) and len(term) == _PAIR
+        name = getattr(term[0], "name", term[0]) if pair else term
+        terms.append((term[0], expansions[name]) if pair and name in expansions else term)
+    return replace(request, parameters=parameters, terms=terms)

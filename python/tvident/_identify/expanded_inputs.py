@@ -1,0 +1,202 @@
+"""What a fit of expansions takes: rows, unknowns, noise, and where to begin, from a record and what windows found in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _core
+from tvident._derivatives import fit_local_polynomials
+from tvident._equation import COEFFICIENTS, parameter
+from tvident._expansion import DERIVATIVES, Coordinate, Curves, Expansion, Part, Record
+from tvident._identify.data import Data
+from tvident._identify.settings import Request
+from tvident._identify.task import Task
+from tvident._results import Identification
+
+Array = npt.NDArray[np.float64]
+
+_QUIET = 1e-9
+"""The torque's noise counts as at least this part of the torque: rows without noise have no covariance."""
+
+
+def role_of(name: str, expansion: Expansion | None) -> str:
+    """Return what an unknown multiplies."""
+    if name == "inertia" and expansion is not None and expansion.inertia_times == "momentum":
+        return "momentum"
+    return name if name in COEFFICIENTS else "term"
+
+
+@dataclass(frozen=True)
+class ExpandedInputs:
+    """A record and what windows found in it, as the fit of expansions takes them.
+
+    Parameters
+    ----------
+    data : Data
+    request : Request
+    expansions : mapping of str to Expansion
+    task : Task
+        Of the windows.
+    pilot : Identification
+        What they found.
+    """
+
+    data: Data
+    request: Request
+    expansions: Mapping[str, Expansion]
+    task: Task
+    pilot: Identification
+
+    @cached_property
+    def angle(self) -> Array:
+        """The angle, from where the spring is relaxed."""
+        return np.asarray(self.data.angles, np.float64) - self.zero
+
+    @cached_property
+    def zero(self) -> float:
+        """The angle at which windows found the spring relaxed."""
+        zero = self.pilot.settings.get("angle_zero") or 0.0
+        return float(zero[0] if isinstance(zero, list) else zero)
+
+    @cached_property
+    def coordinates(self) -> dict[str, list[Coordinate]]:
+        """What every expansion is a function of."""
+        return {name: self.coordinates_of(name, one) for name, one in self.expansions.items()}
+
+    def coordinates_of(self, name: str, expansion: Expansion) -> list[Coordinate]:
+        """Return what an expansion is a function of, scaled, with its rates where the equation needs them."""
+        data, derivatives = self.data, DERIVATIVES.get(role_of(name, expansion), 0)
+        found = []
+        each: Sequence[Array] = expansion.channels or [data.time]
+        for channel, given in zip(each, expansion.given_limits, strict=True):
+            there = np.isfinite(channel)
+            low, high = given or (float(channel[there].min()), float(channel[there].max())) if there.any() else (0, 0)
+            if not low < high:
+                raise ValueError(
+                    f"the channel of an Expansion must change; {name} got one that stays at {low:g}; "
+                    f"say {name}='constant'"
+                )
+            outside = there & ((channel < low) | (channel > high))
+            if outside.any():
+                raise ValueError(
+                    f"limits must hold every value of the channel; got {low:g} to {high:g} for {channel[there].min():g} "
+                    f"to {channel[there].max():g}; widen them"
+                )
+            places = np.where(there, (channel - low) / (high - low), 0.0)
+            rates = np.broadcast_to(np.zeros((2, 1)), (2, channel.size))
+            if expansion.is_of_time:
+                rates = np.broadcast_to(np.array([[1 / (high - low)], [0.0]]), (2, channel.size))
+            elif derivatives:
+                smooth = fit_local_polynomials(np.where(there, channel, np.nan), "auto", delta=data.period)
+                rates = np.nan_to_num(np.stack([smooth.derivatives[1], smooth.derivatives[2]]) / (high - low))
+            found.append(Coordinate(places, rates, (low, high)))
+        return found
+
+    @cached_property
+    def record(self) -> Record:
+        """The record as rows are made of it."""
+        data, settings = self.data, self.pilot.settings
+        torque = np.asarray(data.torques, np.float64)
+        usable = np.isfinite(self.angle) & np.isfinite(torque)
+        for one in self.expansions.values():
+            for channel in one.channels:
+                usable &= np.isfinite(channel)
+        for samples in self.terms.values():
+            usable &= np.isfinite(samples)
+        late = settings.get("lag_samples") or [settings["lag"] / data.period]
+        return Record(
+            angle=np.where(usable, self.angle, 0.0),
+            torque=np.where(usable, torque, 0.0),
+            usable=usable,
+            centres=np.ones(usable.shape, bool) if data.mask is None else data.mask,
+            period=data.period,
+            half=int(settings["window_length"]) // 2,
+            exponent=int(settings["exponent"]),
+            lag=float(late[0]),
+        )
+
+    @cached_property
+    def terms(self) -> dict[str, Array]:
+        """Samples of every further term."""
+        inner = {name: np.ravel(np.asarray(one, float)) for name, one in self.pilot.settings["inner"].items()}
+        return self.task.columns.all_samples(inner)
+
+    @cached_property
+    def parts(self) -> list[Part]:
+        """The unknowns, still without sizes."""
+        found = []
+        for name in (*COEFFICIENTS, *self.terms):
+            expansion = self.expansions.get(name)
+            samples = self.terms.get(name)
+            filled = None if samples is None else np.where(self.record.usable, samples, 0.0)
+            if expansion is None:
+                if name in self.terms or name not in self.known_values:
+                    found.append(Part(name, role_of(name, None), samples=filled))
+                continue
+            role, places = role_of(name, expansion), self.coordinates[name]
+            families = expansion.families_within([one.limits for one in places])
+            sizes = expansion.given_sizes
+            found.append(Part(name, role, places, families, sizes, expansion.largest, filled))
+        if self.zero:
+            found.append(Part("angle_zero", "term", samples=-np.nan_to_num(self.pilot.stiffness)))
+        return found
+
+    @cached_property
+    def known_values(self) -> dict[str, Array]:
+        """Coefficients that are known, at every sample."""
+        data = self.data
+        given = {
+            name: parameter(name, one, data.time.shape)
+            for name, one in self.request.parameters.items()
+            if not isinstance(one, str | Expansion)
+        }
+        return {name: np.broadcast_to(np.asarray(one, np.float64), data.time.shape) for name, one in given.items()}
+
+    @property
+    def known(self) -> Curves:
+        """The same with their rates, as rows take them."""
+        found: Curves = []
+        for name, value in self.known_values.items():
+            along = [np.asarray(value)]
+            for _ in range(DERIVATIVES.get(name, 0)):
+                along.append(np.gradient(along[-1], self.data.period) if np.ptp(value) else np.zeros(value.shape))
+            if np.any(value):
+                found.append((name, along))
+        return found
+
+    @property
+    def start(self) -> Curves:
+        """The coefficients as windows have them; without their slopes, which are noise."""
+        found: Curves = []
+        for name in COEFFICIENTS:
+            if name in self.known_values:
+                continue
+            value: Array = getattr(self.pilot, name)
+            there = np.isfinite(value)
+            middle = float(np.median(value[there])) if there.any() else 0.0
+            level = np.where(there, value, middle) if name == "stiffness" else np.full(value.shape, middle)
+            slopes = [np.zeros(value.shape)] * DERIVATIVES.get(role_of(name, self.expansions.get(name)), 0)
+            found.append((role_of(name, self.expansions.get(name)), [level, *slopes]))
+        return [*found, *self.known]
+
+    @property
+    def start_of_terms(self) -> Array:
+        """Torque of the further terms as windows have it."""
+        total = np.zeros(self.data.time.size)
+        for name, samples in self.terms.items():
+            total += np.nan_to_num(self.pilot.terms[name]) * np.where(self.record.usable, samples, 0.0)
+        return total
+
+    @cached_property
+    def noise(self) -> tuple[float, float]:
+        """Variances of the noise of angle and torque."""
+        (angle,) = _core.noise(self.data.angles, self.request.quantisation)
+        shown = self.pilot.settings.get("shown_noise")
+        torque = float(shown[0]) if shown else _core.noise(self.data.torques)[0].sigma ** 2
+        least = float(np.mean(self.record.torque**2)) * _QUIET**2
+        return angle.sigma**2, max(torque, least) or 1.0

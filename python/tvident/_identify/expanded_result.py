@@ -1,0 +1,226 @@
+"""What a fit of expansions found, as results have it: curves, values and errors at the samples, status, settings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _core
+from tvident._equation import COEFFICIENTS
+from tvident._expansion import (
+    Fitted,
+    Linearised,
+    Tried,
+    Unknown,
+    along_record,
+    errors_along,
+)
+from tvident._identify.expanded_inputs import ExpandedInputs
+from tvident._results import Estimates, ExpandedParameter, of_powers
+from tvident._status import Status
+from tvident._units import unit_said
+
+Array = npt.NDArray[np.float64]
+
+_KEPT = Status.COLOURED | Status.CHANNEL_SUSPECTED
+"""Flags that windows found of the channels, whatever the equation."""
+
+
+@dataclass(frozen=True)
+class ExpandedOutcome:
+    """What a fit found.
+
+    Parameters
+    ----------
+    given : ExpandedInputs
+    unknowns : sequence of Unknown
+    fitted : Fitted
+    around : Linearised
+        The rows around what was found.
+    tried : sequence of Tried
+    """
+
+    given: ExpandedInputs
+    unknowns: Sequence[Unknown]
+    fitted: Fitted
+    around: Linearised
+    tried: Sequence[Tried]
+
+    @property
+    def ratio(self) -> float:
+        """The mean square of the residuals over that of the noise."""
+        free = self.fitted.observations - sum(one.size for one in self.unknowns)
+        return self.fitted.misfit / free if free > 0 else float("nan")
+
+    def with_errors_of_residuals(self) -> ExpandedOutcome:
+        """Return the same with errors that know of residuals larger than the noise, and of their correlation."""
+        if not self.ratio > 1:
+            return self
+        covariance = (
+            self.around.covariance_of_residuals(self.unknowns, self.fitted)
+            if self.ratio > _core.NOISE_MODEL_FAILS
+            else self.fitted.covariance * self.ratio
+        )
+        return replace(self, fitted=replace(self.fitted, covariance=covariance))
+
+    @cached_property
+    def curves(self) -> dict[str, ExpandedParameter]:
+        """Every expansion as a curve."""
+        found = {}
+        for one, place in self._placed():
+            if one.basis is None:
+                continue
+            expansion = self.given.expansions[one.name]
+            own, covariance = self.fitted.values[place], self.fitted.covariance[place, place]
+            sizes = [each.sizes[one.name] for each in self.tried]
+            limits = tuple(each.limits for each in one.basis.coordinates)
+            shown = of_powers(own, covariance) if expansion.is_of_powers else (own, covariance)
+            found[one.name] = ExpandedParameter(
+                name=one.name,
+                family=expansion.called,
+                coefficients=shown[0],
+                covariance=shown[1],
+                sizes={
+                    "size": np.array([each[0] if len(each) == 1 else each for each in sizes]),
+                    "criterion": np.array([each.criterion for each in self.tried]),
+                    "residual": np.array([each.residual for each in self.tried]),
+                    "parameters": np.array([each.parameters for each in self.tried]),
+                },
+                limits=limits[0] if len(limits) == 1 else limits,
+                unit=self.given.data.units.get(one.name, ""),
+                unit_of="s" if expansion.is_of_time else unit_said(expansion.of),
+                _basis=one.basis,
+                _own=own,
+                _own_covariance=covariance,
+            )
+        return found
+
+    def estimates(self) -> Estimates:
+        """Return values and errors at the samples."""
+        given, step = self.given, slice(None, None, self.given.data.step)
+        count = given.data.time[step].size
+        values: dict[str, Array] = {}
+        errors: dict[str, Array] = {}
+        constants: dict[str, tuple[Any, Any]] = {}
+        for one, place in self._placed():
+            own, covariance = self.fitted.values[place], self.fitted.covariance[place, place]
+            if one.basis is None:
+                constants[one.name] = (float(own[0]), float(np.sqrt(covariance[0, 0])))
+                values[one.name], errors[one.name] = (np.full(count, number) for number in constants[one.name])
+            else:
+                values[one.name] = along_record(one.basis, own)[step]
+                errors[one.name] = errors_along(one.basis, covariance)[step]
+        if "angle_zero" in constants:
+            moved, error = constants["angle_zero"]
+            constants["angle_zero"] = (given.zero + moved, error)
+            del values["angle_zero"], errors["angle_zero"]
+        for name, value in given.known_values.items():
+            values[name], errors[name] = np.array(value[step]), np.zeros(count)
+        left = self.around.residuals
+        return replace(
+            given.pilot._found,  # noqa: SLF001 - parts of this package
+            values=values,
+            errors=errors,
+            factors={},
+            covariances=self._covariances(),
+            constants=constants,
+            condition=np.full(count, self.fitted.condition),
+            residual_std=np.full(count, float(np.std(left)) if left.size else np.nan),
+            order=np.zeros(count, np.uint8),
+            status=self._status(values, errors, step),
+            record_status=self._record_status(),
+            expansions=self.curves,
+            kinds={name: np.array(kind) for name, kind in self._kinds().items()},
+        )
+
+    def settings(self, name: str) -> dict[str, Any]:
+        """Return inputs and choices, of a method of this name."""
+        before = dict(self.given.pilot.settings)
+        kinds = {**dict.fromkeys(COEFFICIENTS, "known"), **self._kinds()}
+        sizes = {
+            name: {"family": one.family, "size": one.size, "limits": one.limits} for name, one in self.curves.items()
+        }
+        return {
+            **before,
+            "method": name,
+            "kinds": kinds,
+            "terms": [[term, kinds[term]] for term, _ in before["terms"]],
+            "expansions": sizes,
+            "step": self.given.data.step,
+            "chosen": [one for one in before["chosen"] if one != "regression_window"],
+        }
+
+    def against_windows(self, name: str, found: Estimates) -> tuple[float, int]:
+        """Return the mean squared difference from windows over its variance, and at how many windows, which hardly share equations."""
+        pilot = self.given.pilot
+        if str(pilot.settings["kinds"].get(name)) != "windowed" or self.given.data.step > 1:
+            return float("nan"), 0
+        rows = int(pilot.settings["regression_window"]) + int(pilot.settings["window_length"])
+        apart = slice(rows // 2, None, max(1, rows))
+        value = getattr(pilot, name) if name in COEFFICIENTS else pilot.terms[name]
+        there = pilot.trusted[apart] & np.isfinite(found.values[name][apart])
+        if not there.any():
+            return float("nan"), 0
+        variance = pilot.stderr[name][apart] ** 2 + found.errors[name][apart] ** 2
+        squares = ((value[apart] - found.values[name][apart]) ** 2 / variance)[there]
+        return float(np.mean(squares)), int(there.sum())
+
+    def _placed(self) -> Iterator[tuple[Unknown, slice]]:
+        """Give every unknown and the place of its factors."""
+        first = 0
+        for one in self.unknowns:
+            yield one, slice(first, first + one.size)
+            first += one.size
+
+    def _kinds(self) -> dict[str, str]:
+        return {
+            one.name: "constant" if one.basis is None else "expanded"
+            for one in self.unknowns
+            if one.name != "angle_zero"
+        }
+
+    def _status(self, values: dict[str, Array], errors: dict[str, Array], step: slice) -> npt.NDArray[np.uint16]:
+        """Return the flags of samples, and make values without an error none."""
+        status = np.where(self.given.record.usable[step], np.uint16(0), np.uint16(Status.GAP)).astype(np.uint16)
+        for name, expansion in self.given.expansions.items():
+            for channel in expansion.channels:
+                values[name] = np.where(np.isfinite(channel[step]), values[name], np.nan)
+        for name, value in values.items():
+            missing = ~(np.isfinite(value) & np.isfinite(errors[name]))
+            values[name], errors[name] = np.where(missing, np.nan, value), np.where(missing, np.nan, errors[name])
+            status[missing] |= np.uint16(Status.INVALID)
+        return status
+
+    def _record_status(self) -> Status:
+        flags = Status(int(np.asarray(self.given.pilot.record_status))) & _KEPT
+        if self.given.data.doubts:
+            flags |= Status.CHANNEL_SUSPECTED
+        if not np.isfinite(self.fitted.condition):
+            flags |= Status.RANK_DEFICIENT
+        elif self.fitted.condition > _core.HARDLY_TOLD_APART:
+            flags |= Status.ILL_CONDITIONED
+        if self.ratio > _core.NOISE_MODEL_FAILS:
+            flags |= Status.NOISE_MODEL
+        return flags
+
+    def _covariances(self) -> dict[frozenset[str], Array]:
+        """Return covariances of pairs of coefficients at every sample."""
+        step = slice(None, None, self.given.data.step)
+        samples = self.given.data.time.size
+        placed = [(one, place) for one, place in self._placed() if one.name in COEFFICIENTS]
+        found = {}
+        for (one, rows), (other, columns) in combinations(placed, 2):
+            block = self.fitted.covariance[rows, columns]
+            total = np.zeros(samples)
+            for number, row in enumerate(block):
+                before = 1.0 if one.basis is None else along_record(one.basis, np.eye(len(block))[number])
+                after = float(row[0]) if other.basis is None else along_record(other.basis, row)
+                total += before * after
+            found[frozenset((one.name, other.name))] = total[step]
+        return found

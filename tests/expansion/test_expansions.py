@@ -1,0 +1,184 @@
+"""Parameters as expansions of time and of recorded channels: errors, sizes, what is said, what is refused."""
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+import tvident
+from tvident import Expansion, Status
+
+mpl.use("agg")
+
+CONSTANT: dict[str, Any] = {"inertia": "constant", "damping": "constant"}
+
+
+@pytest.fixture(scope="module")
+def rig() -> tvident.Recording:
+    return tvident.simulate_torsional_rig(duration=20.0, seed=1, angle_noise=1e-2)
+
+
+@pytest.fixture(scope="module")
+def short() -> tvident.Recording:
+    return tvident.simulate_torsional_rig(duration=6.0, seed=2)
+
+
+def identify(rig: tvident.Recording, **given: Any) -> tvident.Identification:
+    return tvident.identify(rig.angle, rig.torque, sample_rate=1000, **{**CONSTANT, **given})
+
+
+def error(result: tvident.Identification, rig: tvident.Recording) -> float:
+    return float(np.sqrt(np.mean((result.stiffness - rig.stiffness) ** 2)) / rig.stiffness.mean())
+
+
+def test_stiffness_over_the_slider(rig: tvident.Recording) -> None:
+    result = identify(rig, stiffness=Expansion("bspline", of=rig.slider_position))
+    # Seeds 0 to 19: median 0.07 %; windows 0.2 to 0.5 %.
+    assert error(result, rig) < 0.0012
+    curve = result.expansions["stiffness"]
+    assert 4 <= curve.size <= 8
+    assert curve.sizes["size"].size == curve.sizes["criterion"].size > 10
+    deviation = (curve.value - 6 / curve.position) / curve.stderr
+    assert np.sqrt(np.mean(deviation**2)) < 3
+    np.testing.assert_allclose(curve.at(rig.slider_position), result.stiffness, rtol=1e-12)
+    assert np.isnan(curve.at(0.1))
+    assert "agree" in result.summary()
+    assert "expanded" in result.summary()
+    assert result.settings["kinds"]["stiffness"] == "expanded"
+    assert result.trusted.all()
+
+
+def test_a_schedule_that_does_not_explain_the_change_is_said(rig: tvident.Recording) -> None:
+    # The slider of another recording.
+    other = np.random.default_rng(0).permutation(np.repeat(np.arange(40), 500)) + 0.01 * rig.time
+    result = identify(rig, stiffness=Expansion("bspline", of=other, size=5))
+    assert any("schedule does not explain" in line for line in result.advice)
+    assert result.record_status & Status.NOISE_MODEL
+
+
+@pytest.mark.parametrize("family", ["chebyshev", "chebyshev2", "legendre", "powers", "laguerre", "db3"])
+def test_smooth_families_find_the_same_curve(short: tvident.Recording, family: str) -> None:
+    size = 8 if family == "db3" else 6
+    result = identify(short, stiffness=Expansion(family, size=size, of=short.slider_position))
+    assert error(result, short) < 0.005
+    if family == "powers":
+        curve = result.expansions["stiffness"]
+        x = np.linspace(-1, 1, curve.position.size)
+        np.testing.assert_allclose(np.polynomial.polynomial.polyval(x, curve.coefficients), curve.value, rtol=1e-9)
+        powers = x[:, np.newaxis] ** np.arange(6)
+        variance = np.einsum("ij,jk,ik->i", powers, curve.covariance, powers)
+        np.testing.assert_allclose(np.sqrt(variance), curve.stderr, rtol=1e-6)
+
+
+def test_functions_of_ones_own(short: tvident.Recording) -> None:
+    # The slider's law is one over its position.
+    own = Expansion(lambda x, size: x[:, np.newaxis] ** -np.arange(1.0, size + 1), of=short.slider_position)
+    result = identify(short, stiffness=own)
+    assert error(result, short) < 0.003
+    assert result.expansions["stiffness"].size == 1
+    assert abs(result.expansions["stiffness"].coefficients[0] - 6) < 0.02
+    with pytest.raises(ValueError, match="one column for each function"):
+        identify(short, stiffness=Expansion(lambda x, size: x * size, of=short.slider_position))
+
+
+def test_damping_and_inertia_that_change() -> None:
+    rig = tvident.simulate_torsional_rig(
+        duration=12.0,
+        pattern="constant",
+        damping=lambda t: 0.05 + 0.02 * np.sin(0.8 * t),
+        inertia=lambda t: 0.0123 * (1 + 0.2 * np.cos(0.6 * t)),
+    )
+    result = identify(
+        rig, inertia=Expansion("bspline", size=9), damping=Expansion("legendre", size=10), stiffness="constant"
+    )
+    for name in ("inertia", "damping"):
+        deviation = (getattr(result, name) - getattr(rig, name)) / result.stderr[name]
+        assert np.sqrt(np.mean(deviation**2)) < 2.5, name
+    assert np.abs(result.inertia / rig.inertia - 1).max() < 0.02
+    # Newton's law of a mass that leaves with its momentum has another torque: d(I θ̇)/dt.
+    more = np.gradient(rig.inertia, rig.time) * rig.true_velocity
+    moving = tvident.identify(
+        rig.angle,
+        rig.torque + more,
+        sample_rate=1000,
+        inertia=Expansion("bspline", size=9, inertia_times="momentum"),
+        damping=Expansion("legendre", size=10),
+        stiffness="constant",
+    )
+    assert np.abs(moving.inertia / rig.inertia - 1).max() < 0.02
+
+
+def test_two_channels_gaps_and_terms(short: tvident.Recording) -> None:
+    angle, slider = short.angle.copy(), short.slider_position.copy()
+    angle[1000:1050] = np.nan
+    slider[3000:3010] = np.nan
+    drift = 0.2 * np.sin(short.time)
+    result = tvident.identify(
+        angle,
+        short.torque + drift,
+        sample_rate=1000,
+        **CONSTANT,
+        stiffness=Expansion("bspline", of=(slider, short.time), size=(4, 2)),
+        terms=[("offset", Expansion("bspline", size=9))],
+    )
+    there = np.isfinite(slider)
+    assert np.array_equal(np.isnan(result.stiffness), ~there)
+    assert np.all(result.status[~there] & Status.INVALID)
+    assert np.all(result.status[1000:1050] & Status.GAP)
+    assert np.sqrt(np.mean((result.stiffness - short.stiffness)[there] ** 2)) / short.stiffness.mean() < 0.02
+    assert np.abs(result.terms["offset"] - drift).max() < 0.02
+    assert result.expansions["stiffness"].size == (4, 2)
+    assert result.expansions["stiffness"].value.shape == (201, 201)
+
+
+def test_it_is_drawn_and_stored(short: tvident.Recording, tmp_path: Path) -> None:
+    result = identify(short, stiffness=Expansion("bspline", of=short.slider_position))
+    figure = result.expansions["stiffness"].plot(truth=lambda x: 6 / x)
+    assert len(figure.axes) == 2
+    result.save(tmp_path / "one.npz")
+    again = tvident.load(tmp_path / "one.npz")
+    np.testing.assert_array_equal(again.stiffness, result.stiffness)
+    with pytest.raises(ValueError, match="pass stiffness"):
+        identify(short, settings=result.settings)
+    repeated = identify(short, settings=result.settings, stiffness=Expansion("bspline", of=short.slider_position))
+    np.testing.assert_allclose(repeated.stiffness, result.stiffness, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"damping": Expansion("haar"), "stiffness": "constant"}, "continuous derivatives"),
+        ({"damping": Expansion("bspline")}, "stiffness='constant'"),
+        ({"stiffness": Expansion("bspline", of=np.zeros(6000))}, "must change"),
+        ({"stiffness": Expansion("bspline", of=np.zeros(5))}, "value for every sample"),
+        ({"stiffness": Expansion("bspline"), "method": "paper"}, "weak form"),
+        ({"stiffness": Expansion("bspline"), "terms": [("offset", "windowed")]}, "make it constant"),
+        ({"stiffness": Expansion("bspline", of=np.arange(6000.0), limits=(0, 10))}, "widen them"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(short: tvident.Recording, given: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        identify(short, **given)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"), [({"size": 4}, "take 5"), ({"limits": (3, 1)}, "exchange"), ({"degree": 9}, "take 3")]
+)
+def test_an_expansion_that_cannot_be(given: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        _ = Expansion("fourier", **given).given_limits
+
+
+def test_errors_are_as_large_as_is_said() -> None:
+    squares, of_curves = [], []
+    for seed in range(8):
+        rig = tvident.simulate_torsional_rig(duration=6.0, seed=seed, angle_noise=1e-2)
+        result = identify(rig, stiffness=Expansion("bspline", of=rig.slider_position, size=6))
+        truth = {"inertia": 0.0123, "damping": 0.00825, "offset": 0.0}
+        squares += [((value - truth[name]) / error) ** 2 for name, (value, error) in result.constants.items()]
+        of_curves.append(np.mean(((result.stiffness - rig.stiffness) / result.stderr["stiffness"]) ** 2))
+    # 24 numbers with variance 2 each around one, at four standard deviations; a curve of 6 factors is not one number either.
+    assert abs(np.mean(squares) - 1) < 4 * np.sqrt(2 / 24)
+    assert 0.3 < np.mean(of_curves) < 2.2
