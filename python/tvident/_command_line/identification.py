@@ -46,6 +46,11 @@ IDENTIFICATION = options_of(
     click.option(
         "--quantisation", type=float, help="Step to which the angle was rounded; estimated if not given; 0: none."
     ),
+    click.option(
+        "--loss",
+        type=click.Choice(["squares", "huber", "auto"]),
+        help="squares (default); huber: spikes of the torque count linearly; auto: where there are any.",
+    ),
     click.option("--mask", metavar="NAME", help="Channel, or file, that is not zero where a sample may be used."),
     click.option(
         "--settings",

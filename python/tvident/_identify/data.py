@@ -39,6 +39,8 @@ class Data:
         What the angle came with: an index, coordinates.
     axis : Axis, optional
         What the channels were measured in.
+    clipped : sequence of float, optional
+        The part of the torque's samples of every record whose residual counts linearly; None for least squares.
     """
 
     angles: npt.NDArray[np.number]
@@ -54,6 +56,7 @@ class Data:
     doubts: Sequence[tuple[int, str]] = ()
     labels: arguments.Labels | None = None
     axis: Axis = field(default_factory=Axis)
+    clipped: Sequence[float] | None = None
 
     @property
     def batch(self) -> tuple[int, ...]:

@@ -437,6 +437,7 @@ class Task:
             "quantisation": self._quantisation,
             "period": request.period,
             "instrument": data.instruments is not None,
+            "loss": "squares" if not any(data.clipped or ()) else "huber",
             "kinds": kinds,
             "terms": [[term.name, kinds[term.name]] for term in self._terms],
             "inner": {name: by_record(value.tolist()) for name, value in searched.values.items()},

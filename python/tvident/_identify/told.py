@@ -58,13 +58,13 @@ class Told:
         if isinstance(self.request.form, StrongForm) and data.instruments is None:
             # What to say takes longer than to identify a short record, so it waits until it is asked for.
             later = partial(_later, self._of_strong_form(), plausible, data.angles, self.batch, more)
-            if not data.doubts:
+            if not data.doubts and not any(data.clipped or ()):
                 return later
             words = later()
         else:
             each = [one + search for one, search in zip(self._of_records(names), more, strict=True)]
             words = plausible.before(of_batch(each) if several else each[0], data.angles, self.batch)
-        return _with_doubts(words, data.doubts, several=several)
+        return _with_doubts(_with_clipped(words, data.clipped, several=several), data.doubts, several=several)
 
     def doubted(self) -> Estimates:
         """Return the estimates, flagged where a channel leaves something open."""
@@ -115,6 +115,19 @@ def _later(
     words = explained.words()
     more_lines = of_batch(more) if batch.status.ndim > 1 else more[0]
     return plausible.before(replace(words + more_lines, each=words.each), angles, batch)
+
+
+def _with_clipped(words: Words, clipped: Sequence[float] | None, *, several: bool) -> Words:
+    """Return words that say how much of the torque is not as it was recorded."""
+    if not any(clipped or ()):
+        return words
+    lines = [
+        f"{f'record {record}: ' if several else ''}Huber's loss: {share:.2g} of the torque's samples differ from what the equation "
+        "predicts by more than 2.5 standard deviations, and count linearly"
+        for record, share in enumerate(clipped or ())
+        if share
+    ]
+    return Words((*words.reasons, *lines), words.advice, words.each)
 
 
 def _with_doubts(words: Words, doubts: Sequence[tuple[int, str]], *, several: bool) -> Words:

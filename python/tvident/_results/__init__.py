@@ -9,6 +9,7 @@ from tvident._results.recorded import Recorded
 from tvident._results.records import IdentifiedRecords, Shared, covariance_between, with_shared
 from tvident._results.result import Identification
 from tvident._results.scan import Scan
+from tvident._results.simulated import predicted_at_samples
 from tvident._results.words import Words, of_batch
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "of_batch",
     "of_powers",
     "of_records",
+    "predicted_at_samples",
     "settings_of",
     "with_shared",
 ]

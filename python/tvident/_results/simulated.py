@@ -21,6 +21,10 @@ Array: TypeAlias = npt.NDArray[np.float64]
 _POOR = 2.0
 """Beside a gap values count whose errors are up to so many times the usual ones."""
 
+_SHORTEST = 9
+_POLYNOMIALS = {"max_order": 4, "criterion": "aicc", "selection": "window"}
+"""Of the motion at single samples."""
+
 
 class Simulated:
     """The part of a result that is compared with records.
@@ -273,6 +277,31 @@ class Simulated:
     def __getstate__(self) -> dict[str, Any]:
         # A record may be long, and functions of terms cannot be stored; what was found of it stays.
         return self.__dict__ | {"_recorded": None}
+
+
+@np.errstate(all="ignore")
+def predicted_at_samples(result: Simulated) -> Array:
+    """Return the torque that the equation of one record predicts at every sample, not averaged, and as late as the recorded one.
+
+    Velocity and acceleration are those of local polynomials in windows half as long as those of the method, whose order is chosen. NaN
+    where there is no whole window.
+    """
+    recorded = result._record("a result of identify")  # noqa: SLF001 - of this file
+    model = result._model()  # noqa: SLF001 - of this file
+    length = result.settings["window_length"]
+    if not isinstance(length, int):
+        # Nothing was determined.
+        return np.full(recorded.angles.size, np.nan)
+    length = max(_SHORTEST, length // 2 | 1)
+    settings = {"form": "strong", "window_length": length, **_POLYNOMIALS}
+    _, predicted = compared(model, recorded.angles, recorded.torques, settings)
+    # Off the centres of windows the noise of an acceleration is many times larger.
+    predicted[: length // 2] = predicted[predicted.size - length // 2 :] = np.nan
+    late = float(model.lags[0])
+    if late == 0:
+        return predicted
+    places = np.arange(predicted.size, dtype=np.float64)
+    return np.asarray(np.interp(places - late, places, predicted, left=np.nan, right=np.nan))
 
 
 def _like_torque(name: str, array: npt.NDArray[np.number], torque: npt.NDArray[np.number]) -> npt.NDArray[np.number]:

@@ -1,0 +1,62 @@
+"""Huber's loss of the torque: its residuals are clipped and the record is identified again until nothing changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, Literal, TypeAlias, cast, get_args
+
+import numpy as np
+
+from tvident import _arguments as arguments
+from tvident._huber import clip_residuals, has_heavy_tails
+from tvident._identify.data import Data
+from tvident._results import Identification, predicted_at_samples
+
+Loss: TypeAlias = Literal["squares", "huber", "auto"]
+
+_ROUNDS = 10
+_SETTLED = 0.02
+"""Rounds end where what was clipped moves by no more than this part of the scale: far below any standard error."""
+
+
+def loss_of(given: Loss | None, settings: Mapping[str, Any] | None) -> Loss:
+    """Return the loss that was given, that of an earlier result, or that of least squares."""
+    word = arguments.one_of("loss", given or (settings or {}).get("loss") or "squares", get_args(Loss))
+    return cast("Loss", word)
+
+
+def with_clipped_torque(data: Data, loss: Loss, identified: Callable[[Data], Identification]) -> Data:
+    """Return the records with a torque whose least squares are those of Huber's loss.
+
+    Parameters
+    ----------
+    data : Data
+    loss : {"squares", "huber", "auto"}
+        ``"auto"``: only of records in which many more residuals are far from zero than of normal noise.
+    identified : callable
+        Identifies records.
+    """
+    if loss == "squares":
+        return data
+    samples = data.time.size
+    recorded = data.torques.reshape(-1, samples).astype(np.float64)
+    torques, shares = recorded.copy(), np.zeros(data.records)
+    open_records = list(range(data.records))
+    for turn in range(_ROUNDS):
+        found = identified(replace(data, torques=torques.reshape(data.torques.shape)))
+        for record in list(open_records):
+            place = tuple(int(index) for index in np.unravel_index(record, data.batch))
+            one = found[place] if place else found
+            predicted = predicted_at_samples(one)
+            if turn == 0 and loss == "auto" and not has_heavy_tails(recorded[record], predicted):
+                open_records.remove(record)
+                continue
+            clipped = clip_residuals(recorded[record], predicted)
+            moved = np.abs(clipped.values - torques[record])
+            torques[record], shares[record] = clipped.values, clipped.share
+            if not np.nanmax(moved, initial=0.0) > _SETTLED * clipped.scale:
+                open_records.remove(record)
+        if not open_records:
+            break
+    return replace(data, torques=torques.reshape(data.torques.shape), clipped=tuple(shares.tolist()))
