@@ -286,7 +286,7 @@ def identify(
     )
     task = ExpandedTask if expansions_of(request) else Task
     asked = loss_of(loss, settings)
-    data = with_clipped_torque(data, asked, lambda some: task(some, request).run(None, diagnose=False))
+    data = with_clipped_torque(data, asked, lambda some: task(some, request).run(None))
     return task(data, request).run(progress)
 
 
