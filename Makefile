@@ -63,8 +63,9 @@ sanitize:  ## unit tests of the core under AddressSanitizer (needs Rust's nightl
 	ASAN_OPTIONS=allocator_may_return_null=1 RUSTFLAGS=-Zsanitizer=address cargo +nightly test --package tvident --lib --target $(TARGET) --target-dir target/sanitize
 
 .PHONY: site
-site: $(BUILT)  ## build the site in docs/site from the pages, the docstrings and the gallery; a warning is an error
+site: $(BUILT)  ## build the site in docs/site from the pages, the docstrings and the gallery, and follow its links; a warning is an error
 	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs docs/site
+	$(BIN)/python docs/links.py docs/site
 
 .PHONY: docs
 docs: $(BUILT) rooms  ## make anew what documents show of the program (pictures, help of the commands, rooms), then the site

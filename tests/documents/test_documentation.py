@@ -122,9 +122,34 @@ def test_links_lead_somewhere(document: Path) -> None:
             assert anchor in {re.sub(r"[^\w -]", "", heading).lower().replace(" ", "-") for heading in headings}, target
 
 
-@pytest.mark.parametrize("name", ["README.md", "docs/statuses.md"])
-def test_tables_of_statuses_have_every_flag(name: str) -> None:
-    rows = table(ROOT / name, "Flag")
+def test_links_of_the_site_that_lead_nowhere_are_found(tmp_path: Path) -> None:
+    (tmp_path / "a.html").write_text(
+        '<h1 id="top">A</h1><a href="b.html#end">b</a><a href="#top">up</a><a href="b.html#no">x</a><a href="c.html">y</a>'
+        '<img src="no.png"><a href="https://example.org/">z</a>'
+    )
+    (tmp_path / "b.html").write_text('<p id="end">B</p><a href="a.html">a</a>')
+    wrong, elsewhere = script("links").wrong_links(tmp_path)
+    assert wrong == ["a.html: b.html#no", "a.html: c.html", "a.html: no.png"]
+    assert elsewhere == {"https://example.org/"}
+
+
+def test_what_is_cited_is_what_the_documents_name() -> None:
+    cited = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"version: {tvident.__version__}\n" in cited
+    authors = re.findall(r"family-names: \"?(\w+)", cited)
+    (title,) = re.findall(r"^    title: (.*)$", cited, re.MULTILINE)
+    for name in ("README.md", "docs/mathematics.md"):
+        page = (ROOT / name).read_text(encoding="utf-8")
+        assert title in page
+        assert ", ".join(f"{one}. {other}" for one, other in zip("MSD", authors, strict=True)) in page
+
+
+def test_the_readme_is_read_in_three_minutes() -> None:
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").split()) <= 600
+
+
+def test_the_table_of_statuses_has_every_flag() -> None:
+    rows = table(ROOT / "docs" / "statuses.md", "Flag")
     assert [row["Flag"] for row in rows] == [f"`{flag.name}`" for flag in Status]
     assert all(row["What to do"] for row in rows)
     for row, flag in zip(rows, Status, strict=True):
