@@ -1,4 +1,4 @@
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Literal, final
 
 import numpy as np
@@ -135,7 +135,13 @@ class RollingRegressions:
     @property
     def rss(self) -> npt.NDArray[np.float64]: ...
     @property
+    def residuals(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def rsquared(self) -> npt.NDArray[np.float64]: ...
+    @property
     def condition(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def lags(self) -> int: ...
     @property
     def status(self) -> npt.NDArray[np.uint16]: ...
 
@@ -339,8 +345,12 @@ def respond(
 def rolling_least_squares(
     regressors: npt.NDArray[np.number],
     rhs: npt.NDArray[np.number],
-    window: int,
+    windows: Mapping[str, object],
     *,
+    weights: npt.NDArray[np.float64] | None = None,
+    constant: int | None = None,
+    correlated: bool = False,
+    lags: int | None = None,
     step: int = 1,
     workers: int | None = None,
     progress: Callable[[int, int], object] | None = None,

@@ -51,9 +51,22 @@ class Solutions:
         )
 
 
-def window_rows(i: int, w: int, n: int) -> slice:
-    """Give the rows of the window around row i, shrunk at the ends."""
-    return slice(max(0, i - w // 2), min(n, i - w // 2 + w))
+def window_rows(i: int, w: int, n: int, alignment: str = "centre") -> slice:
+    """Give the rows of the window of row i, shrunk at the ends."""
+    first = i - {"centre": w // 2, "trailing": w - 1, "leading": 0}[alignment]
+    return slice(max(0, first), min(n, first + w))
+
+
+def solve_fading(A: Array, b: Array, noise: Array, fading: Array) -> tuple[Array, Array, float, float]:
+    """Solve one window with weights of noise and of age by normal equations: parameters, standard errors, RSS, R² around zero."""
+    normal = (A * (noise * fading)[:, None]).T @ A
+    middle = (A * (noise * fading**2)[:, None]).T @ A
+    inverse = np.linalg.inv(normal)
+    x = inverse @ (A.T @ (noise * fading * b))
+    rss = float(np.sum(noise * fading * (b - A @ x) ** 2))
+    variance = rss / (fading.sum() - np.trace(inverse @ middle))
+    error = np.sqrt(variance * np.diagonal(inverse @ middle @ inverse))
+    return x, error, rss, 1 - rss / float(np.sum(noise * fading * b**2))
 
 
 def solve(A: Array, b: Array) -> Solution:

@@ -132,6 +132,7 @@ impl Solutions {
             deviations: Vec::new(),
             condition: &mut self.condition,
             status: &mut self.status,
+            ..Regressions::default()
         }
     }
 }
@@ -141,7 +142,8 @@ fn least_squares(lengths: usize) -> Result<usize, Error> {
     let plan = RollingLeastSquares::new(201, 3, 1, Vec::new(), HALF_OF_THE_DIGITS, instructions)?;
     let windows = lengths * WINDOWS.next_multiple_of(plan.stride());
     let columns: Vec<Repeated> = (0..4).map(|channel| Repeated::new(channel, windows)).collect();
-    let equations = Equations { columns: columns.iter().map(|one| one as &dyn Samples).collect(), rows: 0..windows };
+    let equations =
+        Equations { columns: columns.iter().map(|one| one as &dyn Samples).collect(), weights: None, rows: 0..windows };
     let mut solutions = Solutions::new(windows, 3, 0);
     plan.run(&equations, solutions.regressions(), NonZeroUsize::MIN, &mut |_, _| true)?;
     Ok(windows)

@@ -96,7 +96,11 @@ fn solve(problem: &Problem, cuts: &[usize], instructions: Instructions) -> Outpu
     let kinds = [p * q, p * q, pairs.len() * q, q, q, 1];
     let plan = RollingLeastSquares::new(problem.window, p, q, pairs, HALF_OF_THE_DIGITS, instructions).expect("valid");
     let columns: Vec<&[f64]> = problem.columns.iter().map(Vec::as_slice).collect();
-    let equations = Equations { columns: columns.iter().map(|column| column as &dyn Samples).collect(), rows: 0..n };
+    let equations = Equations {
+        columns: columns.iter().map(|column| column as &dyn Samples).collect(),
+        rows: 0..n,
+        ..Equations::default()
+    };
     let mut all = Outputs::new(kinds.iter().sum(), n);
     let mut scratch = plan.scratch();
     for rows in pieces(cuts, n) {
@@ -112,6 +116,7 @@ fn solve(problem: &Problem, cuts: &[usize], instructions: Instructions) -> Outpu
             deviations,
             condition: condition.pop().expect("there is one"),
             status: &mut all.status[rows.clone()],
+            ..Regressions::default()
         };
         plan.solve(&equations, rows, &mut regressions, &mut scratch);
     }

@@ -33,7 +33,7 @@ fn solve_in_pieces(problem: &Problem, cuts: &[usize], instructions: Instructions
         RollingLeastSquares::new(problem.window, p, q, pairs.clone(), HALF_OF_THE_DIGITS, instructions).expect("valid");
     let columns: Vec<&[f64]> = problem.regressors.iter().chain(&problem.sides).map(Vec::as_slice).collect();
     let columns: Vec<&dyn Samples> = columns.iter().map(|column| column as &dyn Samples).collect();
-    let equations = Equations { columns, rows: 0..n };
+    let equations = Equations { columns, rows: 0..n, ..Equations::default() };
     let mut all = Everything {
         parameters: vec![vec![0.0; n]; p * q],
         errors: vec![vec![0.0; n]; p * q],
@@ -57,6 +57,7 @@ fn solve_in_pieces(problem: &Problem, cuts: &[usize], instructions: Instructions
             deviations: Vec::new(),
             condition: &mut all.condition[rows.clone()],
             status: &mut all.status[rows.clone()],
+            ..Regressions::default()
         };
         plan.solve(&equations, rows, &mut regressions, &mut scratch);
     }

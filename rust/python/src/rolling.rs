@@ -3,17 +3,44 @@
 use std::num::NonZeroUsize;
 
 use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArray};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tvident::exec::workers as threads;
 use tvident::lanes::Elements;
 use tvident::least_squares::HALF_OF_THE_DIGITS;
-use tvident::least_squares::{Equations, Regressions, RollingLeastSquares};
+use tvident::least_squares::{Alignment, Equations, Regressions, RollingLeastSquares};
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
 use crate::arrays::zeros;
 use crate::records::records;
 use crate::watch::{exception, watched};
+
+/// What windows are like.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct RowWindows {
+    rows: usize,
+    alignment: String,
+    at_least: Option<usize>,
+    half_life: Option<f64>,
+}
+
+impl RowWindows {
+    fn plan(&self, regressors: usize, rhs_count: usize) -> PyResult<RollingLeastSquares> {
+        let instructions = Instructions::current();
+        let plan =
+            RollingLeastSquares::new(self.rows, regressors, rhs_count, Vec::new(), HALF_OF_THE_DIGITS, instructions);
+        let plan = plan.map_err(|error| exception(&error))?.aligned(match self.alignment.as_str() {
+            "centre" => Alignment::Centre,
+            "trailing" => Alignment::Trailing,
+            "leading" => Alignment::Leading,
+            other => return Err(PyValueError::new_err(format!("no such alignment: {other}"))),
+        });
+        let plan = if let Some(rows) = self.at_least { plan.of_at_least(rows) } else { plan };
+        Ok(if let Some(rows) = self.half_life { plan.with_half_life(rows) } else { plan })
+    }
+}
 
 /// What least squares give in every window.
 #[pyclass(frozen, get_all, module = "tvident._core")]
@@ -23,57 +50,92 @@ pub(crate) struct RollingRegressions {
     stderr: Py<PyArrayDyn<f64>>,
     /// Residual sums of squares by right-hand side and window.
     rss: Py<PyArrayDyn<f64>>,
+    /// What each window leaves at its own row, likewise.
+    residuals: Py<PyArrayDyn<f64>>,
+    rsquared: Py<PyArrayDyn<f64>>,
     condition: Py<PyArrayDyn<f64>>,
     status: Py<PyArrayDyn<u16>>,
+    /// Rows over which residuals are taken to be correlated.
+    lags: usize,
 }
 
-/// Least squares in every window of rows; regressors and right-hand sides have the rows along their last axis.
+/// Least squares in every window of rows; regressors, right-hand sides and weights have the rows along their last axis. `constant` is the
+/// regressor that is a constant. With `correlated`, which needs a step of 1, standard errors know of residuals that are correlated over so
+/// many `lags`, or over as many as they ask for.
 #[pyfunction]
-#[pyo3(signature = (regressors, rhs, window, *, step=1, workers=None, progress=None))]
+#[pyo3(signature = (regressors, rhs, windows, *, weights=None, constant=None, correlated=false, lags=None, step=1, workers=None, progress=None))]
+#[allow(clippy::too_many_arguments, reason = "named by Python")]
 pub(crate) fn rolling_least_squares<'py>(
     regressors: &Bound<'py, PyUntypedArray>,
     rhs: &Bound<'py, PyUntypedArray>,
-    window: usize,
+    windows: RowWindows,
+    weights: Option<&Bound<'py, PyUntypedArray>>,
+    constant: Option<usize>,
+    correlated: bool,
+    lags: Option<usize>,
     step: usize,
     workers: Option<NonZeroUsize>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<RollingRegressions> {
     let py = regressors.py();
     let (regressors, rhs) = (records(regressors)?, records(rhs)?);
+    let weights = weights.map(records).transpose()?;
     let (p, q) = (regressors.len(), rhs.len());
-    let columns: Vec<&dyn Samples> = regressors.iter().chain(&rhs).map(|record| record as &dyn Samples).collect();
+    let mut columns: Vec<&dyn Samples> = regressors.iter().chain(&rhs).map(|record| record as &dyn Samples).collect();
     let rows = columns.first().map_or(0, |column| column.len());
-    let plan = RollingLeastSquares::new(window, p, q, Vec::new(), HALF_OF_THE_DIGITS, Instructions::current());
-    let plan = plan.map_err(|error| exception(&error))?;
+    let plan = windows.plan(p, q)?.with_fit(constant.is_some());
+    // What comes first is taken off everything that follows.
+    let constant = constant.unwrap_or(0);
+    columns.swap(0, constant);
     let count = rows.div_ceil(step);
 
     let parameters = zeros::<f64>(py, &[p, q, count])?;
     let errors = zeros::<f64>(py, &[p, q, count])?;
-    let residuals = zeros::<f64>(py, &[q, count])?;
+    let [residuals, own, rsquared] =
+        [zeros::<f64>(py, &[q, count])?, zeros::<f64>(py, &[q, count])?, zeros::<f64>(py, &[q, count])?];
     let condition = zeros::<f64>(py, &[count])?;
     let status = zeros::<u16>(py, &[count])?;
+    let mut over = 0;
     {
         let (mut parameters, mut errors) = (parameters.readwrite(), errors.readwrite());
         let (mut residuals, mut condition, mut status) =
             (residuals.readwrite(), condition.readwrite(), status.readwrite());
-        let regressions = Regressions {
+        let (mut own, mut rsquared) = (own.readwrite(), rsquared.readwrite());
+        let mut regressions = Regressions {
             elements: Elements { first: 0, step },
             parameters: parameters.as_slice_mut()?.chunks_exact_mut(count).collect(),
             errors: errors.as_slice_mut()?.chunks_exact_mut(count).collect(),
-            covariances: Vec::new(),
             residuals: residuals.as_slice_mut()?.chunks_exact_mut(count).collect(),
-            deviations: Vec::new(),
+            own_residuals: own.as_slice_mut()?.chunks_exact_mut(count).collect(),
+            rsquared: rsquared.as_slice_mut()?.chunks_exact_mut(count).collect(),
             condition: condition.as_slice_mut()?,
             status: status.as_slice_mut()?,
+            ..Regressions::default()
         };
-        let equations = Equations { columns, rows: 0..rows };
-        watched(py, progress, |watch| plan.run(&equations, regressions, threads(workers), watch))?;
+        for side in 0..q {
+            regressions.parameters.swap(side, constant * q + side);
+            regressions.errors.swap(side, constant * q + side);
+        }
+        let weights = weights.as_ref().and_then(|records| records.first()).map(|record| record as &dyn Samples);
+        let equations = Equations { columns, weights, rows: 0..rows };
+        let workers = threads(workers);
+        watched(py, progress, |watch| {
+            if correlated {
+                over = plan.run_correlated(&equations, regressions, lags, workers, watch)?;
+                Ok(())
+            } else {
+                plan.run(&equations, regressions, workers, watch)
+            }
+        })?;
     }
     Ok(RollingRegressions {
         params: parameters.unbind(),
         stderr: errors.unbind(),
         rss: residuals.unbind(),
+        residuals: own.unbind(),
+        rsquared: rsquared.unbind(),
         condition: condition.unbind(),
         status: status.unbind(),
+        lags: over,
     })
 }

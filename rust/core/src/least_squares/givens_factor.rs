@@ -9,7 +9,7 @@ use std::ops::IndexMut;
 use crate::simd::vectors::Lanes;
 
 /// The initial weight of a column, so that no division is by zero. Squares of samples that matter are far above it.
-const NOTHING: f64 = 1e-300;
+pub(crate) const NOTHING: f64 = 1e-300;
 
 /// Weights up to this belong to columns that are zero in every row.
 const UNDETERMINED: f64 = 1e-290;
@@ -242,6 +242,23 @@ pub(crate) fn squared_norm<S: Lanes, H: Dimensions>(
     for j in 0..i {
         let entry = factor[shape.entry(j, i)];
         sum = simd.mul_add_f64s(simd.mul_f64s(entry, entry), factor[shape.row(j)], sum);
+    }
+    sum
+}
+
+/// The squares of right-hand side `rhs` that the regressors from one on explain beyond those before it.
+#[inline(always)]
+pub(crate) fn explained<S: Lanes, H: Dimensions>(
+    simd: S,
+    shape: H,
+    factor: &H::Factor<S::f64s>,
+    rhs: usize,
+    from: usize,
+) -> S::f64s {
+    let mut sum = simd.splat_f64s(0.0);
+    for i in from..shape.regressors() {
+        let entry = factor[shape.entry(i, shape.regressors() + rhs)];
+        sum = simd.mul_add_f64s(simd.mul_f64s(entry, entry), factor[shape.row(i)], sum);
     }
     sum
 }

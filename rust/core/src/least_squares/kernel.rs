@@ -9,8 +9,9 @@ use std::ops::Range;
 use crate::exec::pool::GoOn;
 use crate::lanes::output::Outputs;
 use crate::lanes::store::Write;
+use crate::least_squares::fading;
 use crate::least_squares::givens_factor::{
-    Dimensions, append, covariance, empty, invert, load, merge, solve, squared_norm, store,
+    Dimensions, append, covariance, empty, explained, invert, load, merge, solve, squared_norm, store,
 };
 use crate::least_squares::plan::{Equations, Slots};
 use crate::least_squares::side_by_side::{RollingRun, RollingScratch, SEGMENT};
@@ -35,12 +36,12 @@ impl<H: Dimensions> Kernel for RollingKernel<'_, '_, '_, H> {
 
     #[inline(always)]
     fn run<S: Lanes>(mut self, simd: S) {
-        self.run.load(simd, self.equations, self.scratch);
+        let full = self.run.load(simd, self.equations, self.scratch);
         let window = self.run.plan.window;
-        let size = self.shape.size() * S::F64_LANES;
+        let size = self.run.plan.summary(self.shape.size() * S::F64_LANES);
         let segments = window.div_ceil(SEGMENT);
         let mut row = self.shape.factor(simd.splat_f64s(0.0));
-        let mut suffix = empty(simd, self.shape);
+        let mut suffix = self.nothing(simd);
         for segment in (1..segments).rev() {
             let rows = segment * SEGMENT..window.min((segment + 1) * SEGMENT);
             for offset in rows.rev() {
@@ -49,23 +50,23 @@ impl<H: Dimensions> Kernel for RollingKernel<'_, '_, '_, H> {
                 }
                 self.append(simd, &mut suffix, offset, 0, &mut row);
             }
-            store(simd, self.shape, &mut self.scratch.checkpoints[(segment - 1) * size..], &suffix);
+            suffix.store(simd, self.shape, &mut self.scratch.checkpoints[(segment - 1) * size..segment * size]);
         }
-        let full = self.run.is_full(S::F64_LANES);
         let places = self.scratch.tile.places();
-        let mut prefix = empty(simd, self.shape);
+        let mut prefix = self.nothing(simd);
         for segment in 0..segments {
             let rows = segment * SEGMENT..window.min((segment + 1) * SEGMENT);
-            suffix = empty(simd, self.shape);
+            suffix = self.nothing(simd);
             if segment + 1 < segments {
-                load(simd, self.shape, &self.scratch.checkpoints[segment * size..], &mut suffix);
+                suffix.load(simd, self.shape, &self.scratch.checkpoints[segment * size..][..size]);
             }
             for offset in rows.clone().rev() {
                 if offset % ASK == 0 && !(self.go_on)() {
                     return;
                 }
                 self.append(simd, &mut suffix, offset, 0, &mut row);
-                store(simd, self.shape, &mut self.scratch.suffixes[(offset - rows.start) * size..], &suffix);
+                let place = (offset - rows.start) * size;
+                suffix.store(simd, self.shape, &mut self.scratch.suffixes[place..place + size]);
             }
             // Merging depends on the step before, solving does not: in separate loops each keeps the processor busy.
             let mut first = rows.start;
@@ -76,13 +77,14 @@ impl<H: Dimensions> Kernel for RollingKernel<'_, '_, '_, H> {
                 let some = first..rows.end.min(first - first % places + places);
                 for offset in some.clone() {
                     let place = (offset - rows.start) * size;
-                    load(simd, self.shape, &self.scratch.suffixes[place..], &mut suffix);
-                    merge(simd, self.shape, &mut suffix, &prefix, &mut row);
-                    store(simd, self.shape, &mut self.scratch.suffixes[place..], &suffix);
+                    suffix.load(simd, self.shape, &self.scratch.suffixes[place..place + size]);
+                    self.merge(simd, &mut suffix, &prefix, offset, &mut row);
+                    suffix.store(simd, self.shape, &mut self.scratch.suffixes[place..place + size]);
                     self.append(simd, &mut prefix, offset, 1, &mut row);
                 }
                 for offset in some.clone() {
-                    load(simd, self.shape, &self.scratch.suffixes[(offset - rows.start) * size..], &mut suffix);
+                    let place = (offset - rows.start) * size;
+                    suffix.load(simd, self.shape, &self.scratch.suffixes[place..place + size]);
                     self.finish(simd, &suffix, offset, full, &mut row);
                 }
                 // The last windows are written together with some that were written before, to fill the vectors.
@@ -92,25 +94,105 @@ impl<H: Dimensions> Kernel for RollingKernel<'_, '_, '_, H> {
                 first = some.end;
             }
         }
-        self.run.mark(&self.scratch.unusable, full, self.outputs);
+        self.run.mark(self.scratch, full, self.outputs);
+    }
+}
+
+/// What some rows of each lane are summarised by.
+#[derive(Clone)]
+struct WindowSummary<F> {
+    factor: F,
+    /// Sums for the errors of windows that fade: see `fading`.
+    sums: Option<F>,
+}
+
+impl<F> WindowSummary<F> {
+    /// Writes it to memory, which holds it exactly.
+    #[inline(always)]
+    fn store<S: Lanes, H: Dimensions<Factor<S::f64s> = F>>(&self, simd: S, shape: H, to: &mut [f64]) {
+        store(simd, shape, to, &self.factor);
+        if let Some(sums) = &self.sums {
+            let half = to.len() / 2;
+            store(simd, shape, &mut to[half..], sums);
+        }
+    }
+
+    /// Reads it from memory.
+    #[inline(always)]
+    fn load<S: Lanes, H: Dimensions<Factor<S::f64s> = F>>(&mut self, simd: S, shape: H, from: &[f64]) {
+        load(simd, shape, from, &mut self.factor);
+        if let Some(sums) = &mut self.sums {
+            load(simd, shape, &from[from.len() / 2..], sums);
+        }
     }
 }
 
 impl<H: Dimensions> RollingKernel<'_, '_, '_, H> {
+    /// The summary of no rows.
+    #[inline(always)]
+    fn nothing<S: Lanes>(&self, simd: S) -> WindowSummary<H::Factor<S::f64s>> {
+        let sums = self.run.plan.fading.as_ref().map(|_| self.shape.factor(simd.splat_f64s(0.0)));
+        WindowSummary { factor: empty(simd, self.shape), sums }
+    }
+
     /// Appends the row at an offset of each lane's block, or of the block after it.
     #[inline(always)]
     fn append<S: Lanes>(
         &self,
         simd: S,
-        factor: &mut H::Factor<S::f64s>,
+        summary: &mut WindowSummary<H::Factor<S::f64s>>,
         offset: usize,
         block: usize,
         row: &mut H::Factor<S::f64s>,
     ) {
-        for column in 0..self.shape.regressors() + self.shape.rhs_count() {
+        let (shape, plan) = (self.shape, self.run.plan);
+        let columns = shape.regressors() + shape.rhs_count();
+        for column in 0..columns {
             row[column] = self.scratch.strips[column].in_block(simd, offset, block);
         }
-        append(simd, self.shape, factor, row, 0, simd.splat_f64s(1.0));
+        let mut weight = simd.splat_f64s(1.0);
+        if plan.is_weighted(self.equations) {
+            weight = self.scratch.strips[columns].in_block(simd, offset, block);
+        }
+        if let (Some(fading), Some(sums)) = (&plan.fading, &mut summary.sums) {
+            // The block's rows are appended from its last to its first, those of the next block from its first to its last.
+            let part = if fading.newest_first == (block == 1) {
+                fading::fade(simd, shape, &mut summary.factor, sums, fading.left[1]);
+                1.0
+            } else {
+                fading.left[if block == 0 { plan.window - 1 - offset } else { offset }]
+            };
+            fading::add(simd, shape, sums, row, weight, part);
+            weight = simd.mul_f64s(weight, simd.splat_f64s(part));
+        }
+        append(simd, shape, &mut summary.factor, row, 0, weight);
+    }
+
+    /// Merges the rows of each lane's block from an offset on with those of the block after it up to that offset.
+    #[inline(always)]
+    fn merge<S: Lanes>(
+        &self,
+        simd: S,
+        suffix: &mut WindowSummary<H::Factor<S::f64s>>,
+        prefix: &WindowSummary<H::Factor<S::f64s>>,
+        offset: usize,
+        row: &mut H::Factor<S::f64s>,
+    ) {
+        let shape = self.shape;
+        let (Some(fading), Some(sums), Some(others)) = (&self.run.plan.fading, &mut suffix.sums, &prefix.sums) else {
+            merge(simd, shape, &mut suffix.factor, &prefix.factor, row);
+            return;
+        };
+        if fading.newest_first {
+            fading::fade(simd, shape, &mut suffix.factor, sums, fading.left[offset]);
+            merge(simd, shape, &mut suffix.factor, &prefix.factor, row);
+            fading::merge(simd, shape, sums, others);
+        } else {
+            let (mut factor, mut others) = (prefix.factor.clone(), others.clone());
+            fading::fade(simd, shape, &mut factor, &mut others, fading.left[self.run.plan.window - offset]);
+            merge(simd, shape, &mut suffix.factor, &factor, row);
+            fading::merge(simd, shape, sums, &others);
+        }
     }
 
     /// Solves each lane's window.
@@ -118,15 +200,15 @@ impl<H: Dimensions> RollingKernel<'_, '_, '_, H> {
     fn finish<S: Lanes>(
         &mut self,
         simd: S,
-        factor: &H::Factor<S::f64s>,
+        summary: &WindowSummary<H::Factor<S::f64s>>,
         offset: usize,
         full: bool,
         values: &mut H::Factor<S::f64s>,
     ) {
-        let (shape, plan) = (self.shape, self.run.plan);
+        let (shape, plan, factor) = (self.shape, self.run.plan, &summary.factor);
         let (p, q) = (shape.regressors(), shape.rhs_count());
         let slots = Slots::of(plan);
-        let freedom = self.freedom(simd, offset, full);
+        let mut freedom = self.freedom(simd, offset, full);
         let tile = &mut self.scratch.tile;
         // The condition number comes first: where it exceeds the precision, no result has any digits.
         invert(simd, shape, factor, values);
@@ -145,7 +227,19 @@ impl<H: Dimensions> RollingKernel<'_, '_, '_, H> {
         tile.put(simd, slots.condition, offset, condition);
         tile.put(simd, slots.condition + 1, offset, simd.select_f64s(determined, flags, deficient));
 
+        let faded = summary.sums.as_ref().map(|sums| {
+            let mut normal = shape.factor(simd.splat_f64s(0.0));
+            freedom = simd.div_f64s(simd.splat_f64s(1.0), fading::freedom(simd, shape, values, sums, &mut normal));
+            normal
+        });
         let nothing = simd.select_f64s(determined, simd.splat_f64s(0.0), simd.splat_f64s(f64::NAN));
+        if plan.normal {
+            let pairs = (0..p).flat_map(|i| (i..p).map(move |k| (i, k)));
+            for (pair, (i, k)) in pairs.enumerate() {
+                let entry = simd.add_f64s(covariance(simd, shape, values, i, k), nothing);
+                tile.put(simd, slots.normal + pair, offset, entry);
+            }
+        }
         for rhs in 0..q {
             let residual = simd.add_f64s(factor[shape.row(p) + rhs], nothing);
             let variance = simd.mul_f64s(residual, freedom);
@@ -157,14 +251,33 @@ impl<H: Dimensions> RollingKernel<'_, '_, '_, H> {
             let deviation = simd.sqrt_f64s(variance);
             tile.put(simd, slots.deviations + rhs, offset, deviation);
             for i in 0..p {
-                let error = simd.mul_f64s(simd.sqrt_f64s(covariance(simd, shape, values, i, i)), deviation);
+                let over = match &faded {
+                    Some(variances) => variances[shape.row(i)],
+                    None => covariance(simd, shape, values, i, i),
+                };
+                let error = simd.mul_f64s(simd.sqrt_f64s(over), deviation);
                 tile.put(simd, slots.errors + i * q + rhs, offset, error);
             }
         }
         for rhs in 0..q {
             solve(simd, shape, factor, rhs, values);
+            let tile = &mut self.scratch.tile;
             for i in 0..p {
                 tile.put(simd, i * q + rhs, offset, simd.add_f64s(values[i], nothing));
+            }
+            if plan.fit {
+                let own = offset + plan.before;
+                let at =
+                    |column: usize| self.scratch.strips[column].in_block(simd, own % plan.window, own / plan.window);
+                let mut residual = simd.add_f64s(at(p + rhs), nothing);
+                for i in 0..p {
+                    residual = simd.negate_mul_add_f64s(at(i), values[i], residual);
+                }
+                let tile = &mut self.scratch.tile;
+                tile.put(simd, slots.own_residuals + rhs, offset, residual);
+                let explained = explained(simd, shape, factor, rhs, usize::from(plan.constant_first));
+                let all = simd.add_f64s(explained, simd.add_f64s(factor[shape.row(p) + rhs], nothing));
+                tile.put(simd, slots.rsquared + rhs, offset, simd.div_f64s(explained, all));
             }
         }
     }
@@ -178,7 +291,8 @@ impl<H: Dimensions> RollingKernel<'_, '_, '_, H> {
         }
         let mut freedom = [0.0; MOST_LANES];
         for (lane, freedom) in freedom[..S::F64_LANES].iter_mut().enumerate() {
-            *freedom = 1.0 / self.run.count(self.run.first(lane) + offset).saturating_sub(p) as f64;
+            let count = self.run.count(self.scratch, self.run.first(lane) + offset);
+            *freedom = 1.0 / count.saturating_sub(p) as f64;
         }
         simd.load(&freedom, 0)
     }
@@ -193,7 +307,7 @@ impl<H: Dimensions> RollingKernel<'_, '_, '_, H> {
             base: self.run.base.cast_signed(),
             block: plan.window,
             windows: self.run.windows.clone(),
-            ahead: (plan.window / 2).cast_signed() - plan.window.cast_signed(),
+            ahead: plan.before.cast_signed() - plan.window.cast_signed(),
             fixed_order: None,
             outputs: &mut *self.outputs,
         };

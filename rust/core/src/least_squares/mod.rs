@@ -1,5 +1,8 @@
 //! Least squares of given rows: in sliding windows, and over a whole record.
 
+pub(crate) mod bandwidth;
+pub(crate) mod correlated;
+pub(crate) mod fading;
 pub(crate) mod givens_factor;
 pub(crate) mod kernel;
 pub(crate) mod plan;
@@ -7,5 +10,5 @@ pub(crate) mod rolling;
 pub(crate) mod side_by_side;
 pub(crate) mod stacked_qr;
 
-pub use plan::{Equations, HALF_OF_THE_DIGITS, Regressions, RollingLeastSquares};
+pub use plan::{Alignment, Equations, HALF_OF_THE_DIGITS, Regressions, RollingLeastSquares};
 pub use stacked_qr::SharedParameters;

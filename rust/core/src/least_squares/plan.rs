@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::lanes::output::{Elements, Outputs, split_off};
+use crate::least_squares::fading::Fading;
 use crate::least_squares::givens_factor::MOST_REGRESSORS;
 use crate::record::samples::Samples;
 use crate::simd::instructions::Instructions;
@@ -14,10 +15,46 @@ use crate::simd::instructions::Instructions;
 /// The condition number at which parameters have lost half of their digits.
 pub const HALF_OF_THE_DIGITS: f64 = 1e8;
 
+/// Where in its window the row is that a window belongs to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Alignment {
+    /// In the middle: row `i` has the rows `i - w/2 … i - w/2 + w - 1`.
+    #[default]
+    Centre,
+    /// At the end: row `i` has the rows `i - w + 1 … i`.
+    Trailing,
+    /// At the beginning: row `i` has the rows `i … i + w - 1`.
+    Leading,
+}
+
+impl Alignment {
+    /// Rows of a window before the row that it belongs to.
+    pub(crate) fn before(self, window: usize) -> usize {
+        match self {
+            Self::Centre => window / 2,
+            Self::Trailing => window - 1,
+            Self::Leading => 0,
+        }
+    }
+}
+
 /// The plan of least squares with some regressors and right-hand sides in windows of some rows.
 #[derive(Clone, Debug)]
 pub struct RollingLeastSquares {
     pub(crate) window: usize,
+    /// Rows of a window before the row that it belongs to.
+    pub(crate) before: usize,
+    /// Rows that a window must hold, where those that are missing are left out; otherwise a missing row spoils its windows, and they must
+    /// hold half of their rows.
+    pub(crate) at_least: Option<usize>,
+    /// Whether the residual of each window at its own row, and R², are wanted.
+    pub(crate) fit: bool,
+    /// Whether the inverse of every window's normal matrix is wanted.
+    pub(crate) normal: bool,
+    /// How weights become less away from the row that a window belongs to.
+    pub(crate) fading: Option<Fading>,
+    /// Whether the first regressor is a constant, so that R² is that of what varies around it.
+    pub(crate) constant_first: bool,
     pub(crate) regressors: usize,
     pub(crate) rhs_count: usize,
     pub(crate) covariances: Vec<(usize, usize)>,
@@ -26,14 +63,17 @@ pub struct RollingLeastSquares {
 }
 
 /// Rows of equations: one record for every regressor, then one for every right-hand side.
+#[derive(Default)]
 pub struct Equations<'a> {
     /// All of the same length.
     pub columns: Vec<&'a dyn Samples>,
+    /// Weights of the rows, finite and not negative. Rows of weight 0 are left out, whatever they hold.
+    pub weights: Option<&'a dyn Samples>,
     /// The rows that are equations; rows before and after are ignored.
     pub rows: Range<usize>,
 }
 
-/// Where results are written. Windows belong to the row at their centre: row `i` to the rows `i - w/2 … i - w/2 + w - 1`.
+/// Where results are written. Windows belong to a row as the plan's [`Alignment`] says.
 ///
 /// An empty slice stands for what is not wanted.
 #[derive(Debug, Default)]
@@ -50,6 +90,12 @@ pub struct Regressions<'a> {
     pub residuals: Vec<&'a mut [f64]>,
     /// Standard deviation of the residuals of every right-hand side.
     pub deviations: Vec<&'a mut [f64]>,
+    /// What each window leaves of the right-hand sides at its own row, where the plan is [`RollingLeastSquares::with_fit`].
+    pub own_residuals: Vec<&'a mut [f64]>,
+    /// The part of the squares of every right-hand side that is explained, likewise.
+    pub rsquared: Vec<&'a mut [f64]>,
+    /// The inverse of the normal matrix, its upper triangle row by row, where the plan asks for it.
+    pub normal: Vec<&'a mut [f64]>,
     /// Condition number of the regressors, each scaled to the same norm.
     pub condition: &'a mut [f64],
     /// Bits of [`crate::Status`].
@@ -68,8 +114,31 @@ impl Regressions<'_> {
             covariances: self.covariances.iter_mut().map(|values| split_off(values, count)).collect(),
             residuals: self.residuals.iter_mut().map(|values| split_off(values, count)).collect(),
             deviations: self.deviations.iter_mut().map(|values| split_off(values, count)).collect(),
+            own_residuals: self.own_residuals.iter_mut().map(|values| split_off(values, count)).collect(),
+            rsquared: self.rsquared.iter_mut().map(|values| split_off(values, count)).collect(),
+            normal: self.normal.iter_mut().map(|values| split_off(values, count)).collect(),
             condition: split_off(&mut self.condition, count),
             status: split_off(&mut self.status, count),
+        }
+    }
+
+    /// The same outputs for one more call.
+    pub(crate) fn reborrow(&mut self) -> Regressions<'_> {
+        fn all<'b>(columns: &'b mut [&mut [f64]]) -> Vec<&'b mut [f64]> {
+            columns.iter_mut().map(|values| &mut **values).collect()
+        }
+        Regressions {
+            elements: self.elements,
+            parameters: all(&mut self.parameters),
+            errors: all(&mut self.errors),
+            covariances: all(&mut self.covariances),
+            residuals: all(&mut self.residuals),
+            deviations: all(&mut self.deviations),
+            own_residuals: all(&mut self.own_residuals),
+            rsquared: all(&mut self.rsquared),
+            normal: all(&mut self.normal),
+            condition: self.condition,
+            status: self.status,
         }
     }
 }
@@ -94,13 +163,64 @@ impl RollingLeastSquares {
         if window <= regressors {
             return Err(Error::RowsTooFew { window, regressors });
         }
-        Ok(Self { window, regressors, rhs_count, covariances, ill_conditioned, instructions })
+        Ok(Self {
+            window,
+            before: Alignment::Centre.before(window),
+            at_least: None,
+            fit: false,
+            normal: false,
+            fading: None,
+            constant_first: false,
+            regressors,
+            rhs_count,
+            covariances,
+            ill_conditioned,
+            instructions,
+        })
+    }
+
+    /// The same with windows that belong to another of their rows.
+    #[must_use]
+    pub fn aligned(mut self, alignment: Alignment) -> Self {
+        self.before = alignment.before(self.window);
+        self
+    }
+
+    /// The same with weights that halve every so many rows away from the row that a window belongs to, which must be at one of its ends.
+    #[must_use]
+    pub fn with_half_life(mut self, rows: f64) -> Self {
+        self.fading = Some(Fading::new(rows, self.window, self.before > 0));
+        self
+    }
+
+    /// The same with missing rows left out, of windows that hold so many others.
+    #[must_use]
+    pub fn of_at_least(mut self, rows: usize) -> Self {
+        self.at_least = Some(rows);
+        self
+    }
+
+    /// The same with the residual at each window's own row and R²: of what varies around a constant, if the first regressor is one.
+    #[must_use]
+    pub fn with_fit(mut self, constant_first: bool) -> Self {
+        (self.fit, self.constant_first) = (true, constant_first);
+        self
     }
 
     /// Number of windows computed side by side. A record may be cut anywhere, but multiples of this waste no work.
     #[must_use]
     pub fn stride(&self) -> usize {
         self.window * self.instructions.lanes()
+    }
+
+    /// Numbers that a window's rows are summarised by, of so many of a factor.
+    pub(crate) fn summary(&self, factor: usize) -> usize {
+        if self.fading.is_some() { 2 * factor } else { factor }
+    }
+
+    /// Whether rows have weights.
+    pub(crate) fn is_weighted(&self, equations: &Equations<'_>) -> bool {
+        equations.weights.is_some() || self.fading.is_some()
     }
 
     /// Rows of a window.
@@ -128,12 +248,12 @@ impl RollingLeastSquares {
 
     /// The rows that lie in the windows around some rows.
     pub(crate) fn rows_needed(&self, around: Range<usize>, rows: usize) -> Range<usize> {
-        around.start.saturating_sub(self.window / 2)..(around.end + self.window).min(rows)
+        around.start.saturating_sub(self.before)..(around.end + self.window).min(rows)
     }
 
     /// First row of the window around a row, counted from one window before the record.
     pub(crate) fn first_row(&self, row: usize) -> usize {
-        row + self.window - self.window / 2
+        row + self.window - self.before
     }
 }
 
@@ -144,6 +264,9 @@ pub(crate) struct Slots {
     pub(crate) covariances: usize,
     pub(crate) residuals: usize,
     pub(crate) deviations: usize,
+    pub(crate) own_residuals: usize,
+    pub(crate) rsquared: usize,
+    pub(crate) normal: usize,
     pub(crate) condition: usize,
 }
 
@@ -153,7 +276,13 @@ impl Slots {
         let errors = p * q;
         let covariances = errors + p * q;
         let residuals = covariances + pairs * q;
-        Self { errors, covariances, residuals, deviations: residuals + q, condition: residuals + 2 * q }
+        let deviations = residuals + q;
+        let own_residuals = deviations + q;
+        let fits = if plan.fit { q } else { 0 };
+        let rsquared = own_residuals + fits;
+        let normal = rsquared + fits;
+        let condition = normal + if plan.normal { p * (p + 1) / 2 } else { 0 };
+        Self { errors, covariances, residuals, deviations, own_residuals, rsquared, normal, condition }
     }
 
     /// All fields: the last holds flags.
@@ -163,15 +292,29 @@ impl Slots {
 
     /// The outputs in the order of the fields.
     pub(crate) fn outputs<'a>(self, regressions: &'a mut Regressions<'_>) -> Outputs<'a> {
-        let Regressions { elements, parameters, errors, covariances, residuals, deviations, condition, status } =
-            regressions;
+        let Regressions {
+            elements,
+            parameters,
+            errors,
+            covariances,
+            residuals,
+            deviations,
+            own_residuals,
+            rsquared,
+            normal,
+            condition,
+            status,
+        } = regressions;
         let mut values: Vec<&'a mut [f64]> = Vec::with_capacity(self.fields());
         let groups = [
             (parameters, self.errors),
             (errors, self.covariances),
             (covariances, self.residuals),
             (residuals, self.deviations),
-            (deviations, self.condition),
+            (deviations, self.own_residuals),
+            (own_residuals, self.rsquared),
+            (rsquared, self.normal),
+            (normal, self.condition),
         ];
         for (group, end) in groups {
             values.extend(group.iter_mut().map(|values| &mut **values));

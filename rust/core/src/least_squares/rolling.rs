@@ -24,9 +24,10 @@ impl RollingLeastSquares {
 
     /// Asks for what the scratch memory of so many threads will take.
     pub(crate) fn ask_for_scratch(&self, threads: usize) -> Result<(), Error> {
-        let run = self.window.saturating_mul(self.instructions.lanes() + 2).saturating_mul(self.columns() + 1);
+        let run = self.window.saturating_mul(self.instructions.lanes() + 2).saturating_mul(self.columns() + 2);
         let factors = self.window.min(SEGMENT) + self.window / SEGMENT;
         let factor = Many { regressors: self.regressors, rhs_count: self.rhs_count }.size() * self.instructions.lanes();
+        let factor = self.summary(factor);
         let numbers = run.saturating_add(factors.saturating_mul(factor));
         memory::ask_for_numbers(numbers.saturating_mul(threads))
     }

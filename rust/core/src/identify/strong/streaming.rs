@@ -194,6 +194,7 @@ pub(crate) fn identify_parts(
         let columns = chunk.columns(total);
         let equations = Equations {
             columns: columns.iter().map(|column| column as &dyn Samples).collect(),
+            weights: None,
             rows: equations(derivatives, total),
         };
         least_squares.solve_while(&equations, samples.clone(), &mut part.regressions, scratch, go_on);

@@ -53,6 +53,7 @@ impl Columns {
             deviations: vec![&mut self.residual_std],
             condition: &mut self.condition,
             status: &mut self.status,
+            ..Regressions::default()
         };
         Identified { regressions, order: &mut self.order }
     }
