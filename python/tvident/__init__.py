@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from tvident._expansion import Expansion
     from tvident._files import FileRecording, read_recording
     from tvident._identify import StrongForm, WeakForm, identify
+    from tvident._plan import ExperimentPlan, plan_experiment
     from tvident._regression import RollingRegression, rolling_least_squares
     from tvident._results import ExpandedParameter, Identification, IdentifiedRecords, Scan, load
     from tvident._simulate import Recording, simulate_torsional_rig
@@ -22,6 +23,7 @@ __all__ = [
     "Channel",
     "ExpandedParameter",
     "Expansion",
+    "ExperimentPlan",
     "FileRecording",
     "Identification",
     "IdentifiedRecords",
@@ -38,6 +40,7 @@ __all__ = [
     "fit_local_polynomials",
     "identify",
     "load",
+    "plan_experiment",
     "read_recording",
     "rolling_least_squares",
     "savgol_filter",
@@ -51,6 +54,7 @@ _ROOMS = {
     "_equation": ("Term",),
     "_files": ("FileRecording", "read_recording"),
     "_identify": ("StrongForm", "WeakForm", "identify"),
+    "_plan": ("ExperimentPlan", "plan_experiment"),
     "_regression": ("RollingRegression", "rolling_least_squares"),
     "_results": ("ExpandedParameter", "Identification", "IdentifiedRecords", "Scan", "load"),
     "_simulate": ("Recording", "simulate_torsional_rig"),

@@ -72,6 +72,13 @@ def test_smooth_families_find_the_same_curve(short: tvident.Recording, family: s
         np.testing.assert_allclose(np.sqrt(variance), curve.stderr, rtol=1e-6)
 
 
+@pytest.mark.parametrize(("family", "size"), [("block_pulse", 30), ("haar", 32)])
+def test_functions_that_jump_serve_for_stiffness(short: tvident.Recording, family: str, size: int) -> None:
+    result = identify(short, stiffness=Expansion(family, size=size, of=short.slider_position))
+    # A step of K = 6/x over the slider's range, from its middle: half a thirtieth of 10 N m/rad, and more where K is steep.
+    assert error(result, short) < 0.02
+
+
 def test_functions_of_ones_own(short: tvident.Recording) -> None:
     # The slider's law is one over its position.
     own = Expansion(lambda x, size: x[:, np.newaxis] ** -np.arange(1.0, size + 1), of=short.slider_position)

@@ -34,6 +34,7 @@ ROOMS = (
     "_advice",
     "_identify",
     "_compare",
+    "_plan",
     "recordings",  # doors: what users import by the room's name
     "figures",
     "tvident",  # the front door

@@ -88,6 +88,7 @@ COMMANDS = {
     "derivatives": "Differentiate a channel of FILE with a polynomial order chosen in every window.",
     "identify": "Identify inertia, damping and stiffness from the angle and torque in FILE.",
     "info": "List the channels of FILE: how many samples, their range, and what is missing.",
+    "plan": "Say how long to record, which frequencies and amplitude give a wanted error, or what more of FILE would bring.",
     "report": "Identify as identify does, and write a page that shows the recording and the result.",
     "simulate": "Write a simulated recording of the paper's rig, with its truth, to OUTPUT: a CSV file, or of another kind by its ending.",
 }

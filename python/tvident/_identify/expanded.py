@@ -163,7 +163,7 @@ class ExpandedTask:
         """Refuse functions that have not the derivatives that rows need, and channels of another length."""
         # The second derivative of an inertia may jump.
         needed = min(DERIVATIVES.get(role_of(name, one), 0), 1)
-        if any(family.smooth < needed for family in one.families):
+        if needed and any(family.smooth < needed for family in one.families):
             _refuse(f"{name} needs functions with continuous derivatives", one.called, "use 'bspline'")
         for channel in one.channels:
             if channel.shape != self._data.time.shape:

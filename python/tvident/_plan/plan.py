@@ -1,0 +1,117 @@
+"""The plan of an experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident._files import aligned
+
+Array: TypeAlias = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ExperimentPlan:
+    r"""What :func:`tvident.plan_experiment` returns.
+
+    Attributes
+    ----------
+    duration : float
+        Seconds.
+    frequencies, amplitudes : ndarray, shape (f,)
+        Sines of the torque: Hz, and N m. Empty of a plan to go on with a recording.
+    torque_rms, angle_rms : float
+        Of the torque, and of the motion that it is expected to make; NaN of a plan to go on.
+    errors : dict of str to float
+        Expected relative standard errors of ``"inertia"``, ``"damping"`` and ``"stiffness"``.
+    before : dict of str to float
+        The same of the recording at hand, if there is one.
+    wanted : float
+        The relative standard error of the stiffness that was asked for.
+    reached : bool
+        Whether it is expected.
+
+    See Also
+    --------
+    plan_experiment : makes one.
+
+    References
+    ----------
+    H. Cramér: Mathematical methods of statistics, Princeton 1946: the inverse of the information bounds the variance of unbiased estimates.
+
+    Examples
+    --------
+    >>> import tvident
+    >>> plan = tvident.plan_experiment(
+    ...     inertia=0.0123, damping=0.008, stiffness=13, band=(0.5, 12), torque_noise=0.02, torque_rms=0.2
+    ... )
+    >>> bool(plan.reached and plan.errors["stiffness"] <= 0.02)
+    True
+    >>> torque = plan.excitation(sample_rate=1000)
+    """
+
+    duration: float
+    frequencies: Array
+    amplitudes: Array
+    torque_rms: float
+    angle_rms: float
+    errors: Mapping[str, float]
+    before: Mapping[str, float]
+    wanted: float
+    reached: bool
+
+    def excitation(self, *, sample_rate: float, seed: int = 0) -> Array:
+        """Return the torque as samples: sines of random phase.
+
+        Parameters
+        ----------
+        sample_rate : float
+            Samples per second.
+        seed : int, optional
+            Of the phases.
+
+        Returns
+        -------
+        ndarray of float64, shape (duration times sample_rate,)
+            N m.
+        """
+        rate = arguments.positive_number("sample_rate", sample_rate)
+        time = np.arange(round(self.duration * rate)) / rate
+        phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, self.frequencies.size)
+        found = np.zeros(time.size)
+        for frequency, amplitude, phase in zip(self.frequencies, self.amplitudes, phases, strict=True):
+            found += amplitude * np.sin(2 * np.pi * frequency * time + phase)
+        return found
+
+    def summary(self) -> str:
+        """Return the plan in words.
+
+        Returns
+        -------
+        str
+        """
+        name = f"stiffness within {100 * self.wanted:.3g} %"
+        if self.reached:
+            lines = [
+                f"{name}: {self.duration:.4g} s in all" if self.before else f"{name}: record {self.duration:.4g} s"
+            ]
+        else:
+            cure = "it belongs to windows, which more time does not lengthen: excite more, or let windows be longer"
+            lines = [f"{name} cannot be reached by recording longer: {cure}"]
+        if self.frequencies.size:
+            lines.append(
+                f"torque of {self.torque_rms:.3g} N m rms, which moves the angle by about {self.angle_rms:.3g} rad rms:"
+            )
+            each = zip(self.frequencies, self.amplitudes, strict=True)
+            lines += aligned([("Hz", "N m"), *((f"{one:.4g}", f"{other:.3g}") for one, other in each)])
+        heads = ("parameter", *(["now"] if self.before else []), "expected error")
+        rows = [
+            (one, *([f"{100 * self.before[one]:.3g} %"] if self.before else []), f"{100 * error:.3g} %")
+            for one, error in self.errors.items()
+        ]
+        return "\n".join([*lines, "", *aligned([heads, *rows])])

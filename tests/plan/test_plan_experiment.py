@@ -1,0 +1,108 @@
+"""Plans: the bound holds in simulation, and what is planned reaches what was wanted."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import tvident
+from tvident._command_line import main
+
+GUESS: dict[str, Any] = {"inertia": 0.0123, "damping": 0.05, "stiffness": 13.0, "band": (0.5, 12)}
+
+WITHIN = 0.1
+"""Of the bound: what is promised."""
+
+
+def recorded(plan: tvident.ExperimentPlan, seed: int, noise: tuple[float, float]) -> tuple[Any, Any]:
+    """Give the steady response to what was planned, which sines give exactly."""
+    generator = np.random.default_rng(seed)
+    time = np.arange(round(plan.duration * 1000)) / 1000
+    s = 2j * np.pi * plan.frequencies
+    phasors = plan.amplitudes * np.exp(1j * generator.uniform(0, 2 * np.pi, s.size))
+    torque, angle = np.zeros((2, time.size))
+    for one, phasor in zip(s, phasors, strict=True):
+        turning = phasor * np.exp(one * time)
+        torque += turning.real
+        angle += (turning / (GUESS["inertia"] * one**2 + GUESS["damping"] * one + GUESS["stiffness"])).real
+    return angle + noise[0] * generator.standard_normal(time.size), torque + noise[1] * generator.standard_normal(
+        time.size
+    )
+
+
+@pytest.mark.parametrize("angle_noise", [1e-6, 1e-3])
+def test_errors_are_the_bound(angle_noise: float) -> None:
+    plan = tvident.plan_experiment(**GUESS, torque_noise=0.02, angle_noise=angle_noise, torque_rms=0.2, duration=10)
+    constant: dict[str, Any] = dict.fromkeys(("inertia", "damping", "stiffness"), "constant")
+    errors: dict[str, list[float]] = {name: [] for name in constant}
+    off: list[float] = []
+    for seed in range(4):
+        angle, torque = recorded(plan, seed, (angle_noise, 0.02))
+        result = tvident.identify(angle, torque, sample_rate=1000, **constant)
+        for name, found in errors.items():
+            found.append(result.constants[name][1] / GUESS[name])
+            off.append((result.constants[name][0] - GUESS[name]) / (plan.errors[name] * GUESS[name]))
+    for name, found in errors.items():
+        assert np.mean(found) == pytest.approx(plan.errors[name], rel=WITHIN), name
+    # Twelve numbers of variance one, at four standard deviations.
+    assert np.mean(np.square(off)) < 1 + 4 * math.sqrt(2 / 12)
+
+
+def test_a_stiffness_that_changes_has_the_bound_of_its_windows() -> None:
+    plan = tvident.plan_experiment(**GUESS, torque_noise=0.02, torque_rms=0.2, duration=20, resolution=2.0)
+    angle, torque = recorded(plan, 0, (0.0, 0.02))
+    pulses = tvident.Expansion("block_pulse", size=10)
+    result = tvident.identify(angle, torque, sample_rate=1000, inertia="constant", damping="constant", stiffness=pulses)
+    # Windows are 2 s, of sines of 0.5 Hz and more: information scatters from window to window.
+    found = np.sqrt(np.mean(result.stderr["stiffness"] ** 2)) / 13
+    assert found == pytest.approx(plan.errors["stiffness"], rel=WITHIN)
+
+
+def test_duration_and_amplitude_reach_what_is_wanted() -> None:
+    long = tvident.plan_experiment(**GUESS, torque_noise=0.02, torque_rms=0.01)
+    assert long.reached
+    assert long.errors["stiffness"] == pytest.approx(0.02, rel=1e-3)
+    strong = tvident.plan_experiment(**GUESS, torque_noise=0.02, duration=long.duration)
+    assert strong.torque_rms == pytest.approx(0.01, rel=1e-3)
+    torque = strong.excitation(sample_rate=100)
+    assert torque.std() == pytest.approx(strong.torque_rms, rel=0.3)
+    never = tvident.plan_experiment(**GUESS, torque_noise=0.02, torque_rms=1e-4, resolution=0.2)
+    assert not never.reached
+    assert "cannot be reached" in never.summary()
+
+
+def test_power_goes_where_it_tells_most() -> None:
+    plan = tvident.plan_experiment(**GUESS, torque_noise=0.02, torque_rms=0.1, duration=10)
+    assert np.sum(plan.amplitudes**2) / 2 == pytest.approx(0.01)
+    even = tvident.plan_experiment(**{**GUESS, "band": (0.5, 0.6)}, torque_noise=0.02, torque_rms=0.1, duration=10)
+    assert plan.errors["stiffness"] < even.errors["stiffness"]
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"stiffness": None}, "guess of stiffness"),
+        ({"band": (3, 1)}, "must rise"),
+        ({"band": None}, r"band=\(0.5, 12\)"),
+        ({"torque_rms": None}, "torque or the time"),
+    ],
+)
+def test_what_is_missing_is_said(changed: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        tvident.plan_experiment(**{**GUESS, "torque_noise": 0.02, "torque_rms": 0.1, **changed})
+
+
+def test_the_command(tmp_path: Any) -> None:
+    numbers = "--inertia 0.0123 --damping 0.05 --stiffness 13 --band 0.5 12 --torque-noise 0.02 --torque-rms 0.01"
+    words = ["plan", *numbers.split(), "-o"]
+    ran = CliRunner().invoke(main, [*words, str(tmp_path / "torque.csv")])
+    assert ran.exit_code == 0, ran.output
+    assert "stiffness within 2 %: record" in ran.output
+    assert (tmp_path / "torque.csv").exists()
+    rig = tvident.simulate_torsional_rig(duration=4.0)
+    tvident.identify(rig.angle, rig.torque, sample_rate=1000).save(tmp_path / "one.npz")
+    more = CliRunner().invoke(main, ["plan", str(tmp_path / "one.npz"), "--more", "60"])
+    assert more.exit_code == 0, more.output
+    assert "now" in more.output
