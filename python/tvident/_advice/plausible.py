@@ -75,7 +75,10 @@ class Plausible:
         if self.period < _SLOW or "time" not in self.axis.assumed:
             return []
         return [
-            f"there is one sample in {self.period:.4g} s: is the time in milliseconds? Then give time_unit='ms' with t or delta"
+            (
+                f"there is one sample in {self.period:.4g} s: is the time in milliseconds? Then give time_unit='ms' with t or delta, "
+                "--time-unit ms on the command line"
+            )
         ]
 
     def _signs(self, found: Estimates, record: int) -> list[str]:

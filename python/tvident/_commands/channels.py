@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
 import sys
 import tempfile
@@ -15,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import recordings
-from tvident._files import full_name, listed, printable
+from tvident._files import full_name, listed, printable, time_channels
 from tvident._units import Channel, named_unit, unit_said
 
 _BAGS, _EVEN, _MOST_SCATTER = {".mcap", ".db3", ".bag"}, 1e-3, 2.0
@@ -89,6 +90,15 @@ def at_even_times(
         err=True,
     )
     return Channel(even, "s"), [Channel(np.interp(even, times, one), unit_said(one)) for one in signals]
+
+
+def check_has_times(who: str, given: bool, channels: recordings.Channels) -> None:  # noqa: FBT001 - said by its name
+    """Refuse to begin without a sample period, and name the channel that may hold the times."""
+    if given:
+        return
+    found = time_channels(channels)
+    known = f"; it may be --time {shlex.quote(printable(found[0]))}" if found else ""
+    raise click.UsageError(f"{who} the sample period; got none; give --sample-rate, --delta or --time{known}")
 
 
 def channels_in(file: str | None) -> recordings.Channels:

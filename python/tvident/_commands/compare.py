@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import click
-
 import tvident
-from tvident._commands.channels import at_even_times, channels_in, mask_of, scaled, source_of, times_of
+from tvident._commands.channels import at_even_times, channels_in, check_has_times, mask_of, scaled, source_of, times_of
 from tvident._commands.equation import lag_of, parameter_of, terms_of
 from tvident._commands.given import check_time, given
 from tvident._commands.named import named
@@ -36,9 +34,8 @@ def compare(
         {RESULTS: output, PICTURE: plot},
         {RECORDING: file, "the angle": angle, "the torque": torque, "the mask": mask},
     )
-    if not check_time(options["sample_rate"], options["delta"], time_channel):
-        raise click.UsageError("compare needs the sample period; got none; give --sample-rate, --delta or --time")
     channels = channels_in(file)
+    check_has_times("compare needs", check_time(options["sample_rate"], options["delta"], time_channel), channels)
     common: dict[str, Any] = {
         name: parameter_of(value, channels, file) if name in COEFFICIENTS else value
         for name, value in given(options).items()

@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import click
 import numpy as np
 import numpy.typing as npt
 
 import tvident
 from tvident import _arguments as arguments
-from tvident._commands.channels import channel_of, channels_in
+from tvident._commands.channels import channel_of, channels_in, check_has_times
 from tvident._commands.given import check_time, given, length, period_of, wanted_progress
 from tvident._commands.output import PICTURE, RECORDING, RESULTS, check_outputs, figures_on_file, give, save_figure
 from tvident._status import describe
@@ -34,9 +33,8 @@ def derivatives(
 ) -> None:
     """Differentiate a channel of FILE with a polynomial order chosen in every window."""
     check_outputs({RESULTS: output, PICTURE: plot}, {RECORDING: file})
-    if not check_time(sample_rate, delta, time_channel):
-        raise click.UsageError("derivatives need the sample period; got none; give --sample-rate, --delta or --time")
     channels = channels_in(file)
+    check_has_times("derivatives need", check_time(sample_rate, delta, time_channel), channels)
     samples = channel_of(channels, channel, file)
     times = None if time_channel is None else times_in_seconds(channel_of(channels, time_channel, file))
     fit = tvident.fit_local_polynomials(

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import click
 import numpy as np
 
 import tvident
 from tvident import recordings
-from tvident._commands.channels import at_even_times, mask_of, scaled, source_of, times_of
+from tvident._commands.channels import at_even_times, check_has_times, mask_of, scaled, source_of, times_of
 from tvident._commands.equation import lag_of, parameter_of, terms_of
 from tvident._commands.given import check_time, given, period_of, wanted_progress
 from tvident._commands.method import NAMES, method_of
@@ -59,10 +58,8 @@ def identified(
     **options: Any,
 ) -> tvident.Identification:
     """Return what is identified from the channels of a file with these options."""
-    if not check_time(options["sample_rate"], options["delta"], time_channel):
-        raise click.UsageError(
-            "an identification needs the sample period; got none; give --sample-rate, --delta or --time"
-        )
+    is_given = check_time(options["sample_rate"], options["delta"], time_channel)
+    check_has_times("an identification needs", is_given, channels)
     of_method = {name: value for name, value in given(options).items() if name in NAMES}
     turn = None if period is None else scaled(np.asarray(period_of(period)), angle_scale, channels, file)
     motion = {"angle": angle, "velocity": velocity, "acceleration": acceleration}

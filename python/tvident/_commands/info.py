@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from tvident._commands.channels import channels_in
 from tvident._files import aligned, printable
+from tvident._units import ROTARY, named_unit, unit_of
 
 
 def info(file: str) -> None:
@@ -32,13 +33,13 @@ def info(file: str) -> None:
                 str(values.size),
                 *shown,
                 str(values.size - finite.size),
-                _remark(values),
+                _remark(name, values),
             )
         )
     click.echo("\n".join(aligned(rows)))
 
 
-def _remark(values: npt.NDArray[Any]) -> str:
+def _remark(name: str, values: npt.NDArray[Any]) -> str:
     """Return what a channel looks like: uniform time, a single number, a constant."""
     if values.ndim == 0:
         return "a number"
@@ -48,6 +49,9 @@ def _remark(values: npt.NDArray[Any]) -> str:
             period = (values[-1] - values[0]) / steps.size
             grid = values[0] + period * np.arange(values.size)
             if np.abs(values - grid).max() <= 1e-3 * period:
-                return f"uniform: {1 / period:.6g} per unit"
+                unit = unit_of(named_unit(name)[1])
+                is_time = unit is not None and unit.dimension == ROTARY.dimensions["time"]
+                hertz = f", {1 / (period * unit.factor):.6g} Hz" if is_time and unit is not None else ""
+                return f"uniform: {1 / period:.6g} per unit{hertz}"
             return "increasing"
     return "constant" if steps.size and not steps.any() else ""

@@ -5,7 +5,7 @@ from tvident._files.channels import Channels, FileError, FileWarning, channel, f
 from tvident._files.names import listed, printable
 from tvident._files.places import ENDINGS as TABLE_ENDINGS
 from tvident._files.places import check_apart, check_folder, check_place
-from tvident._files.recorded import FileRecording, read_recording
+from tvident._files.recorded import FileRecording, read_recording, time_channels
 from tvident._files.recordings import read
 from tvident._files.replacement import replaced
 from tvident._files.results import ENDINGS as RESULT_ENDINGS
@@ -33,6 +33,7 @@ __all__ = [
     "read_result",
     "replaced",
     "settings_beside",
+    "time_channels",
     "write_csv",
     "write_result",
     "write_settings",

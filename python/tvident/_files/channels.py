@@ -84,9 +84,15 @@ def full_name(channels: Mapping[str, Any], name: str, source: str) -> str:
     same = [key for key in channels if key.startswith(name) and named_unit(key)[0] == name]
     if len(same) == 1:
         return same[0]
-    inside = [key for key in channels if named_unit(key)[0].endswith(f".{name}")]
+    inside = [key for key in channels if named_unit(key)[0].endswith(f".{name}") or key.endswith(f".{name}")]
     if not same and len(inside) == 1 and not _NUMBER.fullmatch(name):
         return inside[0]
+    if not same and not inside:
+        # Whoever types a name by hand may not care for capitals; where two channels differ by these alone, nothing is guessed.
+        folded = [key for key in channels if name.casefold() in {key.casefold(), named_unit(key)[0].casefold()}]
+        if len(folded) == 1:
+            return folded[0]
+        same = folded
     place, asked = printable(source), printable(name)
     same = same or inside
     if same:

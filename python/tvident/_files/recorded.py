@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,12 @@ _RATE = re.compile(r"(fs|f_s|fsamp|sample_?rate|sampling_?(rate|frequency)|sampl
 
 _JITTER = 1e-3
 """Of the sample period: how far times may lie from a uniform grid, as where arrays are taken."""
+
+
+def time_channels(names: Iterable[str]) -> list[str]:
+    """Return the names, without units and groups, of channels that are called as times are."""
+    bare = (named_unit(name)[0].rpartition(".")[2] for name in names)
+    return [name for name in bare if _TIME.fullmatch(name)]
 
 
 class FileRecording(Mapping[str, Channel]):
