@@ -79,6 +79,17 @@ def test_a_lag_is_late_or_early(late: int, word: str) -> None:
     assert again.value("damping").value == pytest.approx(0.0081, rel=0.1)
 
 
+def test_records_of_a_batch_have_remedies_as_one_alone() -> None:
+    rig = tvident.simulate_torsional_rig(duration=3.0, seed=3, pattern="constant")
+    torques = np.stack([rig.torque, rig.torque + 0.08 * np.sign(np.gradient(rig.angle))])
+    both = tvident.identify(np.stack([rig.angle] * 2), torques, sample_rate=RATE)
+    alone = tvident.identify(rig.angle, torques[1], sample_rate=RATE)
+    assert "try terms=['offset', 'coulomb']" in alone.advice[0]
+    assert both[1].advice == alone.advice
+    assert both[0].advice == tvident.identify(rig.angle, torques[0], sample_rate=RATE).advice
+    assert "result[1].summary() tries what would explain record 1; so do those of other records" in both.advice
+
+
 def test_friction_that_drives_the_motion_is_never_offered() -> None:
     angle, velocity, acceleration = motion(4)
     torque = 0.5 * acceleration + 2 * velocity + 40 * angle - 6 * np.tanh(velocity / 1e-3)

@@ -38,6 +38,28 @@ def is_to_be_tried(data: Data, request: Request, found: Sequence[_core.Identific
     return bool(flags & _DOUBTED) or changing
 
 
+def is_doubted(flags: int) -> bool:
+    """Return whether something speaks against the model of a record."""
+    return bool(flags & _DOUBTED)
+
+
+def of_one(
+    data: Data, request: Request, flags: int, run: Callable[..., Identification]
+) -> Callable[[Any, Words], Words] | None:
+    """Return what tries the remedies of one record of several, as if it had been identified alone; None where nothing is to be tried.
+
+    Settings of an earlier result are those of the batch, so nothing is tried with them.
+    """
+    is_repeated = bool(request.by_record) or request.lag_samples is not None
+    if not isinstance(request.form, WeakForm) or data.instruments is not None or is_repeated or not is_doubted(flags):
+        return None
+
+    def improve(_: Any, words: Words) -> Words:
+        return replace(words, advice=run(progress=None, diagnose=True).advice)
+
+    return improve
+
+
 @dataclass(frozen=True)
 class Improvement:
     """A single record, and how to identify it with another equation.

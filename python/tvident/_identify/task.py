@@ -20,7 +20,7 @@ from tvident._identify.channels import constants_of
 from tvident._identify.columns import WINDOW_OF_TERMS, Columns, Range, fixed, secant
 from tvident._identify.criterion import criterion_of
 from tvident._identify.data import Data
-from tvident._identify.improved import Improvement, is_to_be_tried
+from tvident._identify.improved import Improvement, is_to_be_tried, of_one
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm, exponent_of
 from tvident._identify.searched import Searched, factor_of, search
 from tvident._identify.settings import Request, plain, resolve
@@ -184,8 +184,7 @@ class Task:
             name: value if isinstance(value, float) else value[..., :: data.step] for name, value in self._known.items()
         }
         inner = [one.full_name for one in self.inner]
-        moving = inner if found and len(found[0].unknowns) > len(self._names) else []
-        names = [*self._names, *moving]
+        names = [*self._names, *(inner if found and len(found[0].unknowns) > len(self._names) else [])]
         batch = estimates(data.batch, names, found, known)
         if inner:
             unknown = {name: one.unknown_error for name, one in self.ranges.items()}
@@ -193,9 +192,8 @@ class Task:
             batch = with_inner(batch, searched.values, unknown, earned, data.time[:: data.step].size)
         if data.labels is not None:
             batch = replace(batch, labels=data.labels.at(slice(None, None, data.step)))
-        batch = replace(batch, constants={**batch.constants, **constants_of(data.motion, data.batch)})
-        settings = self._settings(found, searched)
-        batch = replace(batch, units=data.units)
+        constants = {**batch.constants, **constants_of(data.motion, data.batch)}
+        batch, settings = replace(batch, constants=constants, units=data.units), self._settings(found, searched)
         told = Told(data, self._request, self._unknowns, found, batch, settings)
         words = told.words(names, self._found_by_search(searched, batch))
         if data.doubts:
@@ -244,8 +242,10 @@ class Task:
             alone = some_data.angles.ndim == 1
             own = settings_of(settings, chosen(place, data.batch), kinds, alone=alone)
             known = {name: value if isinstance(value, float) else value[place] for name, value in self._known.items()}
-            request = replace(self._request, by_record={}, parameters={**self._request.parameters, **known}, lag=0.0)
-            return Task(some_data, request)._recorded(own, of_records(found, place))  # noqa: SLF001 - of this class
+            request = replace(self._request, parameters={**self._request.parameters, **known})
+            one, run = of_records(found, place), Task(some_data, request).run
+            recorded = Task(some_data, replace(request, by_record={}, lag=0.0))._recorded(own, one)  # noqa: SLF001 - of this class
+            return replace(recorded, improve=of_one(some_data, request, int(one.record_status), run) if alone else None)
 
         inner = {name: np.ravel(value) for name, value in settings["inner"].items()}
         return Recorded(

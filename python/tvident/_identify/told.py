@@ -14,6 +14,7 @@ from tvident import _core
 from tvident._advice import Explained, ExplainedStrong, FoundBySearch, Plausible, words_of_search, words_with_instrument
 from tvident._equation import Unknown
 from tvident._identify.data import Data
+from tvident._identify.improved import is_doubted
 from tvident._identify.methods import StrongForm
 from tvident._identify.settings import Request
 from tvident._results import Estimates, Words, of_batch
@@ -64,7 +65,17 @@ class Told:
         else:
             each = [one + search for one, search in zip(self._of_records(names), more, strict=True)]
             words = plausible.before(of_batch(each) if several else each[0], data.angles, self.batch)
+            words = replace(words, advice=(*words.advice, *self._where_remedies_are_tried()))
         return _with_doubts(_with_clipped(words, data.clipped, several=several), data.doubts, several=several)
+
+    def _where_remedies_are_tried(self) -> list[str]:
+        """Return where to look for remedies of the records of a batch, which are tried when a record is asked for its words."""
+        flags = np.ravel(self.batch.record_status)
+        if not self.data.batch or self.data.instruments is not None or not any(map(is_doubted, flags.tolist())):
+            return []
+        first = next(place for place, one in enumerate(flags.tolist()) if is_doubted(one))
+        index = ", ".join(map(str, np.unravel_index(first, self.data.batch)))
+        return [f"result[{index}].summary() tries what would explain record {first}; so do those of other records"]
 
     def doubted(self) -> Estimates:
         """Return the estimates, flagged where a channel leaves something open."""
