@@ -63,7 +63,7 @@ _ROOMS = {
 }
 """Where each name comes from: a room is entered when a name of it is asked for, so that the command's help need not wait for NumPy."""
 
-_DOORS = ("figures", "recordings")
+_DOORS = ("baselines", "figures", "recordings")
 """Modules that users import by their name."""
 
 

@@ -22,7 +22,7 @@ import pytest
 
 import tvident
 from calls import paper
-from tvident import Status, figures, recordings
+from tvident import Status, baselines, figures, recordings
 from tvident._command_line import main
 
 ROOT = Path(__file__).parents[2]
@@ -186,7 +186,9 @@ def test_the_reference_has_every_public_name() -> None:
     listed = re.findall(r"^   ([\w.]+)$", page, re.MULTILINE)
     doors = {f"figures.{name}" for name in figures.__all__}
     classes_and_functions = {name for name in recordings.__all__ if name != "Channels"}  # an alias has no page
-    doors |= {f"recordings.{name}" for name in classes_and_functions}
+    doors |= {f"recordings.{name}" for name in classes_and_functions} | {
+        f"baselines.{name}" for name in baselines.__all__
+    }
     assert sorted(listed) == sorted({*tvident.__all__, *doors})
 
 

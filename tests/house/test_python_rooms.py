@@ -35,6 +35,8 @@ ROOMS = (
     "_identify",
     "_compare",
     "_plan",
+    "_baselines",
+    "baselines",
     "recordings",  # doors: what users import by the room's name
     "figures",
     "tvident",  # the front door

@@ -29,6 +29,11 @@ from tvident._command_line.options import CHANNELS, TIME
     metavar="TERM,TERM…",
     help=f"Terms of a candidate, of {', '.join(TERM_NAMES)}, or none; repeat it. By default eight candidates are compared.",
 )
+@click.option(
+    "--methods",
+    is_flag=True,
+    help="Compare methods instead: this one and those that came before. Errors are shown where FILE has the truth, as that of simulate.",
+)
 @click.option("--lag", metavar="TIME", help="Delay of the torque: seconds, '2 ms', or auto.")
 @click.option("--mask", metavar="NAME", help="Channel, or file, that is not zero where a sample may be used.")
 @click.option("--workers", type=int, help="Threads; by default all processors.")

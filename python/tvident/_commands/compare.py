@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import click
+import numpy as np
+
 import tvident
-from tvident._commands.channels import at_even_times, channels_in, check_has_times, mask_of, scaled, source_of, times_of
+from tvident import baselines
+from tvident._commands.channels import (
+    at_even_times,
+    channel_of,
+    channels_in,
+    check_has_times,
+    mask_of,
+    scaled,
+    source_of,
+    times_of,
+)
 from tvident._commands.equation import lag_of, parameter_of, terms_of
 from tvident._commands.given import check_time, given
 from tvident._commands.named import named
@@ -24,6 +38,8 @@ def compare(
     mask: str | None,
     output: str | None,
     plot: str | None,
+    *,
+    methods: bool,
     **options: Any,
 ) -> None:
     """Compare candidates for the equation of motion of the angle and torque in FILE."""
@@ -40,6 +56,13 @@ def compare(
         name: parameter_of(value, channels, file) if name in COEFFICIENTS else value
         for name, value in given(options).items()
     }
+    if methods:
+        if models or plot or lag or mask:
+            raise click.UsageError(
+                "--methods compares methods alone; got options of models; leave --model, --plot, --lag and --mask out"
+            )
+        _methods(file, (angle, torque, time_channel), (angle_scale, torque_scale), options, output)
+        return
     if lag is not None:
         common["lag"] = lag_of(lag)
     if mask is not None:
@@ -58,3 +81,28 @@ def compare(
     give(result.table, {"residual_std": units["residual_std"]}, result.summary(), output)
     if plot is not None:
         save_figure(result.plot(), Path(plot))
+
+
+def _methods(
+    file: str | None,
+    names: tuple[str, str, str | None],
+    scales: tuple[str | None, str | None],
+    options: dict[str, Any],
+    output: str | None,
+) -> None:
+    """Compare methods on one recording."""
+    channels = channels_in(file)
+    angle, torque = (
+        np.asarray(scaled(source_of(channels, name, file), scale, channels, file))
+        for name, scale in zip(names[:2], scales, strict=True)
+    )
+    times = times_of(channels, names[2], names[0], file)
+    rate = options["sample_rate"] or (1 / options["delta"] if options["delta"] else None)
+    rate = rate or 1 / float(np.median(np.diff(np.asarray(times, np.float64))))
+    known = {}
+    for name in COEFFICIENTS:
+        with suppress(KeyError):
+            known[name] = np.asarray(channel_of(channels, name, file))
+    truth = known if len(known) == len(COEFFICIENTS) else None
+    found = baselines.compare_methods(angle, torque, sample_rate=rate, truth=truth)
+    give(found.table, {}, found.summary(), output)
