@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from tvident._expansion import Expansion
     from tvident._files import FileRecording, read_recording
     from tvident._identify import StrongForm, WeakForm, identify
+    from tvident._merged import Chain, Matrix, MergedIdentification
     from tvident._plan import ExperimentPlan, plan_experiment
     from tvident._regression import RollingRegression, rolling_least_squares
     from tvident._results import ExpandedParameter, Identification, IdentifiedRecords, Scan, load
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "Chain",
     "Channel",
     "ExpandedParameter",
     "Expansion",
@@ -28,6 +30,8 @@ __all__ = [
     "Identification",
     "IdentifiedRecords",
     "LocalPolynomialFit",
+    "Matrix",
+    "MergedIdentification",
     "ModelComparison",
     "Recording",
     "RollingRegression",
@@ -54,6 +58,7 @@ _ROOMS = {
     "_equation": ("Term",),
     "_files": ("FileRecording", "read_recording"),
     "_identify": ("StrongForm", "WeakForm", "identify"),
+    "_merged": ("Chain", "Matrix", "MergedIdentification"),
     "_plan": ("ExperimentPlan", "plan_experiment"),
     "_regression": ("RollingRegression", "rolling_least_squares"),
     "_results": ("ExpandedParameter", "Identification", "IdentifiedRecords", "Scan", "load"),

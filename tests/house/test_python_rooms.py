@@ -32,6 +32,7 @@ ROOMS = (
     "_report",
     "_results",
     "_advice",
+    "_merged",
     "_identify",
     "_compare",
     "_plan",

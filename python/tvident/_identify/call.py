@@ -20,8 +20,10 @@ from tvident._identify.records import calls_of_records, identify_records, names_
 from tvident._identify.robust import Loss, loss_of, with_clipped_torque
 from tvident._identify.settings import resolve
 from tvident._identify.task import Task
+from tvident._identify.together import Options, identify_together, sampled
+from tvident._merged import Chain
 from tvident._results import Identification
-from tvident._units import ROTARY, Axis, axis_of, factor_between, scaled, times_in_seconds, unit_said
+from tvident._units import ROTARY, Axis, axis_of, factor_between, scaled, unit_said
 
 
 # All but the data are options, as users call it.
@@ -49,6 +51,10 @@ def identify(
     loss: Loss | None = None,
     period: float | None = None,
     share: str | Sequence[str] = (),
+    dof_axis: int | None = None,
+    structure: Chain | None = None,
+    ensemble_axis: int | None = None,
+    phase: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None,
     nan_policy: arguments.RowPolicy = "omit",
     step: int = 1,
     settings: Mapping[str, Any] | None = None,
@@ -148,6 +154,18 @@ def identify(
         What all records of a list (or of a batch) have in common: ``"inertia"``, ``"damping"``, ``"stiffness"``, unknown and constant. It
         is estimated from all of them, each with the weight of its information, and the rest from each with that known, and its error.
         KIND_CONTRADICTED in ``record_status`` says that records differ more than their errors explain (Cochran's test, 1 in 1000).
+    dof_axis : int, optional
+        The axis of the masses, 0: angle and torque have shape (masses, n), and M q̈ + C q̇ + K q + terms = f is identified. Every entry of
+        the matrices is ``"auto"``, unless a parameter is a kind, nested lists of kinds and numbers, or a :class:`Matrix`. A row of the
+        torque that is NaN was not measured; one that is zero says that no force acts. Returns a :class:`MergedIdentification`.
+    structure : Chain, optional
+        Springs and dampers between masses, in place of full matrices.
+    ensemble_axis : int, optional
+        The axis of repeated trials that share I(t), C(t) and K(t), 0: angle and torque have shape (trials, n), or are lists of
+        records whose lengths may differ. Equations are merged window by window. Returns a :class:`MergedIdentification`.
+    phase : array_like or sequence of array_like, as the angle, optional
+        Aligns trials: a number that grows from 0 to 1 within each, as through a cycle of gait, in place of the time. The result is that of
+        the phase.
     step : int, optional
         Every how many samples a result is wanted.
     nan_policy : {"omit", "propagate", "raise"}, optional
@@ -165,9 +183,9 @@ def identify(
 
     Returns
     -------
-    Identification or IdentifiedRecords
+    Identification, IdentifiedRecords or MergedIdentification
         ``inertia``, ``damping``, ``stiffness``, ``stderr``, ``status``, ``trusted`` and more; ``summary()`` says it in words. For records
-        of different lengths, or with `share`, a sequence of these.
+        of different lengths, or with `share`, a sequence of these; with `dof_axis` or `ensemble_axis` what masses or trials share.
 
     Raises
     ------
@@ -218,9 +236,12 @@ def identify(
     True
     """
     call = {name: value for name, value in locals().items() if name != "share"}
+    together = Options.of({**call, "share": share})
+    # A type for each would ask everyone who identifies one record which it is.
+    if together.is_asked:
+        return cast("Identification", identify_together(angle, torque, together))
     records = calls_of_records(call, names := names_shared(share))
     if records is not None:
-        # A type for either would ask everyone who identifies one record which it is.
         return cast("Identification", identify_records(identify, records, names, progress))
     motion = {"angle": angle, "velocity": velocity, "acceleration": acceleration}
     measured = {name: values for name, values in motion.items() if values is not None}
@@ -235,15 +256,7 @@ def identify(
     axis = axis_of(angle, torque, t, angle_unit=angle_unit, torque_unit=torque_unit, time_unit=time_unit)
     channels = {name: scaled(values, axis.angle) if name == "angle" else values for name, values in channels.items()}
     torques = scaled(torques, axis.torque)
-    if t is not None:
-        t = times_in_seconds(t, time_unit)
-    if delta is not None and axis.time != 1:
-        delta = arguments.positive_number("delta", delta) * axis.time
-    if sample_rate is None and delta is None and t is None:
-        t = arguments.implied_times(first)
-        if t is None:
-            raise TypeError("identify needs the sample period; got none; give sample_rate=, delta= or t=")
-    seconds = arguments.sample_period(samples, delta=delta, sample_rate=sample_rate, t=t)
+    seconds, t = sampled({"sample_rate": sample_rate, "delta": delta, "t": t}, samples, axis, time_unit, first)
     given = {
         "inertia": _known("inertia", inertia, axis),
         "damping": _known("damping", damping, axis),
@@ -268,10 +281,10 @@ def identify(
         request = replace(request, quantisation=quantisation_step(channels["angle"], request.quantisation))
         turned = arguments.unwrapped("angle", channels["angle"], turn)
         channels["angle"], doubts = turned.longest("angle", split=request.counts_turns)
-    together = motion_channels(channels, seconds, has_spring=request.has_spring, quantisation=request.quantisation)
+    moving = motion_channels(channels, seconds, has_spring=request.has_spring, quantisation=request.quantisation)
     data = Data(
-        angles=together.angles,
-        motion=together,
+        angles=moving.angles,
+        motion=moving,
         torques=torques,
         time=arguments.begin_of(t) + np.arange(samples, dtype=np.float64) * seconds,
         period=seconds,
@@ -280,7 +293,7 @@ def identify(
         propagate=nan_policy == "propagate",
         step=arguments.whole_number("step", step, least=1),
         workers=arguments.worker_count(workers),
-        doubts=[*doubts, *together.doubts],
+        doubts=[*doubts, *moving.doubts],
         labels=arguments.labels_of(first),
         axis=axis,
     )

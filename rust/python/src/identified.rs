@@ -183,7 +183,7 @@ impl Identification {
 }
 
 /// What a kind is called.
-fn name(kind: Kind) -> &'static str {
+pub(crate) fn name(kind: Kind) -> &'static str {
     match kind {
         Kind::Windowed => "windowed",
         Kind::Constant => "constant",

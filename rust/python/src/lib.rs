@@ -11,6 +11,7 @@ mod automatic;
 mod identified;
 mod identify;
 mod local_polynomials;
+mod merged;
 mod motions;
 mod noise;
 mod records;
@@ -39,6 +40,8 @@ mod _core {
     use crate::identify::{StrongForm, WeakForm, identify};
     #[pymodule_export]
     use crate::local_polynomials::{LocalEstimates, LocalPolynomials};
+    #[pymodule_export]
+    use crate::merged::{MergedElement, MergedIdentification, identify_merged};
     #[pymodule_export]
     use crate::motions::Motions;
     #[pymodule_export]

@@ -66,6 +66,11 @@ pub(crate) enum NoiseFrom {
 type Estimate = Option<(Vec<f64>, Vec<f64>)>;
 
 impl Test {
+    /// How much more the parts differ than noise explains: the mean of their squared differences over the variances.
+    pub(crate) fn excess(&self) -> f64 {
+        self.squares
+    }
+
     /// The test again where estimates scatter more, by a factor of the variance, than noise explains, or where that noise is known from the
     /// equations alone: it is coloured, and stronger the longer the parts that are compared.
     fn beside_scatter(&mut self, factor: f64, noise: NoiseFrom) {

@@ -67,6 +67,13 @@ impl Scale {
         scales
     }
 
+    /// All lengths that fit into so many times, where `group` rows belong to every time: blocks hold whole groups.
+    pub(crate) fn grouped(times: usize, reach: usize, group: usize) -> Vec<Self> {
+        let of_times = Self::all(times, reach).into_iter();
+        let grouped = of_times.map(|one| Self::new(one.step * group, one.blocks, reach * group));
+        grouped.filter(|one| 2 * one.span() <= times * group).collect()
+    }
+
     /// The fewest rows that windows of any length fit into.
     pub(crate) fn fewest_rows(reach: usize) -> usize {
         let spans = SHORT.iter().map(|&[step, blocks]| Self::new(step, blocks, reach).span());
@@ -275,6 +282,25 @@ mod tests {
                     let [one, all] = scale.centres(cell);
                     assert_eq!(one, (before.start + before.end - 1) as f64 / 2.0);
                     assert_eq!(all, (before.start + after.end - 1) as f64 / 2.0);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn blocks_of_grouped_lengths_hold_whole_groups() {
+        for (times, reach, group) in [(300, 6, 2), (160, 7, 50), (90, 1, 3)] {
+            let scales = Scale::grouped(times, reach, group);
+            assert!(!scales.is_empty());
+            for scale in scales {
+                assert_eq!((scale.step % group, scale.one_sided() % group), (0, 0));
+                assert!(2 * scale.span() <= times * group);
+                for row in scale.full_rows(times * group) {
+                    let cell = scale.cell(row);
+                    let (before, after) = (scale.one_sided_rows(cell), scale.one_sided_rows(scale.after(cell)));
+                    // A row less than the reach, at which a test function is next to nothing.
+                    let least = ((reach - 1) * group).cast_signed();
+                    assert!(before.end + least <= row.cast_signed() + 1 && after.start >= row.cast_signed() + least);
                 }
             }
         }

@@ -51,7 +51,7 @@ impl Session<'_, '_, '_> {
             let whole = whole.get_or_insert_with(|| weak.rows.clone());
             weak.rows = whole.clone();
             let (function, rows) = (&weak.kernels.values[2], weak.rows.len());
-            weak.rows.exclude(search::rows_over(&found, function, weak.first, weak.stride, rows));
+            weak.rows.exclude(search::rows_over(&found, function, (weak.first, weak.stride, 1), rows));
             weak.rows.jumps = found.iter().map(|jump| (jump.sample - weak.first).div_ceil(weak.stride)).collect();
             (jumps, round) = (found, round + 1);
         }

@@ -58,6 +58,7 @@ impl Session<'_, '_, '_> {
             function: &weak.kernels.values[2],
             first: weak.first,
             stride: weak.stride,
+            group: 1,
             expected: decided.expected,
             inflation: decided.error.max(1.0) * if self.noise == self.channel_noise { 1.0 } else { COLOURED },
             scales: &decided.scales,

@@ -128,6 +128,7 @@ impl Session<'_, '_, '_> {
             function: &weak.kernels.values[2],
             first: weak.first,
             stride: weak.stride,
+            group: 1,
             expected: decided.expected,
             inflation: 1.0,
             scales: &[],

@@ -35,6 +35,8 @@ pub(crate) struct JumpSearch<'a> {
     /// Sample of the first row, and samples from one to the next.
     pub(crate) first: usize,
     pub(crate) stride: usize,
+    /// Rows that belong to one time; then there is a signal for each of them, unknown by unknown.
+    pub(crate) group: usize,
     pub(crate) expected: Expected,
     /// The factor on all variances.
     pub(crate) inflation: f64,
@@ -42,6 +44,13 @@ pub(crate) struct JumpSearch<'a> {
     pub(crate) scales: &'a [Scale],
     pub(crate) lengths: &'a [Scale],
     pub(crate) instructions: Instructions,
+}
+
+impl JumpSearch<'_> {
+    /// The first row of the times from a sample on.
+    pub(crate) fn row_from(&self, sample: usize) -> usize {
+        sample.saturating_sub(self.first).div_ceil(self.stride) * self.group
+    }
 }
 
 /// A line for every windowed coefficient: value at a row and growth per row.

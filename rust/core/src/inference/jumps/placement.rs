@@ -20,6 +20,9 @@ pub(crate) struct JumpPlace<'a> {
 impl JumpSearch<'_> {
     /// The residual sum of squares of the rows for a jump before each candidate, or `None` if too few rows are usable.
     pub(crate) fn left(&self, place: &JumpPlace<'_>) -> Option<Vec<f64>> {
+        if self.group > 1 {
+            return self.left_of_groups(place);
+        }
         let (length, over) = (self.function.len(), place.over);
         let begin = self.begin(over.start);
         let present = (over.len() - 1) * self.stride + length;
@@ -39,6 +42,48 @@ impl JumpSearch<'_> {
             return None;
         }
         Some(dispatch(self.instructions, PlacementKernel { search: self, place, signals: &signals }))
+    }
+
+    /// The same where several rows belong to one time, each with signals of its own.
+    fn left_of_groups(&self, place: &JumpPlace<'_>) -> Option<Vec<f64>> {
+        let JumpPlace { lines: [before, after], row, over, candidates } = place;
+        let (length, group, per_sample) = (self.function.len(), self.group, self.group as f64 / self.stride as f64);
+        let used = || (*over).clone().filter(|&row| self.whole.usable[row]);
+        if 2 * used().count() < over.len() {
+            return None;
+        }
+        let mut left = vec![0.0; candidates.len()];
+        let mut samples = vec![0.0; length];
+        let mut squares = vec![0.0; length + 1];
+        for one in used() {
+            let begin = self.first + one / group * self.stride - length / 2;
+            // The middle of a group lies at its sample.
+            let origin = (begin as f64 - self.first as f64) * per_sample + (group as f64 - 1.0) / 2.0 - *row as f64;
+            squares.fill(0.0);
+            let mut total = 0.0;
+            for (unknown, (&[from, rise], &[to, growth])) in before.iter().zip(after).enumerate() {
+                self.signals[unknown * group + one % group].read(begin, &mut samples);
+                if !all_usable(&samples) {
+                    return None;
+                }
+                for (index, (factor, sample)) in self.function.iter().zip(&samples).enumerate() {
+                    let (weight, now) = (factor * sample, origin + index as f64 * per_sample);
+                    let later = to + (now + 1.0) * growth;
+                    total += weight * later;
+                    squares[index + 1] += weight * (later - from - now * rise);
+                }
+            }
+            squares[0] = self.rhs[one] - total;
+            let mut sum = 0.0;
+            for square in &mut squares {
+                sum += *square;
+                *square = sum * sum;
+            }
+            for (left, candidate) in left.iter_mut().zip((*candidates).clone()) {
+                *left += squares[candidate.saturating_sub(begin).min(length)];
+            }
+        }
+        Some(left)
     }
 
     /// The first sample of a row.

@@ -45,8 +45,8 @@ const UNNOTICED: f64 = 1e-4;
 impl JumpSearch<'_> {
     /// The jumps of the record, in order: known ones, placed again, and new ones. `errors` are the residuals of the rows.
     pub(crate) fn find(&self, errors: &[f64], known: &[Jump], stages: &mut Stages<'_, '_>) -> Result<Vec<Jump>, Error> {
-        let room = self.apart() * self.stride;
-        let samples = self.first * 2 + (self.problem.rows() - 1) * self.stride;
+        let room = self.apart() / self.group * self.stride;
+        let samples = self.first * 2 + (self.problem.rows() / self.group - 1) * self.stride;
         let conspicuous = self.conspicuous(errors);
         let places = known.len() + conspicuous.len();
         let shared = SharedWindows::new(self.problem, self.scales, places, self.instructions);
@@ -70,7 +70,7 @@ impl JumpSearch<'_> {
             // What the constants do is not seen in what they leave.
             return jump.clone();
         }
-        let row = (jump.sample - self.first).div_ceil(self.stride);
+        let row = self.row_from(jump.sample);
         let solved = self.solve(&(row..row + 1), shared);
         let windows = around(&solved);
         let placed = windows.iter().rev().find_map(|windows| self.placed(windows, jump.sample));
@@ -98,7 +98,7 @@ impl JumpSearch<'_> {
 
     /// Stretches of rows whose residuals are large enough for a jump to be accepted there.
     fn conspicuous(&self, errors: &[f64]) -> Vec<Range<usize>> {
-        let reach = 2 * (self.function.len() / 2).div_ceil(self.stride);
+        let reach = 2 * (self.function.len() / 2).div_ceil(self.stride) * self.group;
         let least = BELIEVED * self.noise(0.0, 1.0) / CONSPICUOUS;
         let mut found: Vec<Range<usize>> = Vec::new();
         let mut sum = 0.0;
@@ -121,7 +121,7 @@ impl JumpSearch<'_> {
     fn solve<'s>(&self, rows: &Range<usize>, shared: &'s SharedWindows<'_>) -> Vec<(Scale, Cow<'s, Cells>)> {
         let solve = |&scale: &Scale| {
             let all = scale.one_sided_cells(self.problem.rows());
-            let reach = self.function.len() / self.stride;
+            let reach = self.function.len() / self.stride * self.group;
             let first = scale.cell(rows.start.saturating_sub(reach)).max(all.start).min(all.end);
             let end = (scale.cell(rows.end + reach) + 1).min(all.end).max(first);
             (scale, shared.of(scale, &(first..end)))
@@ -131,7 +131,7 @@ impl JumpSearch<'_> {
 
     /// Least distance between jumps, in rows, so that a one-sided window fits between them.
     fn apart(&self) -> usize {
-        SHORTEST_ALONE + 4 * self.function.len() / 2 / self.stride
+        (SHORTEST_ALONE + 4 * self.function.len() / 2 / self.stride) * self.group
     }
 
     /// Rows where the windows before and after differ most: the difference, the row, and the index of the length.
@@ -168,7 +168,7 @@ impl JumpSearch<'_> {
 
     /// Places a jump near a row, or returns `None` if there is none.
     fn place(&self, windows: &Around<'_>, row: usize, shared: &SharedWindows<'_>) -> Option<Jump> {
-        let (jump, (over, left)) = self.placed(windows, self.first + row * self.stride)?;
+        let (jump, (over, left)) = self.placed(windows, self.first + row / self.group * self.stride)?;
         self.is_believed(&over, left, shared).then_some(jump)
     }
 
@@ -176,11 +176,11 @@ impl JumpSearch<'_> {
     fn placed(&self, windows: &Around<'_>, sample: usize) -> Option<(Jump, (Range<usize>, f64))> {
         let rows = self.problem.rows();
         let half = self.function.len() / 2;
-        let reach = half.div_ceil(self.stride);
+        let reach = half.div_ceil(self.stride) * self.group;
         let (mut tau, mut round) = (sample, 0);
         loop {
             // The first row after the jump.
-            let row = tau.saturating_sub(self.first).div_ceil(self.stride).clamp(1, rows - 1);
+            let row = self.row_from(tau).clamp(1, rows - 1);
             let lines = [self.lines(windows, row, 0)?, self.lines(windows, row - 1, 2)?];
             let candidates = tau.saturating_sub(half)..tau + half + 1;
             let over = row.saturating_sub(2 * reach)..(row + 2 * reach).min(rows);
@@ -260,8 +260,7 @@ fn around<'a>(solved: &'a [(Scale, Cow<'_, Cells>)]) -> Vec<Around<'a>> {
 pub(crate) fn rows_over(
     jumps: &[Jump],
     function: &[f64],
-    first: usize,
-    stride: usize,
+    (first, stride, group): (usize, usize, usize),
     rows: usize,
 ) -> impl Iterator<Item = usize> {
     let mut beyond = 0.0;
@@ -275,7 +274,7 @@ pub(crate) fn rows_over(
         .map(|jump| {
             let place = |part: f64| jump.first + jump.happened.partition_point(|&happened| happened < part);
             let (early, late) = (place(UNLIKELY).min(jump.sample), place(1.0 - UNLIKELY).max(jump.sample));
-            let row = |sample: usize| sample.saturating_sub(first).div_ceil(stride).min(rows);
+            let row = |sample: usize| (sample.saturating_sub(first).div_ceil(stride) * group).min(rows);
             row(early.saturating_sub(reach))..row(late + reach)
         })
         .collect();
@@ -337,7 +336,7 @@ mod tests {
         let function = spring(|_| 1.0).function;
         let certain =
             |sample: usize| Jump { sample, first: sample - 1, happened: vec![0.0, 1.0, 1.0], of_constants: false };
-        let over: Vec<usize> = rows_over(&[certain(500)], &function, HALF, STRIDE, 400).collect();
+        let over: Vec<usize> = rows_over(&[certain(500)], &function, (HALF, STRIDE, 1), 400).collect();
         for row in 0..400 {
             // Row r reads the samples from 2 r to 2 r + 24; the jump lies between samples 499 and 500.
             let before: f64 = (0..function.len()).filter(|k| row * STRIDE + k < 500).map(|k| function[k]).sum();
@@ -348,7 +347,7 @@ mod tests {
         // Where the place is uncertain, all rows that may reach over it.
         let happened = (0..40).map(|k| f64::from(k) / 39.0).collect();
         let uncertain = Jump { sample: 500, first: 480, happened, of_constants: false };
-        let wide: Vec<usize> = rows_over(&[uncertain], &function, HALF, STRIDE, 400).collect();
+        let wide: Vec<usize> = rows_over(&[uncertain], &function, (HALF, STRIDE, 1), 400).collect();
         assert!(wide.len() > over.len() + 15 && over.iter().all(|row| wide.contains(row)));
     }
 }

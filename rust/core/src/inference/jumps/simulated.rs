@@ -66,6 +66,7 @@ pub(crate) fn searched<R>(spring: &Spring, work: impl FnOnce(&JumpSearch<'_>) ->
         function: &spring.function,
         first: HALF,
         stride: STRIDE,
+        group: 1,
         expected: white(variance),
         inflation: 1.0,
         scales: &scales,

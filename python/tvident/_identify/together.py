@@ -1,0 +1,252 @@
+"""Calls of ``identify`` with repeated trials or several masses: arguments are checked, and rows merged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident._derivatives import plan
+from tvident._equation import LINEAR_UNITS, UNITS, Unknown, all_terms
+from tvident._identify.columns import WINDOW_OF_TERMS, Columns
+from tvident._identify.methods import SHORTEST_TEST_FUNCTION, WeakForm, exponent_of
+from tvident._merged import Asked, MergedIdentification, identify_masses, identify_trials, masses_of, trials_of
+from tvident._units import ROTARY, Axis, axis_of, times_in_seconds
+
+Numbers = npt.NDArray[np.number]
+
+_ALONE: dict[str, tuple[Any, ...]] = {
+    "velocity": (None,),
+    "acceleration": (None,),
+    "instrument": (None,),
+    "lag": (None, 0, 0.0),
+    "quantisation": (None,),
+    "period": (None,),
+    "settings": (None,),
+    "loss": (None, "squares"),
+    "share": (None, ()),
+    "nan_policy": ("omit", "raise"),
+}
+"""Options that merged rows do not know yet, and what they may be."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What ``identify`` was called with.
+
+    Parameters
+    ----------
+    ensemble_axis, dof_axis : int, optional
+    structure : Chain, optional
+    phase : array_like or sequence of array_like, optional
+    time : mapping
+        ``sample_rate``, ``delta`` and ``t``.
+    units : mapping
+        ``angle_unit``, ``torque_unit`` and ``time_unit``.
+    parameters : mapping
+        Inertia, damping and stiffness.
+    alone : mapping
+        Options that merged rows do not know.
+    """
+
+    ensemble_axis: int | None
+    dof_axis: int | None
+    structure: Any
+    phase: Any
+    method: Any
+    time: Mapping[str, Any]
+    units: Mapping[str, str | None]
+    parameters: Mapping[str, Any]
+    terms: Any
+    mask: Any
+    alone: Mapping[str, Any]
+    step: int
+    workers: int | None
+    progress: arguments.Progress
+
+    @classmethod
+    def of(cls, call: Mapping[str, Any]) -> Options:
+        """Return what a call of ``identify`` asks for."""
+        same = (
+            "ensemble_axis",
+            "dof_axis",
+            "structure",
+            "phase",
+            "method",
+            "terms",
+            "mask",
+            "step",
+            "workers",
+            "progress",
+        )
+        return cls(
+            **{name: call[name] for name in same},
+            time={name: call[name] for name in ("sample_rate", "delta", "t")},
+            units={name: call[name] for name in ("angle_unit", "torque_unit", "time_unit")},
+            parameters={name: call[name] for name in ("inertia", "damping", "stiffness")},
+            alone={name: call[name] for name in _ALONE},
+        )
+
+    @property
+    def is_asked(self) -> bool:
+        """Whether rows are to be merged at all."""
+        return any(one is not None for one in (self.ensemble_axis, self.dof_axis, self.structure, self.phase))
+
+
+def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdentification:
+    """Identify what trials or masses share.
+
+    Raises
+    ------
+    ValueError
+        If options do not go together, or shapes differ.
+    TypeError
+        If there is no sample period, or arrays hold no numbers.
+    """
+    _check(angle, options)
+    axis = _axis(angle, torque, options.units)
+    form = _weak(options.method)
+    terms = all_terms((("offset", "constant"),) if options.terms is None else options.terms, "constant")
+    for term in terms:
+        if term.inner:
+            raise ValueError(
+                f"terms with inner parameters are not supported beside ensemble_axis= and dof_axis= yet; got {term.name!r}; "
+                "find them in one trial, and give a Term with what was found"
+            )
+    if options.dof_axis is None:
+        trials = trials_of(angle, torque, options.ensemble_axis or 0, phase=options.phase, mask=options.mask)
+        trials = trials.scaled(axis.angle, axis.torque)
+        channels: Sequence[tuple[str, Sequence[Numbers]]] = (("angle", trials.angles), ("torque", trials.torques))
+        longest = max(trials.angles, key=len)
+    else:
+        masses = masses_of(angle, torque, options.dof_axis, options.structure, mask=options.mask)
+        masses = masses.scaled(axis.angle, axis.torque)
+        channels = (("angle", masses.angles),)
+        longest = masses.angles[0]
+    for name, arrays in channels:
+        for one in arrays:
+            arguments.check_nan(name, one, options.alone["nan_policy"], arguments.RowPolicy)
+    period, _ = sampled(options.time, longest.size, axis, options.units["time_unit"])
+    with arguments.reporter(options.progress, "identification") as report:
+        asked = Asked(
+            period=period,
+            parameters={name: value for name, value in options.parameters.items() if value is not None},
+            terms=[(one.name, one.kind) for one in terms],
+            form=_lengths(form, period, longest.size),
+            units=UNITS if axis.system is ROTARY else LINEAR_UNITS,
+            step=arguments.whole_number("step", options.step, least=1),
+            workers=arguments.worker_count(options.workers),
+            report=report,
+        )
+        values = _Terms(terms, period, asked.workers)
+        if options.dof_axis is None:
+            return identify_trials(trials, asked, values)
+        return identify_masses(masses, asked, values)
+
+
+class _Terms:
+    """Terms by their names, of any angle."""
+
+    def __init__(self, terms: Sequence[Unknown], period: float, workers: int | None) -> None:
+        self._terms = {one.name: one for one in terms}
+        self._period = period
+        self._workers = workers
+
+    def __call__(self, name: str, angle: Numbers) -> npt.NDArray[np.float64]:
+        time = np.arange(angle.size, dtype=np.float64) * self._period
+        length = min(WINDOW_OF_TERMS, (angle.size - 1) // 2 * 2 + 1)
+
+        def polynomials() -> Any:
+            return plan(length, order=None, derivatives=(0, 1, 2), delta=self._period, noise=True)
+
+        columns = Columns([self._terms[name]], angle, time, self._period, polynomials, weak=True, workers=self._workers)
+        return np.asarray(columns.all_samples({})[name], np.float64)
+
+
+def _check(angle: Any, options: Options) -> None:
+    """Refuse what does not go together."""
+    if angle is None:
+        raise ValueError(
+            "ensemble_axis= and dof_axis= need the angle; got angle=None, which is not supported there yet; integrate the velocity"
+        )
+    for name, allowed in _ALONE.items():
+        value = options.alone[name]
+        if not any(value is one or (isinstance(value, int | float | str | tuple) and value == one) for one in allowed):
+            raise ValueError(
+                f"{name}= is not supported beside ensemble_axis= and dof_axis= yet; got {arguments.shown(value)}; leave it out"
+            )
+    if options.ensemble_axis is not None and options.dof_axis is not None:
+        raise ValueError(
+            f"trials of several masses are not supported together yet; got ensemble_axis={options.ensemble_axis} and "
+            f"dof_axis={options.dof_axis}; identify one trial of all masses, or the trials of one mass, at a time"
+        )
+    if options.structure is not None and options.dof_axis is None:
+        raise ValueError(
+            f"structure= must come with dof_axis=, the axis of the masses; got {options.structure!r} alone; add dof_axis=0"
+        )
+    if options.phase is not None and options.dof_axis is not None:
+        raise ValueError("phase= must come with ensemble_axis=, since it aligns trials; got dof_axis=; leave it out")
+
+
+def _weak(method: Any) -> WeakForm:
+    """Return the settings of the weak form, which is the only one that merges rows."""
+    form = WeakForm() if arguments.is_word(method, "auto") else method
+    if not isinstance(form, WeakForm):
+        raise ValueError(  # noqa: TRY004 - the strong form is of the right type elsewhere
+            f"method must be 'auto' or a WeakForm beside ensemble_axis= and dof_axis=; got {arguments.shown(method)}, which "
+            "is not supported there yet; leave it out"
+        )
+    if form.variation == "constant":
+        raise ValueError(
+            "variation must be 'auto' or 'linear' beside ensemble_axis= and dof_axis=; got 'constant', which is not supported there yet; "
+            "leave it out"
+        )
+    return form
+
+
+def _axis(angle: Any, torque: Any, units: Mapping[str, str | None]) -> Axis:
+    """Return how channels are converted; those of a list are as the first of them."""
+    first = [one[0] if isinstance(one, list | tuple) and len(one) else one for one in (angle, torque)]
+    return axis_of(first[0], first[1], None, **units)
+
+
+def sampled(
+    given: Mapping[str, Any], samples: int, axis: Axis, time_unit: str | None, channel: Any = None
+) -> tuple[float, Any]:
+    """Return the sample period in seconds from ``sample_rate``, ``delta`` or ``t``, or from the index of a channel, and times in seconds.
+
+    Raises
+    ------
+    TypeError
+        If none of them is given, or several.
+    """
+    time = dict(given)
+    if all(value is None for value in time.values()):
+        implied = None if channel is None else arguments.implied_times(channel)
+        if implied is None:
+            raise TypeError("identify needs the sample period; got none; give sample_rate=, delta= or t=")
+        return arguments.sample_period(samples, t=implied), implied
+    if time["t"] is not None:
+        time["t"] = times_in_seconds(time["t"], time_unit)
+    if time["delta"] is not None and axis.time != 1:
+        time["delta"] = arguments.positive_number("delta", time["delta"]) * axis.time
+    return arguments.sample_period(samples, **time), time["t"]
+
+
+def _lengths(form: WeakForm, period: float, samples: int) -> dict[str, int | None]:
+    """Return the settings of the form in samples, None where they are chosen."""
+    length, rows = form.window_length, form.regression_window
+    found: dict[str, int | None] = {"window_length": None, "regression_window": None, "exponent": None}
+    if not arguments.is_word(length, "auto"):
+        checked = arguments.window_length("window_length", length, period, odd=True)
+        arguments.check_window("window_length", checked, samples, least=SHORTEST_TEST_FUNCTION)
+        found["window_length"] = checked
+    if not arguments.is_word(rows, "auto"):
+        found["regression_window"] = arguments.window_length("regression_window", rows, period, odd=False)
+    if not arguments.is_word(form.exponent, "auto"):
+        found["exponent"] = int(exponent_of(form.exponent))
+    return found

@@ -1,0 +1,21 @@
+"""Identifies what repeated trials or coupled masses share, from rows that are merged."""
+
+from tvident._merged.call import Asked, identify_trials
+from tvident._merged.masses import Masses, identify_masses, masses_of
+from tvident._merged.result import Identifiable, MergedIdentification
+from tvident._merged.structure import Chain, Matrix
+from tvident._merged.trials import Trials, trials_of
+
+__all__ = [
+    "Asked",
+    "Chain",
+    "Identifiable",
+    "Masses",
+    "Matrix",
+    "MergedIdentification",
+    "Trials",
+    "identify_masses",
+    "identify_trials",
+    "masses_of",
+    "trials_of",
+]

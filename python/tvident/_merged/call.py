@@ -1,0 +1,105 @@
+"""Identification of what trials or masses share: from channels to elements, and from what the core found to a result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _core
+from tvident._equation import COEFFICIENTS
+from tvident._merged.elements import Element, kind_or_number
+from tvident._merged.result import MergedIdentification, Merging, Part
+from tvident._merged.trials import Trials
+
+Numbers = npt.NDArray[np.number]
+
+TermValues = Callable[[str, Numbers], npt.NDArray[np.float64]]
+"""Gives a term, by its name, of an angle at every sample."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is the same for every call of the core.
+
+    Parameters
+    ----------
+    period : float
+        Seconds from one sample to the next.
+    parameters : mapping of str to object
+        What was given of inertia, damping and stiffness.
+    terms : sequence of (str, str)
+        Names and kinds.
+    form : mapping of str to int or None
+        Window length, exponent and regression window in samples, None where they are chosen.
+    units : mapping of str to str
+        By inertia, damping, stiffness and the name of a term.
+    step : int
+    workers : int, optional
+    report : callable, optional
+        Takes the samples done and all of them.
+    """
+
+    period: float
+    parameters: Mapping[str, Any]
+    terms: Sequence[tuple[str, str]]
+    form: Mapping[str, int | None]
+    units: Mapping[str, str]
+    step: int
+    workers: int | None
+    report: Callable[[int, int], object] | None
+
+    def part(self, trials: list[Any], elements: Sequence[Element], samples: int) -> Part:
+        """Call the core."""
+        found = _core.identify_merged(
+            trials,
+            [element.given() for element in elements],
+            samples,
+            delta=self.period,
+            window_length=self.form["window_length"],
+            exponent=self.form["exponent"],
+            regression_window=self.form["regression_window"],
+            step=self.step,
+            workers=self.workers,
+            progress=self.report,
+        )
+        return Part(found, [element.name for element in elements])
+
+    def units_of(self, elements: Sequence[Element]) -> dict[str, str]:
+        """Return the units of everything by name."""
+        return {**self.units, **{element.name: self.units.get(element.of, "") for element in elements}}
+
+
+def identify_trials(trials: Trials, asked: Asked, term_values: TermValues) -> MergedIdentification:
+    """Identify what repeated trials of one mass share."""
+    elements = []
+    for coefficient, name in enumerate(COEFFICIENTS):
+        default = "windowed" if name == "stiffness" else "auto"
+        given = asked.parameters.get(name)
+        value = kind_or_number(name, default if given is None else given)
+        elements.append(Element(name, name, ((0, coefficient, 0, 1.0),), value))
+    for place, (name, kind) in enumerate(asked.terms):
+        elements.append(Element(name, name, ((0, None, place, 1.0),), kind_or_number(name, kind)))
+    if all(element.is_known for element in elements):
+        raise ValueError("at least one parameter must be unknown; all are given; use 'windowed' or 'constant' for one")
+    given = []
+    for place, (angle, torque) in enumerate(zip(trials.angles, trials.torques, strict=True)):
+        terms = np.stack([term_values(name, angle) for name, _ in asked.terms]) if asked.terms else None
+        mask = None if trials.masks is None else trials.masks[place]
+        position = None if trials.positions is None else np.ascontiguousarray(trials.positions[place])
+        given.append((angle[np.newaxis], torque[np.newaxis], terms, mask, position))
+    merging = Merging(
+        elements,
+        [asked.part(given, elements, trials.samples)],
+        period=asked.period,
+        step=asked.step,
+        samples=trials.samples,
+        trials=len(given),
+        masses=0,
+        units=asked.units_of(elements),
+        phase=trials.phase,
+    )
+    return MergedIdentification(merging)

@@ -1,0 +1,256 @@
+"""Several masses: their channels, which forces are known, and what can be told of their elements before anything is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident._merged.call import Asked, TermValues
+from tvident._merged.elements import Element, kind_or_number
+from tvident._merged.result import MergedIdentification, Merging
+from tvident._merged.structure import Chain, matrices
+from tvident._units import scaled
+
+Numbers = npt.NDArray[np.number]
+
+_DEPENDENT = 0.05
+"""The part of a force's mean square, beyond the noise that it may have, that others must leave of it for it to be a force of its own."""
+
+
+@dataclass(frozen=True)
+class Masses:
+    """Channels of several masses.
+
+    Parameters
+    ----------
+    angles : sequence of ndarray, shape (n,)
+        One a mass, then the base where it moves.
+    torques : sequence of ndarray, or None for a force that was not measured
+    structure : Chain, optional
+    mask : ndarray of bool, shape (n,), optional
+    """
+
+    angles: Sequence[Numbers]
+    torques: Sequence[Numbers | None]
+    structure: Chain | None
+    mask: npt.NDArray[np.bool_] | None
+
+    @property
+    def count(self) -> int:
+        """Number of masses."""
+        return len(self.torques)
+
+    def scaled(self, angle: float, torque: float) -> Masses:
+        """Return the masses with their channels times factors of units."""
+        torques = [None if one is None else scaled(one, torque) for one in self.torques]
+        return replace(self, angles=[scaled(one, angle) for one in self.angles], torques=torques)
+
+    def elements(self, asked: Asked) -> list[Element]:
+        """Return the elements of the equations, those of terms last: one a term and mass on which a force acts."""
+        given = asked.parameters
+        found = matrices(given, self.count) if self.structure is None else self.structure.elements(given)
+        place = 0
+        for name, kind in asked.terms:
+            for mass in self.driven:
+                found.append(Element(f"{name}_{mass}", name, ((mass, None, place, 1.0),), kind_or_number(name, kind)))
+                place += 1
+        return found
+
+    @property
+    def measured(self) -> list[int]:
+        """Masses whose force is known."""
+        return [mass for mass, torque in enumerate(self.torques) if torque is not None]
+
+    @property
+    def driven(self) -> list[int]:
+        """Masses on which a force acts that is known."""
+        return [mass for mass in self.measured if np.any(np.nan_to_num(np.asarray(self.torques[mass], np.float64)))]
+
+
+def masses_of(angle: Any, torque: Any, axis: int, structure: Any, *, mask: Any = None) -> Masses:
+    """Return masses from arrays of shape (masses, n).
+
+    Raises
+    ------
+    ValueError
+        If shapes differ, do not belong to the structure, or no force is known.
+    TypeError
+        If the structure is none.
+    """
+    if structure is not None and not isinstance(structure, Chain):
+        raise TypeError(
+            f"structure must be a tvident.Chain; got {arguments.shown(structure)}; leave it out for full matrices, whose "
+            "entries are given by tvident.Matrix"
+        )
+    angles, torques = arguments.channels(angle=angle, torque=torque)
+    if angles.ndim != 2 or axis not in {0, -2}:  # noqa: PLR2004 - masses and time
+        raise ValueError(
+            f"angle and torque must have shape (masses, n) with dof_axis=0; got {angles.shape} with dof_axis={axis}; transpose "
+            "them, or take one record of a batch"
+        )
+    count, samples = angles.shape
+    each: list[Numbers] = list(angles)
+    if structure is not None:
+        if structure.masses != count:
+            raise ValueError(
+                f"angle must have a row for each of {structure.masses} masses of the structure; got {count} rows; "
+                "give the angles of all masses"
+            )
+        if structure.base is not None:
+            base = arguments.channel("base", structure.base)
+            if base.shape != (samples,):
+                raise ValueError(
+                    f"the base of a chain must have shape ({samples},), as time has; got {base.shape}; resample it"
+                )
+            each.append(base)
+    forces = [None if not np.isfinite(np.asarray(row, np.float64)).any() else row for row in torques]
+    found = Masses(each, forces, structure, None if mask is None else _mask(mask, samples))
+    if not found.driven:
+        raise ValueError(
+            "a force must act on one of the masses and be measured; got torques that are all zero or missing; without one "
+            "everything is known up to scale only"
+        )
+    return found
+
+
+def identify_masses(masses: Masses, asked: Asked, term_values: TermValues) -> MergedIdentification:
+    """Identify the elements of several masses."""
+    elements = masses.elements(asked)
+    if all(element.is_known for element in elements):
+        raise ValueError("at least one element must be unknown; all are given; use 'windowed' or 'constant' for one")
+    unknowable = unknowable_of(masses, elements)
+    open_ones = [one for one in elements if not one.is_known and one.name not in unknowable]
+    samples = masses.angles[0].size
+    parts = []
+    # What is known takes part in all equations, but ties none.
+    for equations in components(masses.measured, open_ones):
+        inside = [one.at(equations) for one in elements if one.is_known or one in open_ones]
+        inside = [one for one in inside if one.entries]
+        if all(one.is_known for one in inside):
+            continue
+        names = dict(_terms_of(inside, elements))
+        terms = np.stack([_term(masses, name, term_values) for name in names.values()]) if names else None
+        order = {place: new for new, place in enumerate(names)}
+        inside = [_renumbered(one, order) for one in inside]
+        torques = np.stack([np.asarray(masses.torques[mass], np.float64) for mass in equations])
+        # The angle of every equation comes first, in their order.
+        channels = [*equations, *(one for one in range(len(masses.angles)) if one not in equations)]
+        inside = [_rewired(one, {channel: place for place, channel in enumerate(channels)}) for one in inside]
+        angles = np.stack([np.asarray(masses.angles[channel], np.float64) for channel in channels])
+        parts.append(asked.part([(angles, torques, terms, masses.mask, None)], inside, samples))
+    merging = Merging(
+        elements,
+        parts,
+        period=asked.period,
+        step=asked.step,
+        samples=samples,
+        trials=1,
+        masses=masses.count,
+        units=asked.units_of(elements),
+        unknowable=unknowable,
+    )
+    return MergedIdentification(merging)
+
+
+def components(equations: Sequence[int], elements: Sequence[Element]) -> list[list[int]]:
+    """Return equations that share unknowns, together: each of the others can be solved alone."""
+    groups: list[set[int]] = [{one} for one in equations]
+    for element in elements:
+        touched = [group for group in groups if group & element.equations]
+        if len(touched) > 1:
+            merged = set().union(*touched)
+            groups = [group for group in groups if group not in touched] + [merged]
+    return sorted(sorted(group) for group in groups)
+
+
+def unknowable_of(masses: Masses, elements: Sequence[Element]) -> dict[str, str]:
+    """Return which elements cannot be known, whatever the motion, and why."""
+    found: dict[str, str] = {}
+    unknown = [one for one in elements if not one.is_known]
+    measured, driven = set(masses.measured), set(masses.driven)
+    for element in unknown:
+        missing = sorted(element.equations - measured)
+        if not element.equations & measured:
+            found[element.name] = (
+                f"the force on mass {' and '.join(map(str, missing))} was not measured, and it appears in "
+                "that equation only; measure the force"
+            )
+    left = [one for one in unknown if one.name not in found]
+    for equations in components(masses.measured, left):
+        here = [one for one in left if one.equations & set(equations)]
+        # A coefficient that is known and not zero sets the scale as a force does.
+        known = any(one.is_known and one.value and one.equations & set(equations) for one in elements)
+        if not set(equations) & driven and not known:
+            for one in here:
+                found[one.name] = (
+                    f"no force acts on mass {' and '.join(map(str, equations))}: its equation is known up to scale only; "
+                    "apply a force, tie it to others with structure=, or give one of its coefficients"
+                )
+            continue
+        dependent = _dependent(masses, equations) if masses.structure is None else None
+        if dependent:
+            for one in here:
+                found[one.name] = dependent
+    return found
+
+
+def _dependent(masses: Masses, equations: Sequence[int]) -> str | None:
+    """Return why full rows cannot be known: forces that depend on each other let one row be added to another."""
+    free = {mass for mass in range(masses.count) if mass not in equations}
+    if not free or len(equations) > 1:
+        return None
+    here = np.nan_to_num(np.asarray(masses.torques[equations[0]], np.float64))
+    silent = [mass for mass in sorted(free) if mass in masses.measured and mass not in masses.driven]
+    if silent:
+        return (
+            f"no force acts on mass {silent[0]}: any multiple of its equation can be added to that of mass {equations[0]}; as "
+            "many independent forces as masses are needed for full matrices; use structure=tvident.Chain(…)"
+        )
+    for mass in sorted(free & set(masses.driven)):
+        other = np.nan_to_num(np.asarray(masses.torques[mass], np.float64))
+        both = float(here @ other) ** 2 / (float(here @ here) * float(other @ other))
+        if 1 - both < _DEPENDENT:
+            return (
+                f"the forces on masses {equations[0]} and {mass} depend on each other (correlation {both**0.5:.3f}): "
+                "their equations can be added; apply independent forces, or use structure=tvident.Chain(…)"
+            )
+    return None
+
+
+def _terms_of(inside: Sequence[Element], elements: Sequence[Element]) -> list[tuple[int, str]]:
+    """Return places and names of the terms in some elements."""
+    names = {one.name for one in inside}
+    return [(entry[2], one.name) for one in elements if one.name in names for entry in one.entries if entry[1] is None]
+
+
+def _term(masses: Masses, name: str, term_values: TermValues) -> npt.NDArray[np.float64]:
+    """Return a term of one mass at every sample."""
+    term, mass = name.rsplit("_", 1)
+    return term_values(term, masses.angles[int(mass)])
+
+
+def _renumbered(element: Element, order: Mapping[int, int]) -> Element:
+    """Return an element whose terms are counted anew."""
+    entries = tuple(
+        entry if entry[1] is not None else (*entry[:2], order[entry[2]], entry[3]) for entry in element.entries
+    )
+    return replace(element, entries=entries)
+
+
+def _rewired(element: Element, places: Mapping[int, int]) -> Element:
+    """Return an element whose channels are counted anew."""
+    entries = tuple(
+        entry if entry[1] is None else (*entry[:2], places[entry[2]], entry[3]) for entry in element.entries
+    )
+    return replace(element, entries=entries)
+
+
+def _mask(mask: Any, samples: int) -> npt.NDArray[np.bool_]:
+    """Return a mask of all masses."""
+    found = arguments.mask("mask", mask, (samples,))
+    return np.ascontiguousarray(found)

@@ -1,0 +1,364 @@
+"""The result of an identification of what trials or masses share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _core
+from tvident._equation import COEFFICIENTS
+from tvident._merged import modal
+from tvident._merged.elements import Element, matrix_of
+from tvident._merged.heterogeneity import differences_of, excess
+from tvident._merged.words import summary_of, words_of
+from tvident._results import Words
+from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
+from tvident._tables import Table, Tabular
+
+Array = npt.NDArray[np.float64]
+
+UNEXPLAINED_SPREAD = Status.KIND_CONTRADICTED
+
+
+@dataclass(frozen=True)
+class Identifiable:
+    """Whether something can be known, and why not. It counts as True where it can."""
+
+    identifiable: bool
+    reason: str
+
+    def __bool__(self) -> bool:
+        return self.identifiable
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one call of the core found: its numbers, and the names of the elements that it was given, in order."""
+
+    found: _core.MergedIdentification
+    names: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Merging:
+    """What a result is made of.
+
+    Parameters
+    ----------
+    elements : sequence of Element
+    parts : sequence of Part
+        What was found of elements that share no equation with others.
+    period : float
+        Seconds from one sample to the next.
+    step, samples, trials, masses : int
+        No masses: one equation of motion, and arrays of shape (n,).
+    units : mapping of str to str
+    phase : ndarray, shape (samples,), optional
+    unknowable : mapping of str to str
+        Why some elements cannot be known.
+    """
+
+    elements: Sequence[Element]
+    parts: Sequence[Part]
+    period: float
+    step: int
+    samples: int
+    trials: int
+    masses: int
+    units: Mapping[str, str]
+    phase: Array | None = None
+    unknowable: Mapping[str, str] = field(default_factory=dict)
+
+
+class MergedIdentification(Tabular):
+    r"""What :func:`tvident.identify` found of what repeated trials or coupled masses share. ``n`` is the number of samples.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+        Seconds; with a phase, those of the median trial.
+    phase : ndarray, shape (n,), or None
+        The phase of every sample, from 0 to 1, where trials were aligned on one.
+    inertia, damping, stiffness : ndarray, shape (n,) for trials, (masses, masses, n) for masses
+        Identified or known values, as matrices for masses. NaN where something that an entry is made of cannot be known.
+    elements : dict of str to ndarray, shape (n,)
+        Values of every element by name: for trials ``"inertia"``, ``"damping"``, ``"stiffness"`` and terms; for matrices
+        ``"stiffness_0_1"`` and so on; for a :class:`Chain` those of springs, dampers and masses.
+    terms : dict of str to ndarray, shape (n,)
+        The elements that are factors of terms.
+    constants : dict of str to (value, stderr)
+        Elements that are constant.
+    kinds : dict of str to str
+        ``"constant"``, ``"windowed"`` or ``"known"``, by element.
+    stderr : dict of str to ndarray
+        Standard errors of all elements and of ``"inertia"``, ``"damping"`` and ``"stiffness"``, in their shapes. Where trials differ by
+        more than their errors explain, those of the elements that do are larger by as much.
+    trial_spread : dict of str to (ndarray, ndarray), each of shape (trials,)
+        By how much every element of each trial alone differs from that of all, and the standard error of that; empty with one trial.
+    identifiable : dict of str to Identifiable
+        Whether every element can be known, with ``.reason``; what cannot is NaN.
+    status : ndarray of uint16, shape (n,)
+        Flags of :class:`tvident.Status` that hold at this sample.
+    record_status : Status
+        Flags that hold for the whole record.
+    residual_std : ndarray, shape (n,)
+        Standard deviation of what is left of the equations, over that of their noise.
+    settings : dict
+        What was chosen, as plain JSON.
+    units : dict of str to str
+
+    See Also
+    --------
+    identify : returns it, with ``ensemble_axis=`` or ``dof_axis=``.
+    Chain : a structure of masses.
+
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion. The
+    perspectives of few degrees of freedom and of ensembles.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tvident
+    >>> rigs = [tvident.simulate_torsional_rig(duration=2.0, seed=seed) for seed in range(4)]
+    >>> angle, torque = (np.stack([getattr(rig, name) for rig in rigs]) for name in ("angle", "torque"))
+    >>> result = tvident.identify(angle, torque, sample_rate=1000, ensemble_axis=0)
+    >>> bool(np.nanmedian(np.abs(result.stiffness / rigs[0].stiffness - 1)) < 0.02)
+    True
+    """
+
+    def __init__(self, merging: Merging) -> None:
+        self._merging = merging
+        wanted = slice(None, None, merging.step)
+        self.time: Array = (np.arange(merging.samples, dtype=np.float64) * merging.period)[wanted]
+        self.phase = None if merging.phase is None else merging.phase[wanted]
+        size = self.time.size
+        self.elements: dict[str, Array] = {}
+        self.kinds: dict[str, str] = {}
+        self.constants: dict[str, tuple[float, float]] = {}
+        self.stderr: dict[str, Array] = {}
+        self.trial_spread: dict[str, tuple[Array, Array]] = {}
+        self._scatter: dict[str, float] = {}
+        self.tests: dict[str, float] = {}
+        self.jumps: tuple[float, ...] = ()
+        for element in merging.elements:
+            value = np.nan if isinstance(element.value, str) else float(element.value)
+            self.elements[element.name] = np.full(size, value)
+            self.stderr[element.name] = np.full(size, np.nan if np.isnan(value) else 0.0)
+            self.kinds[element.name] = "known" if element.is_known else "constant"
+        self.status = np.zeros(size, np.uint16)
+        flags = 0
+        residuals = []
+        for part in merging.parts:
+            self._take(part, size)
+            self.status |= part.found.status
+            flags |= part.found.record_status
+            residuals.append(part.found.residual)
+        squares = [np.square(one) for one in residuals] or [np.full(size, np.nan)]
+        self.residual_std: Array = np.sqrt(np.mean(squares, axis=0)).astype(np.float64)
+        self.jumps = tuple(sorted({one * merging.period for part in merging.parts for one in part.found.jumps}))
+        if any(factor > 1 for factor in self._scatter.values()):
+            flags |= int(UNEXPLAINED_SPREAD)
+        self.identifiable = self._identifiable()
+        for name, verdict in self.identifiable.items():
+            if not verdict:
+                self.elements[name], self.stderr[name] = np.full(size, np.nan), np.full(size, np.nan)
+                self.kinds[name] = "unknown"
+                self.constants.pop(name, None)
+                flags |= int(Status.RANK_DEFICIENT) if merging.unknowable.get(name) is None else 0
+        self.record_status = Status(flags)
+        self.terms = {one.name: self.elements[one.name] for one in merging.elements if one.of not in COEFFICIENTS}
+        self.inertia, self.damping, self.stiffness = (self._coefficient(of) for of in range(3))
+        for coefficient, name in enumerate(COEFFICIENTS):
+            self.stderr[name] = self._error(coefficient)
+        self.units = dict(merging.units)
+        self.settings = self._settings()
+
+    def _take(self, part: Part, size: int) -> None:
+        """Take what the core found of some elements."""
+        for one in part.found.elements:
+            name = part.names[one.element]
+            scatter = 1.0
+            if one.spread:
+                self.trial_spread[name] = differences_of(one.spread)
+                scatter = excess(*self.trial_spread[name])
+            self._scatter[name] = scatter
+            self.kinds[name] = one.kind
+            if one.test is not None:
+                self.tests[name] = one.test[0]
+            if one.kind == "constant":
+                self.constants[name] = (float(one.values[0]), float(one.stderr[0] * scatter**0.5))
+            self.elements[name] = np.broadcast_to(one.values, size).copy()
+            self.stderr[name] = np.broadcast_to(one.stderr * scatter**0.5, size).copy()
+
+    def _identifiable(self) -> dict[str, Identifiable]:
+        """Return what can be known: of what was asked beforehand, and of what the equations determined."""
+        merging, found = self._merging, {}
+        undetermined = {name for part in merging.parts for name in part.names if np.isinf(part.found.condition)}
+        for element in merging.elements:
+            name = element.name
+            if name in merging.unknowable:
+                found[name] = Identifiable(identifiable=False, reason=merging.unknowable[name])
+            elif element.is_known:
+                found[name] = Identifiable(identifiable=True, reason="it is known")
+            elif name in undetermined:
+                found[name] = Identifiable(
+                    identifiable=False,
+                    reason="the equations do not determine it: its regressors are a combination of others",
+                )
+            else:
+                found[name] = Identifiable(identifiable=True, reason=self._told(name))
+        return found
+
+    def _told(self, name: str) -> str:
+        for part in self._merging.parts:
+            if name in part.names and part.found.record_status & Status.ILL_CONDITIONED:
+                return "the equations hardly determine it: the motion tells regressors apart by little more than noise"
+        return "the equations determine it"
+
+    @property
+    def _covariances(self) -> dict[tuple[str, str], Array]:
+        """Covariances of all pairs of elements that one call of the core found, themselves included."""
+        known: dict[tuple[str, str], Array] = {}
+        for part in self._merging.parts:
+            found = part.found
+            names = [part.names[place] for place in found.constants]
+            both = np.array(found.covariance).reshape(len(names), len(names))
+            for i, one in enumerate(names):
+                for j, other in enumerate(names[: i + 1]):
+                    known[one, other] = np.full(self.time.size, both[i, j])
+            for (one_place, other_place), values in found.covariances.items():
+                known[part.names[one_place], part.names[other_place]] = np.asarray(values)
+        larger = {name: factor**0.5 for name, factor in self._scatter.items()}
+        known = {pair: values * (larger.get(pair[0], 1.0) * larger.get(pair[1], 1.0)) for pair, values in known.items()}
+        for name in self.elements:
+            known[name, name] = self.stderr[name] ** 2
+        return known
+
+    def _patterns(self, coefficient: int) -> dict[str, Array]:
+        return matrix_of(self._merging.elements, coefficient, max(self._merging.masses, 1))
+
+    def _coefficient(self, coefficient: int) -> Array:
+        """Return inertia, damping or stiffness: an array, or matrices made of the elements."""
+        if not self._merging.masses:
+            return self.elements[COEFFICIENTS[coefficient]]
+        masses = self._merging.masses
+        total = np.zeros((masses, masses, self.time.size))
+        for name, pattern in self._patterns(coefficient).items():
+            rows, columns = np.nonzero(pattern)
+            total[rows, columns] += pattern[rows, columns, np.newaxis] * self.elements[name]
+        return total
+
+    def _error(self, coefficient: int) -> Array:
+        """Return the standard errors of inertia, damping or stiffness."""
+        if not self._merging.masses:
+            return self.stderr[COEFFICIENTS[coefficient]]
+        patterns, covariances = self._patterns(coefficient), self._covariances
+        variance = np.zeros((self._merging.masses, self._merging.masses, self.time.size))
+        for (one, other), values in covariances.items():
+            if one in patterns and other in patterns:
+                both = patterns[one] * patterns[other] * (1.0 if one == other else 2.0)
+                rows, columns = np.nonzero(both)
+                variance[rows, columns] += both[rows, columns, np.newaxis] * values
+        return np.sqrt(np.maximum(variance, 0))
+
+    @property
+    def trusted(self) -> npt.NDArray[np.bool_]:
+        """Where values can be trusted, shape (n,): all that can be known are numbers, and no flag speaks against them."""
+        trusted = (self.status & DOUBTFUL == 0) & (int(self.record_status) & int(DOUBTFUL_RECORD) == 0)
+        found = [name for name, kind in self.kinds.items() if kind not in {"known", "unknown"}]
+        trusted &= bool(found)
+        for name, values in self.elements.items():
+            if self.identifiable[name]:
+                trusted &= np.isfinite(values)
+        return np.asarray(trusted)
+
+    @cached_property
+    def modes(self) -> modal.Modes:
+        """Natural frequencies, damping ratios and shapes over time, each mode followed by its pole and shape."""
+        merging = self._merging
+        masses = max(merging.masses, 1)
+        patterns = [matrix_of(merging.elements, coefficient, masses) for coefficient in range(3)]
+        names = [one.name for one in merging.elements if any(one.name in pattern for pattern in patterns)]
+        nothing = np.zeros((masses, masses))
+        elements = [
+            modal.Element(tuple(pattern.get(name, nothing) for pattern in patterns), self.elements[name])  # type: ignore[arg-type] # three of them
+            for name in names
+        ]
+        times = modal.times_of(self.time.size)
+        covariances = {pair: values[times] for pair, values in self._covariances.items()}
+        return modal.modes_of(elements, modal.shared(names, covariances, times.size), times, self.time.size)
+
+    @property
+    def natural_frequency(self) -> Array:
+        """Natural frequencies in Hz, shape (n,) for trials, (modes, n) for masses."""
+        found = self.modes.natural_frequency
+        return found if self._merging.masses else found[0]
+
+    @property
+    def damping_ratio(self) -> Array:
+        """Damping ratios, shape (n,) for trials, (modes, n) for masses."""
+        found = self.modes.damping_ratio
+        return found if self._merging.masses else found[0]
+
+    @cached_property
+    def _words(self) -> Words:
+        return words_of(self, [part.found for part in self._merging.parts], self._scatter)
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """What was chosen, and why."""
+        return self._words.reasons
+
+    @property
+    def advice(self) -> tuple[str, ...]:
+        """What to do about what looks wrong."""
+        return self._words.advice
+
+    def summary(self) -> str:
+        """Return a table of the elements, and in words what was chosen and what to do."""
+        return summary_of(self)
+
+    def columns(self) -> dict[str, npt.NDArray[Any]]:
+        """Return everything that has one value a sample, by name: elements, their standard errors, residuals and flags."""
+        found: dict[str, npt.NDArray[Any]] = {"time": self.time}
+        if self.phase is not None:
+            found["phase"] = self.phase
+        for name, values in self.elements.items():
+            found[name], found[f"{name}_stderr"] = values, self.stderr[name]
+        found["residual_std"], found["status"] = self.residual_std, self.status
+        found["record_status"] = np.full(self.status.shape, int(self.record_status), np.uint16)
+        found["trusted"] = self.trusted.astype(np.uint8)
+        return found
+
+    def _table(self) -> Table:
+        columns = self.columns()
+        return Table(columns.pop("time"), columns, self.units, self.settings)
+
+    def _settings(self) -> dict[str, Any]:
+        """Return what was chosen, as plain JSON."""
+        merging = self._merging
+        of = [part.found for part in merging.parts]
+        return {
+            "form": "weak",
+            "sample_rate": 1 / merging.period,
+            "trials": merging.trials,
+            "masses": merging.masses or 1,
+            "kinds": dict(self.kinds),
+            "window_length": [one.window_length for one in of],
+            "exponent": [one.exponent for one in of],
+            "regression_window": [one.regression_window for one in of],
+            "noise": [list(map(list, one.noise)) for one in of],
+            "prediction_error": [one.prediction_error for one in of],
+            "step": merging.step,
+        }
+
+    def __repr__(self) -> str:
+        shape = f"{self._merging.masses} masses" if self._merging.masses else f"{self._merging.trials} trials"
+        return f"MergedIdentification({shape}, {self.time.size} samples, {len(self.elements)} elements)"

@@ -1,0 +1,88 @@
+"""What a result of trials or masses says in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from tvident import _core
+from tvident._arguments import own_digits, to_digits_of
+from tvident._files import aligned
+from tvident._results import Words
+from tvident._status import Status, describe
+
+_MOST = 20
+"""Sentences of a kind that a summary shows."""
+
+
+def words_of(  # noqa: C901 - one branch a sentence
+    result: Any, found: Sequence[_core.MergedIdentification], scatter: Mapping[str, float]
+) -> Words:
+    """Return reasons and advice."""
+    reasons, advice = [], []
+    for one in found:
+        reasons.append(
+            f"the test function has {one.window_length} samples and exponent {one.exponent}; rows are predicted with "
+            f"{one.prediction_error:.2f} times the variance of the channels' noise"
+        )
+        if one.lengths:
+            best = min(one.lengths, key=lambda length: length[1])
+            reasons.append(f"windows of {best[0]} samples predict best, of {len(one.lengths)} lengths that were tried")
+        if one.record_status & Status.NOISE_MODEL:
+            advice.append(
+                "the equations leave more than the noise of the channels explains: a term may be missing, a channel may be late or coupled "
+                "in another way"
+            )
+        if one.record_status & Status.KIND_CONTRADICTED:
+            advice.append(
+                "an element that is taken as constant differs between parts of the record: give it the kind 'windowed'"
+            )
+    for name, probability in result.tests.items():
+        kind = result.kinds[name]
+        if kind == "constant":
+            reasons.append(f"{name} is constant: parts of the record differ as chance allows (p = {probability:.2g})")
+        elif kind == "windowed":
+            reasons.append(f"{name} is followed in windows, since parts of the record differ (p = {probability:.2g})")
+    for name, factor in scatter.items():
+        if factor > 1:
+            differences = result.trial_spread[name][0]
+            spread = float(np.nanstd(differences))
+            advice.append(
+                f"trials do not share {name}: it scatters by {spread:.3g} from trial to trial, {factor**0.5:.1f} times what noise "
+                "explains, and its standard errors are larger by as much; look at trial_spread"
+            )
+    for name, verdict in result.identifiable.items():
+        if not verdict:
+            advice.append(f"{name} cannot be known: {verdict.reason}")
+    return Words(tuple(dict.fromkeys(reasons)), tuple(dict.fromkeys(advice)))
+
+
+@np.errstate(all="ignore")
+def summary_of(result: Any) -> str:
+    """Return a table of the elements, and what was chosen and what to do."""
+    rows = [("element", "kind", "median", "5 %", "95 %", "std. error", "unit")]
+    for name, values in result.elements.items():
+        finite = values[np.isfinite(values)]
+        numbers = np.percentile(finite, [50, 5, 95]).tolist() if finite.size else [np.nan] * 3
+        error = result.stderr[name][np.isfinite(result.stderr[name])]
+        middle = float(np.median(error)) if error.size else np.nan
+        shown = [to_digits_of(number, middle) for number in numbers]
+        if result.kinds[name] != "windowed":
+            shown[1] = shown[2] = ""
+        rows.append((name, result.kinds[name], *shown, own_digits(middle), result.units.get(name, "")))
+    s = result.settings
+    seconds = float(result.time[-1]) if result.time.size else 0.0
+    lines = [
+        f"{s['trials']} trials of {s['masses']} masses, {result.time.size} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz",
+        "",
+    ]
+    lines += aligned(rows)
+    for name, title in (("advice", "what to do"), ("reasons", "what was chosen, and why")):
+        sentences = getattr(result, name)
+        if sentences:
+            lines += ["", title, *(f"  {sentence}" for sentence in sentences[:_MOST])]
+        if len(sentences) > _MOST:
+            lines.append(f"  and {len(sentences) - _MOST} more in .{name}")
+    return "\n".join([*lines, "", *describe(result.status, result.record_status)])

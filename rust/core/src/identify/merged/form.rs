@@ -1,0 +1,58 @@
+//! Merged rows, from channels to their result.
+
+use std::num::NonZeroUsize;
+
+use crate::error::Error;
+use crate::exec::pool::Watch;
+use crate::exec::stages::Stages;
+use crate::identify::merged::choice::noise_of;
+use crate::identify::merged::found::MergedFound;
+use crate::identify::merged::interleaved::{Interleaved, Weights};
+use crate::identify::merged::session::MergedSession;
+use crate::identify::merged::system::{Merged, MergedOptions};
+use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
+
+/// Stages of a call, about: only for showing progress.
+const STAGES: usize = 60;
+/// Exponent of the test function that rows are made for before one is chosen.
+const EXPONENT: usize = 9;
+
+/// Identifies what trials and masses share, in weak form.
+///
+/// # Errors
+/// If records are too short, settings are impossible, or the watch cancels.
+pub fn identify_merged(
+    merged: &Merged<'_>,
+    options: &MergedOptions,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<MergedFound, Error> {
+    let samples: usize = merged.trials.iter().filter_map(|trial| trial.angles.first()).map(|one| one.len()).sum();
+    let mut stages = Stages::new(workers, samples, STAGES, watch);
+    let function = TestFunction::new(LEAST_HALF_WIDTH, EXPONENT, options.delta)?;
+    let (all, trials) = Interleaved::build(merged, function, options.delta, &mut stages)?;
+    let mut session = MergedSession {
+        merged,
+        options,
+        noise: [Vec::new(), Vec::new()],
+        parameters: merged.elements.iter().map(|element| element.known.unwrap_or(0.0)).collect(),
+        weights: Weights { angles: Vec::new(), equations: Vec::new() },
+        all,
+        trials,
+        at_end: false,
+        jumps: Vec::new(),
+        whole: None,
+        stages,
+    };
+    session.noise = noise_of(&mut session)?;
+    session.choose()?;
+    let model = session.model();
+    let Some(fitted) = session.settle(&model)? else { return session.nothing() };
+    let (mut found, at_rows) = session.report(&fitted)?;
+    let windowed = fitted.model.windowed.clone();
+    drop(fitted);
+    let results = at_rows.at_samples(merged.samples, options.step, &mut session.stages)?;
+    found.take(&windowed, results);
+    session.stages.finish()?;
+    Ok(found)
+}

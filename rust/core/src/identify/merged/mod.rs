@@ -1,0 +1,12 @@
+//! Identification from rows that are merged: of repeated trials that share their parameters, and of coupled masses.
+
+pub(crate) mod choice;
+pub(crate) mod fitted;
+pub(crate) mod form;
+pub(crate) mod found;
+pub(crate) mod interleaved;
+pub(crate) mod jumps;
+pub(crate) mod report;
+pub(crate) mod session;
+pub(crate) mod spread;
+pub(crate) mod system;

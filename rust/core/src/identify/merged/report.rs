@@ -1,0 +1,251 @@
+//! Values, standard errors and flags from merged rows.
+
+use crate::error::Error;
+use crate::identify::kinds::Kind;
+use crate::identify::merged::fitted::MergedFit;
+use crate::identify::merged::found::{FoundElement, MergedFound};
+use crate::identify::merged::session::MergedSession;
+use crate::identify::results::{RowResults, SampleResults};
+use crate::inference::identifiability::is_mostly_noise;
+use crate::inference::window_averaging::{Averages, average};
+use crate::regression::constants::weakest;
+use crate::regression::limits::{HARDLY_TOLD_APART, NOISE_MODEL_FAILS};
+use crate::regression::model::Model;
+use crate::regression::predictor::without_constants;
+use crate::regression::residuals::residuals;
+use crate::regression::sandwich::joint_covariance;
+use crate::regression::solved::sensitivity;
+use crate::regression::subsample::{stretches_of_rows, thinned_rows};
+use crate::status::Status;
+
+/// Flags, standard errors of windowed elements, their covariances with others, and which those are, by row.
+struct AtRows {
+    status: Vec<u16>,
+    errors: Vec<Vec<f64>>,
+    covariances: Vec<Vec<f64>>,
+    pairs: Vec<(usize, usize)>,
+}
+
+impl MergedSession<'_, '_, '_> {
+    /// What there is to say of everything; the numbers at the rows are left to be put at the samples.
+    pub(crate) fn report(&mut self, fitted: &MergedFit) -> Result<(MergedFound, RowResults), Error> {
+        let (model, fit) = (&fitted.model, &fitted.fit);
+        let inflation = fitted.error.max(1.0);
+        let rows = &self.all.rows;
+        let problem = model.problem(rows, &rows.rhs, 1.0, Some(&fitted.correlated));
+        let mut covariance = fit.covariance(&problem, &fitted.covariance, &mut self.stages)?;
+        for entry in &mut covariance {
+            *entry *= inflation;
+        }
+        let weakest = weakest(&fit.full, &fit.pooled.weights);
+        let mostly_noise = is_mostly_noise(&problem, rows, model, fit, &weakest, 1.0, &mut self.stages)?;
+        let averages = self.averages(fitted)?;
+        let AtRows { status, errors, covariances, pairs } = self.at_rows(fitted, &averages, &covariance, inflation);
+        let spread = self.spread(fitted, &averages.values, inflation);
+        let count = model.constant.len();
+        let kind = |place: usize| if place < model.windowed.len() { Kind::Windowed } else { Kind::Constant };
+        let elements = model.windowed.iter().chain(&model.constant).enumerate().zip(spread);
+        let elements = elements.map(|((place, &element), spread)| {
+            let constant = place.checked_sub(model.windowed.len());
+            FoundElement {
+                element,
+                kind: kind(place),
+                values: constant.map_or_else(Vec::new, |one| vec![fit.pooled.values[one]]),
+                stderr: constant.map_or_else(Vec::new, |one| vec![covariance[one * (count + 1)].max(0.0).sqrt()]),
+                test: fitted.tests.iter().find(|(one, _)| *one == element).map(|(_, test)| test.clone()),
+                spread,
+            }
+        });
+        let mut found = MergedFound { elements: elements.collect(), ..self.nothing_yet(fitted) };
+        found.elements.sort_by_key(|one| one.element);
+        found.constants.clone_from(&model.constant);
+        (found.condition, found.weakest) = (fit.pooled.condition, weakest);
+        (found.covariance, found.pairs) = (covariance, pairs);
+        for (holds, flag) in [
+            (self.at_end || fitted.has_shortest_windows(), Status::WINDOW_LIMIT),
+            (found.condition > HARDLY_TOLD_APART || mostly_noise, Status::ILL_CONDITIONED),
+            (fitted.error > NOISE_MODEL_FAILS, Status::NOISE_MODEL),
+            (fitted.contradicted, Status::KIND_CONTRADICTED),
+        ] {
+            found.record_status |= if holds { flag } else { Status::GOOD };
+        }
+        let deviation = self.deviation(fitted)?;
+        let ([first, stride], period) = (self.all.samples(), self.all.rows.period);
+        let results = RowResults {
+            first,
+            stride,
+            slopes: averages.slopes.iter().map(|column| column.iter().map(|one| one * period).collect()).collect(),
+            values: averages.values,
+            errors,
+            covariances,
+            condition: vec![found.condition; status.len()],
+            deviation,
+            status,
+            jumps: fitted.jumps.clone(),
+        };
+        Ok((found, results))
+    }
+
+    /// Windowed elements at every row.
+    fn averages(&mut self, fitted: &MergedFit) -> Result<Averages, Error> {
+        let (model, fit) = (&fitted.model, &fitted.fit);
+        if model.windowed.is_empty() {
+            return Ok(Averages::default());
+        }
+        let rows = &self.all.rows;
+        let constants = &fit.pooled.values;
+        let whole = model.problem(rows, &rows.rhs, 1.0, Some(&fitted.correlated));
+        let rhs = without_constants(&whole, constants);
+        let rest = model.without_constants(rows, &whole, &rhs, constants, 1.0);
+        let thinned = stretches_of_rows(rows.len()).map(|stretches| thinned_rows(rows, &stretches));
+        let of_thinned = thinned.as_ref().map(|rows| model.problem(rows, &rows.rhs, 1.0, None));
+        let thinned_rhs = of_thinned.as_ref().map_or_else(Vec::new, |problem| without_constants(problem, constants));
+        let of_thinned = thinned
+            .as_ref()
+            .zip(of_thinned.as_ref())
+            .map(|(rows, problem)| model.without_constants(rows, problem, &thinned_rhs, constants, 1.0));
+        let judged = (fitted.expected, fit.span);
+        average(&rest, of_thinned.as_ref(), &fitted.scales, judged, self.options.instructions, &mut self.stages)
+    }
+
+    /// Flags and standard errors of windowed elements, by row.
+    fn at_rows(&self, fitted: &MergedFit, averages: &Averages, covariance: &[f64], inflation: f64) -> AtRows {
+        let Model { windowed, constant, .. } = &fitted.model;
+        let (fit, rows, group) = (&fitted.fit, &self.all.rows, self.all.group);
+        let condition = fit.full.field(fit.full.fields.condition());
+        let mut status = vec![0; rows.len()];
+        let usable = &self.whole.as_ref().unwrap_or(rows).usable;
+        for (time, usable) in usable.chunks(group).enumerate() {
+            // What one trial misses others have.
+            let gap = if usable.iter().any(|usable| *usable) { Status::GOOD } else { Status::GAP };
+            for row in time * group..time * group + usable.len() {
+                let mut here = gap;
+                if averages.values.iter().any(|column| !column[row].is_finite()) {
+                    here |= Status::INVALID;
+                }
+                if !windowed.is_empty() && condition[fit.nearest(row)] > HARDLY_TOLD_APART {
+                    here |= Status::ILL_CONDITIONED;
+                }
+                status[row] = here.bits();
+            }
+        }
+        let count = constant.len();
+        let bias = self.squared_bias(fitted, averages);
+        let joint = |one: usize, other: usize, row: usize| {
+            let place = fit.nearest(row);
+            let later = (row as f64 - fit.centre(place)) * rows.period;
+            // Averages over windows know nothing of what two windowed elements share beside the constants.
+            let own =
+                |i: usize, j: usize| if i == j { averages.errors[i][row].powi(2) * inflation + bias[i] } else { 0.0 };
+            let sensitive = |one: usize, constant: usize| sensitivity(&fit.full, place, one, constant, later);
+            let between = |i: usize, j: usize| covariance[i * count + j];
+            joint_covariance([one, other], [windowed.len(), count], own, sensitive, between)
+        };
+        let column = |one: usize, other: usize| (0..rows.len()).map(move |row| joint(one, other, row));
+        let errors = (0..windowed.len()).map(|one| column(one, one).map(|variance| variance.max(0.0).sqrt()).collect());
+        let all = windowed.len() + count;
+        let pairs: Vec<_> = (0..windowed.len()).flat_map(|one| (one + 1..all).map(move |other| (one, other))).collect();
+        let covariances = pairs.iter().map(|&(one, other)| column(one, other).collect()).collect();
+        let element = |place: usize| windowed.get(place).copied().unwrap_or_else(|| constant[place - windowed.len()]);
+        let pairs = pairs.iter().map(|&(one, other)| (element(one), element(other))).collect();
+        AtRows { status, errors: errors.collect(), covariances, pairs }
+    }
+
+    /// What windows that are as short as can be and yet do not follow leave of every windowed element: rows are predicted worse than noise
+    /// and the windows' own errors explain, and that is an error of the elements.
+    fn squared_bias(&self, fitted: &MergedFit, averages: &Averages) -> Vec<f64> {
+        let (windowed, rows) = (&fitted.model.windowed, &self.all.rows);
+        let excess = (fitted.error - 1.0).max(0.0) * fitted.expected.variance;
+        let of = |place: usize| {
+            if !fitted.has_shortest_windows() {
+                return 0.0;
+            }
+            let (value, errors) = (&rows.regressors[windowed[place]].value, &averages.errors[place]);
+            let used = (0..rows.len()).filter(|&row| rows.usable[row] && errors[row].is_finite());
+            let sums = used.fold([0.0; 3], |[count, squares, own], row| {
+                [count + 1.0, squares + value[row] * value[row], own + errors[row] * errors[row]]
+            });
+            let [count, squares, own] = sums;
+            // Several share what is left.
+            (excess / windowed.len() as f64 * count / squares.max(f64::MIN_POSITIVE) - own / f64::max(count, 1.0))
+                .max(0.0)
+        };
+        (0..windowed.len()).map(of).collect()
+    }
+
+    /// What is left of the rows of every time, over the noise's standard deviation.
+    fn deviation(&mut self, fitted: &MergedFit) -> Result<Vec<f64>, Error> {
+        let rows = &self.all.rows;
+        let problem = fitted.model.problem(rows, &rows.rhs, 1.0, None);
+        let (left, usable) = residuals(&problem, &fitted.fit, &mut self.stages)?;
+        let span = fitted.fit.span.min(rows.len()).max(self.all.group);
+        let mut deviation = vec![f64::NAN; rows.len()];
+        // Means over the windows' length, one for every time.
+        for (window, places) in deviation.chunks_mut(span).enumerate() {
+            let here = window * span..(window * span + places.len()).min(rows.len());
+            let used = || here.clone().filter(|&row| usable[row]);
+            let count = used().count() as f64;
+            let sum: f64 = used().map(|row| left[row] * left[row]).sum();
+            if count > 0.0 {
+                places.fill((sum / count / fitted.expected.variance).sqrt());
+            }
+        }
+        Ok(deviation)
+    }
+
+    /// What is known before anything is reported.
+    fn nothing_yet(&self, fitted: &MergedFit) -> MergedFound {
+        let [_, stride] = self.all.samples();
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "samples of a record")]
+        let span = (fitted.fit.span as f64 * stride).round() as usize;
+        MergedFound {
+            window_length: self.all.function.window_length(),
+            exponent: self.all.function.exponent(),
+            regression_window: span.min(self.merged.samples),
+            lengths: fitted.lengths.clone(),
+            prediction_error: fitted.error,
+            jumps: fitted.jumps.iter().map(|jump| jump.sample).collect(),
+            ..self.undetermined()
+        }
+    }
+
+    /// Nothing but a status.
+    pub(crate) fn undetermined(&self) -> MergedFound {
+        let unknown = |element: usize| FoundElement {
+            element,
+            kind: Kind::Constant,
+            values: vec![f64::NAN],
+            stderr: vec![f64::NAN],
+            test: None,
+            spread: Vec::new(),
+        };
+        MergedFound {
+            window_length: self.all.function.window_length(),
+            exponent: self.all.function.exponent(),
+            regression_window: 0,
+            lengths: Vec::new(),
+            prediction_error: 1.0,
+            noise: (self.noise[0].clone(), self.noise[1].clone()),
+            elements: self.merged.unknowns().into_iter().map(unknown).collect(),
+            constants: Vec::new(),
+            covariance: Vec::new(),
+            pairs: Vec::new(),
+            covariances: Vec::new(),
+            condition: f64::INFINITY,
+            weakest: Vec::new(),
+            residual: Vec::new(),
+            status: Vec::new(),
+            record_status: Status::GOOD,
+            jumps: Vec::new(),
+        }
+    }
+
+    /// The result where the rows do not determine what is constant.
+    pub(crate) fn nothing(&mut self) -> Result<MergedFound, Error> {
+        let elements = self.merged.samples.div_ceil(self.options.step);
+        let results = SampleResults::undetermined(0, elements, &mut self.stages)?;
+        let mut found = MergedFound { record_status: Status::RANK_DEFICIENT, ..self.undetermined() };
+        found.take(&[], results);
+        Ok(found)
+    }
+}

@@ -1,0 +1,206 @@
+//! The working data of merged rows: what every step needs of them.
+
+use crate::equation::rows::Rows;
+use crate::error::Error;
+use crate::exec::stages::Stages;
+use crate::identify::kinds::Kind;
+use crate::identify::merged::interleaved::{Channels, Interleaved, Weights};
+use crate::identify::merged::system::{Entry, Merged, MergedOptions, Multiplied};
+use crate::inference::jumps::jump::Jump;
+use crate::regression::constants::Expected;
+use crate::regression::fit::Fit;
+use crate::regression::model::Model;
+use crate::regression::row_covariance::RowCovariance;
+use crate::regression::window_length::Scale;
+use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
+
+/// Half-widths of the test function that windows span while it is chosen.
+const PILOT_WINDOW: usize = 4;
+/// Fits with the weights that the last one gives.
+const WEIGHTINGS: usize = 3;
+/// The least noise of an equation, as a part of the torques' root mean square: no channel is known better than rounding lets it be.
+const LEAST_NOISE: f64 = 1e-6;
+
+/// Merged rows under work.
+pub(crate) struct MergedSession<'a, 'b, 'c> {
+    pub(crate) merged: &'a Merged<'a>,
+    pub(crate) options: &'a MergedOptions,
+    /// Variances of the noise of angles and torques.
+    pub(crate) noise: [Vec<f64>; 2],
+    /// The elements' values as far as they are known, those of windowed ones about.
+    pub(crate) parameters: Vec<f64>,
+    pub(crate) weights: Weights,
+    pub(crate) all: Interleaved,
+    pub(crate) trials: Vec<Channels>,
+    /// Whether the narrowest or widest test function was chosen of all that were tried.
+    pub(crate) at_end: bool,
+    /// Where windowed elements jump, and all rows where some are left out for that.
+    pub(crate) jumps: Vec<Jump>,
+    pub(crate) whole: Option<Rows>,
+    pub(crate) stages: Stages<'b, 'c>,
+}
+
+impl MergedSession<'_, '_, '_> {
+    /// What is windowed and what is constant, as asked.
+    pub(crate) fn model(&self) -> Model {
+        let unknowns = self.merged.unknowns();
+        let windowed = unknowns.iter().map(|&place| self.merged.elements[place].kind == Kind::Windowed);
+        Model::new(&unknowns, windowed, true)
+    }
+
+    /// Builds the rows of all trials with a test function.
+    pub(crate) fn build(&mut self, function: TestFunction) -> Result<(), Error> {
+        (self.all, self.trials) = Interleaved::build(self.merged, function, self.options.delta, &mut self.stages)?;
+        Ok(())
+    }
+
+    /// Fills in the columns with the weights that belong to the parameters at hand.
+    pub(crate) fn fill(&mut self) {
+        self.weights = self.weights_now();
+        self.all.fill(self.merged, &self.trials, &self.weights, self.options.delta);
+        self.whole = self.exclude_jumps();
+    }
+
+    /// Windows of all lengths that the rows hold.
+    pub(crate) fn scales(&self) -> Vec<Scale> {
+        let times = self.all.rows.len() / self.all.group;
+        Scale::grouped(times, self.all.reach() / self.all.group, self.all.group)
+    }
+
+    /// A first estimate, in windows of a few test functions.
+    pub(crate) fn pilot(&mut self) -> Result<(), Error> {
+        let model = self.model();
+        for _ in 0..WEIGHTINGS {
+            self.fill();
+            let scale = if model.windowed.is_empty() {
+                None
+            } else {
+                let scales = self.scales();
+                let function = self.all.function;
+                let wanted = PILOT_WINDOW * function.half_width() / function.stride() * self.all.group;
+                Some(scales[Scale::nearest(&scales, wanted).ok_or(self.too_short())?])
+            };
+            let problem = model.problem(&self.all.rows, &self.all.rows.rhs, 1.0, None);
+            let instructions = self.options.instructions;
+            let fit = Fit::new(&problem, scale, Expected::UNKNOWN, instructions, &mut self.stages)?;
+            let Some(fit) = fit else { return Ok(()) };
+            self.remember(&model, &fit);
+        }
+        Ok(())
+    }
+
+    /// Takes the values of a fit as those of the elements, as far as they are numbers.
+    pub(crate) fn remember(&mut self, model: &Model, fit: &Fit) {
+        for (place, &element) in model.constant.iter().enumerate() {
+            self.parameters[element] = fit.pooled.values[place];
+        }
+        for (place, &element) in model.windowed.iter().enumerate() {
+            self.parameters[element] = fit.median(place);
+        }
+        self.parameters.iter_mut().filter(|value| !value.is_finite()).for_each(|value| *value = 0.0);
+    }
+
+    /// How the noise of an angle enters an equation at the parameters at hand.
+    fn mixed(&self, equation: usize, channel: usize) -> Vec<f64> {
+        let mut kernel = vec![0.0; self.all.kernels.values[0].len()];
+        for (element, parameter) in self.merged.elements.iter().zip(&self.parameters) {
+            for Entry { equation: one, of, factor } in &element.entries {
+                match *of {
+                    Multiplied::Motion { channel: other, coefficient } if *one == equation && other == channel => {
+                        let values = &self.all.kernels.values[coefficient];
+                        kernel.iter_mut().zip(values).for_each(|(sum, value)| *sum += parameter * factor * value);
+                    }
+                    _ => {}
+                }
+            }
+        }
+        kernel
+    }
+
+    /// What every equation is to be divided by, and the noise of the angles.
+    fn weights_now(&self) -> Weights {
+        let equations = self.merged.equations();
+        let torque = products(&self.all.kernels.values[2], &self.all.kernels.values[2], 0);
+        let variance = |equation: usize| {
+            let of_angles = (0..self.merged.channels()).map(|channel| {
+                let mixed = self.mixed(equation, channel);
+                self.noise[0][channel] * products(&mixed, &mixed, 0)
+            });
+            self.noise[1][equation] * torque + of_angles.sum::<f64>()
+        };
+        let least = self.least_variance();
+        let equations = (0..equations).map(|one| 1.0 / variance(one).max(least).sqrt()).collect();
+        Weights { angles: self.noise[0].iter().map(|variance| variance.sqrt()).collect(), equations }
+    }
+
+    /// The variance that no equation's noise is below.
+    fn least_variance(&self) -> f64 {
+        let mean = |equation: usize| {
+            let of = self.trials.iter().map(|trial| trial.mean_square(equation));
+            of.sum::<f64>() / self.trials.len().max(1) as f64
+        };
+        let most = (0..self.merged.equations()).map(mean).fold(0.0, f64::max);
+        let noise = self.noise[1].iter().copied().fold(0.0, f64::max);
+        let torque = products(&self.all.kernels.values[2], &self.all.kernels.values[2], 0);
+        // Before anything is known of the motion, an equation without torque counts as the others do.
+        let unknown = self.parameters.iter().all(|&value| value == 0.0);
+        let least = (LEAST_NOISE * LEAST_NOISE * most).max(if unknown { noise * torque } else { 0.0 });
+        if least > 0.0 { least } else { 1.0 }
+    }
+
+    /// The covariance of the rows as the noise of all channels makes it, and what windows are expected to leave.
+    ///
+    /// The row at a distance is of the same equation, or of another one of the same trial: then it is the mean over the pairs of equations
+    /// that lie so far apart.
+    pub(crate) fn covariance(&self) -> (RowCovariance, Expected) {
+        let (equations, channels, group) = (self.merged.equations(), self.merged.channels(), self.all.group);
+        let (stride, torque) = (self.all.function.stride(), &self.all.kernels.values[2]);
+        let mixed: Vec<Vec<Vec<f64>>> = (0..equations)
+            .map(|equation| (0..channels).map(|channel| self.mixed(equation, channel)).collect())
+            .collect();
+        let weights = &self.weights.equations;
+        // Between a row of one equation and a row of another so many times later.
+        let between = |one: usize, other: usize, times: usize| {
+            let of_angles = (0..channels)
+                .map(|channel| {
+                    self.noise[0][channel] * products(&mixed[other][channel], &mixed[one][channel], times * stride)
+                })
+                .sum::<f64>();
+            let of_torque =
+                if one == other { self.noise[1][one] * products(torque, torque, times * stride) } else { 0.0 };
+            weights[one] * weights[other] * (of_angles + of_torque) / equations as f64
+        };
+        let times = torque.len().div_ceil(stride);
+        let mut lags = vec![0.0; (times - 1) * group + equations];
+        for time in 0..times {
+            for one in 0..equations {
+                for other in 0..equations {
+                    if let Some(lag) = (time * group + other).checked_sub(one).filter(|_| time > 0 || other >= one) {
+                        lags[lag] += between(one, other, time);
+                    }
+                }
+            }
+        }
+        let of_torque = (0..equations)
+            .map(|one| weights[one].powi(2) * self.noise[1][one] * products(torque, torque, 0) / equations as f64)
+            .sum();
+        if lags[0] <= 0.0 {
+            // Without any noise rows count as if each had some of its own.
+            lags = vec![1.0];
+        }
+        let known = RowCovariance { lags };
+        let expected = Expected::new(&known, of_torque);
+        (known, expected)
+    }
+
+    pub(crate) fn too_short(&self) -> Error {
+        let samples = self.merged.trials.iter().map(|trial| trial.angles[0].len()).max().unwrap_or(0);
+        let samples = samples.min(self.merged.samples);
+        Error::RecordTooShortForWindows { samples, least: (16 * LEAST_HALF_WIDTH).max(samples + 1) }
+    }
+}
+
+/// The sum of products of a kernel and another one so many samples later.
+fn products(one: &[f64], other: &[f64], lag: usize) -> f64 {
+    one.iter().zip(other.get(lag..).unwrap_or_default()).map(|(a, b)| a * b).sum()
+}

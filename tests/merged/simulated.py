@@ -1,0 +1,125 @@
+"""Simulated trials and masses: a spring that changes, any force, a classic Runge-Kutta."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+FINER = 1
+"""Steps of the integration within a sample."""
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Channels with noise, and the truth."""
+
+    angle: Array
+    torque: Array
+    stiffness: Array
+    inertia: float = 0.0123
+    damping: float = 0.008
+
+
+def drive(rng: np.random.Generator, channels: int, times: Array, highest: float = 25.0) -> Array:
+    """Give multisines of random phases, shape (channels, times)."""
+    frequencies = np.linspace(0.5, highest, 31)
+    phases = rng.uniform(0, 2 * np.pi, (channels, frequencies.size))
+    return np.stack([np.sin(2 * np.pi * np.outer(times, frequencies) + one).sum(axis=1) for one in phases]) * 0.05
+
+
+def integrated(slope: Callable[[Array, int], Array], state: Array, samples: int, step: float) -> Array:
+    """Give the states at every sample; a slope takes the state and the half step."""
+    states = np.empty((samples, *state.shape))
+    for sample in range(samples):
+        states[sample] = state
+        for finer in range(FINER):
+            half = 2 * (sample * FINER + finer)
+            one = slope(state, half)
+            two = slope(state + step / 2 * one, half + 1)
+            three = slope(state + step / 2 * two, half + 1)
+            four = slope(state + step * three, half + 2)
+            state = state + step / 6 * (one + 2 * two + 2 * three + four)
+    return states
+
+
+def noisy(rng: np.random.Generator, clean: Array, part: float) -> Array:
+    return np.asarray(clean + part * clean.std(axis=-1, keepdims=True) * rng.standard_normal(clean.shape))
+
+
+def simulated(
+    trials: int, samples: int, stiffness: Callable[[Array], Array], *, seed: int, angle_noise: float = 1e-3
+) -> Trials:
+    """Give trials of one mass that share K(t): torque SNR 20 dB."""
+    rng = np.random.default_rng(seed)
+    step = 1e-3 / FINER
+    times = np.arange(2 * samples * FINER + 1) * step / 2
+    torque, spring = drive(rng, trials, times), np.asarray(stiffness(times))
+    inertia, damping = Trials.inertia, Trials.damping
+
+    def slope(state: Array, half: int) -> Array:
+        angle, velocity = state
+        return np.stack([velocity, (torque[:, half] - damping * velocity - spring[half] * angle) / inertia])
+
+    state = np.stack([rng.normal(0, 0.02, trials), rng.normal(0, 0.5, trials)])
+    angle = integrated(slope, state, samples, step)[:, 0].T
+    whole = slice(0, 2 * FINER * samples, 2 * FINER)
+    return Trials(noisy(rng, angle, angle_noise), noisy(rng, torque[:, whole], 0.1), spring[whole])
+
+
+@dataclass(frozen=True)
+class Masses:
+    """Channels of a chain with noise, and its true elements."""
+
+    angle: Array
+    torque: Array
+    base: Array | None
+    stiffness: list[Array]
+    damping: list[float]
+    inertia: list[float]
+
+
+def chain(
+    stiffness: list[Callable[[Array], Array]],
+    samples: int,
+    *,
+    seed: int,
+    driven: tuple[int, ...] | None = None,
+    base: bool = False,
+    angle_noise: float = 1e-3,
+    highest: float = 12.0,
+) -> Masses:
+    """Give masses in a row, the first held by a spring to the base, a damper beside every spring: torque SNR 20 dB."""
+    rng = np.random.default_rng(seed)
+    masses, step = len(stiffness), 1e-3 / FINER
+    times = np.arange(2 * samples * FINER + 1) * step / 2
+    inertia = np.linspace(0.02, 0.03, masses)
+    damping = np.full(masses, 0.03)
+    springs = np.stack([np.broadcast_to(one(times), times.shape) for one in stiffness])
+    forces = drive(rng, masses, times, highest)
+    if driven is not None:
+        forces[[mass for mass in range(masses) if mass not in driven]] = 0.0
+    road = 0.01 * drive(rng, 1, times, 4.0)[0] if base else np.zeros(times.size)
+    speed = np.gradient(road, step / 2)
+
+    def slope(state: Array, half: int) -> Array:
+        angle, velocity = state
+        stretched = np.diff(angle, prepend=road[half])
+        faster = np.diff(velocity, prepend=speed[half])
+        pull = springs[:, half] * stretched + damping * faster
+        return np.stack([velocity, (forces[:, half] - pull + np.append(pull[1:], 0.0)) / inertia])
+
+    angle = integrated(slope, np.zeros((2, masses)), samples, step)[:, 0].T
+    whole = slice(0, 2 * FINER * samples, 2 * FINER)
+    return Masses(
+        noisy(rng, angle, angle_noise),
+        noisy(rng, forces[:, whole], 0.1),
+        noisy(rng, road[whole], angle_noise) if base else None,
+        list(springs[:, whole]),
+        list(damping),
+        list(inertia),
+    )

@@ -1,0 +1,204 @@
+"""Few masses: chains and full matrices."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import tvident
+from merged.simulated import Masses, chain
+from reference import merged as reference
+
+Array = npt.NDArray[np.float64]
+
+identify: Any = tvident.identify
+"""Its type is that of a single record."""
+
+OPTIONS: dict[str, Any] = {"sample_rate": 1000, "dof_axis": 0}
+
+
+def springs(masses: int) -> list[tuple[Any, int]]:
+    return [("base" if mass == 0 else mass - 1, mass) for mass in range(masses)]
+
+
+def changing(t: Array) -> Array:
+    return np.asarray(12 + 3 * np.sin(0.6 * t))
+
+
+def constant(value: float) -> Any:
+    return lambda t: value + 0 * t
+
+
+def matrices(masses: Masses) -> tuple[Array, Array]:
+    """Give the true inertia and stiffness."""
+    count, samples = masses.angle.shape
+    inertia, stiffness = np.diag(masses.inertia), np.zeros((count, count, samples))
+    for place, spring in enumerate(masses.stiffness):
+        stiffness[place, place] += spring
+        if place:
+            stiffness[place - 1, place - 1] += spring
+            stiffness[place - 1, place] -= spring
+            stiffness[place, place - 1] -= spring
+    return inertia, stiffness
+
+
+def rms(found: Array, true: Array) -> float:
+    return float(np.sqrt(np.nanmean((found - true) ** 2)) / np.mean(np.abs(true)))
+
+
+@settings(max_examples=5)
+@given(seed=st.integers(0, 2**31), half=st.integers(20, 40), angle_noise=st.sampled_from([1e-3, 1e-2]))
+def test_constants_of_a_chain_are_those_of_all_equations_together(seed: int, half: int, angle_noise: float) -> None:
+    masses = chain([constant(12.0), constant(18.0)], 3000, seed=seed, angle_noise=angle_noise)
+    form = tvident.WeakForm(window_length=2 * half + 1, exponent=8)
+    structure = tvident.Chain(2, springs(2))
+    found = identify(
+        masses.angle,
+        masses.torque,
+        structure=structure,
+        method=form,
+        inertia="constant",
+        damping="constant",
+        stiffness="constant",
+        **OPTIONS,
+    )
+    elements: list[list[reference.Entry]] = [[(mass, 0, mass, 1.0)] for mass in range(2)]
+    for coefficient in (1, 2):
+        elements.append([(0, coefficient, 0, 1.0)])
+        elements.append(
+            [(0, coefficient, 0, 1.0), (0, coefficient, 1, -1.0), (1, coefficient, 1, 1.0), (1, coefficient, 0, -1.0)]
+        )
+    elements += [[(0, None, 0, 1.0)], [(1, None, 0, 1.0)]]
+    noise = found.settings["noise"][0]
+    expected = reference.constants([(masses.angle, masses.torque)], elements, (half, 8), 1e-3, noise)
+    values = [found.constants[name][0] for name in (*structure.names, "offset_0", "offset_1")]
+    errors = [found.constants[name][1] for name in (*structure.names, "offset_0", "offset_1")]
+    # Weights and values are found in turn: five rounds here, twelve there, each at least ten times closer.
+    np.testing.assert_array_less(np.abs(values - expected), 1e-2 * np.array(errors))
+
+
+@pytest.mark.parametrize(("masses", "most"), [(2, 0.004), (3, 0.01)])
+def test_one_spring_of_a_chain_is_followed(masses: int, most: float) -> None:
+    rest = [constant(18.0 - 2 * place) for place in range(masses - 1)]
+    simulated = chain([changing, *rest], 12000, seed=masses)
+    found = identify(simulated.angle, simulated.torque, structure=tvident.Chain(masses, springs(masses)), **OPTIONS)
+    inertia, stiffness = matrices(simulated)
+    assert found.kinds["stiffness_base_0"] == "windowed"
+    assert all(found.kinds[f"stiffness_{place}_{place + 1}"] == "constant" for place in range(masses - 1))
+    for i in range(masses):
+        assert abs(found.inertia[i, i, 0] / inertia[i, i] - 1) < 0.002
+        for j in range(max(i - 1, 0), min(i + 2, masses)):
+            assert rms(found.stiffness[i, j], stiffness[i, j]) < most, (i, j)
+    inside = np.abs(found.elements["stiffness_base_0"] - simulated.stiffness[0]) < 2 * found.stderr["stiffness_base_0"]
+    assert inside.mean() > 0.8
+    assert all(found.identifiable.values())
+
+
+def test_modes_are_those_of_the_matrices_and_keep_their_names() -> None:
+    simulated = chain([changing, constant(18.0)], 12000, seed=4)
+    found = identify(simulated.angle, simulated.torque, structure=tvident.Chain(2, springs(2)), **OPTIONS)
+    inertia, stiffness = matrices(simulated)
+    for sample in (1000, 6000, 11000):
+        undamped = np.sqrt(np.linalg.eigvals(np.linalg.inv(inertia) @ stiffness[:, :, sample]).real) / (2 * np.pi)
+        # Light damping moves natural frequencies by its square: a thousandth here.
+        np.testing.assert_allclose(found.natural_frequency[:, sample], np.sort(undamped), rtol=0.01)
+    assert found.natural_frequency.shape == found.damping_ratio.shape == (2, 12000)
+    assert found.modes.shapes.shape == (2, 2, 12000)
+    # In the lower mode both masses move together, in the upper one against each other, at all times.
+    relative = (found.modes.shapes[1] / found.modes.shapes[0]).real
+    assert (relative[0] > 0).all()
+    assert (relative[1] < 0).all()
+    assert np.isfinite(found.modes.natural_frequency_stderr).all()
+    assert (found.modes.natural_frequency_stderr < 0.02 * found.natural_frequency).all()
+
+
+def test_a_force_on_one_mass_is_enough_for_a_chain() -> None:
+    simulated = chain([constant(12.0), constant(18.0)], 12000, seed=5, driven=(0,))
+    found = identify(simulated.angle, simulated.torque, structure=tvident.Chain(2, springs(2)), **OPTIONS)
+    for name, true in (("stiffness_base_0", 12.0), ("stiffness_0_1", 18.0)):
+        assert abs(np.nanmean(found.elements[name]) / true - 1) < 0.015
+        assert found.identifiable[name]
+
+
+def test_what_cannot_be_known_is_said_and_no_number() -> None:
+    simulated = chain([constant(12.0), constant(18.0)], 6000, seed=6, driven=(0,))
+    full = identify(simulated.angle, simulated.torque, **OPTIONS)
+    assert not any(full.identifiable[f"stiffness_{i}_{j}"] for i in range(2) for j in range(2))
+    assert "up to scale" in full.identifiable["stiffness_1_1"].reason
+    assert "independent forces" in full.identifiable["stiffness_0_0"].reason
+    assert np.isnan(full.stiffness).all()
+    assert not full.trusted.any()
+    driven = chain([constant(12.0), constant(18.0)], 6000, seed=7)
+    torque = driven.torque.copy()
+    torque[1] = np.nan
+    found = identify(driven.angle, torque, structure=tvident.Chain(2, springs(2)), **OPTIONS)
+    assert "was not measured" in found.identifiable["inertia_1"].reason
+    assert np.isnan(found.elements["inertia_1"]).all()
+    assert abs(found.constants["stiffness_0_1"][0] / 18 - 1) < 0.05
+
+
+def test_full_matrices_of_masses_with_independent_forces() -> None:
+    simulated = chain([constant(12.0), constant(18.0)], 12000, seed=8)
+    found = identify(simulated.angle, simulated.torque, **OPTIONS)
+    inertia, stiffness = matrices(simulated)
+    np.testing.assert_allclose(found.stiffness[:, :, 0], stiffness[:, :, 0], rtol=0.02)
+    np.testing.assert_allclose(np.diagonal(found.inertia[:, :, 0]), np.diagonal(inertia), rtol=0.01)
+    assert np.all(np.abs(found.inertia[:, :, 0] - inertia) < 5 * found.stderr["inertia"][:, :, 0])
+    symmetric = identify(
+        simulated.angle,
+        simulated.torque,
+        inertia=tvident.Matrix("diagonal"),
+        stiffness=tvident.Matrix("symmetric"),
+        **OPTIONS,
+    )
+    assert sorted(name for name in symmetric.elements if name.startswith("stiffness")) == [
+        "stiffness_0_0",
+        "stiffness_0_1",
+        "stiffness_1_1",
+    ]
+    assert symmetric.inertia[0, 1, 0] == 0
+    assert symmetric.stiffness[0, 1, 0] == symmetric.stiffness[1, 0, 0] == pytest.approx(-18, rel=0.02)
+
+
+def test_a_moving_base_drives_a_chain() -> None:
+    simulated = chain([constant(12.0), constant(18.0)], 12000, seed=9, base=True)
+    structure = tvident.Chain(2, springs(2), base=simulated.base)
+    found = identify(simulated.angle, simulated.torque, structure=structure, **OPTIONS)
+    for name, true in (("stiffness_base_0", 12.0), ("stiffness_0_1", 18.0), ("inertia_0", 0.02)):
+        value, error = found.constants[name]
+        assert abs(value / true - 1) < 0.01
+        assert abs(value - true) < 4 * error
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"structure": tvident.Chain(3, [("base", 0)])}, "row for each"),
+        ({"structure": tvident.Chain(2, [("base", 0)], base=np.zeros(7))}, "base of a chain"),
+        ({"stiffness": [["windowed"]]}, "rows of 2 entries"),
+        ({"structure": tvident.Chain(2, [("base", 0)]), "stiffness": {"spring": "windowed"}}, "must name elements"),
+        ({"structure": tvident.Chain(2, [("base", 0)]), "stiffness": ["windowed", "constant"]}, "each of 1 elements"),
+        ({"phase": np.zeros((2, 500))}, "ensemble_axis"),
+        ({"velocity": np.zeros((2, 500))}, "not supported"),
+    ],
+)
+def test_what_is_wrong_is_refused_with_the_cure(options: dict[str, Any], message: str) -> None:
+    rng = np.random.default_rng(0)
+    with pytest.raises(ValueError, match=message):
+        identify(rng.standard_normal((2, 500)), rng.standard_normal((2, 500)), **{**OPTIONS, **options})
+
+
+@pytest.mark.parametrize("links", [[], [(0, 0)], [(0, 2)], [(0, 1), (1, 0)], [("base", "base")], ["ab"]])
+def test_a_chain_connects_what_there_is(links: list[Any]) -> None:
+    with pytest.raises(ValueError, match="got"):
+        tvident.Chain(2, links)
+
+
+def test_silence_determines_nothing() -> None:
+    with pytest.raises(ValueError, match="force must act"):
+        identify(np.ones((2, 500)), np.zeros((2, 500)), **OPTIONS)

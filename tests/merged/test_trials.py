@@ -1,0 +1,155 @@
+"""Repeated trials that share their parameters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import tvident
+from merged.simulated import Trials, simulated
+from reference import merged as reference
+
+Array = npt.NDArray[np.float64]
+
+identify: Any = tvident.identify
+"""Its type is that of a single record."""
+
+OPTIONS: dict[str, Any] = {"sample_rate": 1000, "ensemble_axis": 0}
+
+
+@settings(max_examples=8)
+@given(
+    seed=st.integers(0, 2**31),
+    lengths=st.lists(st.integers(300, 700), min_size=2, max_size=4),
+    half=st.integers(12, 25),
+    gap=st.booleans(),
+)
+def test_constants_are_those_of_the_rows_of_all_trials(seed: int, lengths: list[int], half: int, *, gap: bool) -> None:
+    rng = np.random.default_rng(seed)
+    angles, torques = [], []
+    for samples in lengths:
+        trial = simulated(1, samples, lambda t: 15 + 0 * t, seed=int(rng.integers(2**31)), angle_noise=1e-2)
+        angles.append(trial.angle[0])
+        torques.append(trial.torque[0])
+    if gap:
+        angles[0][100:103] = np.nan
+    form = tvident.WeakForm(window_length=2 * half + 1, exponent=8)
+    found = identify(
+        angles, torques, method=form, stiffness="constant", inertia="constant", damping="constant", **OPTIONS
+    )
+    names = ["inertia", "damping", "stiffness", "offset"]
+    elements: list[list[reference.Entry]] = [[(0, place, 0, 1.0)] for place in range(3)]
+    elements.append([(0, None, 0, 1.0)])
+    trials = [(angle[np.newaxis], torque[np.newaxis]) for angle, torque in zip(angles, torques, strict=True)]
+    noise = found.settings["noise"][0]
+    expected = reference.constants(trials, elements, (half, 8), 1e-3, noise)
+    errors = np.array([found.constants[name][1] for name in names])
+    # The same normal equations, solved through factors here and squared there: rounding times the square of a condition number of 1e3.
+    np.testing.assert_allclose(
+        [found.constants[name][0] for name in names], expected, rtol=1e-8, atol=float(1e-6 * errors.max())
+    )
+
+
+def rms(found: Array, true: Array) -> float:
+    return float(np.sqrt(np.nanmean((found - true) ** 2)) / np.mean(true))
+
+
+def within_20_ms(values: Array, before: float, after: float) -> bool:
+    """Whether a step is followed, 10 to 90 %, within 20 samples."""
+    part = (values - before) / (after - before)
+    last_low, first_high = np.flatnonzero(part < 0.1)[-1], np.flatnonzero(part > 0.9)[0]
+    return bool(first_high - last_low <= 20)
+
+
+def test_short_trials_together_follow_what_none_could() -> None:
+    trials = simulated(50, 500, lambda t: np.where(t < 0.2465, 12.0, 18.0), seed=3)
+    found = identify(trials.angle, trials.torque, **OPTIONS)
+    assert found.stiffness.shape == (500,)
+    assert rms(found.stiffness, trials.stiffness) < 0.03
+    assert within_20_ms(found.stiffness, 12.0, 18.0)
+    for name, true in (("inertia", trials.inertia), ("damping", trials.damping)):
+        value, error = found.constants[name]
+        assert abs(value - true) < 4 * error
+        assert error < 0.05 * true
+    smooth = simulated(50, 500, lambda t: 15 + 4 * np.sin(4 * np.pi * t), seed=4)
+    found = identify(smooth.angle, smooth.torque, **OPTIONS)
+    assert rms(found.stiffness, smooth.stiffness) < 0.03
+    inside = np.abs(found.stiffness - smooth.stiffness) < 2 * found.stderr["stiffness"]
+    assert inside[found.status == 0].mean() > 0.8
+
+
+def test_errors_shrink_with_the_root_of_the_number_of_trials() -> None:
+    trials = simulated(10, 2000, lambda t: 15 + 0 * t, seed=5)
+    form = tvident.WeakForm(window_length=61, exponent=8, regression_window=400)
+    all_together = identify(trials.angle, trials.torque, method=form, inertia="constant", damping="constant", **OPTIONS)
+    each = [
+        identify(angle[np.newaxis], torque[np.newaxis], method=form, inertia="constant", damping="constant", **OPTIONS)
+        for angle, torque in zip(trials.angle, trials.torque, strict=True)
+    ]
+    for name in ("inertia", "damping", "stiffness"):
+        single = np.median([np.nanmedian(one.stderr[name]) for one in each])
+        assert np.nanmedian(all_together.stderr[name]) * 10**0.5 == pytest.approx(single, rel=0.15), name
+    actual = [np.nanmean((one.stiffness - 15) ** 2) for one in (all_together, *each)]
+    assert (actual[0] / np.mean(actual[1:])) ** 0.5 < 0.6
+
+
+def test_trials_that_differ_are_said_to() -> None:
+    alike = simulated(6, 1500, lambda t: 15 + 0 * t, seed=6)
+    found = identify(alike.angle, alike.torque, **OPTIONS)
+    assert not found.record_status & tvident.Status.KIND_CONTRADICTED
+    values, errors = found.trial_spread["stiffness"]
+    assert values.shape == errors.shape == (6,)
+    assert np.all(np.abs(values) < 5 * errors)
+    parts = [simulated(1, 1500, lambda t, k=k: k + 0 * t, seed=7 + place) for place, k in enumerate((13.0, 15.0, 17.0))]  # type: ignore[misc]
+    different = [np.concatenate([getattr(part, name) for part in parts]) for name in ("angle", "torque")]
+    found = identify(*different, **OPTIONS)
+    assert found.record_status & tvident.Status.KIND_CONTRADICTED
+    assert any("trials do not share stiffness" in line for line in found.advice)
+    assert "trials do not share stiffness" in found.summary()
+
+
+def test_trials_of_several_lengths_are_aligned_on_their_phase() -> None:
+    rng = np.random.default_rng(8)
+    angles, torques, phases = [], [], []
+    for _ in range(20):
+        samples = int(rng.integers(520, 680))
+        phase = np.arange(samples) / samples
+
+        def stiffness(t: Array, samples: int = samples) -> Array:
+            return 15 + 4 * np.sin(2 * np.pi * t * 1000 / samples)
+
+        trial: Trials = simulated(1, samples, stiffness, seed=int(rng.integers(2**31)))
+        angles.append(trial.angle[0])
+        torques.append(trial.torque[0])
+        phases.append(phase)
+    found = identify(angles, torques, phase=phases, **OPTIONS)
+    assert found.phase is not None
+    expected = 15 + 4 * np.sin(2 * np.pi * found.phase)
+    assert rms(found.stiffness, expected) < 0.03
+    unaligned = identify(angles, torques, **OPTIONS)
+    assert rms(unaligned.stiffness, 15 + 4 * np.sin(2 * np.pi * unaligned.time * 1000 / 600)) > 0.03
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"phase": np.ones((3, 400))}, "grow"),
+        ({"phase": np.ones((3, 300))}, "sample for every sample"),
+        ({"lag": "auto"}, "not supported"),
+        ({"instrument": np.ones((3, 400))}, "not supported"),
+        ({"method": "paper"}, "WeakForm"),
+        ({"dof_axis": 0}, "not supported together"),
+        ({"stiffness": "varying"}, "'windowed'"),
+        ({"ensemble_axis": 1}, "ensemble_axis must be"),
+        ({"structure": tvident.Chain(1, [("base", 0)])}, "dof_axis"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_with_the_cure(options: dict[str, Any], message: str) -> None:
+    trials = simulated(3, 400, lambda t: 15 + 0 * t, seed=9)
+    with pytest.raises(ValueError, match=message):
+        identify(trials.angle, trials.torque, **{**OPTIONS, **options})
