@@ -73,6 +73,23 @@ class LocalPolynomials:
         workers: int | None = None,
         progress: Callable[[int, int], object] | None = None,
     ) -> LocalEstimates: ...
+    def estimate_incomplete(
+        self,
+        samples: npt.NDArray[np.number],
+        places: Sequence[int],
+        parts: Sequence[tuple[int, int]],
+        least: int,
+        *,
+        weights: Sequence[float] | None = None,
+        workers: int | None = None,
+        progress: Callable[[int, int], object] | None = None,
+    ) -> tuple[
+        npt.NDArray[np.float64],
+        npt.NDArray[np.float64],
+        npt.NDArray[np.uintp],
+        npt.NDArray[np.uint16],
+        npt.NDArray[np.float64],
+    ]: ...
     def errors(
         self, samples: npt.NDArray[np.number], *, step: int = 1, workers: int | None = None
     ) -> npt.NDArray[np.float64]: ...

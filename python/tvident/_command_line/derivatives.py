@@ -6,7 +6,7 @@ from typing import Any, get_args
 
 import click
 
-from tvident._choices import Loss, NanPolicy, Selection
+from tvident._choices import Loss, RowPolicy, Selection
 from tvident._command_line.group import commands, main
 from tvident._command_line.options import CRITERION, PERIOD, RUN, TIME
 
@@ -39,10 +39,15 @@ from tvident._command_line.options import CRITERION, PERIOD, RUN, TIME
 @click.option("--max-deriv", type=int, default=2, show_default=True, help="Highest derivative.")
 @click.option(
     "--nan-policy",
-    type=click.Choice(get_args(NanPolicy)),
+    type=click.Choice(get_args(RowPolicy)),
     default="propagate",
     show_default=True,
     help="Missing values.",
+)
+@click.option("--weights", metavar="NAME", help="Channel of weights: one over the variance of each sample's noise.")
+@click.option("--max-gap", help="Longer gaps split the record: samples or a duration. Half a window if not given.")
+@click.option(
+    "--min-observations", type=int, help="Samples that a window with a gap must hold. Half of them if not given."
 )
 @RUN
 def derivatives(**options: Any) -> None:

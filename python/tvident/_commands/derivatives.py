@@ -26,6 +26,8 @@ def derivatives(
     delta: float | None,
     time_channel: str | None,
     period: str | None,
+    weights: str | None,
+    max_gap: str | None,
     output: str | None,
     plot: str | None,
     progress: bool | None,  # noqa: FBT001 - click passes options by name
@@ -44,6 +46,8 @@ def derivatives(
         sample_rate=sample_rate,
         t=times,
         period=period_of(period),
+        weights=None if weights is None else channel_of(channels, weights, file),
+        max_gap=None if max_gap is None else length(max_gap),
         progress=wanted_progress(progress),
         **given(options),
     )

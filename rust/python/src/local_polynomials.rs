@@ -2,13 +2,15 @@
 
 use std::num::NonZeroUsize;
 
-use numpy::{IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tvident::Error;
 use tvident::exec::{Watch, workers as threads};
 use tvident::lanes::Elements;
-use tvident::local_polynomials::{Criterion, Estimates, LocalPolynomials as Plan, Order, PolynomialOptions, Selection};
+use tvident::local_polynomials::{
+    Criterion, Estimates, Incomplete, LocalPolynomials as Plan, Order, PolynomialOptions, Selection,
+};
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
@@ -26,6 +28,15 @@ pub(crate) struct LocalEstimates {
     /// Standard deviation of the noise.
     sigma: Py<PyArrayDyn<f64>>,
 }
+
+/// Derivatives, their standard errors, orders, flags and noise.
+type IncompleteEstimates<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray1<usize>>,
+    Bound<'py, PyArray1<u16>>,
+    Bound<'py, PyArray1<f64>>,
+);
 
 /// Tables for windows of one length, made once and used for any number of records.
 #[pyclass(frozen, module = "tvident._core")]
@@ -121,6 +132,47 @@ impl LocalPolynomials {
         let outputs =
             self.outputs(samples, true, step, None, |work, watch| plan.errors(work, threads(workers), watch))?;
         Ok(outputs.derivatives.into_bound(samples.py()))
+    }
+
+    /// Estimates at some samples of one record from what their windows hold, within parts of the record: derivatives and their standard
+    /// errors, a row each, then orders, flags and noise.
+    #[pyo3(signature = (samples, places, parts, least, *, weights=None, workers=None, progress=None))]
+    fn estimate_incomplete<'py>(
+        &self,
+        samples: &Bound<'py, PyUntypedArray>,
+        places: Vec<usize>,
+        parts: Vec<(usize, usize)>,
+        least: usize,
+        weights: Option<Vec<f64>>,
+        workers: Option<NonZeroUsize>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<IncompleteEstimates<'py>> {
+        let py = samples.py();
+        let records = records(samples)?;
+        let record = records.first().ok_or_else(|| PyValueError::new_err("there is no record"))?;
+        let mut found = Vec::new();
+        watched(py, progress, |watch| {
+            let mut values = vec![0.0; record.len()];
+            record.read(0, &mut values);
+            let parts: Vec<std::ops::Range<usize>> = parts.iter().map(|&(first, end)| first..end).collect();
+            let record = Incomplete { samples: &values, weights: weights.as_deref(), parts: &parts, least };
+            found = self.plan.run_incomplete(&record, &places, threads(workers), watch)?;
+            Ok(())
+        })?;
+        let count = self.plan.options().derivatives.len();
+        let rows = |of: fn(&(f64, f64)) -> f64| -> Vec<Vec<f64>> {
+            (0..count).map(|row| found.iter().map(|one| of(&one.derivatives[row])).collect()).collect()
+        };
+        let order: Vec<usize> = found.iter().map(|one| one.order).collect();
+        let status: Vec<u16> = found.iter().map(|one| one.status.bits()).collect();
+        let sigma: Vec<f64> = found.iter().map(|one| one.sigma).collect();
+        Ok((
+            PyArray2::from_vec2(py, &rows(|one| one.0))?,
+            PyArray2::from_vec2(py, &rows(|one| one.1))?,
+            order.into_pyarray(py),
+            status.into_pyarray(py),
+            sigma.into_pyarray(py),
+        ))
     }
 
     /// The criterion of every order in the window around a sample of a record.

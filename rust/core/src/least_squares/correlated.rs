@@ -120,6 +120,9 @@ impl Fits<'_> {
         let centre = |row: usize| (row.saturating_sub(plan.window / 2).min(last) + plan.before).min(total - 1);
         let begin = centre(rows.start).saturating_sub(plan.window);
         let end = total.min(centre(rows.end - 1) + plan.window);
+        if (begin..end).all(is_valid) {
+            return rows.map(centre).collect();
+        }
         let mut before = Vec::with_capacity(end - begin);
         for row in begin..end {
             before.push(if is_valid(row) { row } else { before.last().copied().unwrap_or(total) });
@@ -239,60 +242,63 @@ impl Kernel for Sandwich<'_, '_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<S: Lanes>(mut self, _simd: S) {
+    fn run<S: Lanes>(self, _simd: S) {
+        // Vectors that hold the products of a row, and those of pairs of them.
+        match self.fits.plan.regressors {
+            0..=3 => self.run_with::<1, 1>(),
+            4..=5 => self.run_with::<1, 2>(),
+            6..=8 => self.run_with::<1, 5>(),
+            _ => self.run_with::<2, 17>(),
+        }
+    }
+}
+
+impl Sandwich<'_, '_, '_> {
+    #[inline(always)]
+    fn run_with<const V: usize, const P: usize>(mut self) {
         let (fits, plan, correlated) = (self.fits, self.fits.plan, self.bandwidth.rows);
         let (p, length) = (plan.regressors, plan.window - correlated + 1);
-        let (vectors, pairs) = (fits.vectors(), p * (p + 1) / 2);
+        let pairs = p * (p + 1) / 2;
         let first = self.rows.start.cast_signed() - plan.before.cast_signed();
         // Sums of neighbours are wanted from the block of the first window to the end of the block after that of the last one.
         let span = length.cast_signed();
         let begin = first.div_euclid(span) * span;
         let end = ((first + self.rows.len().cast_signed()).div_euclid(span) + 2) * span;
         let products = fits.products(begin..end + correlated.cast_signed());
-        let count = (end - begin).unsigned_abs();
-        let mut neighbours = vec![[0.0; WIDTH]; count * vectors];
-        let of_product = |row: isize, into: &mut [[f64; WIDTH]]| {
+        let mut neighbours = vec![[[0.0; WIDTH]; V]; (end - begin).unsigned_abs()];
+        let of_product = |row: isize| {
+            let mut found = [[0.0; WIDTH]; V];
             let place = usize::try_from(row - begin).ok();
-            match place.and_then(|place| products.values.get(place * vectors..(place + 1) * vectors)) {
-                Some(values) => into.copy_from_slice(values),
-                None => into.fill([0.0; WIDTH]),
+            if let Some(values) = place.and_then(|place| products.values.get(place * V..(place + 1) * V)) {
+                found.copy_from_slice(values);
             }
+            found
         };
-        let keep = |place: usize, suffix: &[[f64; WIDTH]], prefix: &[[f64; WIDTH]]| {
-            let into = &mut neighbours[place * vectors..][..vectors];
-            for ((into, suffix), prefix) in into.iter_mut().zip(suffix).zip(prefix) {
-                for ((into, suffix), prefix) in into.iter_mut().zip(suffix).zip(prefix) {
-                    *into = suffix + prefix;
-                }
-            }
-        };
-        sliding_sums(vectors, correlated, begin..end, of_product, keep);
-        let square = |row: isize, into: &mut [[f64; WIDTH]]| {
-            let of = &neighbours[(row - begin).unsigned_abs() * vectors..][..vectors];
-            let mut pair = 0;
+        sliding_sums(correlated, begin..end, of_product, |place, sum| neighbours[place] = sum);
+        let square = |row: isize| {
+            let of = &neighbours[(row - begin).unsigned_abs()];
+            let (mut found, mut pair) = ([[0.0; WIDTH]; P], 0);
             for i in 0..p {
                 for k in i..p {
-                    into[pair / WIDTH][pair % WIDTH] = of[i / WIDTH][i % WIDTH] * of[k / WIDTH][k % WIDTH];
+                    found[pair / WIDTH][pair % WIDTH] = of[i / WIDTH][i % WIDTH] * of[k / WIDTH][k % WIDTH];
                     pair += 1;
                 }
             }
+            found
         };
         let mut tile = vec![[0.0; TILE]; pairs];
         let (last, windows) = (self.rows.len() - 1, first..first + self.rows.len().cast_signed());
-        let finish = |place: usize, suffix: &[[f64; WIDTH]], prefix: &[[f64; WIDTH]]| {
-            for (pair, tile) in tile.iter_mut().enumerate() {
-                let (vector, lane) = (pair / WIDTH, pair % WIDTH);
-                tile[place % TILE] = suffix[vector][lane] + prefix[vector][lane];
+        let finish = |place: usize, sum: [[f64; WIDTH]; P]| {
+            for (tile, sum) in tile.iter_mut().zip(sum.as_flattened()) {
+                tile[place % TILE] = *sum;
             }
             if place % TILE == TILE - 1 || place == last {
                 self.write(place - place % TILE..place + 1, &tile, &products);
             }
         };
-        sliding_sums(pairs.div_ceil(WIDTH), length, windows, square, finish);
+        sliding_sums(length, windows, square, finish);
     }
-}
 
-impl Sandwich<'_, '_, '_> {
     /// Writes the errors of some windows of the piece from the sums of squares of each.
     #[inline(always)]
     fn write(&mut self, places: Range<usize>, sums: &[[f64; TILE]], products: &RowProducts) {
@@ -306,12 +312,13 @@ impl Sandwich<'_, '_, '_> {
         for (scale, row) in scale.iter_mut().zip(rows.clone()) {
             *scale = self.scale(row, products);
         }
+        let kept: Vec<f64> = self.bandwidth.kept.iter().map(|kept| kept.sqrt().recip()).collect();
         for a in 0..p {
             let mut variance = [0.0; TILE];
             for b in 0..p {
                 let mut inner = [0.0; TILE];
                 for c in 0..p {
-                    let kept = 1.0 / (self.bandwidth.kept[b] * self.bandwidth.kept[c]).sqrt();
+                    let kept = kept[b] * kept[c];
                     let (of, sum) = (&self.fits.normal[pair(c, a)][rows.clone()], &sums[pair(b, c)]);
                     for ((inner, of), sum) in inner.iter_mut().zip(of).zip(sum) {
                         *inner += kept * of * sum;
@@ -354,44 +361,38 @@ impl Sandwich<'_, '_, '_> {
 
 /// Sums of `length` rows from each of some rows on, as a suffix of one block and a prefix of the next. `row` gives a row.
 #[inline(always)]
-fn sliding_sums(
-    vectors: usize,
+fn sliding_sums<const V: usize>(
     length: usize,
     wanted: Range<isize>,
-    row: impl Fn(isize, &mut [[f64; WIDTH]]),
-    mut give: impl FnMut(usize, &[[f64; WIDTH]], &[[f64; WIDTH]]),
+    row: impl Fn(isize) -> [[f64; WIDTH]; V],
+    mut give: impl FnMut(usize, [[f64; WIDTH]; V]),
 ) {
+    let add = |one: &[[f64; WIDTH]; V], other: &[[f64; WIDTH]; V]| {
+        let mut sum = *one;
+        for (sum, other) in sum.as_flattened_mut().iter_mut().zip(other.as_flattened()) {
+            *sum += other;
+        }
+        sum
+    };
     let span = length.cast_signed();
-    let mut suffixes = vec![[0.0; WIDTH]; (length + 1) * vectors];
-    let mut prefix = vec![[0.0; WIDTH]; vectors];
-    let mut one = vec![[0.0; WIDTH]; vectors];
+    let mut suffixes = vec![[[0.0; WIDTH]; V]; length];
     let mut block = wanted.start.div_euclid(span) * span;
     while block < wanted.end {
-        suffixes[length * vectors..].fill([0.0; WIDTH]);
-        for offset in (0..length).rev() {
-            row(block + offset.cast_signed(), &mut one);
-            let (into, after) = suffixes[offset * vectors..(offset + 2) * vectors].split_at_mut(vectors);
-            for ((into, after), one) in into.iter_mut().zip(after).zip(&one) {
-                for ((into, after), one) in into.iter_mut().zip(after).zip(one) {
-                    *into = *after + one;
-                }
-            }
+        let mut suffix = [[0.0; WIDTH]; V];
+        for (offset, kept) in suffixes.iter_mut().enumerate().rev() {
+            suffix = add(&suffix, &row(block + offset.cast_signed()));
+            *kept = suffix;
         }
-        prefix.fill([0.0; WIDTH]);
-        for offset in 0..length {
+        let mut prefix = [[0.0; WIDTH]; V];
+        for (offset, suffix) in suffixes.iter().enumerate() {
             let place = block + offset.cast_signed();
             if place >= wanted.end {
                 break;
             }
             if place >= wanted.start {
-                give((place - wanted.start).unsigned_abs(), &suffixes[offset * vectors..][..vectors], &prefix);
+                give((place - wanted.start).unsigned_abs(), add(suffix, &prefix));
             }
-            row(place + span, &mut one);
-            for (prefix, one) in prefix.iter_mut().zip(&one) {
-                for (prefix, one) in prefix.iter_mut().zip(one) {
-                    *prefix += one;
-                }
-            }
+            prefix = add(&prefix, &row(place + span));
         }
         block += span;
     }
@@ -405,13 +406,8 @@ mod tests {
     fn sums_slide_over_blocks_from_any_row_on() {
         for (length, wanted) in [(1, -3..4_isize), (4, -7..9), (5, 0..1), (3, 2..20)] {
             let mut found = Vec::new();
-            sliding_sums(
-                1,
-                length,
-                wanted.clone(),
-                |row, into| into[0] = [row as f64; WIDTH],
-                |place, suffix, prefix| found.push((place, suffix[0][3] + prefix[0][3])),
-            );
+            let row = |row: isize| [[row as f64; WIDTH]];
+            sliding_sums(length, wanted.clone(), row, |place, sum| found.push((place, sum[0][3])));
             let expected = |(place, first): (usize, isize)| {
                 (place, (first..first + length.cast_signed()).map(|row| row as f64).sum::<f64>())
             };

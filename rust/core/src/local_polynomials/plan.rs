@@ -102,6 +102,11 @@ impl LocalPolynomials {
         &self.options
     }
 
+    /// The polynomials of a window.
+    pub(crate) fn basis(&self) -> &Basis {
+        &self.basis
+    }
+
     /// Number of orders in play: one more than the highest.
     #[must_use]
     pub fn orders(&self) -> usize {

@@ -1,0 +1,162 @@
+"""Samples that are missing or have weights: windows that hold any are fitted on what is there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident import _core
+from tvident._status import Status
+
+Array = npt.NDArray[np.float64]
+
+_FEWEST = 3
+"""Samples that leave a choice of order."""
+
+
+@dataclass(frozen=True)
+class Incomplete:
+    r"""What is left out, and what windows must hold.
+
+    Parameters
+    ----------
+    omit : bool
+        Samples that are no numbers are left out.
+    weights : ndarray, shape (\*, n), optional
+    longest_gap : int
+        Samples; windows do not reach across longer gaps.
+    least : int
+        Samples that a window must hold.
+    """
+
+    omit: bool
+    weights: Array | None
+    longest_gap: int
+    least: int
+
+    def plain(self, samples: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return samples whose windows are not to be fitted if they hold what is no number."""
+        return samples if self.weights is None else np.where(self.weights > 0, samples, 0)
+
+
+@dataclass
+class Filled:
+    """Estimates of all windows, and the standard errors of those that lack samples."""
+
+    derivatives: Array
+    order: npt.NDArray[np.uint8]
+    status: npt.NDArray[np.uint16]
+    sigma: Array
+    errors: Callable[[], Array]
+
+
+# Arguments of the call, and what they are checked by.
+def incomplete_given(
+    nan_policy: str,
+    weights: npt.ArrayLike | None,
+    max_gap: int | str | None,
+    min_observations: int | None,
+    *,
+    shape: tuple[int, ...],
+    length: int,
+    period: float,
+    axis: int,
+) -> Incomplete | None:
+    """Return what is left out, as it was asked for; None where windows are to be whole."""
+    if nan_policy != "omit" and weights is None:
+        for name, value in (("max_gap", max_gap), ("min_observations", min_observations)):
+            if value is not None:
+                raise ValueError(
+                    f"{name} must go with nan_policy='omit' or weights; got {value!r} with {nan_policy!r}; give one of them, or no {name}"
+                )
+        return None
+    longest = length // 2
+    if max_gap is not None:
+        longest = arguments.window_length("max_gap", max_gap, period, odd=False)
+    least = (length + 1) // 2
+    if min_observations is not None:
+        least = arguments.whole_number("min_observations", min_observations, least=_FEWEST, most=length)
+    given, is_one = None, False
+    if weights is not None:
+        is_one = arguments.any_array("weights", weights).ndim == 1
+        given = arguments.weights("weights", weights, (shape[axis],) if is_one else shape)
+    if given is not None:
+        leading = [extent for place, extent in enumerate(shape) if place != axis % len(shape)]
+        last = given if is_one else np.moveaxis(given, axis, -1)
+        given = np.broadcast_to(last, (*leading, shape[axis]))
+    return Incomplete(nan_policy == "omit", given, longest, least)
+
+
+def check_whole_windows(*, automatic: bool, selection: str, loss: str) -> None:
+    """Check what does not go with missing samples."""
+    wrong = [
+        ("window_length", "a length", "'auto'", automatic),
+        ("selection", "'window'", repr(selection), selection != "window"),
+        ("loss", "'squares'", repr(loss), loss != "squares"),
+    ]
+    for name, right, got, is_wrong in wrong:
+        if is_wrong:
+            raise ValueError(
+                f"{name} must be {right} where samples are left out or have weights (nan_policy='omit', weights=); got {got}; "
+                f"give {right}, or repair the samples first"
+            )
+
+
+def filled(
+    core_plan: _core.LocalPolynomials,
+    estimates: _core.LocalEstimates,
+    samples: npt.NDArray[Any],
+    incomplete: Incomplete,
+    *,
+    step: int,
+    workers: int | None,
+) -> Filled:
+    """Return estimates with those of windows that lack samples, or whose samples have weights."""
+    derivatives, order, status, sigma = estimates.derivatives, estimates.order, estimates.status, estimates.sigma
+    leading = samples.shape[:-1]
+    errors: list[tuple[Any, Array]] = []
+    for index in np.ndindex(leading):
+        weight = None if incomplete.weights is None else incomplete.weights[index]
+        lost = status[index] & Status.INVALID != 0
+        wanted = lost if weight is None else np.ones_like(lost) if incomplete.omit else ~lost
+        places = np.flatnonzero(wanted)
+        if not places.size:
+            continue
+        there = np.isfinite(samples[index]) & (True if weight is None else weight > 0)
+        found = core_plan.estimate_incomplete(
+            np.ascontiguousarray(samples[index]),
+            (places * step).tolist(),
+            _parts(there, incomplete.longest_gap),
+            incomplete.least,
+            weights=None if weight is None else weight.tolist(),
+            workers=workers,
+        )
+        derivatives[(slice(None), *index, places)] = found[0]
+        order[(*index, places)], status[(*index, places)], sigma[(*index, places)] = found[2], found[3], found[4]
+        # A polynomial of a lower order has no such derivative: zero without an error is no estimate of it.
+        unknown = np.arange(derivatives.shape[0])[:, None] > found[2]
+        errors.append(((slice(None), *index, places), np.where(unknown, np.nan, found[1])))
+
+    def standard_errors() -> Array:
+        computed = core_plan.errors(incomplete.plain(samples), step=step, workers=workers)
+        for place, values in errors:
+            computed[place] = values
+        return computed
+
+    return Filled(derivatives, order, status, sigma, standard_errors)
+
+
+def _parts(there: npt.NDArray[np.bool_], longest_gap: int) -> list[tuple[int, int]]:
+    """Return the parts of a record between gaps that are longer, first and end of each."""
+    held = np.flatnonzero(there)
+    if not held.size:
+        return []
+    wide = np.flatnonzero(np.diff(held) - 1 > longest_gap)
+    begins = [0 if held[0] <= longest_gap else held[0], *held[wide + 1]]
+    last = there.size if there.size - 1 - held[-1] <= longest_gap else held[-1] + 1
+    return [(int(begin), int(end)) for begin, end in zip(begins, [*(held[wide] + 1), last], strict=True)]

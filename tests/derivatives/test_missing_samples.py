@@ -1,0 +1,182 @@
+"""Windows that lack samples are fitted on what is there, and no others change."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import tvident
+from tvident import Status
+
+Array = npt.NDArray[np.float64]
+
+# Legendre polynomials at arbitrary places of a window: a design of condition up to 1e3 here, times rounding, times derivatives' gains.
+ROUNDING = 1e-8
+
+
+def design(places: Array, length: int, order: int, derivative: int = 0) -> Array:
+    """Return Legendre polynomials on the window, or their derivatives by the sample number."""
+    scale = 2 / length
+    columns = []
+    for degree in range(order + 1):
+        one = np.polynomial.Legendre.basis(degree)
+        columns.append((one.deriv(derivative) if derivative else one)(places * scale) * scale**derivative)
+    return np.stack(columns, axis=1)
+
+
+def fitted(
+    y: Array, weights: Array, sample: int, length: int, order: int | None, highest: int
+) -> tuple[Array, float, int]:
+    """Fit the window around a sample by least squares of what has weight: derivatives, noise and order."""
+    first = min(max(sample - length // 2, 0), y.size - length)
+    rows = np.arange(first, first + length)
+    rows = rows[(weights[rows] > 0) & np.isfinite(y[rows])]
+    root = np.sqrt(weights[rows])
+    best = (np.inf, np.zeros(0), 0.0, 0)
+    for n in range(highest + 1) if order is None else [order]:
+        if rows.size < n + 3:
+            continue
+        x = design((rows - sample).astype(float), length, n)
+        found = np.linalg.lstsq(x * root[:, None], y[rows] * root, rcond=None)[0]
+        rss = float(np.sum((root * (y[rows] - x @ found)) ** 2))
+        k, m = n + 1, rows.size
+        score = m * np.log(rss) + 2 * k + 2 * k * (k + 1) / (m - k - 1)
+        if score < best[0]:
+            values = [float((design(np.zeros(1), length, n, d) @ found)[0]) for d in range(3)]
+            best = (score, np.array(values), float(np.sqrt(rss / (m - n - 1))), n)
+    return best[1], best[2], best[3]
+
+
+@given(
+    seed=st.integers(0, 2**32),
+    length=st.sampled_from([9, 21, 51]),
+    order=st.sampled_from([2, 3, 4]),
+    lost=st.sampled_from([0.01, 0.1, 0.3]),
+    weighted=st.booleans(),
+)
+def test_every_window_is_the_least_squares_of_what_it_holds(
+    seed: int, length: int, order: int, lost: float, *, weighted: bool
+) -> None:
+    generator = np.random.default_rng(seed)
+    n = 140
+    y = np.sin(np.arange(n) / 9) + 0.1 * generator.standard_normal(n)
+    weights = generator.uniform(0.2, 3, n) if weighted else np.ones(n)
+    missing = generator.random(n) < lost
+    holed = np.where(missing & (np.arange(n) % 2 == 0), np.nan, np.where(missing, np.inf, y))
+    options: dict[str, Any] = {"order": order, "max_gap": n, "min_observations": order + 3}
+    found = tvident.fit_local_polynomials(
+        holed, length, nan_policy="omit", weights=weights if weighted else None, **options
+    )
+    for sample in range(n):
+        first = min(max(sample - length // 2, 0), n - length)
+        rows = np.arange(first, first + length)
+        held = rows[~missing[rows]]
+        status = Status(int(found.status[sample]))
+        if held.size < order + 3:
+            assert Status.INVALID in status
+            assert np.isnan(found.derivatives[:, sample]).all()
+            continue
+        if not missing[rows].any() and not weighted:
+            continue
+        assert (Status.GAP in status) == bool(missing[rows].any())
+        assert (Status.EDGE in status) == (sample - first != length // 2)
+        expected, sigma, _ = fitted(holed, np.where(missing, 0, weights), sample, length, order, order)
+        size = np.abs(expected) + found.stderr[:, sample]
+        assert (np.abs(found.derivatives[:, sample] - expected) <= ROUNDING * size).all()
+        assert found.sigma[sample] == pytest.approx(sigma, rel=1e-6)
+
+
+def test_windows_without_gaps_keep_their_bits_and_errors() -> None:
+    generator = np.random.default_rng(0)
+    y = np.sin(np.arange(4000) / 40) + 1e-3 * generator.standard_normal(4000)
+    clean = tvident.fit_local_polynomials(y, 101)
+    holed = y.copy()
+    holed[[700, 1500, 1501, 1502, 3990]] = np.nan
+    holed[2000:2060] = np.nan
+    found = tvident.fit_local_polynomials(holed, 101, nan_policy="omit")
+    plain = tvident.fit_local_polynomials(holed, 101)
+    whole = plain.status & Status.INVALID == 0
+    for name in ("derivatives", "stderr", "order", "sigma", "status"):
+        np.testing.assert_array_equal(getattr(found, name)[..., whole], getattr(plain, name)[..., whole])
+    # A gap of more than half a window splits the record: nothing in it, and windows end there as at an end.
+    assert (found.status[2000:2060] == Status.INVALID | Status.GAP).all()
+    assert (found.status[1999 - 40 : 2000] & (Status.EDGE | Status.GAP | Status.INVALID) == Status.EDGE).all()
+    assert np.isfinite(found.derivatives[:, :2000]).all()
+    assert np.isfinite(found.stderr[:, 2060:]).all()
+    assert (found.status[650:751] & Status.GAP != 0).all()
+    near = np.r_[655:690, 1510:1550]
+    assert np.abs(found.derivatives[2, near] - clean.derivatives[2, near]).max() < 4 * found.stderr[2, near].max()
+    some = tvident.fit_local_polynomials(holed, 101, nan_policy="omit", step=7)
+    np.testing.assert_allclose(some.derivatives, found.derivatives[:, ::7], rtol=1e-9, equal_nan=True)
+    two = tvident.fit_local_polynomials(np.stack([holed, y], axis=1), 101, nan_policy="omit", axis=0)
+    np.testing.assert_array_equal(two.derivatives[..., 0], found.derivatives)
+    np.testing.assert_array_equal(two.derivatives[..., 1], clean.derivatives)
+
+
+@pytest.mark.parametrize(("order", "least"), [(4, 0.92), (None, 0.8)])
+def test_errors_hold_beside_gaps(order: int | None, least: float) -> None:
+    over = []
+    for seed in range(15):
+        generator = np.random.default_rng(seed)
+        t = np.arange(600)
+        y = np.sin(t / 60) + 0.02 * generator.standard_normal(600)
+        lost = generator.random(600) < 0.05
+        found = tvident.fit_local_polynomials(
+            np.where(lost, np.nan, y), 61, order=order, max_order=8, nan_policy="omit"
+        )
+        some = slice(60, -60, 30)
+        truth = np.stack([np.sin(t / 60), np.cos(t / 60) / 60, -np.sin(t / 60) / 3600])
+        over.append(((found.derivatives - truth) / found.stderr)[:, some])
+        assert (found.status & Status.INVALID == 0).all()
+        assert (
+            np.isnan(found.stderr) == ((np.arange(3)[:, None] > found.order) & (found.status & Status.GAP != 0))
+        ).all()
+    # Of 15 · 16 windows and three derivatives: 0.95 ± 0.01. That an order was chosen is not in its error.
+    scores = np.abs(np.concatenate(over, axis=1))
+    assert least < np.mean(scores[np.isfinite(scores)] < 1.96) < 0.98
+
+
+def test_weights_say_how_much_samples_count() -> None:
+    generator = np.random.default_rng(1)
+    noise = np.where(generator.random(1500) < 0.3, 30.0, 1.0)
+    t = np.arange(1500)
+    y = 100 * np.sin(t / 50) + noise * generator.standard_normal(1500)
+    weights = 1 / noise**2
+    plain = tvident.fit_local_polynomials(y, 101, order=4)
+    found = tvident.fit_local_polynomials(y, 101, order=4, weights=weights)
+    error = [np.sqrt(np.mean((fit.derivatives[0] - 100 * np.sin(t / 50))[60:-60] ** 2)) for fit in (plain, found)]
+    assert error[1] < error[0] / 5
+    assert abs(np.sqrt(np.mean(found.sigma**2)) - 1) < 0.1
+    ones = tvident.fit_local_polynomials(y, 101, order=4, weights=np.ones(1500))
+    np.testing.assert_allclose(ones.derivatives[:, 60:-60], plain.derivatives[:, 60:-60], rtol=1e-7, atol=1e-9)
+    left_out = np.where(np.arange(1500) == 700, 0.0, 1.0)
+    spoiled = np.where(left_out > 0, y, np.nan)
+    omitted = tvident.fit_local_polynomials(spoiled, 101, order=4, nan_policy="omit")
+    weighted = tvident.fit_local_polynomials(spoiled, 101, order=4, weights=left_out)
+    np.testing.assert_allclose(weighted.derivatives[:, 680:720], omitted.derivatives[:, 680:720], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        ({"window_length": "auto"}, "window_length must be a length where samples are left out .*; got 'auto'"),
+        ({"selection": "pooled"}, "selection must be 'window' where .*; got 'pooled'"),
+        ({"loss": "huber"}, "loss must be 'squares' where .*; got 'huber'"),
+        (
+            {"nan_policy": "propagate", "max_gap": 3},
+            "max_gap must go with nan_policy='omit' or weights; got 3 with 'prop",
+        ),
+        ({"min_observations": 12}, "min_observations must be at most 11; got 12"),
+        ({"weights": np.ones(99)}, "one value for every sample, shape \\(100,\\); got shape \\(99,\\)"),
+        ({"nan_policy": "drop"}, "nan_policy must be 'omit', 'propagate' or 'raise'; got 'drop'"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(call: dict[str, Any], message: str) -> None:
+    good: dict[str, Any] = {"window_length": 11, "nan_policy": "omit"}
+    with pytest.raises(ValueError, match=message):
+        tvident.fit_local_polynomials(np.sin(np.arange(100.0)), **(good | call))
