@@ -98,7 +98,7 @@ def test_methods_are_compared(tmp_path: Path) -> None:
     assert 0 < table["rise_time"][0] < 0.02
     assert table["vaf"][0] > 99
     assert "tvident" in found.summary()
-    rig.save(tmp_path / "rig.csv")
+    tvident.simulate_torsional_rig(duration=2.0).save(tmp_path / "rig.csv")
     words = [
         "compare",
         str(tmp_path / "rig.csv"),

@@ -34,7 +34,7 @@ def of_time(family: str, size: int, samples: int) -> Basis:
 
 
 @pytest.mark.parametrize(("role", "parts"), [("inertia", 2), ("damping", 1), ("stiffness", 0)])
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(seed=st.integers(0, 1000), half=st.integers(14, 25), exponent=st.integers(5, 8), size=st.integers(1, 4))
 def test_columns_are_the_integrals_of_products(
     role: str, parts: int, seed: int, half: int, exponent: int, size: int
