@@ -32,8 +32,10 @@ __all__ = [
     "fuse",
     "identify",
     "instructions",
+    "merged_rows",
     "noise",
     "noise_coherence",
+    "parts_of_quantisation",
     "quantisation_step",
     "respond",
     "rolling_least_squares",
@@ -70,6 +72,7 @@ class LocalPolynomials:
         *,
         ends: bool = True,
         step: int = 1,
+        part: tuple[tuple[int, int], tuple[int, int], int] | None = None,
         workers: int | None = None,
         progress: Callable[[int, int], object] | None = None,
     ) -> LocalEstimates: ...
@@ -91,7 +94,12 @@ class LocalPolynomials:
         npt.NDArray[np.float64],
     ]: ...
     def errors(
-        self, samples: npt.NDArray[np.number], *, step: int = 1, workers: int | None = None
+        self,
+        samples: npt.NDArray[np.number],
+        *,
+        step: int = 1,
+        part: tuple[tuple[int, int], tuple[int, int], int] | None = None,
+        workers: int | None = None,
     ) -> npt.NDArray[np.float64]: ...
     def scores(self, samples: npt.NDArray[np.number], sample: int) -> npt.NDArray[np.float64]: ...
 
@@ -106,6 +114,8 @@ class Motions:
         *,
         channels: Sequence[npt.NDArray[np.number] | None] = ...,
         noise: Sequence[tuple[float, int, Sequence[tuple[int, float]]]] | None = None,
+        parts: Sequence[tuple[int, int]] | None = None,
+        samples: int = 0,
     ) -> Motions: ...
 
 @final
@@ -188,6 +198,15 @@ class StrongForm:
     def __new__(
         cls, plan: LocalPolynomials, regression_window: int, *, filter_torque: bool = False, linear: bool = False
     ) -> StrongForm: ...
+    def around(self, first: int, end: int, samples: int) -> tuple[int, int]: ...
+    def parts_of_scatter(self, samples: int) -> list[tuple[int, int]]: ...
+    def scatter(self, motions: Motions, *, workers: int | None = None) -> list[list[float]]: ...
+    def rows(
+        self, motions: Motions, wanted: tuple[int, int], *, workers: int | None = None
+    ) -> tuple[list[float], int, int]: ...
+    def constants(
+        self, motions: Motions, rows: tuple[list[float], int, int], *, workers: int | None = None
+    ) -> tuple[list[float], list[float], float, float] | None: ...
 
 @final
 class Unknown:
@@ -326,7 +345,13 @@ def fuse(
     others: Sequence[tuple[int, float, npt.NDArray[np.number]]],
     delta: float,
 ) -> npt.NDArray[np.float64]: ...
-def quantisation_step(samples: npt.NDArray[np.number]) -> float: ...
+def parts_of_quantisation(samples: int) -> list[tuple[int, int]]: ...
+def merged_rows(
+    one: tuple[list[float], int, int], other: tuple[list[float], int, int]
+) -> tuple[list[float], int, int]: ...
+def quantisation_step(
+    samples: npt.NDArray[np.number], *, parts: Sequence[tuple[int, int]] | None = None, of: int = 0
+) -> float: ...
 def identify(
     motions: Motions,
     kinds: Sequence[str],
@@ -339,6 +364,7 @@ def identify(
     masks: Sequence[npt.NDArray[np.bool_]] | None = None,
     propagate: bool = False,
     step: int = 1,
+    wanted: tuple[int, int] | None = None,
     diagnose: bool = True,
     instrument: npt.NDArray[np.number] | None = None,
     workers: int | None = None,

@@ -3,5 +3,20 @@
 from tvident._identify.call import identify
 from tvident._identify.criterion import aicc, effective_observations
 from tvident._identify.methods import Method, StrongForm, WeakForm
+from tvident._identify.parts import Held, Long, Rows, Span, requested
+from tvident._identify.settings import Request
 
-__all__ = ["Method", "StrongForm", "WeakForm", "aicc", "effective_observations", "identify"]
+__all__ = [
+    "Held",
+    "Long",
+    "Method",
+    "Request",
+    "Rows",
+    "Span",
+    "StrongForm",
+    "WeakForm",
+    "aicc",
+    "effective_observations",
+    "identify",
+    "requested",
+]

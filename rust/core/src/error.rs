@@ -66,6 +66,12 @@ pub enum Error {
         /// Length of the window, samples.
         window_length: usize,
     },
+    /// Numbers of a part of a record that only the whole gives.
+    #[error(
+        "a part of a record gives what is windowed in strong form without lag, mask or filtered torque; got other unknowns or settings; identify the \
+         whole record"
+    )]
+    OnlyOfWholeRecord,
     /// No regressors, or more than the kernels hold.
     #[error("the number of regressors must be between 1 and {most}; got {regressors}; drop or combine some")]
     Regressors {

@@ -8,8 +8,10 @@ use pyo3::prelude::*;
 use tvident::exec::workers as threads;
 use tvident::identify::{
     Identification as Found, InstrumentTest, Kind, Method, Options, StrongForm as Strong, Task, WeakForm as Weak,
-    identify_all, identify_with_instruments,
+    around, constants_of_rows, identify_all, identify_with_instruments, parts_of_scatter, rows_of_part,
+    scatter_of_windows,
 };
+use tvident::least_squares::Summary;
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
@@ -68,6 +70,98 @@ impl StrongForm {
     fn new(plan: Py<LocalPolynomials>, regression_window: usize, filter_torque: bool, linear: bool) -> Self {
         Self { plan, regression_window, filter_torque, linear }
     }
+
+    /// The samples that must be there for windows around those from one to before another, in a record of so many.
+    fn around(&self, first: usize, end: usize, samples: usize) -> (usize, usize) {
+        let needed = around(&self.settings(), &(first..end), samples);
+        (needed.start, needed.end)
+    }
+
+    /// The parts of a record of so many samples that `scatter` looks at.
+    fn parts_of_scatter(&self, samples: usize) -> Vec<(usize, usize)> {
+        parts_of_scatter(&self.settings(), samples).into_iter().map(|part| (part.start, part.end)).collect()
+    }
+
+    /// By how much standard errors of windowed unknowns exceed those of ordinary least squares, for every record and unknown.
+    #[pyo3(signature = (motions, *, workers=None))]
+    fn scatter(&self, py: Python<'_>, motions: &Motions, workers: Option<NonZeroUsize>) -> PyResult<Vec<Vec<f64>>> {
+        let (form, motions) = (self.settings(), motions.all()?);
+        let mut factors = Vec::new();
+        watched(py, None, |watch| {
+            let each = motions.iter().map(|motion| scatter_of_windows(&form, motion, threads(workers), watch));
+            factors = each.collect::<Result<_, _>>()?;
+            Ok(())
+        })?;
+        Ok(factors)
+    }
+
+    /// The triangular factor of the equations around some samples of one record: its numbers row by row, its columns, and how many rows it stands for.
+    #[pyo3(signature = (motions, wanted, *, workers=None))]
+    fn rows(
+        &self,
+        py: Python<'_>,
+        motions: &Motions,
+        wanted: (usize, usize),
+        workers: Option<NonZeroUsize>,
+    ) -> PyResult<Rows> {
+        let (form, motions) = (self.settings(), motions.all()?);
+        let motion = motions.first().ok_or_else(|| PyValueError::new_err("there is no record"))?;
+        let mut found = None;
+        watched(py, None, |watch| {
+            found = Some(rows_of_part(&form, motion, wanted.0..wanted.1, threads(workers), watch)?.numbers());
+            Ok(())
+        })?;
+        found.ok_or_else(|| PyValueError::new_err("there are no rows"))
+    }
+
+    /// Values, covariance, residual and condition number of the constants that rows tell; None where they do not.
+    #[pyo3(signature = (motions, rows, *, workers=None))]
+    fn constants(
+        &self,
+        py: Python<'_>,
+        motions: &Motions,
+        rows: Rows,
+        workers: Option<NonZeroUsize>,
+    ) -> PyResult<Option<(Vec<f64>, Vec<f64>, f64, f64)>> {
+        let (form, motions, rows) = (self.settings(), motions.all()?, summary(&rows)?);
+        let motion = motions.first().ok_or_else(|| PyValueError::new_err("there is no record"))?;
+        let mut found = None;
+        watched(py, None, |watch| {
+            found = constants_of_rows(&form, motion, &rows, threads(workers), watch)?;
+            Ok(())
+        })?;
+        Ok(found.map(|found| (found.values, found.covariance, found.residual, found.condition)))
+    }
+}
+
+/// The numbers of a triangular factor, its columns, and how many rows it stands for.
+type Rows = (Vec<f64>, usize, usize);
+
+fn summary((numbers, columns, rows): &Rows) -> PyResult<Summary> {
+    Summary::of_numbers(numbers, *columns, *rows).ok_or_else(|| PyValueError::new_err("this is no triangular factor"))
+}
+
+/// The factor of the rows of two together.
+#[pyfunction]
+pub(crate) fn merged_rows(one: Rows, other: Rows) -> PyResult<Rows> {
+    let (mut all, other) = (summary(&one)?, summary(&other)?);
+    if one.1 != other.numbers().1 {
+        return Err(PyValueError::new_err("rows to be merged have the same columns"));
+    }
+    all.add(&other);
+    Ok(all.numbers())
+}
+
+impl StrongForm {
+    /// The settings as the core has them.
+    fn settings(&self) -> Strong<'_> {
+        Strong {
+            derivatives: self.plan.get().plan(),
+            regression_window: self.regression_window,
+            filter_torque: self.filter_torque,
+            linear: self.linear,
+        }
+    }
 }
 
 /// One of the two forms.
@@ -87,21 +181,17 @@ impl Form<'_> {
                     .map(Method::Weak)
                     .ok_or_else(|| PyValueError::new_err("weak form needs settings of every record"))
             }
-            Self::Strong(form) => Ok(Method::Strong(Strong {
-                derivatives: form.plan.get().plan(),
-                regression_window: form.regression_window,
-                filter_torque: form.filter_torque,
-                linear: form.linear,
-            })),
+            Self::Strong(form) => Ok(Method::Strong(form.settings())),
         }
     }
 }
 
 /// Identifies every record. `kinds` holds one word an unknown, `lag` the samples by which the torque of each record comes late (None: estimate
-/// it), `angle_zero` the angle about which each spring is relaxed (None: zero, unless the record contradicts that), `masks` one mask a record, `instrument` a channel a record that noise does not reach.
+/// it), `angle_zero` the angle about which each spring is relaxed (None: zero, unless the record contradicts that), `masks` one mask a record, `instrument` a channel a record that noise does not reach, `wanted` the
+/// first sample that numbers are wanted at and the one after the last.
 #[pyfunction]
 #[pyo3(signature = (
-    motions, kinds, method, *, delta, lag, angle_zero=None, quantisation=None, masks=None, propagate=false, step=1, diagnose=true, instrument=None, workers=None, progress=None
+    motions, kinds, method, *, delta, lag, angle_zero=None, quantisation=None, masks=None, propagate=false, step=1, wanted=None, diagnose=true, instrument=None, workers=None, progress=None
 ))]
 pub(crate) fn identify<'py>(
     py: Python<'py>,
@@ -115,6 +205,7 @@ pub(crate) fn identify<'py>(
     masks: Option<Vec<Bound<'py, PyUntypedArray>>>,
     propagate: bool,
     step: usize,
+    wanted: Option<(usize, usize)>,
     diagnose: bool,
     instrument: Option<&Bound<'py, PyUntypedArray>>,
     workers: Option<NonZeroUsize>,
@@ -127,6 +218,7 @@ pub(crate) fn identify<'py>(
         quantisation,
         propagate,
         step,
+        wanted: wanted.map(|(first, end)| first..end),
         diagnose,
         instructions: Instructions::current(),
     };

@@ -37,7 +37,7 @@ mod _core {
     #[pymodule_export]
     use crate::identified::{Identification, OutsideMask, Scan, Suspect, Unknown};
     #[pymodule_export]
-    use crate::identify::{StrongForm, WeakForm, identify};
+    use crate::identify::{StrongForm, WeakForm, identify, merged_rows};
     #[pymodule_export]
     use crate::local_polynomials::{LocalEstimates, LocalPolynomials};
     #[pymodule_export]
@@ -45,7 +45,7 @@ mod _core {
     #[pymodule_export]
     use crate::motions::Motions;
     #[pymodule_export]
-    use crate::noise::{Noise, fuse, noise, noise_coherence, quantisation_step};
+    use crate::noise::{Noise, fuse, noise, noise_coherence, parts_of_quantisation, quantisation_step};
     #[pymodule_export]
     use crate::respond::{Responses, respond};
     #[pymodule_export]

@@ -1,6 +1,7 @@
 //! `tvident._core.LocalPolynomials`: the plan of local polynomials in every window.
 
 use std::num::NonZeroUsize;
+use std::ops::Range;
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -15,8 +16,28 @@ use tvident::record::Samples;
 use tvident::simd::Instructions;
 
 use crate::arrays::zeros;
-use crate::records::records;
+use crate::records::{placed, records};
 use crate::watch::watched;
+
+/// Records and where what is known of them goes.
+type Work<'a, 'b> = Vec<(&'a dyn Samples, Estimates<'b>)>;
+
+/// A part of longer records: the samples that are wanted, those that are held, and all that there are.
+#[derive(Clone, Copy, FromPyObject)]
+pub(crate) struct Part {
+    #[pyo3(item(0))]
+    wanted: (usize, usize),
+    #[pyo3(item(1))]
+    held: (usize, usize),
+    #[pyo3(item(2))]
+    of: usize,
+}
+
+impl Part {
+    fn wanted(self) -> Range<usize> {
+        self.wanted.0..self.wanted.1
+    }
+}
 
 /// What was estimated in every window.
 #[pyclass(frozen, get_all, module = "tvident._core")]
@@ -107,30 +128,40 @@ impl LocalPolynomials {
     }
 
     /// Estimates along the last axis; without `ends` only where a full window lies around a sample.
-    #[pyo3(signature = (samples, *, ends=true, step=1, workers=None, progress=None))]
+    /// Where `samples` hold a part of longer records, `part` says which samples are wanted, which are held, and how many there are.
+    #[pyo3(signature = (samples, *, ends=true, step=1, part=None, workers=None, progress=None))]
     fn estimate(
         &self,
         samples: &Bound<'_, PyUntypedArray>,
         ends: bool,
         step: usize,
+        part: Option<Part>,
         workers: Option<NonZeroUsize>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<LocalEstimates> {
         let plan = &self.plan;
-        self.outputs(samples, ends, step, progress, |work, watch| plan.run(work, ends, threads(workers), watch))
+        let wanted = part.map(Part::wanted);
+        let fill = |work: Work<'_, '_>, watch: &mut Watch<'_>| {
+            plan.run_part(work, ends, wanted.as_ref(), threads(workers), watch)
+        };
+        self.outputs(samples, (ends, step, part), progress, fill)
     }
 
     /// Standard errors of the derivatives, one row each, along the last axis.
-    #[pyo3(signature = (samples, *, step=1, workers=None))]
+    #[pyo3(signature = (samples, *, step=1, part=None, workers=None))]
     fn errors<'py>(
         &self,
         samples: &Bound<'py, PyUntypedArray>,
         step: usize,
+        part: Option<Part>,
         workers: Option<NonZeroUsize>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let plan = &self.plan;
-        let outputs =
-            self.outputs(samples, true, step, None, |work, watch| plan.errors(work, threads(workers), watch))?;
+        let wanted = part.map(Part::wanted);
+        let fill = |work: Work<'_, '_>, watch: &mut Watch<'_>| {
+            plan.errors_of_part(work, wanted.as_ref(), threads(workers), watch)
+        };
+        let outputs = self.outputs(samples, (true, step, part), None, fill)?;
         Ok(outputs.derivatives.into_bound(samples.py()))
     }
 
@@ -193,18 +224,23 @@ impl LocalPolynomials {
     fn outputs(
         &self,
         samples: &Bound<'_, PyUntypedArray>,
-        ends: bool,
-        step: usize,
+        (ends, step, part): (bool, usize, Option<Part>),
         progress: Option<&Bound<'_, PyAny>>,
-        fill: impl FnOnce(Vec<(&dyn Samples, Estimates<'_>)>, &mut Watch<'_>) -> Result<(), Error> + Send,
+        fill: impl FnOnce(Work<'_, '_>, &mut Watch<'_>) -> Result<(), Error> + Send,
     ) -> PyResult<LocalEstimates> {
         let py = samples.py();
         let options = self.plan.options();
-        let records = records(samples)?;
-        let first = if ends { 0 } else { self.plan.before_centre() };
-        let length = samples.shape().last().copied().unwrap_or(0);
+        let held = part.map(|part| [part.held]);
+        let records = placed(samples, held.as_ref().map(<[_; 1]>::as_slice), part.map_or(0, |part| part.of))?;
+        let before = if ends { 0 } else { self.plan.before_centre() };
+        let length = part.map_or(samples.shape().last().copied().unwrap_or(0), |part| part.of);
         let covered = if ends { length } else { (length + 1).saturating_sub(options.window_length) };
-        let count = covered.div_ceil(step);
+        let all = Elements { first: before, step };
+        let elements = match part {
+            Some(part) => all.of(part.wanted()),
+            None => 0..covered.div_ceil(step),
+        };
+        let (first, count) = (all.sample(elements.start), elements.len());
 
         let mut shape = samples.shape().to_vec();
         if let Some(last) = shape.last_mut() {
@@ -226,7 +262,7 @@ impl LocalPolynomials {
             let mut orders = order.as_slice_mut()?.chunks_exact_mut(count.max(1));
             let mut statuses = status.as_slice_mut()?.chunks_exact_mut(count.max(1));
             let mut sigmas = sigma.as_slice_mut()?.chunks_exact_mut(count.max(1));
-            let mut work: Vec<(&dyn Samples, Estimates<'_>)> = Vec::with_capacity(records.len());
+            let mut work: Work<'_, '_> = Vec::with_capacity(records.len());
             for (index, record) in records.iter().enumerate() {
                 let own = rows.iter_mut().skip(index).step_by(records.len());
                 let estimates = Estimates {

@@ -5,15 +5,15 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tvident::equation::{BuiltInTerm, Coefficient, Measured, Motion, Term};
 use tvident::noise::{AngleNoise, Beside};
-use tvident::record::Samples;
+use tvident::record::{Placed, Samples};
 
-use crate::records::{StridedSamples, records};
+use crate::records::{StridedSamples, placed};
 
 /// A coefficient of the equation of motion, or a term of it.
 enum Held {
     Unknown,
     Number(f64),
-    Records(Vec<StridedSamples>),
+    Records(Vec<Placed<StridedSamples>>),
     BuiltIn(&'static BuiltInTerm),
 }
 
@@ -42,10 +42,10 @@ type NoiseOfAngle = (f64, usize, Vec<(usize, f64)>);
 /// The equation of motion of every record of some arrays, which have time along their last axis.
 #[pyclass(frozen, module = "tvident._core")]
 pub(crate) struct Motions {
-    angles: Vec<StridedSamples>,
-    torques: Vec<StridedSamples>,
+    angles: Vec<Placed<StridedSamples>>,
+    torques: Vec<Placed<StridedSamples>>,
     /// What was recorded of the motion, where the angle was made of it, and its noise.
-    channels: [Option<Vec<StridedSamples>>; 3],
+    channels: [Option<Vec<Placed<StridedSamples>>>; 3],
     noises: Option<Vec<AngleNoise>>,
     coefficients: [Held; 3],
     terms: Vec<Held>,
@@ -57,9 +57,10 @@ pub(crate) struct Motions {
 impl Motions {
     /// Coefficients are unknown (None), a number, or an array; terms are a name or an array. Where the angle was made of the recorded channels
     /// (angle, velocity, acceleration), `noise` holds for every record the variance of the first of them, how often that was integrated, and
-    /// which derivatives were fused with it, with their noise.
+    /// which derivatives were fused with it, with their noise. Where arrays hold parts of longer records, `parts` says which samples, one after the
+    /// other, and `samples` how many a record has.
     #[new]
-    #[pyo3(signature = (angle, torque, coefficients, terms, *, channels=[None, None, None], noise=None))]
+    #[pyo3(signature = (angle, torque, coefficients, terms, *, channels=[None, None, None], noise=None, parts=None, samples=0))]
     fn new(
         angle: &Bound<'_, PyUntypedArray>,
         torque: &Bound<'_, PyUntypedArray>,
@@ -67,7 +68,10 @@ impl Motions {
         terms: Vec<Bound<'_, PyAny>>,
         channels: [Option<Bound<'_, PyUntypedArray>>; 3],
         noise: Option<Vec<NoiseOfAngle>>,
+        parts: Option<Vec<(usize, usize)>>,
+        samples: usize,
     ) -> PyResult<Self> {
+        let records = |array: &Bound<'_, PyUntypedArray>| placed(array, parts.as_deref(), samples);
         let held = |given: &Bound<'_, PyAny>| {
             if given.is_none() {
                 return Ok(Held::Unknown);
@@ -104,8 +108,9 @@ impl Motions {
     /// The equation of motion of one record.
     fn motion<'a>(&'a self, record: usize) -> PyResult<Motion<'a>> {
         let [inertia, damping, stiffness] = &self.coefficients;
-        let measured =
-            |channel: &'a Option<Vec<StridedSamples>>| channel.as_ref().map(|channel| one(channel, record)).transpose();
+        let measured = |channel: &'a Option<Vec<Placed<StridedSamples>>>| {
+            channel.as_ref().map(|channel| one(channel, record)).transpose()
+        };
         let [angle, velocity, acceleration] = &self.channels;
         Ok(Motion {
             angle: one(&self.angles, record)?,
@@ -132,7 +137,7 @@ fn angle_noise((variance, integrations, beside): NoiseOfAngle) -> AngleNoise {
 }
 
 /// The samples that belong to one record.
-fn one(records: &[StridedSamples], record: usize) -> PyResult<&dyn Samples> {
+fn one(records: &[Placed<StridedSamples>], record: usize) -> PyResult<&dyn Samples> {
     let found = records.get(record).map(|samples| samples as &dyn Samples);
     found.ok_or_else(|| {
         PyValueError::new_err("angle, torque, known parameters and terms need as many records as each other")

@@ -6,11 +6,12 @@ use pyo3::prelude::*;
 use tvident::Error;
 use tvident::noise::{
     Beside, fuse as core_fuse, noise as core_noise, noise_coherence as core_coherence, quantisation_step as core_step,
+    searched,
 };
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
-use crate::records::records;
+use crate::records::{placed, records};
 use crate::watch::watched;
 
 /// Records between two looks at the watch: each takes well below a millisecond.
@@ -72,9 +73,16 @@ fn values(record: &Bound<'_, PyUntypedArray>) -> PyResult<Vec<f64>> {
 }
 
 /// The smallest quantisation step of the records along the last axis, zero where one of them has none.
+///
+/// Where they hold parts of longer records, `parts` says which samples, and `of` how many there are.
 #[pyfunction]
-pub(crate) fn quantisation_step(samples: &Bound<'_, PyUntypedArray>) -> PyResult<f64> {
-    let records = records(samples)?;
+#[pyo3(signature = (samples, *, parts=None, of=0))]
+pub(crate) fn quantisation_step(
+    samples: &Bound<'_, PyUntypedArray>,
+    parts: Option<Vec<(usize, usize)>>,
+    of: usize,
+) -> PyResult<f64> {
+    let records = placed(samples, parts.as_deref(), of)?;
     let mut least = f64::INFINITY;
     watched(samples.py(), None, |watch| {
         for (done, record) in records.iter().enumerate() {
@@ -89,6 +97,12 @@ pub(crate) fn quantisation_step(samples: &Bound<'_, PyUntypedArray>) -> PyResult
         Ok(())
     })?;
     Ok(if records.is_empty() { 0.0 } else { least })
+}
+
+/// The parts of a record of so many samples that its quantisation step is found in.
+#[pyfunction]
+pub(crate) fn parts_of_quantisation(samples: usize) -> Vec<(usize, usize)> {
+    searched(samples).map(|part| (part.start, part.end)).collect()
 }
 
 /// The coherence of the noise of angle and torque of every record, above the motion; `variances` are those of the angles' noise.

@@ -3,10 +3,10 @@
 use std::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, AtomicU64, Ordering};
 
 use numpy::{PyArrayDescr, PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods, dtype};
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use tvident::Error;
-use tvident::record::Samples;
+use tvident::record::{Placed, Samples};
 
 use crate::watch::exception;
 
@@ -167,6 +167,21 @@ pub(crate) fn records(array: &Bound<'_, PyUntypedArray>) -> PyResult<Vec<Strided
         Number::Bool => Err(unknown(&array.dtype())),
         number => strided(array, number),
     }
+}
+
+/// All records of an array, which holds them as a whole or some parts of each: the first sample of every part and the one after its last.
+pub(crate) fn placed(
+    array: &Bound<'_, PyUntypedArray>,
+    parts: Option<&[(usize, usize)]>,
+    samples: usize,
+) -> PyResult<Vec<Placed<StridedSamples>>> {
+    let held = records(array)?.into_iter();
+    let Some(parts) = parts else { return Ok(held.map(Placed::whole).collect()) };
+    let parts: Vec<_> = parts.iter().map(|&(first, end)| first..end).collect();
+    let places = held.map(|held| Placed::new(held, &parts, samples));
+    places
+        .collect::<Option<_>>()
+        .ok_or_else(|| PyValueError::new_err("parts of a record are apart, in order, and what the array holds"))
 }
 
 fn strided(array: &Bound<'_, PyUntypedArray>, number: Number) -> PyResult<Vec<StridedSamples>> {

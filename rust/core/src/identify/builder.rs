@@ -276,6 +276,7 @@ impl<'a> Identify<'a> {
             quantisation: self.quantisation,
             propagate: false,
             step: self.step,
+            wanted: None,
             diagnose: true,
             instructions: Instructions::current(),
         };

@@ -1,5 +1,7 @@
 //! The options of identification.
 
+use std::ops::Range;
+
 use crate::equation::motion::Motion;
 use crate::identify::kinds::Kind;
 use crate::local_polynomials::plan::LocalPolynomials;
@@ -91,6 +93,9 @@ pub struct Options {
     pub propagate: bool,
     /// Every how many samples numbers are wanted.
     pub step: usize,
+    /// The samples at which numbers are wanted; all if `None`. Windows of the strong form alone can be had for a part of a record: of the rest only
+    /// what [`around`](crate::identify::around()) says need be there, and standard errors are those of ordinary least squares.
+    pub wanted: Option<Range<usize>>,
     /// Whether to look for terms that may have been left out.
     pub diagnose: bool,
     /// Vector instructions.

@@ -40,11 +40,14 @@ pub fn identify_all(
     let mut found: Vec<Option<Identification>> = tasks.iter().map(|_| None).collect();
     // Asked once, since the answer may need every sample of the record.
     let routes: Vec<Pieces> = tasks.iter().map(|task| route(task, options, watch)).collect::<Result<_, Error>>()?;
+    if options.wanted.is_some() && routes.iter().any(|route| *route != Pieces::Windowed) {
+        return Err(Error::OnlyOfWholeRecord);
+    }
     for pieces in [Pieces::Windowed, Pieces::Constant] {
         for (form, places) in together(tasks, &routes, pieces) {
             let motions: Vec<Motion<'_>> = places.iter().map(|&place| tasks[place].motion.clone()).collect();
             let each = if pieces == Pieces::Windowed {
-                windows(form, &motions, options.step, workers, watch)?
+                windows(form, &motions, options, workers, watch)?
             } else {
                 constants(form, &motions, options.step, workers, watch)?
             };
@@ -110,7 +113,10 @@ fn route(task: &Task<'_>, options: &Options, watch: &mut Watch<'_>) -> Result<Pi
     let all = |kind: Kind| is_plain && kinds.iter().all(|one| *one == kind);
     Ok(if all(Kind::Constant) {
         Pieces::Constant
-    } else if all(Kind::Windowed) && !form.linear && (options.propagate || holes(&task.motion, watch)?.is_empty()) {
+    } else if all(Kind::Windowed)
+        && !form.linear
+        && (options.propagate || options.wanted.is_some() || holes(&task.motion, watch)?.is_empty())
+    {
         Pieces::Windowed
     } else {
         Pieces::Whole

@@ -11,4 +11,4 @@ pub(crate) mod side_by_side;
 pub(crate) mod stacked_qr;
 
 pub use plan::{Alignment, Equations, HALF_OF_THE_DIGITS, Regressions, RollingLeastSquares};
-pub use stacked_qr::SharedParameters;
+pub use stacked_qr::{SharedParameters, Summary};

@@ -9,7 +9,7 @@ use faer::{Mat, MatRef};
 
 /// The triangular factor `R` of rows `[a | b]`, and their number.
 #[derive(Clone, Debug)]
-pub(crate) struct Summary {
+pub struct Summary {
     factor: Mat<f64>,
     rows: usize,
 }
@@ -29,8 +29,26 @@ pub struct SharedParameters {
 
 impl Summary {
     /// The summary of no rows, with so many columns, the right-hand side included.
-    pub(crate) fn empty(columns: usize) -> Self {
+    #[must_use]
+    pub fn empty(columns: usize) -> Self {
         Self { factor: Mat::zeros(0, columns), rows: 0 }
+    }
+
+    /// The numbers that it consists of: those of the factor row by row, how many columns it has, and how many rows it stands for.
+    #[must_use]
+    pub fn numbers(&self) -> (Vec<f64>, usize, usize) {
+        let (count, columns) = (self.factor.nrows(), self.factor.ncols());
+        let numbers = (0..count * columns).map(|place| self.factor[(place / columns, place % columns)]).collect();
+        (numbers, columns, self.rows)
+    }
+
+    /// The summary that consists of these numbers, or `None` if they are none.
+    #[must_use]
+    pub fn of_numbers(numbers: &[f64], columns: usize, rows: usize) -> Option<Self> {
+        let is_factor = columns > 0 && numbers.len().is_multiple_of(columns) && numbers.len() / columns <= columns;
+        let count = numbers.len() / columns.max(1);
+        is_factor
+            .then(|| Self { factor: Mat::from_fn(count, columns, |row, column| numbers[row * columns + column]), rows })
     }
 
     /// Summarises rows given column by column.
@@ -94,7 +112,7 @@ impl Summary {
     }
 
     /// Adds the rows of another summary.
-    pub(crate) fn add(&mut self, other: &Self) {
+    pub fn add(&mut self, other: &Self) {
         let (above, below) = (self.factor.nrows(), other.factor.nrows());
         let stacked = Mat::from_fn(above + below, self.factor.ncols(), |row, column| {
             if row < above { self.factor[(row, column)] } else { other.factor[(row - above, column)] }

@@ -259,6 +259,21 @@ impl LocalPolynomials {
         workers: NonZeroUsize,
         watch: &mut Watch<'_>,
     ) -> Result<(), Error> {
+        self.run_part(records, ends, None, workers, watch)
+    }
+
+    /// The same at the samples of a part, to which every element of the outputs must belong.
+    ///
+    /// # Errors
+    /// As [`LocalPolynomials::run`].
+    pub fn run_part(
+        &self,
+        records: Vec<(&dyn Samples, Estimates<'_>)>,
+        ends: bool,
+        part: Option<&Range<usize>>,
+        workers: NonZeroUsize,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Error> {
         let work = |(record, samples, mut estimates): Part<'_, '_>, scratch: &mut PolynomialScratch| {
             let outcome = if ends {
                 self.estimate(record, samples, &mut estimates, scratch)
@@ -267,7 +282,7 @@ impl LocalPolynomials {
             };
             debug_assert_eq!(outcome, Ok(()), "the lengths of all records were checked");
         };
-        let pieces = self.pieces(records, ends, Wanted::Derivatives)?;
+        let pieces = self.pieces(records, ends, part, Wanted::Derivatives)?;
         self.ask_for_scratch(Wanted::Derivatives, workers.get().min(pieces.len()))?;
         pool::run(pieces, workers, || self.scratch(), work, watch)
     }
@@ -285,11 +300,25 @@ impl LocalPolynomials {
         workers: NonZeroUsize,
         watch: &mut Watch<'_>,
     ) -> Result<(), Error> {
+        self.errors_of_part(records, None, workers, watch)
+    }
+
+    /// The same at the samples of a part, to which every element of the outputs must belong.
+    ///
+    /// # Errors
+    /// As [`LocalPolynomials::run`].
+    pub fn errors_of_part(
+        &self,
+        records: Vec<(&dyn Samples, Estimates<'_>)>,
+        part: Option<&Range<usize>>,
+        workers: NonZeroUsize,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Error> {
         let work = |(record, samples, mut estimates): Part<'_, '_>, scratch: &mut PolynomialScratch| {
             let outcome = self.everywhere(record, samples, Wanted::Errors, &mut estimates, scratch);
             debug_assert_eq!(outcome, Ok(()), "the lengths of all records were checked");
         };
-        let pieces = self.pieces(records, true, Wanted::Errors)?;
+        let pieces = self.pieces(records, true, part, Wanted::Errors)?;
         self.ask_for_scratch(Wanted::Errors, workers.get().min(pieces.len()))?;
         pool::run(pieces, workers, || self.scratch_for(Wanted::Errors), work, watch)
     }
@@ -311,18 +340,20 @@ impl LocalPolynomials {
         &self,
         records: Vec<(&'a dyn Samples, Estimates<'b>)>,
         ends: bool,
+        part: Option<&Range<usize>>,
         wanted: Wanted,
     ) -> Result<Vec<Piece<Part<'a, 'b>>>, Error> {
         let least = self.selector(wanted).map_or(0, Selector::least_piece);
         let mut pieces = Vec::new();
         for (record, mut estimates) in records {
             let (windows, before) = (self.windows(record.len())?, self.before_centre());
-            let samples = if ends { 0..record.len() } else { before..before + windows };
+            let there = if ends { 0..record.len() } else { before..before + windows };
+            let samples = part.map_or(there.clone(), |part| part.start.max(there.start)..part.end.min(there.end));
             let piece = PIECE.max(least).next_multiple_of(self.engine.stride(estimates.elements.step));
             let mut first = samples.start;
             while first < samples.end {
                 let next = (first.max(before) - before) / piece * piece + piece + before;
-                let end = if next >= before + windows { samples.end } else { next };
+                let end = if next >= before + windows { samples.end } else { next.min(samples.end) };
                 let part = estimates.split_off_before(end);
                 pieces.push(Piece { size: end - first, content: (record, first..end, part) });
                 first = end;

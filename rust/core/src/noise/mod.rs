@@ -16,4 +16,4 @@ pub use colour::coloured_noise;
 pub use correlated::CorrelatedNoise;
 pub use defects::Defect;
 pub use fused::{AngleNoise, Beside, fuse};
-pub use quantisation::quantisation_step;
+pub use quantisation::{quantisation_step, searched};

@@ -1,5 +1,7 @@
 //! The quantisation step of a channel, found from the differences of neighbouring samples.
 
+use std::ops::Range;
+
 use crate::record::samples::{Samples, is_usable};
 use crate::record::subsample::stretches;
 
@@ -20,6 +22,11 @@ const PRECISIONS: [f64; 2] = [8.0 * f32::EPSILON as f64, 8.0 * f64::EPSILON];
 /// The least ratio of a step to rounding.
 const ABOVE_ROUNDING: f64 = 64.0;
 
+/// The parts of a record of so many samples whose differences are searched.
+pub fn searched(samples: usize) -> impl Iterator<Item = Range<usize>> {
+    stretches(samples, MOST_DIFFERENCES, STRETCHES)
+}
+
 /// The step that all differences of neighbouring samples are multiples of, or zero where there is none.
 ///
 /// The cost is negligible: at most 4096 differences are searched.
@@ -28,7 +35,7 @@ pub fn quantisation_step(record: &dyn Samples) -> f64 {
     let mut differences = Vec::new();
     let mut largest = 0.0_f64;
     let mut samples = Vec::new();
-    for places in stretches(record.len(), MOST_DIFFERENCES, STRETCHES) {
+    for places in searched(record.len()) {
         samples.resize(places.len(), 0.0);
         record.read(places.start, &mut samples);
         let usable = samples.iter().filter(|value| is_usable(**value));

@@ -3,7 +3,9 @@
 pub(crate) mod buffer;
 pub(crate) mod delayed;
 pub(crate) mod derived;
+pub(crate) mod placed;
 pub(crate) mod samples;
 pub(crate) mod subsample;
 
+pub use placed::Placed;
 pub use samples::Samples;

@@ -20,6 +20,9 @@ use crate::regression::limits::status_of;
 use crate::regression::newey_west::enlarge;
 use crate::status::Status;
 
+/// No sample has an element there.
+const NOWHERE: Elements = Elements { first: 0, step: 1 };
+
 /// Identifies parameters that are the same over the whole record, one result per record, or `None` if they are not determined.
 ///
 /// `derivatives` must be a plan for the value and the first two derivatives. Equations that hold a value that is no number are left
@@ -35,13 +38,29 @@ pub(crate) fn identify_constant(
     watch: &mut Watch<'_>,
 ) -> Result<Vec<Option<SharedParameters>>, Error> {
     let motions: Vec<Motion<'_>> = records.iter().map(|(motion, _)| motion.clone()).collect();
+    let records = records.into_iter().map(|(motion, identified)| (0..motion.angle.len(), identified)).collect();
+    let totals = summaries(derivatives, &motions, records, workers, watch)?;
+    solved(derivatives, &motions, &totals, workers, watch)
+}
+
+/// The summary of the rows of some samples of every record. Of the outputs, which belong to these samples, only orders and statuses are written.
+///
+/// # Errors
+/// As [`identify_constant`].
+pub(crate) fn summaries(
+    derivatives: &LocalPolynomials,
+    motions: &[Motion<'_>],
+    records: Vec<(Range<usize>, Identified<'_>)>,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<Summary>, Error> {
     let unknowns = motions.first().map_or(0, Motion::unknowns);
     let mut pieces = Vec::new();
     let mut owners = Vec::new();
-    for (index, (motion, (_, mut identified))) in motions.iter().zip(records).enumerate() {
+    for (index, (motion, (wanted, mut identified))) in motions.iter().zip(records).enumerate() {
         derivatives.windows(motion.angle.len())?;
-        for first in (0..motion.angle.len()).step_by(PIECE) {
-            let samples = first..motion.angle.len().min(first + PIECE);
+        for first in (wanted.start - wanted.start % PIECE..wanted.end).step_by(PIECE) {
+            let samples = first.max(wanted.start)..wanted.end.min(first + PIECE);
             let part = identified.split_off_before(samples.end);
             pieces.push(Piece { size: samples.len(), content: (pieces.len(), motion, samples, part) });
             owners.push(index);
@@ -70,7 +89,42 @@ pub(crate) fn identify_constant(
             totals[owner].add(summary);
         }
     }
-    solved(derivatives, &motions, &totals, workers, watch)
+    Ok(totals)
+}
+
+/// The summary of the equations around some samples of a record of which [`around`](super::parts::around()) them is there. Summaries of parts add up
+/// to that of the record.
+///
+/// # Errors
+/// If the record is shorter than the window of the polynomials, or the watch cancels.
+pub fn rows_of_part(
+    form: &StrongForm<'_>,
+    motion: &Motion<'_>,
+    wanted: Range<usize>,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<Summary, Error> {
+    let nowhere =
+        Identified { regressions: Regressions { elements: NOWHERE, ..Regressions::default() }, order: &mut [] };
+    let motions = [motion.clone()];
+    let mut found = summaries(form.derivatives, &motions, vec![(wanted, nowhere)], workers, watch)?;
+    Ok(found.pop().unwrap_or_else(|| Summary::empty(motion.unknowns() + 1)))
+}
+
+/// The constants that the rows of a record tell, with the correlation of neighbouring rows in their standard errors. Of the record only
+/// [`parts_of_scatter`](super::parts::parts_of_scatter) need be there. `None` if they are not determined.
+///
+/// # Errors
+/// If the record is shorter than the window of the polynomials, or the watch cancels.
+pub fn constants_of_rows(
+    form: &StrongForm<'_>,
+    motion: &Motion<'_>,
+    rows: &Summary,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<Option<SharedParameters>, Error> {
+    let solved = solved(form.derivatives, &[motion.clone()], std::slice::from_ref(rows), workers, watch)?;
+    Ok(solved.into_iter().next().flatten())
 }
 
 /// The constants of every record, with the correlation of neighbouring rows in their standard errors.

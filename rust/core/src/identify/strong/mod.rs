@@ -2,6 +2,7 @@
 
 pub(crate) mod constant;
 pub(crate) mod general;
+pub(crate) mod parts;
 pub(crate) mod rows;
 pub(crate) mod scatter;
 pub(crate) mod streaming;

@@ -41,7 +41,7 @@ pub(crate) struct Track<'a> {
 
 /// By how much standard errors of windowed unknowns exceed those of ordinary least squares: one factor an unknown, in every record.
 ///
-/// The tracks hold what [`identify_windowed`] found at every sample. The factors are never less than one. Where
+/// The tracks hold what [`identify_parts`] found at every sample. The factors are never less than one. Where
 /// a record is too short for windows that share no equation they come from the correlation of the residuals. They cost well below a
 /// millisecond.
 ///
@@ -60,7 +60,7 @@ pub(crate) fn scatter(
     Ok(all)
 }
 
-/// Identifies as [`identify_windowed`] does, for outputs of which not every sample has an element, and returns
+/// Identifies some samples of every record as [`identify_parts`] does, for outputs of which not every sample has an element, and returns
 /// the factors of [`scatter`] as well: the windows that they need, 32 768 or so, are solved in the same go.
 ///
 /// # Errors
@@ -68,11 +68,16 @@ pub(crate) fn scatter(
 pub(crate) fn identify_with_scatter(
     derivatives: &LocalPolynomials,
     least_squares: &RollingLeastSquares,
-    records: Vec<(Motion<'_>, Identified<'_>)>,
+    records: Vec<(Motion<'_>, Range<usize>, Identified<'_>)>,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<Vec<f64>>, Error> {
-    let (motions, outputs): (Vec<Motion<'_>>, Vec<Identified<'_>>) = records.into_iter().unzip();
+    let mut motions = Vec::new();
+    let mut outputs = Vec::new();
+    for (motion, wanted, identified) in records {
+        motions.push(motion);
+        outputs.push((wanted, identified));
+    }
     let taken = |motion: &Motion<'_>| -> Vec<Taken> {
         let compared = Compared::new(derivatives, least_squares.window(), motion.angle.len());
         let stretches = compared.stretches().into_iter();
@@ -81,7 +86,7 @@ pub(crate) fn identify_with_scatter(
     let mut taken: Vec<Vec<Taken>> = motions.iter().map(taken).collect();
     let mut parts = Vec::new();
     for ((motion, identified), taken) in motions.iter().zip(outputs).zip(&mut taken) {
-        parts.push((motion, (0..motion.angle.len(), identified)));
+        parts.push((motion, identified));
         parts.extend(taken.iter_mut().map(|taken| (motion, (taken.around.clone(), taken.outputs()))));
     }
     identify_parts(derivatives, least_squares, parts, workers, watch)?;
@@ -184,6 +189,11 @@ impl Taken {
             }
         }
     }
+}
+
+/// Samples whose windows are compared in a record of so many.
+pub(crate) fn compared_windows(derivatives: &LocalPolynomials, window: usize, samples: usize) -> Vec<Range<usize>> {
+    Compared::new(derivatives, window, samples).stretches()
 }
 
 /// The scatter of windows around every sample of a record over their standard errors, or `None` if the record is too short.

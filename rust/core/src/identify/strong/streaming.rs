@@ -137,27 +137,14 @@ pub(crate) fn equations(plan: &LocalPolynomials, samples: usize) -> Range<usize>
     before..(samples + before + 1).saturating_sub(plan.options().window_length).max(before)
 }
 
-/// Identifies parameters in a window of equations around every sample: (3) and (4) of the paper, in parallel over all records.
+/// Identifies parameters in a window of equations around some samples of every record: (3) and (4) of the paper, in parallel over all records. All
+/// outputs belong to these samples.
 ///
 /// `derivatives` must be a plan for the value and the first two derivatives, `least_squares` one with the unknowns of the motions.
-/// Standard errors are those of ordinary least squares; [`scatter`](crate::scatter()) says by what they are too small.
+/// Standard errors are those of ordinary least squares; [`scatter`](super::scatter::scatter()) says by what they are too small.
 ///
 /// # Errors
 /// If a record is shorter than the window of the polynomials, or the watch cancels.
-pub(crate) fn identify_windowed(
-    derivatives: &LocalPolynomials,
-    least_squares: &RollingLeastSquares,
-    records: Vec<(Motion<'_>, Identified<'_>)>,
-    workers: NonZeroUsize,
-    watch: &mut Watch<'_>,
-) -> Result<(), Error> {
-    let whole = |(motion, identified): (Motion<'_>, _)| (0..motion.angle.len(), identified);
-    let motions: Vec<Motion<'_>> = records.iter().map(|(motion, _)| motion.clone()).collect();
-    let parts = motions.iter().zip(records).map(|(motion, record)| (motion, whole(record))).collect();
-    identify_parts(derivatives, least_squares, parts, workers, watch)
-}
-
-/// The same for some samples of each record, which all outputs belong to.
 pub(crate) fn identify_parts(
     derivatives: &LocalPolynomials,
     least_squares: &RollingLeastSquares,
@@ -218,6 +205,21 @@ pub(crate) fn finish(chunk: &Chunk, samples: Range<usize>, part: &mut Identified
     }
 }
 
+/// Rows farther apart than this hardly share noise: polynomials weigh the middle half of their windows.
+fn correlated(derivatives: &LocalPolynomials) -> usize {
+    derivatives.options().window_length / 2
+}
+
+/// The rows that [`variance_inflations`] looks at in a record of so many samples.
+pub(crate) fn rows_of_variance_inflations(
+    derivatives: &LocalPolynomials,
+    samples: usize,
+) -> impl Iterator<Item = Range<usize>> {
+    let rows = equations(derivatives, samples);
+    let most = MOST_ROWS.max(4 * STRETCHES * correlated(derivatives));
+    stretches(rows.len(), most, STRETCHES).map(move |part| rows.start + part.start..rows.start + part.end)
+}
+
 /// By how much the standard errors of constants exceed those of ordinary least squares, from stretches of a long record.
 pub(crate) fn variance_inflations(
     derivatives: &LocalPolynomials,
@@ -225,12 +227,9 @@ pub(crate) fn variance_inflations(
     chunk: &mut Chunk,
 ) -> Result<Vec<f64>, Error> {
     let rows = equations(derivatives, motion.angle.len());
-    // Polynomials weigh the middle half of their windows: beyond that derivatives hardly share noise.
-    let reach = derivatives.options().window_length / 2;
-    let most = MOST_ROWS.max(4 * STRETCHES * reach);
-    let mut stretched = Stretched::new(motion.unknowns() + 1, reach);
-    for stretch in stretches(rows.len(), most, STRETCHES) {
-        chunk.fill(derivatives, motion, rows.start + stretch.start..rows.start + stretch.end)?;
+    let mut stretched = Stretched::new(motion.unknowns() + 1, correlated(derivatives));
+    for stretch in rows_of_variance_inflations(derivatives, motion.angle.len()) {
+        chunk.fill(derivatives, motion, stretch)?;
         stretched.push(&chunk.columns, |row| chunk.is_equation(row, &rows));
     }
     Ok(stretched.factors().unwrap_or_else(|| vec![1.0; motion.unknowns()]))

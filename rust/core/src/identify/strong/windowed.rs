@@ -7,9 +7,9 @@ use crate::error::Error;
 use crate::exec::huge_pages::zeros;
 use crate::exec::pool::Watch;
 use crate::identify::identification::{Covariance, Identification, Unknown};
-use crate::identify::options::StrongForm;
+use crate::identify::options::{Options, StrongForm};
 use crate::identify::strong::scatter::{Track, identify_with_scatter, scatter, slices};
-use crate::identify::strong::streaming::{Identified, identify_windowed, pairs};
+use crate::identify::strong::streaming::{Identified, identify_parts, pairs};
 use crate::lanes::output::Elements;
 use crate::least_squares::plan::{Regressions, RollingLeastSquares};
 use crate::regression::limits::HARDLY_TOLD_APART;
@@ -66,7 +66,7 @@ impl Columns {
 pub(crate) fn windows(
     form: &StrongForm<'_>,
     motions: &[Motion<'_>],
-    step: usize,
+    options: &Options,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<Identification>, Error> {
@@ -74,16 +74,24 @@ pub(crate) fn windows(
     let (derivatives, unknowns, pairs) = (form.derivatives, first.unknowns(), pairs(first));
     let (rows, instructions) = (form.regression_window, derivatives.options().instructions);
     let least_squares = RollingLeastSquares::new(rows, unknowns, 1, pairs.clone(), HARDLY_TOLD_APART, instructions)?;
-    let wanted = |motion: &Motion<'_>| Columns::new(unknowns, pairs.len(), motion.angle.len().div_ceil(step));
-    let mut columns: Vec<Columns> = motions.iter().map(wanted).collect::<Result<_, _>>()?;
-    let outputs = columns.iter_mut().map(|columns| columns.outputs(Elements { first: 0, step }));
-    let records = motions.iter().cloned().zip(outputs).collect();
-    let factors = if step == 1 {
-        identify_windowed(derivatives, &least_squares, records, workers, watch)?;
+    let step = options.step;
+    let wanted = |motion: &Motion<'_>| options.wanted.clone().unwrap_or(0..motion.angle.len());
+    let elements =
+        Elements { first: options.wanted.as_ref().map_or(0, |wanted| wanted.start.next_multiple_of(step)), step };
+    let empty = |motion: &Motion<'_>| Columns::new(unknowns, pairs.len(), elements.of(wanted(motion)).len());
+    let mut columns: Vec<Columns> = motions.iter().map(empty).collect::<Result<_, _>>()?;
+    let outputs = columns.iter_mut().map(|columns| columns.outputs(elements));
+    let records: Vec<_> = motions.iter().zip(outputs).map(|(motion, out)| (motion, (wanted(motion), out))).collect();
+    let factors = if options.wanted.is_some() {
+        identify_parts(derivatives, &least_squares, records, workers, watch)?;
+        vec![vec![1.0; unknowns]; motions.len()]
+    } else if step == 1 {
+        identify_parts(derivatives, &least_squares, records, workers, watch)?;
         let found: Vec<_> = columns.iter().map(|columns| (slices(&columns.values), slices(&columns.stderr))).collect();
         let tracks = found.iter().map(|(values, errors)| Track { values, errors });
         scatter(derivatives, &least_squares, &motions.iter().cloned().zip(tracks).collect::<Vec<_>>())?
     } else {
+        let records = records.into_iter().map(|(motion, (wanted, out))| (motion.clone(), wanted, out)).collect();
         identify_with_scatter(derivatives, &least_squares, records, workers, watch)?
     };
     let numbers = unknowns_of(&first.coefficients, first.terms.len());
