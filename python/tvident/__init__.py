@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from tvident._files import FileRecording, read_recording
     from tvident._identify import StrongForm, WeakForm, identify
     from tvident._merged import Chain, Matrix, MergedIdentification
+    from tvident._in_pieces import FileIdentification, identify_file
     from tvident._plan import ExperimentPlan, plan_experiment
     from tvident._regression import RollingRegression, rolling_least_squares
     from tvident._results import ExpandedParameter, Identification, IdentifiedRecords, Scan, load
@@ -26,6 +27,7 @@ __all__ = [
     "ExpandedParameter",
     "Expansion",
     "ExperimentPlan",
+    "FileIdentification",
     "FileRecording",
     "Identification",
     "IdentifiedRecords",
@@ -43,6 +45,7 @@ __all__ = [
     "compare_models",
     "fit_local_polynomials",
     "identify",
+    "identify_file",
     "load",
     "plan_experiment",
     "read_recording",
@@ -60,6 +63,7 @@ _ROOMS = {
     "_identify": ("StrongForm", "WeakForm", "identify"),
     "_merged": ("Chain", "Matrix", "MergedIdentification"),
     "_plan": ("ExperimentPlan", "plan_experiment"),
+    "_in_pieces": ("FileIdentification", "identify_file"),
     "_regression": ("RollingRegression", "rolling_least_squares"),
     "_results": ("ExpandedParameter", "Identification", "IdentifiedRecords", "Scan", "load"),
     "_simulate": ("Recording", "simulate_torsional_rig"),

@@ -38,8 +38,11 @@ ROOMS = (
     "_plan",
     "_baselines",
     "baselines",
+    "_in_pieces",
+    "_dask",
     "recordings",  # doors: what users import by the room's name
     "figures",
+    "dask",
     "tvident",  # the front door
     "_commands",
     "_command_line",

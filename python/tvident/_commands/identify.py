@@ -12,6 +12,7 @@ import numpy as np
 
 from tvident._commands.channels import channels_in
 from tvident._commands.identification import identified, inputs
+from tvident._commands.in_pieces import identify_in_pieces
 from tvident._commands.named import named, with_velocity
 from tvident._commands.output import PICTURE, RESULTS, SETTINGS, check_outputs, give, save_figure
 from tvident._files import RESULT_ENDINGS, place_beside, replaced
@@ -26,10 +27,15 @@ def identify(
     plot: str | None,
     as_json: bool,  # noqa: FBT001 - click passes options by name
     explain: bool,  # noqa: FBT001 - likewise
+    in_pieces: bool,  # noqa: FBT001 - likewise
     **options: Any,
 ) -> None:
     """Identify inertia, damping and stiffness from the angle and torque in FILE."""
     options = named(options)
+    if in_pieces:
+        others = {"plot": plot, "json": as_json, "explain": explain}
+        identify_in_pieces(file, output, settings_output, others, options)
+        return
     outputs = {RESULTS: output, PICTURE: plot, SETTINGS: settings_output}
     if output is not None and Path(output).suffix not in RESULT_ENDINGS and (beside := place_beside(Path(output))):
         outputs["the settings beside results"] = str(beside)

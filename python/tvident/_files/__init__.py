@@ -5,12 +5,13 @@ from tvident._files.channels import Channels, FileError, FileWarning, channel, f
 from tvident._files.names import listed, printable
 from tvident._files.places import ENDINGS as TABLE_ENDINGS
 from tvident._files.places import check_apart, check_folder, check_place
-from tvident._files.recorded import FileRecording, read_recording, time_channels
+from tvident._files.recorded import FileRecording, is_time, read_recording, time_channels
 from tvident._files.recordings import read
 from tvident._files.replacement import replaced
 from tvident._files.results import ENDINGS as RESULT_ENDINGS
 from tvident._files.results import read_result, write_result
 from tvident._files.table import aligned, write_csv, write_table
+from tvident._files.text import copy_text
 
 __all__ = [
     "RESULT_ENDINGS",
@@ -24,7 +25,9 @@ __all__ = [
     "check_apart",
     "check_folder",
     "check_place",
+    "copy_text",
     "full_name",
+    "is_time",
     "listed",
     "place_beside",
     "printable",

@@ -145,10 +145,8 @@ class FileRecording(Mapping[str, Channel]):
     def time(self) -> npt.NDArray[np.float64] | None:
         """Time of every sample in seconds, shape (n,); None where the file has no channel of times."""
         for name, values in self._channels.items():
-            if values.ndim == 1 and values.size > 1 and _TIME.fullmatch(name):
-                unit = unit_of(values.unit)
-                if not values.unit or (unit is not None and unit.dimension == ROTARY.dimensions["time"]):
-                    return np.asarray(times_in_seconds(values), dtype=np.float64)
+            if values.ndim == 1 and values.size > 1 and is_time(name, values.unit):
+                return np.asarray(times_in_seconds(values), dtype=np.float64)
         return None
 
     def select(self, t0: float, t1: float) -> FileRecording:
@@ -212,6 +210,14 @@ class FileRecording(Mapping[str, Channel]):
             name if named_unit(name)[1] else with_unit(name, values.unit): values
             for name, values in self._channels.items()
         }
+
+
+def is_time(name: str, unit: str) -> bool:
+    """Return whether a channel of this name, with this unit or none, holds the times of samples."""
+    known = unit_of(unit)
+    return _TIME.fullmatch(name) is not None and (
+        not unit or (known is not None and known.dimension == ROTARY.dimensions["time"])
+    )
 
 
 def read_recording(path: str | Path) -> FileRecording:

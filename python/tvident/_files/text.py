@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
-from typing import TextIO, TypeVar
+from typing import IO, TextIO, TypeVar
 
 import numpy as np
 
@@ -85,7 +86,57 @@ def read_columns(file: TextIO, say: Say) -> Channels:
     return channels
 
 
+def copy_text(path: Path, rows: IO[bytes], say: Say) -> list[str | None]:
+    """Copy the columns of a text, row by row, as 64-bit floats; return their names, None where a column holds no numbers."""
+
+    def copy(encoding: str) -> list[str | None]:
+        with path.open(encoding=encoding) as file:
+            decimal = None
+            while True:
+                said: list[str] = []
+                file.seek(0)
+                rows.seek(0)
+                try:
+                    names = _copied(file, rows, decimal, said.append)
+                except OtherDecimalSignError as found:
+                    decimal = found.sign
+                    continue
+                rows.truncate()
+                for message in said:
+                    say(message)
+                return names
+
+    return _decoded(path, copy)
+
+
+def _copied(file: TextIO, copy: IO[bytes], decimal: str | None, say: Say) -> list[str | None]:
+    begun = _begun(file, decimal, say)
+    if begun is None:
+        raise FileError("it is empty; record again")
+    dialect, rows, parts = begun
+    for part in parts:
+        copy.write(np.ascontiguousarray(part).tobytes())
+    rows.finish()
+    for column in rows.times:
+        say(
+            f"column '{printable(dialect.names[column], 40)}' holds times of a clock: not read piece by piece; give sample_rate="
+        )
+    left_out = rows.dropped | set(rows.times)
+    return [None if column in left_out else name for column, name in enumerate(dialect.names)]
+
+
 def _read(file: TextIO, decimal: str | None, say: Say) -> Channels:
+    begun = _begun(file, decimal, say)
+    if begun is None:
+        return {}
+    dialect, rows, parts = begun
+    read = list(parts)
+    rows.finish()
+    return _columns(dialect, read, rows, say)
+
+
+def _begun(file: TextIO, decimal: str | None, say: Say) -> tuple[Dialect, Rows, Iterator[Numbers]] | None:
+    """Return how a text is written and its rows, piece by piece; None where it is empty."""
     head = file.read(_HEAD)
     rest = file.readline(_LONGEST_LINE) if head and not head.endswith("\n") else ""
     if len(rest) >= _LONGEST_LINE:
@@ -100,14 +151,13 @@ def _read(file: TextIO, decimal: str | None, say: Say) -> Channels:
     if dialect is None:
         if head.strip():
             raise FileError(f"holds no numbers; {mixed_line(lines)}{CURE}")
-        return {}
+        return None
     dialect = replace(dialect, decimal=decimal)
     rows = Rows(dialect, say)
     rows.skip(dialect.first)
-    parts = [rows.read("\n".join(lines[dialect.first :]))]
-    parts += [rows.read(piece) for piece in _pieces(file, head.count("\n"))]
-    rows.finish()
-    return _columns(dialect, parts, rows, say)
+    first = "\n".join(lines[dialect.first :])
+    pieces = chain([first], _pieces(file, head.count("\n")))
+    return dialect, rows, map(rows.read, pieces)
 
 
 def _refuse_long_line(place: int) -> None:

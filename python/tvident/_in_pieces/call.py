@@ -1,0 +1,218 @@
+"""The function ``identify_file``: a recording longer than memory, from file to file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tvident import _arguments as arguments
+from tvident import _core
+from tvident._equation import GivenTerm
+from tvident._files import check_apart, full_name, is_time
+from tvident._identify import Method
+from tvident._in_pieces.copied import copied
+from tvident._in_pieces.found import FileIdentification
+from tvident._in_pieces.given import Given
+from tvident._in_pieces.kept import Kept, mark_of
+from tvident._in_pieces.outputs import check_output
+from tvident._in_pieces.recorded import Recording, uniform, units_of
+from tvident._in_pieces.run import Asked, Run
+from tvident._in_pieces.sources import TEXT, Source, opened
+from tvident._units import Channel as Said
+from tvident._units import named_unit, times_in_seconds
+
+PIECE = 1 << 18
+"""Samples of a piece, about: what is computed of it fits into 100 MiB."""
+
+
+# All but the files are options, as users call it.
+def identify_file(
+    path: str | Path,
+    output: str | Path,
+    *,
+    angle: str,
+    torque: str,
+    sample_rate: float | None = None,
+    delta: float | None = None,
+    t: str | None = None,
+    angle_unit: str | None = None,
+    torque_unit: str | None = None,
+    method: Method = "auto",
+    inertia: str | float | None = None,
+    damping: str | float | None = None,
+    stiffness: str | float | None = None,
+    terms: Sequence[GivenTerm] | None = None,
+    lag: float | str | None = None,
+    quantisation: float | None = None,
+    nan_policy: arguments.RowPolicy = "omit",
+    step: int = 1,
+    settings: Mapping[str, Any] | None = None,
+    workers: int | None = None,
+    progress: arguments.Progress = None,
+) -> FileIdentification:
+    """Identify a recording that is longer than memory, from a file to a file, piece by piece.
+
+    What :func:`identify` does, with memory that does not grow: below 300 MiB for a day at 1 kHz. Pieces that are done are kept in a folder
+    beside the output, ``.NAME.tvident``: the same call goes on there after an interruption. The output appears when it is whole.
+
+    Parameters
+    ----------
+    path : str or Path
+        The recording: ``.npy`` (columns, or fields with names), ``.parquet``, ``.h5``, ``.zarr``, or text (``.csv``), which is copied once
+        to binary numbers beside the output.
+    output : str or Path
+        Where columns go, one row for every `step`-th sample: ``.npy`` (fields with names), ``.parquet``, ``.h5``, ``.zarr`` or ``.csv``.
+        All but ``.npy`` and ``.csv`` hold settings and constants as JSON too, under ``tvident``.
+    angle, torque : str
+        Names of the channels, of shape (n,), or their numbers from 0. Units are those of the file, or rad and N m.
+    sample_rate, delta : float, optional
+        Samples per second, or seconds from one to the next; by default from a channel of times.
+    t : str, optional
+        The channel of times, which must be uniform to a thousandth of their step; by default one that is called ``time``.
+    angle_unit, torque_unit : str, optional
+        Units of the channels, where the file says none or others.
+    method, inertia, damping, stiffness, terms, lag, quantisation, nan_policy, step, settings, workers : optional
+        As in :func:`identify`; parameters are kinds or numbers, terms are built-in ones without inner parameters.
+    progress : bool or callable, optional
+        Show a bar, or call a function with the samples done and all of them. An exception that it raises interrupts the work.
+
+    Returns
+    -------
+    FileIdentification
+        ``constants``, ``settings``, ``record_status``, ``advice`` and how many rows have each flag.
+
+    Raises
+    ------
+    FileError
+        If the recording cannot be read as it is meant: :mod:`tvident.recordings` has it.
+    ValueError
+        If the output's ending is unknown, times are not uniform, or what is asked for needs the whole record.
+    KeyError
+        If there is no such channel.
+    OSError
+        If the output cannot be written.
+
+    Notes
+    -----
+    With everything windowed in strong form, as with ``method="paper"``, the numbers are those of one call in memory, bit for bit, as long
+    as no sample is missing. A piece with missing samples is identified on its own: its numbers agree to rounding, its standard errors to
+    chance.
+
+    In weak form, and with constants in strong form, every piece is identified as a record of its own with neighbours on both sides. What
+    is left to be chosen is chosen once, from at most eight stretches of 65 536 samples spread over the recording; flags and advice of
+    these stretches are those of the record. The constants of all pieces are put together, each weighted by the inverse of its variance,
+    and the numbers of every piece are corrected for the difference of its own constants. Where pieces differ by more than chance, constants
+    stay those of the pieces, and the record has the flag KIND_CONTRADICTED.
+
+    Equations (2) to (4), (8) and (9) of the paper. The cost is that of :func:`identify`, in strong form about 60 ns a sample and thread,
+    and that of writing and reading the results once more.
+
+    See Also
+    --------
+    identify : of arrays in memory.
+    FileIdentification : what is returned.
+    tvident.dask : on several machines.
+
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tvident
+    >>> rig = tvident.simulate_torsional_rig(duration=20.0)
+    >>> np.save("rig.npy", np.stack([rig.angle, rig.torque], axis=1))
+    >>> found = tvident.identify_file("rig.npy", "parameters.npy", angle="0", torque="1", sample_rate=1000, method="paper")
+    >>> rows = np.load("parameters.npy", mmap_mode="r")
+    >>> whole = tvident.identify(rig.angle, rig.torque, sample_rate=1000, method="paper")
+    >>> bool(np.array_equal(rows["stiffness"], whole.stiffness, equal_nan=True))
+    True
+    """
+    source_path, place = Path(path), Path(output)
+    check_output(place)
+    check_apart({"the output": place}, {"the recording": source_path})
+    every = arguments.whole_number("step", step, least=1)
+    threads = arguments.worker_count(workers)
+    arguments.one_of("nan_policy", nan_policy, ("omit", "propagate", "raise"))
+    given = {
+        "inertia": inertia,
+        "damping": damping,
+        "stiffness": stiffness,
+        "terms": terms,
+        "lag": lag,
+        "quantisation": quantisation,
+    }
+    told = {
+        "version": version("tvident"),
+        "instructions": _core.instructions(),
+        "recording": [mark_of(source_path) if source_path.exists() else "", angle, torque, sample_rate, delta, t],
+        "units": [angle_unit, torque_unit],
+        "asked": [repr(method), repr(given), nan_policy, every, repr(dict(settings or {}))],
+    }
+    with ExitStack() as stack, arguments.reporter(progress, "identification") as report:
+        source, kept = _opened(source_path, place, told)
+        stack.callback(source.close)
+        try:
+            recording = _recording(source, (angle, torque, t), (angle_unit, torque_unit), (delta, sample_rate))
+            call = Given(method, given, settings, nan_policy, recording.period, recording.axis, threads)
+            return Run(Asked(recording, call, every), kept, PIECE, place, report).all()
+        except BaseException:
+            if kept.is_empty:
+                kept.remove()
+            raise
+
+
+def _opened(path: Path, output: Path, told: Mapping[str, Any]) -> tuple[Source, Kept]:
+    """Return the recording, as rows of numbers where it is text, and what is kept of an earlier call."""
+    if path.suffix.lower() in TEXT and path.is_file():
+        kept = Kept(output, told)
+        return copied(path, kept.folder), kept
+    return opened(path), Kept(output, told)
+
+
+def _recording(
+    source: Source,
+    names: tuple[str, str, str | None],
+    units: tuple[str | None, str | None],
+    rates: tuple[float | None, float | None],
+) -> Recording:
+    """Return the two channels of a recording and their times."""
+    (angle, samples, angle_says), (torque, others, torque_says) = (
+        source.channel(name) for name in names[:2] if name is not None
+    )
+    if samples != others:
+        raise ValueError(
+            f"angle and torque must have one length; {source.place} has {samples} and {others} samples; resample one of them"
+        )
+    if not samples:
+        raise ValueError(f"a recording must hold samples; {source.place} has none; check it")
+    axis = units_of(angle_says, torque_says, *units)
+    delta, rate = rates
+    if delta is not None or rate is not None:
+        if names[2] is not None:
+            raise TypeError("give only one of delta, sample_rate and t; got t too; drop all but one")
+        return Recording(
+            angle, torque, samples, 0.0, arguments.sample_period(samples, delta=delta, sample_rate=rate), axis
+        )
+    name = names[2]
+    if name is None:
+        known = [one for one in source.channels if is_time(*named_unit(one))]
+        if not known:
+            raise TypeError(
+                f"an identification needs the sample period; {source.place} has no channel of times; give sample_rate=, delta= or t="
+            )
+        name = known[0]
+    times, count, unit = source.channel(name)
+    if count != samples:
+        raise ValueError(
+            f"times must have one value for every sample; {name!r} has {count} for {samples}; give sample_rate="
+        )
+    factor = float(times_in_seconds(Said(np.ones(1), unit))[0])
+    begin, period = uniform(times, samples, factor, full_name(source.channels, name, source.place))
+    return Recording(angle, torque, samples, begin, period, axis)

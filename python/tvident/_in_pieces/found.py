@@ -1,0 +1,80 @@
+"""What is known of a long record beside its columns, which are in a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tvident._status import Status
+
+
+@dataclass(frozen=True)
+class FileIdentification:
+    """The result of :func:`tvident.identify_file`: its columns are in the file, the rest is here.
+
+    Attributes
+    ----------
+    path : Path
+        The file with the columns.
+    samples : int
+        Of the recording.
+    rows : int
+        Of the file: one for every `step`-th sample.
+    constants : dict of str to (value, stderr)
+        What is constant over the whole recording.
+    record_status : Status
+        Flags of the whole recording.
+    flags : dict of str to int
+        How many rows have each flag of :class:`tvident.Status`.
+    settings : dict
+        What was given and chosen: ``settings=`` of another call repeats it.
+    units : dict of str to str
+        Units of the columns by name.
+    advice : tuple of str
+        What is worth doing, of pieces and of the stretches that choices were made from.
+
+    See Also
+    --------
+    identify_file : returns it.
+
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
+
+    Examples
+    --------
+    >>> import tvident
+    >>> tvident.simulate_torsional_rig(duration=20.0).save("rig.csv")
+    >>> found = tvident.identify_file("rig.csv", "parameters.csv", angle="angle", torque="torque", method="paper")
+    >>> found.rows, int(found.record_status)
+    (20000, 0)
+    """
+
+    path: Path
+    samples: int
+    rows: int
+    constants: Mapping[str, tuple[float, float]]
+    record_status: Status
+    flags: Mapping[str, int]
+    settings: Mapping[str, Any]
+    units: Mapping[str, str]
+    advice: tuple[str, ...] = ()
+
+    def summary(self) -> str:
+        """Return in words what was found, and what is worth doing.
+
+        Returns
+        -------
+        str
+        """
+        lines = [f"{self.samples} samples, {self.rows} rows in {self.path}"]
+        lines += [
+            f"{name} = {value:.8g} ± {error:.2g} {self.units.get(name, '')}".rstrip()
+            for name, (value, error) in self.constants.items()
+        ]
+        if self.record_status:
+            lines.append(f"the record: {self.record_status.advice}")
+        lines += [f"{count} rows ({count / max(self.rows, 1):.1%}): {name}" for name, count in self.flags.items()]
+        return "\n".join([*lines, *(f"- {line}" for line in self.advice)])

@@ -1,0 +1,64 @@
+"""What a call gives to every part of a long record that is identified as a record of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from tvident import _arguments as arguments
+from tvident._identify import Held, Method, WeakForm, identify
+from tvident._results import Identification
+from tvident._units import ROTARY, Axis
+
+
+@dataclass(frozen=True)
+class Given:
+    """Arguments of a call.
+
+    Parameters
+    ----------
+    method : Method
+    equation : mapping
+        Parameters, terms, lag and quantisation.
+    settings : mapping, optional
+        Of an earlier result.
+    nan_policy : str
+    period : float
+        Seconds from one sample to the next.
+    axis : Axis
+    workers : int, optional
+    """
+
+    method: Method
+    equation: Mapping[str, Any]
+    settings: Mapping[str, Any] | None
+    nan_policy: arguments.RowPolicy
+    period: float
+    axis: Axis
+    workers: int | None
+
+    def identified(
+        self, held: Held, report: Any = None, *, chosen: Mapping[str, Any] | None = None, step: int = 1
+    ) -> Identification:
+        """Identify a part, with what was chosen for the whole record if anything was."""
+        equation: dict[str, Any] = {name: value for name, value in self.equation.items() if value is not None}
+        method, settings = self.method, self.settings
+        if chosen is not None:
+            # What was chosen is in the settings; what was given to choose from is not asked again.
+            equation = {} if settings is None else equation
+            method, settings = "auto" if isinstance(method, WeakForm) or method == "auto" else method, chosen
+        units: dict[str, Any] = {} if self.axis.system is ROTARY else {"angle_unit": "m", "torque_unit": "N"}
+        return identify(
+            held.angle,
+            held.torque,
+            delta=self.period,
+            method=method,
+            settings=settings,
+            nan_policy=self.nan_policy,
+            step=step,
+            workers=self.workers,
+            progress=report,
+            **units,
+            **equation,
+        )

@@ -1,0 +1,131 @@
+"""What is kept of work that may be interrupted: a folder beside the result, with the rows that are done."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._files import printable
+
+_FORMAT = 1
+"""Folders of another number hold other things."""
+
+Columns = Mapping[str, npt.NDArray[Any]]
+
+
+def mark_of(path: Path) -> str:
+    """Return what tells a file, or a folder of files, from what it is after a change."""
+    files = sorted(one for one in path.rglob("*") if one.is_file()) if path.is_dir() else [path]
+    told = [(str(one.relative_to(path)), one.stat().st_size, one.stat().st_mtime_ns) for one in files]
+    return hashlib.sha256(json.dumps(told).encode()).hexdigest()
+
+
+class Kept:
+    """The folder of one call: ``.NAME.tvident`` beside the result.
+
+    Parameters
+    ----------
+    output : Path
+        The result that is to be.
+    told : mapping
+        Everything that the numbers depend on, as JSON has it: of another input, or other settings, nothing is used.
+    """
+
+    def __init__(self, output: Path, told: Mapping[str, Any]) -> None:
+        self.folder = output.with_name(f".{output.name}.tvident")
+        self._told = hashlib.sha256(json.dumps([_FORMAT, told], sort_keys=True).encode()).hexdigest()
+        self._state = self._read()
+        if self._state is None:
+            shutil.rmtree(self.folder, ignore_errors=True)
+            self.folder.mkdir()
+            self._state = {"told": self._told, "notes": [], "rows": 0, "facts": {}}
+            self._write()
+
+    @property
+    def notes(self) -> list[Any]:
+        """What was noted of every piece that is done."""
+        return list(self._found["notes"])
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What was noted of the whole record."""
+        return dict(self._found["facts"])
+
+    def note_fact(self, name: str, value: Any) -> None:
+        """Keep something of the whole record."""
+        self._found["facts"][name] = value
+        self._write()
+
+    def add(self, columns: Columns, note: Any) -> None:
+        """Keep the rows of one more piece, and a note of it."""
+        names = list(columns)
+        row = np.dtype([(name, columns[name].dtype) for name in names])
+        rows = np.empty(columns[names[0]].size, row)
+        for name in names:
+            rows[name] = columns[name]
+        with self._rows.open("r+b" if self._rows.exists() else "w+b") as file:
+            # What an interrupted call wrote beyond the rows that it noted is written again.
+            file.seek(self._found["rows"] * row.itemsize)
+            file.write(rows.view(np.uint8).data if rows.size else b"")
+            file.truncate()
+        self._found["row"] = [[name, columns[name].dtype.str] for name in names]
+        self._found["rows"] += rows.size
+        self._found["notes"].append(note)
+        self._write()
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is kept that would be missed."""
+        return not self._found["notes"] and not self._found["facts"] and len(list(self.folder.iterdir())) == 1
+
+    @property
+    def count(self) -> int:
+        """Rows that are done."""
+        return int(self._found["rows"])
+
+    def rows(self, first: int, end: int) -> npt.NDArray[Any]:
+        """Return some of the rows that are done, shape (end - first,)."""
+        row = np.dtype([(name, kind) for name, kind in self._found["row"]])
+        return np.fromfile(self._rows, row, end - first, offset=first * row.itemsize)
+
+    def remove(self) -> None:
+        """Remove the folder."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    @property
+    def _rows(self) -> Path:
+        return self.folder / "rows"
+
+    @property
+    def _found(self) -> dict[str, Any]:
+        assert self._state is not None  # noqa: S101 - it was made
+        return self._state
+
+    def _read(self) -> dict[str, Any] | None:
+        """Return what an interrupted call of the same kind left, or None."""
+        try:
+            state = json.loads((self.folder / "state.json").read_text(encoding="utf-8"))
+            if state["told"] != self._told:
+                return None
+            rows = int(state["rows"])
+            size = np.dtype([(name, kind) for name, kind in state["row"]]).itemsize if rows else 0
+            if rows and self._rows.stat().st_size < rows * size:
+                return None
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+        return dict(state)
+
+    def _write(self) -> None:
+        beside = self.folder / "state.json.new"
+        beside.write_text(json.dumps(self._state), encoding="utf-8")
+        beside.replace(self.folder / "state.json")
+
+    def __repr__(self) -> str:
+        return f"<Kept in {printable(self.folder)}>"

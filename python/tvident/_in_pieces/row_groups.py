@@ -1,0 +1,93 @@
+"""Columns of Parquet files, row group by row group."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._files import FileError, printable
+from tvident._units import named_unit, with_unit
+
+_BATCH = 1 << 17
+"""Rows that are decoded at a time: a row group may be as long as the file."""
+
+
+@dataclass
+class ParquetRows:
+    """The rows of one file, and how far each column was read."""
+
+    path: Path
+    samples: int = field(init=False)
+    _file: Any = field(init=False, repr=False)
+    _first: list[int] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        try:
+            from pyarrow import ArrowException, parquet  # noqa: PLC0415 - an extra
+        except ImportError:
+            raise ImportError(
+                "Parquet needs pyarrow, which is not installed; install it with: pip install 'tvident[io]'"
+            ) from None
+        try:
+            # Read-ahead would hold whole row groups.
+            self._file = parquet.ParquetFile(self.path, pre_buffer=False, memory_map=False)
+        except (ArrowException, OSError) as error:
+            raise FileError(
+                f"{printable(self.path)}: must be whole; pyarrow says: {printable(error, 200)}; copy it again"
+            ) from None
+        groups = [self._file.metadata.row_group(place).num_rows for place in range(self._file.num_row_groups)]
+        self._first = np.concatenate([[0], np.cumsum(groups, dtype=np.int64)]).tolist()
+        self.samples = self._first[-1]
+
+    def names(self) -> dict[str, str]:
+        """Return columns of numbers: names with units to names in the file."""
+        import pyarrow as pa  # noqa: PLC0415 - an extra
+
+        found = {}
+        for one in self._file.schema_arrow:
+            if pa.types.is_integer(one.type) or pa.types.is_floating(one.type):
+                said = {key.decode(errors="replace").lower(): text for key, text in (one.metadata or {}).items()}
+                unit = (said.get("unit") or said.get("units") or b"").decode(errors="replace")
+                found[one.name if named_unit(one.name)[1] else with_unit(one.name, unit)] = one.name
+        return found
+
+    def batches(self, name: str, first: int) -> Iterator[tuple[int, npt.NDArray[Any]]]:
+        """Give the samples of a column from one on, with the number of the first of each batch."""
+        group = int(np.searchsorted(self._first, first, side="right")) - 1
+        place = self._first[group]
+        for batch in self._file.iter_batches(_BATCH, range(group, self._file.num_row_groups), [name]):
+            yield place, np.asarray(batch.column(0).to_numpy(zero_copy_only=False))
+            place += batch.num_rows
+
+    def close(self) -> None:
+        self._file.close()
+
+
+@dataclass
+class ParquetColumn:
+    """One column: read on from where it was, or again from the row group that a sample is in."""
+
+    rows: ParquetRows
+    name: str
+    _going: Iterator[tuple[int, npt.NDArray[Any]]] | None = field(default=None, init=False, repr=False)
+    _kept: list[tuple[int, npt.NDArray[Any]]] = field(default_factory=list, init=False, repr=False)
+
+    def read(self, first: int, end: int) -> npt.NDArray[Any]:
+        reached = self._kept[-1][0] + self._kept[-1][1].size if self._kept else -1
+        if self._going is None or not self._kept or first < self._kept[0][0] or first > reached + 4 * _BATCH:
+            self._going, self._kept, reached = self.rows.batches(self.name, first), [], -1
+        while reached < end:
+            batch = next(self._going, None)
+            if batch is None:
+                break
+            reached = batch[0] + batch[1].size
+            self._kept.append(batch)
+            # What lies before is not asked for again: the next piece begins a little before the end of this one.
+            self._kept = [one for one in self._kept if one[0] + one[1].size > first]
+        parts = [values[max(first - place, 0) : end - place] for place, values in self._kept if place < end]
+        return np.concatenate(parts) if len(parts) != 1 else parts[0]

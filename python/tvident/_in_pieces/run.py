@@ -1,0 +1,218 @@
+"""One call from file to file: choices, pieces, what they say together, the output."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tvident import _core
+from tvident._equation import LINEAR_UNITS, UNITS
+from tvident._identify import Long, Span, WeakForm, requested
+from tvident._in_pieces.choices import chosen, stretches
+from tvident._in_pieces.found import FileIdentification
+from tvident._in_pieces.given import Given
+from tvident._in_pieces.kept import Kept
+from tvident._in_pieces.merged import Mean, means_of
+from tvident._in_pieces.outputs import CHUNK, Table, writer
+from tvident._in_pieces.recorded import Recording
+from tvident._in_pieces.work import SHARED, Alone, Columns, Windows, Work, reach_of
+from tvident._status import Status
+from tvident._units import ROTARY
+
+
+class Asked:
+    """What is asked for of a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+    given : Given
+    step : int
+        Every how many samples a row is wanted.
+    """
+
+    def __init__(self, recording: Recording, given: Given, step: int) -> None:
+        self.recording, self.given, self.step = recording, given, step
+        rate = 1 / recording.period
+        request = requested(given.method, given.equation, given.settings, rate)
+        self.long: Long | None = None
+        if isinstance(request.form, WeakForm):
+            return
+        if request.quantisation is None:
+            spans = _core.parts_of_quantisation(recording.samples)
+            held = recording.held(spans)
+            found = _core.quantisation_step(held.angle, parts=spans, of=recording.samples)
+            self.given = replace(given, equation={**given.equation, "quantisation": found})
+            request = requested(given.method, self.given.equation, given.settings, rate)
+        self.long = Long(
+            request,
+            recording.samples,
+            recording.period,
+            recording.axis,
+            propagate=given.nan_policy == "propagate",
+            step=step,
+        )
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units of results."""
+        return UNITS if self.recording.axis.system is ROTARY else LINEAR_UNITS
+
+    def borders(self, piece: int) -> list[int]:
+        """Return where pieces of about so many samples begin, and where the last ends: neighbours are at most a quarter of them."""
+        samples, reach = self.recording.samples, 0
+        if self.long is not None:
+            first, end = self.long.around((samples, samples))
+            reach = end - first
+        count = max(1, round(samples / max(piece, 4 * reach)))
+        return [samples * place // count for place in range(count + 1)]
+
+    def in_pieces(self, choices: Mapping[str, Any] | None) -> Alone:
+        """Return the work on pieces that are records of their own, with what was chosen for all of them."""
+        settings = choices if choices is not None else self.long.settings() if self.long is not None else None
+        reach = 0 if settings is None else reach_of(settings)
+        return Alone(self.recording, partial(self.given.identified, chosen=choices, step=self.step), reach, self.step)
+
+
+class Run:
+    """One call: what is done is kept, and not done again.
+
+    Parameters
+    ----------
+    asked : Asked
+    kept : Kept
+    piece : int
+        Samples of a piece, about.
+    output : Path
+    report : callable, optional
+    """
+
+    def __init__(self, asked: Asked, kept: Kept, piece: int, output: Path, report: Any) -> None:
+        self._asked, self._kept, self._output, self._report = asked, kept, output, report
+        self._pieces: list[Span] = list(pairwise(asked.borders(piece)))
+        self._samples = asked.recording.samples
+
+    def all(self) -> FileIdentification:
+        """Do all that is not done yet."""
+        settings, work = self._prepared()
+        for piece in self._pieces[len(self._kept.notes) :]:
+            columns, note = work.piece(piece, self._progress(piece))
+            self._kept.add(columns, note)
+            if self._report is not None:
+                self._report(piece[1], self._samples)
+        return self._written(settings, work)
+
+    def _progress(self, piece: Span) -> Any:
+        """Return what is told of the work within a piece."""
+        report, samples = self._report, self._samples
+        if report is None:
+            return None
+        first, length = piece[0], piece[1] - piece[0]
+        return lambda done, total: report(first + length * done // max(total, 1), samples)
+
+    def _prepared(self) -> tuple[dict[str, Any] | None, Work]:
+        """Return the settings, None where the only piece has its own, and the work on a piece."""
+        asked, long = self._asked, self._asked.long
+        if long is not None and long.is_windowed:
+            if "factors" not in self._kept.facts:
+                held = asked.recording.held(long.spans_of_scatter())
+                self._kept.note_fact("factors", long.factors(held, asked.given.workers))
+            alone = None if asked.given.nan_policy == "propagate" else asked.in_pieces(None)
+            factors = self._kept.facts["factors"]
+            return long.settings(), Windows(asked.recording, long, factors, alone, asked.step, asked.given.workers)
+        if long is not None:
+            return long.settings(), asked.in_pieces(None)
+        if len(self._pieces) == 1:
+            return None, asked.in_pieces(None)
+        if "settings" not in self._kept.facts:
+            self._choose()
+        settings = dict(self._kept.facts["settings"])
+        return settings, asked.in_pieces(settings)
+
+    def _choose(self) -> None:
+        """Take the settings of an earlier result, or choose from stretches of the recording."""
+        asked = self._asked
+        if asked.given.settings is not None:
+            self._kept.note_fact("settings", dict(asked.given.settings))
+            return
+        spans = stretches(self._samples, asked.step)
+        choices = chosen(spans, asked.recording.held, asked.given.identified, asked.recording.period)
+        self._kept.note_fact("advice", choices.advice)
+        self._kept.note_fact("record_status", choices.record_status)
+        self._kept.note_fact("settings", choices.settings)
+
+    def _written(self, settings: dict[str, Any] | None, work: Work) -> FileIdentification:
+        """Write the output, now that all pieces are known."""
+        notes, facts = self._kept.notes, self._kept.facts
+        means = means_of([note for note in notes if note is not None])
+        status = Status(int(facts.get("record_status", 0)))
+        for note in notes:
+            status |= Status(int(note["record_status"]) if note else 0)
+        advice = self._contradictions(means)
+        if advice:
+            status |= Status.KIND_CONTRADICTED
+        advice += facts.get("advice", [])
+        if settings is None:
+            settings = notes[0]["settings"]
+            advice += notes[0]["advice"]
+        constants = {name: (mean.value, mean.error) for name, mean in means.items()}
+        told = {"settings": settings, "constants": constants, "record_status": int(status), "advice": advice}
+        some = self._finished(work, notes[0], (0, min(1, self._kept.count)), means)
+        kinds = {name: values.dtype for name, values in some.items()}
+        table = Table(kinds, self._kept.count, self._asked.units, told)
+        counts: dict[str, int] = {}
+        with writer(self._output, table) as put:
+            done = 0
+            for note, piece in zip(notes, self._pieces, strict=True):
+                last = done + len(range(piece[0] + -piece[0] % self._asked.step, piece[1], self._asked.step))
+                for begin in range(done, last, CHUNK):
+                    columns = self._finished(work, note, (begin, min(begin + CHUNK, last)), means)
+                    _count(columns["status"], counts)
+                    put(columns)
+                done = last
+        self._kept.remove()
+        return FileIdentification(
+            self._output,
+            self._samples,
+            table.rows,
+            constants,
+            status,
+            counts,
+            settings,
+            self._asked.units,
+            tuple(advice),
+        )
+
+    def _contradictions(self, means: Mapping[str, Mean]) -> list[str]:
+        """Return what is to be said of constants that are none."""
+        length = self._pieces[0][1] - self._pieces[0][0]
+        return [
+            f"{name} differs between pieces of {length} samples by {mean.spread:.1f} times what its errors say: every piece keeps its own; "
+            f"give {name}='varying' where it changes, or identify parts of the recording"
+            for name, mean in means.items()
+            if not mean.agree
+        ]
+
+    def _finished(self, work: Work, note: Any, span: Span, means: Mapping[str, Mean]) -> Columns:
+        """Return some rows as they are written."""
+        rows = self._kept.rows(*span)
+        columns = {name: rows[name] for name in rows.dtype.names or ()}
+        if note is not None:
+            return work.finished(columns, note, means)
+        return {name: values for name, values in columns.items() if not name.startswith(SHARED)}
+
+
+def _count(status: Any, counts: dict[str, int]) -> None:
+    """Add how many rows have each flag."""
+    if not np.any(status):
+        return
+    for flag in Status:
+        found = int(np.count_nonzero(status & np.uint16(flag)))
+        if found:
+            counts[str(flag.name)] = counts.get(str(flag.name), 0) + found

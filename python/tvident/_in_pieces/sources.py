@@ -1,0 +1,253 @@
+"""Recordings in files that are read piece by piece: one channel after the other, any samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._files import FileError, full_name, listed, printable
+from tvident._units import named_unit
+
+_UNITS = ("unit", "units", "Unit", "Units", "UNITS")
+
+
+class Channel(Protocol):
+    """Samples of one channel, wherever they are."""
+
+    def read(self, first: int, end: int) -> npt.NDArray[Any]:
+        """Return some samples, shape (end - first,)."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A recording that is not read yet.
+
+    Parameters
+    ----------
+    channels : mapping of str to (Channel, int)
+        Every channel, by its name with its unit in brackets, and how many samples it has.
+    close : callable
+        Closes the file.
+    place : str
+        What messages call it.
+    """
+
+    channels: Mapping[str, tuple[Channel, int]]
+    close: Callable[[], object]
+    place: str
+
+    def channel(self, name: str) -> tuple[Channel, int, str]:
+        """Return a channel by its name, how many samples it has, and its unit.
+
+        Raises
+        ------
+        KeyError
+            If there is none of this name, or there are several.
+        """
+        full = full_name(self.channels, name, self.place)
+        channel, samples = self.channels[full]
+        return channel, samples, named_unit(full)[1]
+
+
+@dataclass(frozen=True)
+class _OfArray:
+    """A vector, or a column of a matrix, of anything that is sliced as NumPy's arrays are."""
+
+    array: Any
+    column: int | None = None
+
+    def read(self, first: int, end: int) -> npt.NDArray[Any]:
+        part = self.array[first:end] if self.column is None else self.array[first:end, self.column]
+        return np.asarray(part)
+
+
+class RowsOfFile:
+    """Rows that lie one after the other in a file: the last that were read are kept, for another column of theirs."""
+
+    def __init__(self, path: Path, offset: int, row: np.dtype[Any], columns: int = 1) -> None:
+        self._path, self._offset, self._row, self._columns = path, offset, row, columns
+        self._last: tuple[int, int, npt.NDArray[Any]] | None = None
+
+    def read(self, first: int, end: int) -> npt.NDArray[Any]:
+        """Return some rows, shape (end - first, columns)."""
+        if self._last is not None and self._last[:2] == (first, end):
+            return self._last[2]
+        # Not mapped: pages of a map count as memory until the system wants them back.
+        count, start = (end - first) * self._columns, self._offset + first * self._columns * self._row.itemsize
+        rows = np.fromfile(self._path, self._row, count, offset=start)
+        if rows.size < count:
+            raise FileError(f"{printable(self._path)}: must be whole; it ends before sample {end}; copy it again")
+        self._last = first, end, rows.reshape(-1, self._columns)
+        return self._last[2]
+
+
+@dataclass(frozen=True)
+class ColumnOfRows:
+    """A column of rows, by its number, or the name of a field."""
+
+    rows: RowsOfFile
+    place: int | str
+
+    def read(self, first: int, end: int) -> npt.NDArray[Any]:
+        """Return some samples, as they lie between others."""
+        found = self.rows.read(first, end)
+        return found[self.place][:, 0] if isinstance(self.place, str) else found[:, self.place]
+
+
+def _npy(path: Path) -> Source:
+    with path.open("rb") as file:
+        version = np.lib.format.read_magic(file)
+        header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, is_fortran, dtype = header(file)
+        offset = file.tell()
+    if dtype.names:
+        _check_shape(path, len(shape) == 1, shape)
+        fields = RowsOfFile(path, offset, dtype)
+        kept = [name for name in dtype.names if dtype[name].kind in "iuf" and not dtype[name].shape]
+        return _source(path, {name: (ColumnOfRows(fields, name), shape[0]) for name in kept})
+    if dtype.kind not in "iuf":
+        raise FileError(f"{printable(path)}: an array must hold real numbers; it holds {dtype}; convert it")
+    if len(shape) == 1:
+        return _source(path, {"0": (ColumnOfRows(RowsOfFile(path, offset, dtype), 0), shape[0])})
+    _check_shape(path, len(shape) == 2, shape)  # noqa: PLR2004 - samples and channels
+    rows, columns = shape if shape[0] >= shape[1] else shape[::-1]
+    # Samples of a channel lie side by side where the first axis is that of the channels, or the order is Fortran's.
+    apart = is_fortran if shape[0] >= shape[1] else not is_fortran
+    size = dtype.itemsize * rows
+    together = RowsOfFile(path, offset, dtype, columns)
+
+    def column(place: int) -> ColumnOfRows:
+        return (
+            ColumnOfRows(RowsOfFile(path, offset + place * size, dtype), 0) if apart else ColumnOfRows(together, place)
+        )
+
+    return _source(path, {str(place): (column(place), rows) for place in range(columns)})
+
+
+def _check_shape(path: Path, is_right: bool, shape: tuple[int, ...]) -> None:  # noqa: FBT001 - what is checked
+    if not is_right:
+        raise FileError(
+            f"{printable(path)}: an array must hold one row a sample; its shape is {shape}; save samples along the first axis"
+        )
+
+
+def _parquet(path: Path) -> Source:
+    from tvident._in_pieces.row_groups import ParquetColumn, ParquetRows  # noqa: PLC0415 - an extra
+
+    rows = ParquetRows(path)
+    names = rows.names()
+    return Source(
+        {shown: (ParquetColumn(rows, name), rows.samples) for shown, name in names.items()}, rows.close, printable(path)
+    )
+
+
+def _hdf5(path: Path) -> Source:
+    try:
+        import h5py  # noqa: PLC0415 - an extra
+    except ImportError:
+        raise ImportError(
+            "HDF5 needs h5py, which is not installed; install it with: pip install 'tvident[io]'"
+        ) from None
+    try:
+        file = h5py.File(path, "r")
+    except OSError as error:
+        raise FileError(
+            f"{printable(path)}: must be whole; h5py says: {printable(error, 200)}; copy it again"
+        ) from None
+    found: dict[str, Any] = {}
+
+    def note(name: str, one: Any) -> None:
+        if isinstance(one, h5py.Dataset):
+            found[name.replace("/", ".")] = one
+
+    file.visititems(note)
+    return _source(path, _of_arrays(found), file.close)
+
+
+def _zarr(path: Path) -> Source:
+    try:
+        import zarr  # noqa: PLC0415 - an extra
+    except ImportError:
+        raise ImportError(
+            "Zarr needs zarr, which is not installed; install it with: pip install 'tvident[io]'"
+        ) from None
+    try:
+        opened = zarr.open(str(path), mode="r")
+    except Exception as error:  # noqa: BLE001 - stores raise what they like
+        raise FileError(
+            f"{printable(path)}: must be a Zarr group or array; zarr says: {printable(error, 200)}"
+        ) from None
+    if isinstance(opened, zarr.Array):
+        return _source(path, _of_arrays({"": opened}))
+    return _source(path, _of_arrays({name.replace("/", "."): one for name, one in opened.arrays()}))
+
+
+def _of_arrays(found: Mapping[str, Any]) -> dict[str, tuple[Channel, int]]:
+    """Return the channels of arrays with attributes: vectors, and columns of matrices."""
+    channels: dict[str, tuple[Channel, int]] = {}
+    for name, array in found.items():
+        if array.dtype.kind not in "iuf" or not array.shape:
+            continue
+        said = next((array.attrs[one] for one in _UNITS if one in array.attrs), "")
+        unit = said.decode(errors="replace") if isinstance(said, bytes) else str(said)
+        ending = f" [{unit}]" if unit else ""
+        if array.ndim == 1:
+            channels[(name or "0") + ending] = (_OfArray(array), array.shape[0])
+        elif array.ndim == 2:  # noqa: PLR2004 - samples and channels
+            for column in range(array.shape[1]):
+                channels[f"{name}.{column}".lstrip(".") + ending] = (_OfArray(array, column), array.shape[0])
+    return channels
+
+
+def _source(
+    path: Path, channels: Mapping[str, tuple[Channel, int]], close: Callable[[], object] = lambda: None
+) -> Source:
+    return Source(channels, close, printable(path))
+
+
+READERS: dict[str, Callable[[Path], Source]] = {
+    ".npy": _npy,
+    ".parquet": _parquet,
+    ".h5": _hdf5,
+    ".hdf5": _hdf5,
+    ".zarr": _zarr,
+}
+"""By the ending."""
+
+TEXT = (".csv", ".txt", ".tsv", ".dat")
+"""Endings of text, which is copied to rows of numbers before anything is done with it."""
+
+
+def opened(path: Path) -> Source:
+    """Open a recording.
+
+    Raises
+    ------
+    FileError
+        If there is none, it cannot be read piece by piece, or it is damaged.
+    ImportError
+        If its library is missing.
+    """
+    place, ending = printable(path), path.suffix.lower()
+    if not path.exists():
+        raise FileError(f"{place}: there is no such file; check the name and the folder")
+    if ending not in READERS:
+        known = ", ".join([*READERS, *TEXT])
+        raise FileError(f"{place}: files that end in {known} are read piece by piece; got '{ending}'; convert it first")
+    if ending != ".zarr" and not path.is_file():
+        raise FileError(f"{place}: must be a file; it is a folder or a device; name the file")
+    try:
+        source = READERS[ending](path)
+    except (FileError, ImportError):
+        raise
+    except (OSError, ValueError, EOFError) as error:
+        raise FileError(f"{place}: must be whole; it cannot be read ({printable(error, 200)}); copy it again") from None
+    if not source.channels:
+        source.close()
+        raise FileError(f"{place}: holds no channels; {listed(['nothing that is a column of real numbers'])}")
+    return source

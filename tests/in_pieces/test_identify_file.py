@@ -1,0 +1,295 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from click.testing import CliRunner
+
+import tvident
+from tvident import Status
+from tvident._command_line import main
+from tvident._in_pieces import call, choices
+
+SAMPLES = 70_001
+"""Four pieces of the tests, the last of another length."""
+MOST_DIFFERENCE = 1.0
+"""Of a standard error. Neighbours count twice in the short pieces of these tests, and windows are chosen from parts. An estimate with
+twice the variance of a better one differs from it by one of its errors: the variance of a difference is that of the variances."""
+
+
+@pytest.fixture(autouse=True)
+def _small_pieces(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(call, "PIECE", 20_000)
+    monkeypatch.setattr(choices, "STRETCH", 8_000)
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def rig() -> tvident.Recording:
+    return tvident.simulate_torsional_rig(duration=SAMPLES / 1000, sample_rate=1000, seed=5, pattern="slider")
+
+
+def columns_of(path: Path | str) -> dict[str, npt.NDArray[Any]]:
+    """Read a result as others would."""
+    match Path(path).suffix:
+        case ".npy":
+            rows = np.load(path, mmap_mode="r")
+            return {name: rows[name] for name in rows.dtype.names}
+        case ".parquet":
+            from pyarrow import parquet  # noqa: PLC0415 - as users do
+
+            table = parquet.read_table(path)
+            return {name: table.column(name).to_numpy() for name in table.column_names}
+        case ".zarr":
+            import zarr  # noqa: PLC0415 - as users do
+
+            return {name: np.asarray(one) for name, one in zarr.open_group(str(path), mode="r").arrays()}
+        case _:
+            channels = tvident.read_recording(path)
+            return {name: np.asarray(channels[name]) for name in channels}
+
+
+def write(path: str, angle: npt.NDArray[Any], torque: npt.NDArray[Any]) -> str:
+    """Write a recording as others would, with names where the file has any."""
+    match Path(path).suffix:
+        case ".npy":
+            np.save(path, np.rec.fromarrays([angle, torque], dtype=[("angle", angle.dtype), ("torque", torque.dtype)]))
+        case ".parquet":
+            import pyarrow as pa  # noqa: PLC0415 - as users do
+            from pyarrow import parquet  # noqa: PLC0415 - likewise
+
+            parquet.write_table(pa.table({"angle": angle, "torque": torque}), path, row_group_size=17_000)
+        case ".h5":
+            import h5py  # noqa: PLC0415 - as users do
+
+            with h5py.File(path, "w") as file:
+                file["angle"], file["torque"] = angle, torque
+        case ".zarr":
+            import zarr  # noqa: PLC0415 - as users do
+
+            group = zarr.open_group(path, mode="w")
+            for name, values in (("angle", angle), ("torque", torque)):
+                group.create_array(name, shape=values.shape, dtype=values.dtype, chunks=(9_000,))[:] = values
+        case _:
+            head = "angle,torque"
+            np.savetxt(path, np.stack([angle, torque], axis=1), delimiter=",", header=head, comments="", fmt="%.17g")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("ending", "step"), [("npy", 1), ("npy", 7), ("parquet", 3), ("h5", 1), ("zarr", 1), ("csv", 100)]
+)
+def test_windows_have_the_bits_of_one_call_in_memory(rig: tvident.Recording, ending: str, step: int) -> None:
+    source, target = write(f"in.{ending}", rig.angle, rig.torque), f"out.{ending}"
+    found = tvident.identify_file(
+        source, target, angle="angle", torque="torque", sample_rate=1000, method="paper", step=step
+    )
+    whole = tvident.identify(rig.angle, rig.torque, sample_rate=1000, method="paper", step=step)
+    written, expected = columns_of(target), whole.columns()
+    assert found.rows == whole.time.size
+    for name, values in written.items():
+        assert np.array_equal(values, expected[name], equal_nan=True), name
+    assert {"time", "inertia", "stiffness_stderr", "status"} <= set(written)
+    assert found.settings == whole.settings
+    assert sorted(path.name for path in Path.cwd().iterdir()) == sorted([source, target])
+
+
+def test_terms_lags_and_windows_of_other_lengths_have_them_too(rig: tvident.Recording) -> None:
+    source = write("in.npy", np.round(rig.angle / 1e-4) * 1e-4, rig.torque)
+    angle = np.load(source)["angle"]
+    options: dict[str, Any] = {
+        "method": tvident.StrongForm(window_length=151, regression_window=333, selection="pooled"),
+        **dict.fromkeys(("inertia", "stiffness"), "windowed"),
+        "damping": 0.01,
+        "terms": [("offset", "windowed")],
+        "sample_rate": 1000,
+    }
+    tvident.identify_file(source, "out.npy", angle="angle", torque="torque", **options)
+    whole = tvident.identify(angle, rig.torque, **options).columns()
+    for name, values in columns_of("out.npy").items():
+        assert np.array_equal(values, whole[name], equal_nan=True), name
+
+
+def test_missing_samples_leave_other_pieces_as_they_are(rig: tvident.Recording) -> None:
+    torque = np.array(rig.torque)
+    torque[30_000:30_050] = np.nan
+    source = write("in.npy", rig.angle, torque)
+    tvident.identify_file(source, "out.npy", angle="angle", torque="torque", sample_rate=1000, method="paper")
+    written = columns_of("out.npy")
+    whole = tvident.identify(rig.angle, torque, sample_rate=1000, method="paper")
+    assert np.array_equal(written["status"], whole.status)
+    scale = whole.stderr["stiffness"]
+    # Both routes make the same rows: what differs is rounding, amplified by the condition of a window.
+    assert np.nanmax(np.abs(written["stiffness"] - whole.stiffness) / scale) < 1e-6
+    assert (written["status"][30_000:30_050] & Status.GAP != 0).all()
+
+
+@pytest.mark.parametrize("choose", [True, False])
+def test_the_weak_form_finds_what_one_call_in_memory_finds(rig: tvident.Recording, choose: bool) -> None:
+    source = write("in.npy", rig.angle, rig.torque)
+    whole = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
+    settings = None if choose else whole.settings
+    found = tvident.identify_file(
+        source, "out.npy", angle="angle", torque="torque", sample_rate=1000, settings=settings
+    )
+    written = columns_of("out.npy")
+    for name, (value, error) in whole.constants.items():
+        assert abs(found.constants[name][0] - value) < 3 * MOST_DIFFERENCE * error, name
+    difference = (written["stiffness"] - whole.stiffness) / whole.stderr["stiffness"]
+    assert np.sqrt(np.nanmean(difference**2)) < MOST_DIFFERENCE
+    ratio = written["stiffness_stderr"] / whole.stderr["stiffness"]
+    assert 0.8 < np.nanmedian(ratio) < 1.25
+    assert np.ptp(written["inertia"]) == 0
+    assert written["inertia"][0] == found.constants["inertia"][0]
+    assert found.record_status == whole.record_status
+
+
+def test_a_constant_that_drifts_from_piece_to_piece_is_contradicted(rig: tvident.Recording) -> None:
+    torque = np.array(rig.torque)
+    acceleration = tvident.fit_local_polynomials(rig.angle, 101, sample_rate=1000).derivatives[2]
+    torque += np.repeat([0.0, 0.002], [40_000, SAMPLES - 40_000]) * acceleration
+    source = write("in.npy", rig.angle, torque)
+    found = tvident.identify_file(
+        source,
+        "out.npy",
+        angle="angle",
+        torque="torque",
+        sample_rate=1000,
+        method=tvident.WeakForm(window_length=41, exponent=9),
+        inertia="constant",
+        damping="constant",
+    )
+    assert found.record_status & Status.KIND_CONTRADICTED
+    assert any("inertia" in line for line in found.advice)
+    inertia = columns_of("out.npy")["inertia"]
+    assert inertia[-1] - inertia[0] == pytest.approx(0.002, rel=0.2)
+
+
+class StopError(Exception):
+    """What a caller raises to interrupt the work."""
+
+
+@pytest.mark.parametrize("method", ["paper", "auto"])
+def test_interrupted_work_leaves_no_result_and_goes_on(rig: tvident.Recording, method: str) -> None:
+    source = write("in.npy", rig.angle, rig.torque)
+    options: dict[str, Any] = {"angle": "angle", "torque": "torque", "sample_rate": 1000, "method": method}
+    if method == "auto":
+        some = tvident.identify(rig.angle[:8000], rig.torque[:8000], sample_rate=1000)
+        options["settings"] = some.settings
+    tvident.identify_file(source, "whole.npy", **options)
+    seen: list[int] = []
+
+    def stop(done: int, total: int) -> None:
+        seen.append(done)
+        assert total == SAMPLES
+        if done > SAMPLES // 2:
+            raise StopError
+
+    with pytest.raises(StopError):
+        tvident.identify_file(source, "out.npy", **options, progress=stop)
+    assert not Path("out.npy").exists()
+    assert Path(".out.npy.tvident").is_dir()
+    resumed: list[int] = []
+    tvident.identify_file(source, "out.npy", **options, progress=lambda done, _: resumed.append(done))
+    assert min(resumed) > SAMPLES // 5  # the first pieces were done
+    assert Path("out.npy").read_bytes() == Path("whole.npy").read_bytes()
+    assert not Path(".out.npy.tvident").exists()
+
+
+def test_what_another_input_left_is_not_used(rig: tvident.Recording) -> None:
+    options: dict[str, Any] = {"angle": "angle", "torque": "torque", "sample_rate": 1000, "method": "paper"}
+
+    def stop(done: int, _: int) -> None:
+        if done > SAMPLES // 2:
+            raise StopError
+
+    with pytest.raises(StopError):
+        tvident.identify_file(write("in.npy", rig.angle, rig.torque), "out.npy", **options, progress=stop)
+    tvident.identify_file(write("in.npy", rig.angle, -rig.torque), "out.npy", **options)
+    whole = tvident.identify(rig.angle, -rig.torque, sample_rate=1000, method="paper")
+    assert np.array_equal(np.load("out.npy")["stiffness"], whole.stiffness, equal_nan=True)
+
+
+def test_units_and_times_of_the_file_are_used(rig: tvident.Recording) -> None:
+    time = 5 + np.arange(SAMPLES) / 1000
+    text = np.stack([time, np.degrees(rig.angle), 1000 * rig.torque], axis=1)
+    np.savetxt("in.csv", text, delimiter=",", header="time [s],angle [deg],torque [N mm]", comments="", fmt="%.12g")
+    tvident.identify_file("in.csv", "out.npy", angle="angle", torque="torque", method="paper")
+    recording = tvident.read_recording("in.csv")
+    whole = tvident.identify(recording["angle"], recording["torque"], t=recording.time, method="paper")
+    written = columns_of("out.npy")
+    assert np.array_equal(written["stiffness"], whole.stiffness, equal_nan=True)
+    assert np.allclose(written["time"], time, rtol=0, atol=1e-9)  # times are written with twelve digits
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        ({"angle": "angel"}, KeyError, "has no channel 'angel'"),
+        ({"output": "out.xlsx"}, ValueError, "out.xlsx"),
+        ({"output": "nowhere/out.npy"}, FileNotFoundError, "no such folder"),
+        ({"output": "in.npy"}, ValueError, "must not replace"),
+        ({"path": "gone.npy"}, tvident.recordings.FileError, "no such file"),
+        ({"path": "in.mat"}, tvident.recordings.FileError, "in.mat"),
+        ({"sample_rate": None}, TypeError, "no channel of times"),
+        ({"inertia": np.ones(SAMPLES)}, TypeError, "give a number"),
+        ({"step": 0}, ValueError, "step"),
+    ],
+)
+def test_a_wrong_call_says_what_would_be_right(
+    rig: tvident.Recording, change: dict[str, Any], error: type[Exception], words: str
+) -> None:
+    write("in.npy", rig.angle, rig.torque)
+    Path("in.mat").touch()
+    options = {"path": "in.npy", "output": "out.npy", "angle": "angle", "torque": "torque", "sample_rate": 1000}
+    with pytest.raises(error, match=words):
+        tvident.identify_file(**{**options, "method": "paper", **change})
+    assert not Path("out.npy").exists()
+    assert not list(Path.cwd().glob(".*"))
+
+
+def test_times_that_are_not_uniform_are_named(rig: tvident.Recording) -> None:
+    time = np.arange(SAMPLES) / 1000
+    time[44_444] += 2e-4
+    np.save(
+        "in.npy",
+        np.rec.fromarrays([time, rig.angle, rig.torque], dtype=[(name, float) for name in ("time", "angle", "torque")]),
+    )
+    with pytest.raises(ValueError, match="sample 44444"):
+        tvident.identify_file("in.npy", "out.npy", angle="angle", torque="torque")
+
+
+def peak_of(arguments: list[str]) -> int:
+    """Return the bytes that a process of its own held at most beyond what its imports need."""
+    command = [sys.executable, str(Path(__file__).with_name("peak_of_file.py")), *arguments]
+    return int(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="only Linux keeps the most memory held")
+@pytest.mark.parametrize(("method", "most"), [("paper", 120), ("given", 200)])
+def test_memory_does_not_grow_with_the_recording(method: str, most: int) -> None:
+    # What pieces of 262 144 samples need, in MiB.
+    rig = tvident.simulate_torsional_rig(duration=500 if method == "paper" else 300, sample_rate=1000, seed=1)
+    angle, torque = rig.angle, rig.torque
+    write("in.npy", angle, torque)
+    assert peak_of(["in.npy", "out.npy", method]) < most * 2**20
+
+
+def test_the_command_goes_from_file_to_file(rig: tvident.Recording) -> None:
+    write("in.npy", rig.angle, rig.torque)
+    options = ["--angle", "angle", "--torque", "torque", "--sample-rate", "1000", "--method", "paper", "--step", "5"]
+    done = CliRunner().invoke(main, ["identify", "in.npy", *options, "-o", "out.npy", "--in-pieces"])
+    assert done.exit_code == 0, done.output
+    assert "14001 rows in out.npy" in done.output
+    whole = tvident.identify(rig.angle, rig.torque, sample_rate=1000, method="paper", step=5)
+    assert np.array_equal(np.load("out.npy")["stiffness"], whole.stiffness, equal_nan=True)
+    refused = CliRunner().invoke(
+        main, ["identify", "in.npy", *options, "-o", "o.npy", "--plot", "o.png", "--in-pieces"]
+    )
+    assert refused.exit_code == 2
+    assert "--plot needs the whole recording" in refused.output
