@@ -1,0 +1,107 @@
+"""What is identified in dask arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from tvident._equation import COEFFICIENTS
+
+
+@dataclass(frozen=True)
+class DaskIdentification:
+    r"""Parameters as dask arrays; nothing is computed before it is asked for.
+
+    Attributes
+    ----------
+    time : dask.array.Array, shape (n,)
+    inertia, damping, stiffness : dask.array.Array, shape (\*, n)
+    terms, stderr : dict of str to dask.array.Array
+        Factors of further terms, and standard errors of all parameters.
+    condition, residual_std, order, status : dask.array.Array, shape (\*, n)
+        As in :class:`tvident.Identification`.
+    constants : dict of str to (value, stderr)
+        What is constant over a record: numbers, or arrays in the shape of the batch. Asking computes them.
+    record_status : int, or ndarray of uint16 in the shape of the batch
+        Flags of whole records. Asking computes them.
+    settings : dict
+        What was given; in weak form what stretches chose is computed with the rest.
+    units : dict of str to str
+
+    See Also
+    --------
+    tvident.dask.identify : returns it.
+    tvident.Identification : the same of arrays in memory, which says more.
+
+    Examples
+    --------
+    >>> import dask.array as da
+    >>> import tvident
+    >>> import tvident.dask
+    >>> rig = tvident.simulate_torsional_rig(duration=20.0)
+    >>> angle, torque = (da.from_array(one, chunks=6000) for one in (rig.angle, rig.torque))
+    >>> result = tvident.dask.identify(angle, torque, sample_rate=1000, method="paper", step=100)
+    >>> result.stiffness.shape
+    (200,)
+    """
+
+    time: Any
+    columns: Mapping[str, Any] = field(repr=False)
+    settings: Mapping[str, Any]
+    units: Mapping[str, str]
+    told: Any = field(repr=False)
+
+    @property
+    def inertia(self) -> Any:
+        return self.columns["inertia"]
+
+    @property
+    def damping(self) -> Any:
+        return self.columns["damping"]
+
+    @property
+    def stiffness(self) -> Any:
+        return self.columns["stiffness"]
+
+    @property
+    def terms(self) -> dict[str, Any]:
+        return {name: self.columns[name] for name in self._names if name not in COEFFICIENTS}
+
+    @property
+    def stderr(self) -> dict[str, Any]:
+        return {name: self.columns[f"{name}_stderr"] for name in self._names}
+
+    @property
+    def condition(self) -> Any:
+        return self.columns["condition"]
+
+    @property
+    def residual_std(self) -> Any:
+        return self.columns["residual_std"]
+
+    @property
+    def order(self) -> Any:
+        return self.columns["order"]
+
+    @property
+    def status(self) -> Any:
+        return self.columns["status"]
+
+    @property
+    def constants(self) -> dict[str, tuple[Any, Any]]:
+        return dict(self._computed[0])
+
+    @property
+    def record_status(self) -> Any:
+        return self._computed[1]
+
+    @property
+    def _names(self) -> list[str]:
+        return [name.removesuffix("_stderr") for name in self.columns if name.endswith("_stderr")]
+
+    @cached_property
+    def _computed(self) -> tuple[dict[str, tuple[Any, Any]], Any]:
+        constants, status = self.told.compute()
+        return constants, status

@@ -1,0 +1,276 @@
+"""One long record in dask arrays: its blocks, what they say together, and its columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from tvident import _core
+from tvident._dask.blocks import blocks, imported, joined, rows, tree
+from tvident._dask.polynomials import rounding
+from tvident._identify import Held, Long, Request, Span, WeakForm, requested
+from tvident._in_pieces import (
+    Choices,
+    Given,
+    Mean,
+    chosen,
+    columns_of,
+    finished,
+    means_of,
+    part_alone,
+    reach_of,
+    stretches,
+    with_neighbours,
+)
+from tvident._status import Status
+
+Columns = dict[str, Any]
+
+_LEAST_BLOCK = 1 << 12
+"""Samples of a block: a task costs as much as some thousand of them."""
+
+_REACH = 1 << 13
+"""Neighbours of a block that is a record of its own, where its windows are not chosen yet."""
+
+_NEIGHBOURS = 4
+"""A block is at least so many times as long as its neighbours on one side."""
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What is to be computed of one record.
+
+    Parameters
+    ----------
+    columns : mapping of str to dask.array.Array
+    settings : mapping
+    told : Delayed
+        Constants by name, and the flags of the record.
+    """
+
+    columns: Mapping[str, Any]
+    settings: Mapping[str, Any]
+    told: Any
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What a task makes a long record of: little, and it goes to every worker."""
+
+    request: Request
+    samples: int
+    given: Given
+    step: int
+
+    def long(self, quantisation: float) -> Long:
+        """Return the record, without its samples."""
+        given = self.given
+        propagate = given.nan_policy == "propagate"
+        request = replace(self.request, quantisation=quantisation)
+        return Long(request, self.samples, given.period, given.axis, propagate=propagate, step=self.step)
+
+
+class _Record:
+    """Angle and torque of one record, and what is asked for."""
+
+    def __init__(self, angle: Any, torque: Any, asked: _Asked) -> None:
+        self.dask, _ = imported()
+        self.angle, self.torque, self.asked = angle, torque, asked
+        self.quantisation = asked.request.quantisation
+        # What names, kinds and windows are does not depend on the step that samples were rounded to.
+        self.plain = asked.long(0.0)
+        if self.quantisation is None:
+            self.quantisation = rounding(angle)
+
+    def held(self, spans: Sequence[Span]) -> tuple[Any, Any]:
+        """Return some samples of both channels."""
+        _, array = imported()
+        both = (array.concatenate([one[slice(*span)] for span in spans]) for one in (self.angle, self.torque))
+        angle, torque = both
+        return angle, torque
+
+    def blocks(self, least: int) -> list[Span]:
+        """Return the blocks that are worked on."""
+        return blocks(self.angle.chunks[-1], max(_LEAST_BLOCK, least))
+
+    def columns(self, parts: Sequence[Any], found: Sequence[Span]) -> Columns:
+        """Return the columns of all blocks."""
+        counts = [rows(block, self.asked.step) for block in found]
+        names = [*self.plain.names, *self.plain.known]
+        kinds: dict[str, Any] = {}
+        for name in names:
+            kinds |= {name: np.float64, f"{name}_stderr": np.float64}
+        kinds |= {"condition": np.float64, "residual_std": np.float64, "order": np.uint8, "status": np.uint16}
+        return {name: joined([part[name] for part in parts], counts, kind) for name, kind in kinds.items()}
+
+
+def record_of(angle: Any, torque: Any, given: Given, step: int) -> Identified:
+    """Return what is to be computed of one record."""
+    request = requested(given.method, given.equation, given.settings, 1 / given.period)
+    record = _Record(angle, torque, _Asked(request, angle.shape[-1], given, step))
+    if not isinstance(request.form, WeakForm) and record.plain.is_windowed:
+        return _windowed(record)
+    if not isinstance(request.form, WeakForm) and record.plain.is_constant:
+        return _constant(record)
+    return _alone(record)
+
+
+def _windowed(record: _Record) -> Identified:
+    """Windows of the strong form: blocks have the bits of the whole record."""
+    dask, plain, asked = record.dask, record.plain, record.asked
+    spans = plain.spans_of_scatter()
+    factors = dask.delayed(_factors, pure=True)(*record.held(spans), spans, asked, record.quantisation)
+    work = dask.delayed(_windows, pure=True)
+    found = record.blocks(_reach(plain, asked.samples))
+    parts = []
+    for block in found:
+        span = plain.around(block)
+        parts.append(work(*record.held([span]), (span, block), factors, asked, record.quantisation))
+    return Identified(record.columns(parts, found), plain.settings(), dask.delayed(({}, 0)))
+
+
+def _reach(plain: Long, samples: int) -> int:
+    first, end = plain.around((samples, samples))
+    return end - first
+
+
+def _factors(angle: Any, torque: Any, spans: Sequence[Span], asked: _Asked, quantisation: float) -> list[float]:
+    return asked.long(quantisation).factors(_held(angle, torque, spans), 1)
+
+
+def _held(angle: Any, torque: Any, spans: Sequence[Span]) -> Held:
+    return Held(np.ascontiguousarray(angle), np.ascontiguousarray(torque), spans)
+
+
+def _windows(
+    angle: Any, torque: Any, places: tuple[Span, Span], factors: Sequence[float], asked: _Asked, quantisation: float
+) -> Columns:
+    """Return the columns of one block, on one thread: dask has others."""
+    span, block = places
+    long, held = asked.long(quantisation), _held(angle, torque, [span])
+    if asked.given.nan_policy == "raise" and not held.is_whole:
+        raise ValueError(f"samples {block[0]} to {block[1]} must be finite; some are not; use nan_policy='omit'")
+    if asked.given.nan_policy == "omit" and not held.is_whole:
+        begin = -(-span[0] // asked.step) * asked.step - span[0]
+        alone = Held(held.angle[begin:], held.torque[begin:], [(span[0] + begin, span[1])])
+        result = asked.given.identified(alone, step=asked.step)
+        return part_alone(result, alone.spans[0], block, asked.step)[0]
+    return columns_of(long.windows(held, block, factors, 1))
+
+
+def _constant(record: _Record) -> Identified:
+    """Constants of the strong form: the equations of blocks add up, in a tree."""
+    dask, plain, asked = record.dask, record.plain, record.asked
+    found = record.blocks(_reach(plain, asked.samples))
+    rows_of, merged = dask.delayed(_rows, pure=True), dask.delayed(_core.merged_rows, pure=True)
+    parts = []
+    for block in found:
+        span = plain.around(block)
+        parts.append((*record.held([span]), (span, block), asked, record.quantisation))
+    total = tree([rows_of(*part) for part in parts], merged)
+    spans = plain.spans_of_scatter()
+    told = dask.delayed(_constants, pure=True)(*record.held(spans), spans, total, asked, record.quantisation)
+    everywhere = dask.delayed(_everywhere, pure=True)
+    columns = record.columns([everywhere(*part, told) for part in parts], found)
+    return Identified(columns, plain.settings(), told[:2])
+
+
+def _rows(angle: Any, torque: Any, places: tuple[Span, Span], asked: _Asked, quantisation: float) -> Any:
+    span, block = places
+    return asked.long(quantisation).rows(_held(angle, torque, [span]), block, 1)
+
+
+def _constants(
+    angle: Any, torque: Any, spans: Sequence[Span], total: Any, asked: _Asked, quantisation: float
+) -> tuple[dict[str, tuple[float, float]], int, float, float]:
+    """Return the constants of the record, its flags, the condition number and the standard deviation of the residuals."""
+    long = asked.long(quantisation)
+    return long.constants(_held(angle, torque, spans), total, 1)
+
+
+def _everywhere(
+    angle: Any, torque: Any, places: tuple[Span, Span], asked: _Asked, quantisation: float, told: Any
+) -> Columns:
+    """Return the columns of a block whose parameters are those of the record."""
+    span, block = places
+    constants, flags, condition, residual = told
+    long = asked.long(quantisation)
+    polynomials = long.polynomials(_held(angle, torque, [span]), block)
+    count = polynomials.status.size
+    status = polynomials.status & ~np.uint16(Status.INVALID)
+    if flags & Status.RANK_DEFICIENT:
+        status |= np.uint16(Status.INVALID | Status.RANK_DEFICIENT)
+    columns: Columns = {}
+    for name, (value, error) in {**constants, **long.values_known()}.items():
+        columns |= {name: np.full(count, value), f"{name}_stderr": np.full(count, error)}
+    columns |= {"condition": np.full(count, condition), "residual_std": np.full(count, residual)}
+    return columns | {"order": polynomials.order, "status": status}
+
+
+def _alone(record: _Record) -> Identified:
+    """Blocks that are records of their own; constants are put together in a tree, and windows corrected for them."""
+    dask, asked = record.dask, record.asked
+    given = asked.given
+    choices: Any = None
+    reach = _REACH
+    if given.settings is not None:
+        reach = reach_of(given.settings)
+        choices = dask.delayed(Choices(dict(given.settings), 0, []))
+    elif not isinstance(asked.request.form, WeakForm):
+        reach = reach_of(record.plain.settings())
+    found = record.blocks(_NEIGHBOURS * reach)
+    if isinstance(asked.request.form, WeakForm) and choices is None and len(found) > 1:
+        spans = stretches(asked.samples, asked.step)
+        each = [record.held([span]) for span in spans]
+        choices = dask.delayed(_choices, pure=True)(each, spans, given)
+    work, finish = dask.delayed(_block_alone, pure=True), dask.delayed(_finished, pure=True)
+    parts = []
+    for block in found:
+        span = with_neighbours(block, reach, asked.samples, asked.step)
+        parts.append(work(*record.held([span]), (span, block), choices, given, asked.step))
+    notes = tree([dask.delayed(_listed, pure=True)(part) for part in parts], dask.delayed(_together, pure=True))
+    means = dask.delayed(means_of, pure=True)(notes)
+    columns = record.columns([finish(part, means) for part in parts], found)
+    told = dask.delayed(_told, pure=True)(notes, means, choices)
+    settings = given.settings or {"method": asked.request.name, "step": asked.step, "sample_rate": 1 / given.period}
+    return Identified(columns, settings, told)
+
+
+def _choices(each: Sequence[tuple[Any, Any]], spans: Sequence[Span], given: Given) -> Choices:
+    """Return what stretches choose."""
+    read = dict(zip(spans, each, strict=True))
+    return chosen(spans, lambda some: _held(*read[some[0]], some), given.identified, given.period)
+
+
+def _block_alone(
+    angle: Any, torque: Any, places: tuple[Span, Span], choices: Choices | None, given: Given, step: int
+) -> tuple[Columns, dict[str, Any]]:
+    span, block = places
+    settings = None if choices is None else choices.settings
+    result = given.identified(_held(angle, torque, [span]), chosen=settings, step=step)
+    return part_alone(result, span, block, step)
+
+
+def _listed(part: tuple[Columns, dict[str, Any]]) -> list[dict[str, Any]]:
+    return [part[1]]
+
+
+def _together(one: list[dict[str, Any]], other: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return one + other
+
+
+def _finished(part: tuple[Columns, dict[str, Any]], means: Mapping[str, Mean]) -> Columns:
+    return finished(*part, means)
+
+
+def _told(notes: Sequence[Mapping[str, Any]], means: Mapping[str, Mean], choices: Choices | None) -> Any:
+    """Return the constants of the record, and its flags."""
+    status = 0 if choices is None else choices.record_status
+    for note in notes:
+        status |= note["record_status"]
+    if not all(mean.agree for mean in means.values()):
+        status |= int(Status.KIND_CONTRADICTED)
+    return {name: (mean.value, mean.error) for name, mean in means.items()}, status

@@ -1,0 +1,190 @@
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from typing import Any
+
+import dask
+import dask.array as da
+import numpy as np
+import pytest
+from distributed import Client, LocalCluster
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import tvident
+import tvident.dask
+from tvident import Status
+
+SAMPLES = 60_000
+ROUNDING = 1e-12
+"""Promised of shared parameters, times the condition number of the equations."""
+MOST_DIFFERENCE = 3.0
+"""Of a standard error: three of the difference of two estimates, one with twice the variance of the other."""
+
+
+@pytest.fixture(scope="module")
+def rig() -> tvident.Recording:
+    return tvident.simulate_torsional_rig(duration=SAMPLES / 1000, sample_rate=1000, seed=2, pattern="slider")
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[Client]:
+    with (
+        LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
+        Client(cluster) as client,
+    ):
+        yield client
+
+
+def chunked(values: Any, chunks: Any) -> Any:
+    return da.from_array(np.asarray(values), chunks=chunks)
+
+
+def assert_same_bits(found: tvident.dask.DaskIdentification, whole: tvident.Identification) -> None:
+    expected = whole.columns()
+    (columns,) = da.compute(dict(found.columns))
+    for name, values in columns.items():
+        assert values.tobytes() == np.ascontiguousarray(expected[name]).tobytes(), name
+    assert found.settings == whole.settings
+    assert np.array_equal(found.time.compute(), whole.time)
+
+
+cuts = st.lists(st.integers(1, 20_000), min_size=1, max_size=12)
+
+
+@settings(max_examples=8)
+@given(cuts=cuts, step=st.sampled_from([1, 3, 250]), half=st.integers(3, 150), rows=st.integers(5, 400))
+def test_chunks_of_any_size_have_the_bits_of_one_call(cuts: list[int], step: int, half: int, rows: int) -> None:
+    generator = np.random.default_rng(sum(cuts))
+    samples = sum(cuts) + 1000
+    angle, torque = np.cumsum(generator.standard_normal((2, samples)), axis=-1)
+    form = tvident.StrongForm(window_length=2 * half + 1, regression_window=rows)
+    options: dict[str, Any] = {
+        **dict.fromkeys(("inertia", "damping", "stiffness"), "windowed"),
+        "method": form,
+        "terms": (),
+        "sample_rate": 1000,
+        "step": step,
+    }
+    chunks = ((*cuts, 1000),)
+    found = tvident.dask.identify(chunked(angle, chunks), chunked(torque, (samples,)), **options)
+    with dask.config.set(scheduler="synchronous"):
+        assert_same_bits(found, tvident.identify(angle, torque, **options))
+
+
+@settings(max_examples=8)
+@given(
+    cuts=cuts,
+    step=st.sampled_from([1, 4, 90]),
+    half=st.integers(2, 120),
+    selection=st.sampled_from(["window", "pooled", "average"]),
+    rounded=st.booleans(),
+)
+def test_derivatives_have_them_too(cuts: list[int], step: int, half: int, selection: Any, rounded: bool) -> None:
+    generator = np.random.default_rng(sum(cuts))
+    samples = sum(cuts) + 2 * half + 1
+    y = np.sin(np.arange(samples) / 30) + 1e-3 * generator.standard_normal(samples)
+    y[generator.integers(0, samples, 2)] = np.nan
+    y = np.round(y, 2) if rounded else y
+    whole = tvident.fit_local_polynomials(y, 2 * half + 1, sample_rate=100, selection=selection, step=step)
+    found = tvident.dask.fit_local_polynomials(
+        chunked(y, ((*cuts, 2 * half + 1),)), 2 * half + 1, sample_rate=100, selection=selection, step=step
+    )
+    names = ("derivatives", "stderr", "order", "sigma", "status")
+    for name, values in zip(
+        names, dask.compute(*(getattr(found, one) for one in names), scheduler="synchronous"), strict=True
+    ):
+        assert values.tobytes() == np.ascontiguousarray(getattr(whole, name)).tobytes(), name
+
+
+def test_two_processes_have_the_bits_of_one_call(rig: tvident.Recording, client: Client) -> None:
+    assert len(client.scheduler_info()["workers"]) == 2
+    angle, torque = (chunked(one, 9_000) for one in (rig.angle, rig.torque))
+    found = tvident.dask.identify(angle, torque, sample_rate=1000, method="paper")
+    assert_same_bits(found, tvident.identify(rig.angle, rig.torque, sample_rate=1000, method="paper"))
+
+
+@pytest.mark.parametrize("terms", [(), ("offset", "coulomb")])
+def test_shared_parameters_are_those_of_one_call(
+    rig: tvident.Recording, client: Client, terms: tuple[str, ...]
+) -> None:
+    del client  # the work goes there
+    angle, torque = (chunked(one, 7_001) for one in (rig.angle, rig.torque))
+    options: dict[str, Any] = {
+        **dict.fromkeys(("inertia", "damping", "stiffness"), "constant"),
+        "method": tvident.StrongForm(window_length=101),
+        "terms": terms,
+        "sample_rate": 1000,
+    }
+    found = tvident.dask.identify(angle, torque, **options)
+    whole = tvident.identify(rig.angle, rig.torque, **options)
+    for name, (value, error) in whole.constants.items():
+        near = ROUNDING * float(whole.condition[0])
+        assert found.constants[name] == (pytest.approx(value, rel=near), pytest.approx(error, rel=near)), name
+    assert np.array_equal(found.status.compute(), whole.status)
+    assert np.array_equal(found.order.compute(), whole.order)
+    assert found.record_status == whole.record_status
+
+
+def test_the_weak_form_finds_what_one_call_finds(rig: tvident.Recording, client: Client) -> None:
+    del client
+    whole = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
+    angle, torque = (chunked(one, 20_000) for one in (rig.angle, rig.torque))
+    found = tvident.dask.identify(angle, torque, sample_rate=1000, settings=whole.settings)
+    for name, (value, error) in whole.constants.items():
+        # Neighbours of blocks count twice, and noise is known of each block by itself: two good estimates of one value.
+        assert abs(found.constants[name][0] - value) < MOST_DIFFERENCE * error, name
+    difference = (found.stiffness.compute() - whole.stiffness) / whole.stderr["stiffness"]
+    assert np.sqrt(np.nanmean(difference**2)) < MOST_DIFFERENCE / 3
+    assert found.record_status == whole.record_status
+
+
+def test_a_batch_is_many_records(rig: tvident.Recording) -> None:
+    angle = np.stack([rig.angle[:9_000], 2 * rig.angle[:9_000]])
+    torque = np.stack([rig.torque[:9_000], rig.torque[:9_000]])
+    found = tvident.dask.identify(
+        chunked(angle, (1, 5_000)), chunked(torque, (2, 5_000)), sample_rate=1000, method="paper"
+    )
+    for record in range(2):
+        whole = tvident.identify(angle[record], torque[record], sample_rate=1000, method="paper")
+        assert np.array_equal(found.stiffness[record].compute(), whole.stiffness, equal_nan=True)
+
+
+def test_missing_samples_leave_other_blocks_as_they_are(rig: tvident.Recording) -> None:
+    torque = np.array(rig.torque)
+    torque[30_000:30_040] = np.nan
+    found = tvident.dask.identify(chunked(rig.angle, 6_000), chunked(torque, 6_000), sample_rate=1000, method="paper")
+    whole = tvident.identify(rig.angle, torque, sample_rate=1000, method="paper")
+    assert np.array_equal(found.status.compute(), whole.status)
+    difference = (found.stiffness.compute() - whole.stiffness) / whole.stderr["stiffness"]
+    assert np.nanmax(np.abs(difference)) < 1e-6  # both make the same rows: rounding, times the condition of a window
+    assert (found.status[30_000:30_040].compute() & Status.GAP != 0).all()
+
+
+def test_a_killed_worker_costs_time_and_no_results(rig: tvident.Recording, client: Client) -> None:
+    angle, torque = (chunked(one, 6_000) for one in (rig.angle, rig.torque))
+    found = tvident.dask.identify(angle, torque, sample_rate=1000, method="paper").stiffness
+    pids = client.run(os.getpid)
+    future = client.compute(found)
+    os.kill(next(iter(pids.values())), signal.SIGKILL)
+    stiffness = future.result(timeout=60)
+    whole = tvident.identify(rig.angle, rig.torque, sample_rate=1000, method="paper")
+    assert np.array_equal(stiffness, whole.stiffness, equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        ({"angle": np.ones(9000)}, TypeError, "must be a dask array"),
+        ({"angle": da.ones(9000, dtype=complex)}, TypeError, "real numbers"),
+        ({"torque": da.ones(8000)}, ValueError, "one shape"),
+        ({"sample_rate": None}, TypeError, "sample period"),
+        ({"inertia": np.ones(9000)}, TypeError, "give a number"),
+    ],
+)
+def test_a_wrong_call_says_what_would_be_right(change: dict[str, Any], error: type[Exception], words: str) -> None:
+    options: dict[str, Any] = {"angle": da.ones(9000), "torque": da.ones(9000), "sample_rate": 1000, "method": "paper"}
+    with pytest.raises(error, match=words):
+        tvident.dask.identify(**(options | change))
