@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from tvident._expansion import Expansion
     from tvident._files import FileRecording, read_recording
     from tvident._identify import StrongForm, WeakForm, identify
-    from tvident._merged import Chain, Matrix, MergedIdentification
     from tvident._in_pieces import FileIdentification, identify_file
+    from tvident._merged import Chain, Matrix, MergedIdentification
     from tvident._plan import ExperimentPlan, plan_experiment
     from tvident._regression import RollingRegression, rolling_least_squares
     from tvident._results import ExpandedParameter, Identification, IdentifiedRecords, Scan, load
