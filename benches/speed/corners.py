@@ -106,6 +106,23 @@ def _spoilt(share: float) -> Duel:
     return Duel([work(*kind) for kind in kinds], _unchecked, samples)
 
 
+def _irregular(share: float) -> Duel:
+    """Pit times that scatter by 0.3 of a step against uniform ones."""
+    angle, torque = signals.recording(max(_LEAST, int(_FEW_MILLIONS * share)))
+    shift = 0.3 * np.random.default_rng(24).uniform(-0.5, 0.5, angle.size)
+    # Samples of the same motion at shifted times, but for what lines between samples of 1 kHz lose.
+    count = np.arange(angle.size, dtype=np.float64)
+    t, taken = (count + shift) / signals.RATE, [np.interp(count + shift, count, one) for one in (angle, torque)]
+    return Duel(
+        [
+            lambda: tvident.identify(*taken, t=t, workers=1),
+            lambda: tvident.identify(angle, torque, sample_rate=signals.RATE, workers=1),
+        ],
+        _unchecked,
+        angle.size,
+    )
+
+
 _SHORT, _PLAIN = "5000 records of 400 samples, window 51", "window 201"
 
 CORNERS = [
@@ -153,6 +170,7 @@ CORNERS = [
         _automatic(inertia="constant", damping="constant", stiffness="constant"),
         most=4,
     ),
+    Row("irregular", "`identify(t=)`, steps that scatter by 0.3 of a step", "uniform times", _irregular, most=6),
     Row("events", "`identify`, 4 million samples, a break every 4 s", "a quarter of them", _events, most=5),
     Row(
         "spoilt",

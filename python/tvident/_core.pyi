@@ -116,7 +116,28 @@ class Motions:
         noise: Sequence[tuple[float, int, Sequence[tuple[int, float]]]] | None = None,
         parts: Sequence[tuple[int, int]] | None = None,
         samples: int = 0,
+        passed: tuple[PassedNoise | None, PassedNoise | None] = ...,
     ) -> Motions: ...
+
+@final
+class PassedNoise:
+    @property
+    def gain(self) -> float: ...
+
+@final
+class Resampling:
+    def __new__(
+        cls,
+        times: npt.NDArray[np.float64],
+        grid: int,
+        *,
+        order: int,
+        bridged: float,
+        propagate: bool = False,
+    ) -> Resampling: ...
+    def onto_grid(self, samples: npt.NDArray[np.number], *, workers: int | None = None) -> npt.NDArray[np.float64]: ...
+    def gain(self, *, workers: int | None = None) -> float: ...
+    def passed_noise(self, *, workers: int | None = None) -> PassedNoise: ...
 
 @final
 class LocalEstimates:
@@ -143,6 +164,29 @@ class AutomaticEstimates:
     def chosen(self) -> list[list[tuple[int, int]]]: ...
     @property
     def noise(self) -> list[tuple[float, float]]: ...
+
+@final
+class WindowFit:
+    def __new__(
+        cls,
+        times: npt.NDArray[np.float64],
+        window_length: float,
+        *,
+        order: int | None,
+        max_order: int,
+        criterion: str,
+        derivatives: int,
+        quantisation: float,
+    ) -> WindowFit: ...
+    def estimate(
+        self,
+        samples: npt.NDArray[np.number],
+        *,
+        step: int = 1,
+        workers: int | None = None,
+        progress: Callable[[int, int], object] | None = None,
+    ) -> tuple[LocalEstimates, npt.NDArray[np.float64]]: ...
+    def scores(self, samples: npt.NDArray[np.number], sample: int) -> npt.NDArray[np.float64]: ...
 
 @final
 class Responses:
@@ -336,7 +380,9 @@ def estimate_automatically(
     workers: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> AutomaticEstimates: ...
-def noise(samples: npt.NDArray[np.number], quantisation: float | None = None) -> list[Noise]: ...
+def noise(
+    samples: npt.NDArray[np.number], quantisation: float | None = None, passed: PassedNoise | None = None
+) -> list[Noise]: ...
 def noise_coherence(
     angle: npt.NDArray[np.number], torque: npt.NDArray[np.number], variances: list[float]
 ) -> list[float | None]: ...

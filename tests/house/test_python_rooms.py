@@ -25,6 +25,7 @@ ROOMS = (
     "_formats",
     "_files",
     "_huber",
+    "_clocks",
     "_derivatives",
     "_regression",
     "_simulate",

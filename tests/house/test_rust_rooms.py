@@ -21,6 +21,7 @@ ROOMS = (
     "lanes",
     "local_polynomials",
     "noise",
+    "irregular",
     "auto_derivatives",
     "least_squares",
     "equation",

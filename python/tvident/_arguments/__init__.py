@@ -18,7 +18,7 @@ from tvident._arguments.numbers import (
 from tvident._arguments.progress import Progress, reporter
 from tvident._arguments.sampling import check_power, check_window, length_given, sample_period, seconds, window_length
 from tvident._arguments.shown import shown
-from tvident._arguments.times import begin_of, implied_times, times_of
+from tvident._arguments.times import NotUniformError, begin_of, implied_times, printed_step, times_of
 from tvident._arguments.workers import worker_count
 from tvident._arguments.wrapped import Unwrapped, unwrapped
 from tvident._choices import NanPolicy, RowPolicy
@@ -27,6 +27,7 @@ __all__ = [
     "LARGEST",
     "Labels",
     "NanPolicy",
+    "NotUniformError",
     "Progress",
     "RowPolicy",
     "Unwrapped",
@@ -56,6 +57,7 @@ __all__ = [
     "percent",
     "plain",
     "positive_number",
+    "printed_step",
     "real_array",
     "real_number",
     "reporter",

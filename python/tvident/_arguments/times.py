@@ -29,10 +29,27 @@ _DIGITS = 9
 _BLOCKS = 4096
 """Parts of a record of whose times the extremes are kept: they bound the period as all times do."""
 
+_FEW_SHARED = 0.01
+"""So few samples that have the time of another are mistakes, not times that are too coarse."""
+
 _HALVINGS = 50
 
 _SEARCHED = 1e-6
 """How closely the period is found, as a part of what times may be off."""
+
+
+class NotUniformError(ValueError):
+    """Times increase, but not by equal steps.
+
+    Attributes
+    ----------
+    times : ndarray
+        In seconds.
+    """
+
+    def __init__(self, message: str, times: Seconds) -> None:
+        super().__init__(message)
+        self.times = times
 
 
 def times_of(t: npt.ArrayLike) -> npt.NDArray[np.number]:
@@ -101,7 +118,15 @@ def implied_times(values: Any) -> Any:
 
 
 def period_of_times(t: npt.ArrayLike, samples: int) -> float:
-    """Return the period of times that are uniform, within rounding or within the digits that they were printed with."""
+    """Return the period of times that are uniform, within rounding or within the digits that they were printed with.
+
+    Raises
+    ------
+    NotUniformError
+        If they increase by steps that differ.
+    ValueError
+        If they do not increase, are missing or too coarse, or are not as many as the samples.
+    """
     given = times_of(t)
     if given.ndim > 1 and given.size == max(given.shape):
         given = given.reshape(-1)
@@ -120,7 +145,7 @@ def period_of_times(t: npt.ArrayLike, samples: int) -> float:
         raise ValueError(f"t must hold finite times; t[{place}] is {seconds[place]}; repair it")
     period = float(seconds[-1] - seconds[0]) / (samples - 1)
     if not period > 0:
-        raise ValueError(f"t must increase; it goes from {seconds[0]} to {seconds[-1]}; sort the samples by time")
+        raise _not_increasing(seconds)
     distance = np.abs(seconds - (seconds[0] + period * np.arange(samples)))
     if float(distance.max()) <= max(_JITTER * period, rounding * float(np.max(np.abs(seconds)))):
         return period
@@ -144,7 +169,7 @@ def period_of_times(t: npt.ArrayLike, samples: int) -> float:
 
 def _too_coarse(seconds: Seconds, distance: Seconds, period: float, quantum: float, rate: float) -> ValueError:
     """Return what to say of times whose digits are no finer than their steps."""
-    if (np.diff(seconds) > 0).all():
+    if np.count_nonzero(np.diff(seconds) <= 0) <= _FEW_SHARED * seconds.size:
         return _not_uniform(seconds, distance, period)
     return ValueError(
         f"t must tell samples apart; it was printed in steps of {quantum:g} s, which several samples share; "
@@ -154,6 +179,8 @@ def _too_coarse(seconds: Seconds, distance: Seconds, period: float, quantum: flo
 
 def _not_uniform(seconds: Seconds, distance: Seconds, period: float) -> ValueError:
     """Return what says where times are not uniform, and what to do."""
+    if not (np.diff(seconds) > 0).all():
+        return _not_increasing(seconds)
     # The widest step tells where; the farthest sample may be an innocent one.
     usual = float(np.median(np.diff(seconds)))
     place = int(np.abs(np.diff(seconds) - usual).argmax()) + 1
@@ -162,10 +189,31 @@ def _not_uniform(seconds: Seconds, distance: Seconds, period: float) -> ValueErr
         count = np.arange(seconds.size) - (seconds.size - 1) / 2
         rate = float(count @ count / (count @ (seconds - seconds[0])))
         cure += f", or give sample_rate={rate:.6g} if only the clock was read unevenly"
-    return ValueError(
+    return NotUniformError(
         f"t must be uniform; the step to t[{place}] = {seconds[place]:g} is {seconds[place] - seconds[place - 1]:g} s "
-        f"where the others are {usual:g} s; {cure}"
+        f"where the others are {usual:g} s; {cure}",
+        seconds,
     )
+
+
+def _not_increasing(seconds: Seconds) -> ValueError:
+    """Return what says where times do not increase, and what to do."""
+    place = int(np.flatnonzero(np.diff(seconds) <= 0)[0]) + 1
+    now, before = float(seconds[place]), float(seconds[place - 1])
+    if now == before:
+        return ValueError(
+            f"t must increase; t[{place}] = {now!r} is that of the sample before; leave one of the two out, or give sample_rate= instead "
+            "of t if samples were taken evenly"
+        )
+    return ValueError(
+        f"t must increase; t[{place}] = {now!r} comes after t[{place - 1}] = {before!r}; sort the samples by time, or cut the record where "
+        "its clock was set back"
+    )
+
+
+def printed_step(seconds: Seconds) -> float:
+    """Return the decimal step that times were printed in, 0 where they have too many digits for one."""
+    return _quantum(seconds, float(np.spacing(np.abs(seconds).max()))) or 0.0
 
 
 def _quantum(seconds: Seconds, slack: float) -> float | None:

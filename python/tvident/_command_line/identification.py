@@ -44,6 +44,14 @@ IDENTIFICATION = options_of(
     ),
     click.option("--lag", metavar="TIME", help="Delay of the torque: seconds, '2 ms', or auto."),
     click.option(
+        "--torque-time", metavar="NAME", help="Channel of times of the torque, where it has a clock of its own."
+    ),
+    click.option(
+        "--align",
+        metavar="HOW",
+        help="By how much times of the torque are late: offset or drift (found from the equation), or a time such as '2 ms'.",
+    ),
+    click.option(
         "--quantisation", type=float, help="Step to which the angle was rounded; estimated if not given; 0: none."
     ),
     click.option(

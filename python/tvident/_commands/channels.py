@@ -7,7 +7,6 @@ import shutil
 import sys
 import tempfile
 import warnings
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +16,7 @@ import numpy.typing as npt
 
 from tvident import recordings
 from tvident._files import full_name, listed, printable, time_channels
-from tvident._units import Channel, named_unit, unit_said
-
-_BAGS, _EVEN, _MOST_SCATTER = {".mcap", ".db3", ".bag"}, 1e-3, 2.0
-"""Endings of ROS bags; periods by which stamps are even, and by which they scatter without a gap."""
-
-_FEWEST = 3
-"""Stamps between which there is one that may scatter."""
+from tvident._units import Channel, named_unit
 
 _MOST_START = 4096
 _BEGINNINGS = {
@@ -65,31 +58,6 @@ def times_of(channels: recordings.Channels, name: str | None, beside: str, file:
         if not group:
             raise
         return channel_of(channels, f"{group}{name}", file)
-
-
-def at_even_times(
-    times: npt.NDArray[Any], signals: Sequence[npt.NDArray[Any]], file: str | None
-) -> tuple[npt.NDArray[Any], list[npt.NDArray[Any]]]:
-    """Return messages of a ROS bag as if they had been stamped at even times: between stamps that scatter, straight lines."""
-    given = times, list(signals)
-    if (
-        Path(file or "").suffix.lower() not in _BAGS
-        or times.size < _FEWEST
-        or any(one.shape != times.shape for one in signals)
-    ):
-        return given
-    even = np.linspace(float(times[0]), float(times[-1]), times.size)
-    period = even[1] - even[0]
-    scatter = float(np.abs(np.asarray(times) - even).max())
-    # What is lost for several periods is a gap, which nobody may fill.
-    if not _EVEN * period < scatter < _MOST_SCATTER * period or not (np.diff(times) > 0).all():
-        return given
-    click.echo(
-        f"Warning: stamps of the messages scatter by up to {scatter / period:.2g} of their period; angle and torque are interpolated "
-        f"between them, at {1 / period:.6g} Hz",
-        err=True,
-    )
-    return Channel(even, "s"), [Channel(np.interp(even, times, one), unit_said(one)) for one in signals]
 
 
 def check_has_times(who: str, given: bool, channels: recordings.Channels) -> None:  # noqa: FBT001 - said by its name

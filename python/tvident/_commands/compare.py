@@ -12,7 +12,6 @@ import numpy as np
 import tvident
 from tvident import baselines
 from tvident._commands.channels import (
-    at_even_times,
     channel_of,
     channels_in,
     check_has_times,
@@ -70,7 +69,7 @@ def compare(
     signals = [source_of(channels, name, file) for name in (angle, torque)]
     times = times_of(channels, time_channel, angle, file)
     if times is not None:
-        common["t"], signals = at_even_times(times, signals, file)
+        common["t"] = times
     result = tvident.compare_models(
         scaled(signals[0], angle_scale, channels, file),
         scaled(signals[1], torque_scale, channels, file),

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 import tvident
-from tvident import _arguments as arguments
 from tvident._commands.channels import channel_of, channels_in, check_has_times
 from tvident._commands.given import check_time, given, length, period_of, wanted_progress
 from tvident._commands.output import PICTURE, RECORDING, RESULTS, check_outputs, figures_on_file, give, save_figure
@@ -51,11 +50,8 @@ def derivatives(
         progress=wanted_progress(progress),
         **given(options),
     )
-    seconds = arguments.sample_period(samples.size, delta=delta, sample_rate=sample_rate, t=times)
-    start = 0.0 if times is None else float(times[0])
-    step = int(options["step"])
     names = ["value", *(f"derivative_{d}" for d in range(1, fit.derivatives.shape[0]))]
-    columns: dict[str, npt.NDArray[Any]] = {"time": start + np.arange(0, samples.size, step) * seconds}
+    columns: dict[str, npt.NDArray[Any]] = {"time": fit.time}
     for name, values, errors in zip(names, fit.derivatives, fit.stderr, strict=True):
         columns |= {name: values, f"{name}_stderr": errors}
     columns |= {"sigma": fit.sigma, "order": fit.order, "status": fit.status}

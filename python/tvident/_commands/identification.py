@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
+import click
 import numpy as np
+import numpy.typing as npt
 
 import tvident
 from tvident import recordings
-from tvident._commands.channels import at_even_times, check_has_times, mask_of, scaled, source_of, times_of
+from tvident._commands.channels import channel_of, check_has_times, mask_of, scaled, source_of, times_of
 from tvident._commands.equation import lag_of, parameter_of, terms_of
 from tvident._commands.given import check_time, given, period_of, wanted_progress
 from tvident._commands.method import NAMES, method_of
@@ -52,6 +54,8 @@ def identified(
     terms: tuple[str, ...],
     instrument: str | None,
     lag: str | None,
+    torque_time: str | None,
+    align: str | None,
     mask: str | None,
     settings: str | None,
     progress: bool | None,
@@ -66,18 +70,17 @@ def identified(
     named = {name: channel for name, channel in motion.items() if channel is not None}
     recorded = [source_of(channels, name, file) for name in (*named.values(), torque)]
     times = times_of(channels, time_channel, next(iter(named.values())), file)
-    if times is not None:
-        times, recorded = at_even_times(times, recorded, file)
     signals = dict(zip(named, recorded, strict=False))
     if "angle" in signals:
         signals["angle"] = scaled(signals["angle"], angle_scale, channels, file)
-    return tvident.identify(
+    result = tvident.identify(
         signals.get("angle"),
         scaled(recorded[-1], torque_scale, channels, file),
         velocity=signals.get("velocity"),
         acceleration=signals.get("acceleration"),
         method=method_of(method, of_method, has_settings=settings is not None),
-        t=times,
+        t=times if torque_time is None else _both(times, channel_of(channels, torque_time, file)),
+        align=_align_of(align),
         instrument=None if instrument is None else source_of(channels, instrument, file),
         period=None if turn is None else abs(float(turn)),
         lag=None if lag is None else lag_of(lag),
@@ -91,3 +94,29 @@ def identified(
             if name not in NAMES
         },
     )
+    if "times" in result.settings:
+        click.echo(f"Times: {result.reasons[0]}", err=True)
+    return result
+
+
+def _both(times: npt.NDArray[Any] | None, of_torque: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """Return the times of both channels."""
+    if times is None:
+        raise click.UsageError("--torque-time needs the times of the angle, too; got none; give --time")
+    return times, of_torque
+
+
+def _align_of(text: str | None) -> Literal["offset", "drift"] | float | None:
+    """Return how clocks are aligned: a word, or a time that is given as a lag is."""
+    if text is None:
+        return None
+    if text == "offset":
+        return "offset"
+    if text == "drift":
+        return "drift"
+    found = lag_of(text)
+    if isinstance(found, str):
+        raise click.UsageError(
+            f"align must be offset, drift, seconds or a time such as '2 ms'; got {text!r}; repair it"
+        )
+    return found

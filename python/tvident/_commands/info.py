@@ -8,6 +8,7 @@ import click
 import numpy as np
 import numpy.typing as npt
 
+from tvident._clocks import grid_of
 from tvident._commands.channels import channels_in
 from tvident._files import aligned, printable
 from tvident._units import ROTARY, named_unit, unit_of
@@ -53,5 +54,20 @@ def _remark(name: str, values: npt.NDArray[Any]) -> str:
                 is_time = unit is not None and unit.dimension == ROTARY.dimensions["time"]
                 hertz = f", {1 / (period * unit.factor):.6g} Hz" if is_time and unit is not None else ""
                 return f"uniform: {1 / period:.6g} per unit{hertz}"
-            return "increasing"
+            return _steps(values)
     return "constant" if steps.size and not steps.any() else ""
+
+
+def _steps(times: npt.NDArray[np.float64]) -> str:
+    """Return in words how increasing times are spaced."""
+    try:
+        grid = grid_of(times)
+    except ValueError:
+        return "increasing, mostly gaps"
+    gaps = int(np.count_nonzero(np.diff(grid.places) > grid.bridged))
+    words = f"increasing: {1 / grid.period:.6g} per unit"
+    if grid.jitter:
+        words += f", steps scatter by {grid.jitter:.2g} of a step"
+    elif grid.samples > times.size:
+        words += f", {grid.samples - times.size} samples lost"
+    return words + (f", {gaps} gaps" if gaps else "")

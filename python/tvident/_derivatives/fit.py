@@ -27,12 +27,21 @@ class Sampled:
         Seconds from sample to sample, and of the first.
     labels : Labels, optional
         Those of the container that the samples came in.
+    times : ndarray, optional
+        Time of every sample in seconds where the period does not tell it.
     """
 
     step: int = 1
     period: float = 1.0
     start: float = 0.0
     labels: arguments.Labels | None = None
+    times: npt.NDArray[np.float64] | None = None
+
+    def at(self, samples: int) -> npt.NDArray[np.float64]:
+        """Return the time of every result of so many samples in seconds."""
+        if self.times is not None:
+            return self.times[:: self.step]
+        return self.start + np.arange(0, samples, self.step, dtype=np.float64) * self.period
 
 
 class LocalPolynomialFit(Tabular):
@@ -51,9 +60,9 @@ class LocalPolynomialFit(Tabular):
         of the record, also of noise that is correlated from sample to sample.
     status : ndarray of uint16, shape y.shape
         Flags of :class:`tvident.Status`, 0 is good.
-    window_length : int or ndarray of int
-        Samples in a window. Where they were chosen, those that suit each record best, one number a derivative: shape
-        (max_deriv + 1, \*y.shape without the axis).
+    window_length : int, str or ndarray of int
+        Samples in a window, or a duration where `t` is not uniform and one was given. Where they were chosen, those that suit each record
+        best, one number a derivative: shape (max_deriv + 1, \*y.shape without the axis).
     settings : dict
         What was used and what was chosen: ``window_length``, ``order``, ``max_order``, ``quantisation``, and either ``criterion`` and
         ``selection`` or ``noise``, the standard deviation of each record's noise.
@@ -94,8 +103,13 @@ class LocalPolynomialFit(Tabular):
         self.order: npt.NDArray[np.uint8] = self._in_place(found.order)
         self.status: npt.NDArray[np.uint16] = self._in_place(found.status)
         self.sigma: npt.NDArray[np.float64] = self._in_place(found.sigma)
-        self.window_length: int | npt.NDArray[np.intp] = found.window_length
+        self.window_length: int | str | npt.NDArray[np.intp] = found.window_length
         self.settings: dict[str, Any] = found.settings
+
+    @property
+    def time(self) -> npt.NDArray[np.float64]:
+        """Time of every result in seconds, along the axis of time."""
+        return self._sampled.at(self._samples.shape[-1])
 
     def _in_place(self, array: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Put the axis of the samples, last so far, where the user has it."""
@@ -187,7 +201,7 @@ class LocalPolynomialFit(Tabular):
         columns |= {name: np.moveaxis(each, last, -1) for name, each in rest.items()}
         every, labels = sampled.step, sampled.labels
         return Table(
-            time=sampled.start + np.arange(0, self._samples.shape[-1], every, dtype=np.float64) * sampled.period,
+            time=self.time,
             columns=columns,
             settings=json.loads(json.dumps(self.settings, default=np.ndarray.tolist)),
             labels=None if labels is None else labels.at(slice(None, None, every)),

@@ -20,9 +20,9 @@ class Found:
     order: npt.NDArray[np.uint8]
     status: npt.NDArray[np.uint16]
     sigma: npt.NDArray[np.float64]
-    window_length: int | npt.NDArray[np.intp]
+    window_length: int | str | npt.NDArray[np.intp]
     settings: dict[str, Any]
     errors: Callable[[], npt.NDArray[np.float64]]
     """Gives the standard errors, in the shape of the derivatives."""
-    plan_of: Callable[[tuple[int, ...]], _core.LocalPolynomials]
+    plan_of: Callable[[tuple[int, ...]], _core.LocalPolynomials | _core.WindowFit]
     """Gives the plan of a record's windows."""

@@ -15,6 +15,7 @@ from tvident._derivatives.automatic import choose
 from tvident._derivatives.fit import LocalPolynomialFit, Sampled
 from tvident._derivatives.found import Found
 from tvident._derivatives.incomplete import check_whole_windows, filled, incomplete_given
+from tvident._derivatives.own_times import at_own_times, check_plain, period_or_times
 from tvident._derivatives.plans import HIGHEST_ORDER, SHORTEST_WINDOW, plan, quantisation_step
 from tvident._huber import pseudo_values
 from tvident._tables import shaped
@@ -74,8 +75,8 @@ def fit_local_polynomials(
     sample_rate : float, optional
         Samples per second.
     t : array_like, optional
-        Time of every sample, shape (n,): seconds, dates or durations, uniform to a thousandth of the sample period or within the digits
-        that they were printed with.
+        Time of every sample, shape (n,): seconds, dates or durations, which increase. Where they are not uniform to a thousandth of the
+        sample period, or within the digits that they were printed with, every window is fitted at the true times of its samples.
     max_order : int, optional
         Highest candidate order, at most 15. Orders that are too high for a short window are left out.
     order : int, optional
@@ -129,7 +130,7 @@ def fit_local_polynomials(
     Raises
     ------
     ValueError
-        If the window is even, shorter than 5 samples or longer than the record, if an order is too high, if `t` is not uniform, if
+        If the window is even, shorter than 5 samples or longer than the record, if an order is too high, if `t` does not increase, if
         `y` spans more than one and a half of `period`, or if a name is unknown. With ``"auto"``, if the record has fewer than 64
         samples, if no order reaches `max_deriv`, or if `criterion` or `selection` is given. With ``nan_policy="omit"`` or `weights`, if
         the window is ``"auto"``, orders are pooled or averaged, or the loss is Huber's.
@@ -160,6 +161,10 @@ def fit_local_polynomials(
     the order with the least estimated squared bias plus variance, since such a window is not symmetric. Its standard errors are those of
     that order with the bias; that the order was chosen is not in them, so that nominal 95 % intervals cover 80 to 95 %. A
     derivative above the order is zero and has no standard error (NaN). This costs some 50 µs a window of 201 samples and thread.
+
+    Where `t` is not uniform every window has a design of its own, and derivatives are those at each sample's own time. A duration takes
+    the samples that lie in it, however many; windows with fewer than 5 are NaN. ``"auto"``, ``"pooled"`` and ``"average"`` need uniform
+    times. A window of 201 samples takes some 50 µs.
 
     The cost is about 15 ns a sample and thread for any window length on a processor with AVX-512, about twice that with AVX2; averaged
     about twice as much; pooled about 300 ns, because the orders of every window need logarithms; ``"auto"`` about 5 µs a sample and
@@ -201,7 +206,7 @@ def fit_local_polynomials(
     count = samples.shape[-1]
     if delta is None and sample_rate is None and t is None:
         t = arguments.implied_times(y)
-    seconds = arguments.sample_period(count, delta=delta, sample_rate=sample_rate, t=t)
+    seconds, times = period_or_times(count, delta=delta, sample_rate=sample_rate, t=t)
     arguments.one_of("criterion", criterion, get_args(Criterion))
     arguments.one_of("selection", selection, get_args(Selection))
     arguments.check_nan("y", array, nan_policy, arguments.RowPolicy)
@@ -212,23 +217,39 @@ def fit_local_polynomials(
     arguments.check_power("max_deriv", max_deriv, seconds)
     every = arguments.whole_number("step", step, least=1)
     threads = arguments.worker_count(workers)
+    # Whole periods need not be multiples of the step.
+    step_of_rounding = quantisation_step(samples, quantisation)
+    turned = None if period is None else arguments.unwrapped("y", samples, period)
+    samples = samples if turned is None else turned.values
+    sampled = Sampled(every, seconds, arguments.begin_of(t), arguments.labels_of(y), times)
+    if times is not None:
+        check_plain(nan_policy, weights, max_gap, min_observations)
+        found = at_own_times(
+            samples,
+            times,
+            window_length,
+            order=order,
+            max_order=max_order,
+            criterion=criterion,
+            selection=selection,
+            loss=loss,
+            max_deriv=max_deriv,
+            quantisation=step_of_rounding,
+            step=every,
+            workers=threads,
+            progress=progress,
+        )
+        found.settings.update(_of_wrapped(turned, period))
+        return LocalPolynomialFit(samples, axis, found, sampled)
     automatic = isinstance(window_length, str) and window_length.strip() == "auto"
-    length = 0
+    length = 0 if automatic else _window(window_length, seconds, count)
     if automatic:
         _check_left_to_the_rule(criterion, selection)
-    else:
-        length = arguments.window_length("window_length", window_length, seconds, odd=True)
-        arguments.check_window("window_length", length, count, least=SHORTEST_WINDOW)
     incomplete = incomplete_given(
         nan_policy, weights, max_gap, min_observations, shape=array.shape, length=length, period=seconds, axis=axis
     )
     if incomplete is not None:
         check_whole_windows(automatic=automatic, selection=selection, loss=loss)
-    # Whole periods need not be multiples of the step.
-    step_of_rounding = quantisation_step(samples, quantisation)
-    turned = None if period is None else arguments.unwrapped("y", samples, period)
-    samples = samples if turned is None else turned.values
-    sampled = Sampled(every, seconds, arguments.begin_of(t), arguments.labels_of(y))
 
     def plan_of_window(length: int) -> _core.LocalPolynomials:
         return plan(
@@ -292,6 +313,13 @@ def fit_local_polynomials(
         plan_of=lambda _: core_plan,
     )
     return LocalPolynomialFit(samples, axis, found, sampled)
+
+
+def _window(window_length: int | str, seconds: float, count: int) -> int:
+    """Return the samples of a window."""
+    length = arguments.window_length("window_length", window_length, seconds, odd=True)
+    arguments.check_window("window_length", length, count, least=SHORTEST_WINDOW)
+    return length
 
 
 def _with_clipped_residuals(

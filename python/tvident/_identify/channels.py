@@ -99,6 +99,7 @@ def motion_channels(
     *,
     has_spring: bool,
     quantisation: float | None,
+    passed: _core.PassedNoise | None = None,
 ) -> MotionChannels:
     """Return one angle from what was measured of a motion.
 
@@ -112,6 +113,8 @@ def motion_channels(
         Whether the equation asks for the angle: then the mean of a velocity without an angle is its bias.
     quantisation : float, optional
         Step to which the angle was rounded.
+    passed : PassedNoise, optional
+        What became of white noise where channels were resampled.
     """
     if list(given) == ["angle"]:
         return MotionChannels(given["angle"])
@@ -124,11 +127,11 @@ def motion_channels(
     shape = missing.shape[:-1]
     biases: dict[str, tuple[list[float], list[float]]] = {}
     doubts: list[tuple[int, str]] = []
-    sigmas = [_sigma(record, quantisation if source == "angle" else None) for record in _records(first)]
+    sigmas = [_sigma(record, quantisation if source == "angle" else None, passed) for record in _records(first)]
     beside: list[list[tuple[int, float, _Numbers]]] = [[] for _ in sigmas]
     for name, values in others:
         order = DERIVATIVES[name] - integrations
-        noises = [_sigma(record) for record in _records(values)]
+        noises = [_sigma(record, None, passed) for record in _records(values)]
         found = _judged_all(first, values, (order, period), (sigmas, noises))
         wrong = [record for record, one in enumerate(found) if one.words]
         if wrong:
@@ -222,10 +225,10 @@ def _sums(values: _Numbers, period: float) -> _Numbers:
     return np.concatenate([[0.0], np.cumsum(steps)]) * period
 
 
-def _sigma(record: _Numbers, quantisation: float | None = None) -> float:
+def _sigma(record: _Numbers, quantisation: float | None, passed: _core.PassedNoise | None) -> float:
     """Return the standard deviation of a channel's noise; 0 where nothing tells it."""
     try:
-        sigma = _core.noise(np.ascontiguousarray(record), quantisation)[0].sigma
+        sigma = _core.noise(np.ascontiguousarray(record), quantisation, passed)[0].sigma
     except ValueError:  # the record is too short
         return 0.0
     return sigma if math.isfinite(sigma) else 0.0

@@ -4,14 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident import _core
 from tvident._equation import LINEAR_UNITS, UNITS
 from tvident._identify.channels import MotionChannels
 from tvident._units import ROTARY, Axis
+
+
+class Timed(Protocol):
+    """How channels were brought onto a uniform grid."""
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What settings keep."""
+
+    @property
+    def words(self) -> str:
+        """What was done."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +55,10 @@ class Data:
         What the channels were measured in.
     clipped : sequence of float, optional
         The part of the torque's samples of every record whose residual counts linearly; None for least squares.
+    clock : Timed, optional
+        How the channels were brought onto a uniform grid; None where their times are uniform.
+    passed : (PassedNoise, PassedNoise), optional
+        What that makes of white noise of angle and torque.
     """
 
     angles: npt.NDArray[np.number]
@@ -57,6 +75,8 @@ class Data:
     labels: arguments.Labels | None = None
     axis: Axis = field(default_factory=Axis)
     clipped: Sequence[float] | None = None
+    clock: Timed | None = None
+    passed: tuple[_core.PassedNoise | None, _core.PassedNoise | None] = (None, None)
 
     @property
     def batch(self) -> tuple[int, ...]:
@@ -74,6 +94,17 @@ class Data:
     def records(self) -> int:
         """How many records there are."""
         return int(np.prod(self.batch, dtype=int))
+
+    @property
+    def timing(self) -> dict[str, Any]:
+        """What settings keep of times."""
+        own = {} if self.clock is None else self.clock.settings
+        return {"sample_rate": 1 / self.period, "step": self.step, **own}
+
+    @property
+    def noise(self) -> dict[str, Any]:
+        """What is known of the channels' noise, as the core asks for it."""
+        return {"noise": self.motion.noise, "passed": self.passed}
 
     @property
     def units(self) -> Mapping[str, str]:

@@ -389,7 +389,7 @@ class Task:
         known = [self._known.get(name) for name in COEFFICIENTS]
         data, motion = self._data, self._data.motion
         recorded = [motion.recorded.get(name) for name in ("angle", "velocity", "acceleration")]
-        return _core.Motions(data.angles, data.torques, known, columns, channels=recorded, noise=motion.noise)
+        return _core.Motions(data.angles, data.torques, known, columns, channels=recorded, **data.noise)
 
     def _settings(self, found: Sequence[_core.Identification], searched: Searched) -> dict[str, Any]:
         """Return inputs and choices."""
@@ -444,7 +444,6 @@ class Task:
             "earned": {name: by_record(value.tolist()) for name, value in searched.earned.items()},
             "own_terms": [term.name for term in self._terms if term.own is not None],
             "known": {name: value if isinstance(value, float) else None for name, value in self._known.items()},
-            "sample_rate": 1 / data.period,
-            "step": data.step,
+            **data.timing,
             "chosen": chosen,
         }

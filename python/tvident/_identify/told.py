@@ -59,13 +59,15 @@ class Told:
         if isinstance(self.request.form, StrongForm) and data.instruments is None:
             # What to say takes longer than to identify a short record, so it waits until it is asked for.
             later = partial(_later, self._of_strong_form(), plausible, data.angles, self.batch, more)
-            if not data.doubts and not any(data.clipped or ()):
+            if not data.doubts and data.clock is None and not any(data.clipped or ()):
                 return later
             words = later()
         else:
             each = [one + search for one, search in zip(self._of_records(names), more, strict=True)]
             words = plausible.before(of_batch(each) if several else each[0], data.angles, self.batch)
             words = replace(words, advice=(*words.advice, *self._where_remedies_are_tried()))
+        if data.clock is not None:
+            words = replace(words, reasons=(data.clock.words, *words.reasons))
         return _with_doubts(_with_clipped(words, data.clipped, several=several), data.doubts, several=several)
 
     def _where_remedies_are_tried(self) -> list[str]:

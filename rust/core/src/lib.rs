@@ -6,6 +6,7 @@ mod error;
 pub mod exec;
 pub mod identify;
 pub mod inference;
+pub mod irregular;
 pub mod lanes;
 pub mod least_squares;
 pub mod local_polynomials;

@@ -10,6 +10,7 @@ mod arrays;
 mod automatic;
 mod identified;
 mod identify;
+mod irregular;
 mod local_polynomials;
 mod merged;
 mod motions;
@@ -20,6 +21,7 @@ mod respond;
 mod rolling;
 mod sliding;
 mod watch;
+mod window_fit;
 
 use pyo3::prelude::*;
 
@@ -39,6 +41,8 @@ mod _core {
     #[pymodule_export]
     use crate::identify::{StrongForm, WeakForm, identify, merged_rows};
     #[pymodule_export]
+    use crate::irregular::{PassedNoise, Resampling};
+    #[pymodule_export]
     use crate::local_polynomials::{LocalEstimates, LocalPolynomials};
     #[pymodule_export]
     use crate::merged::{MergedElement, MergedIdentification, identify_merged};
@@ -52,6 +56,8 @@ mod _core {
     use crate::rolling::{RollingRegressions, rolling_least_squares};
     #[pymodule_export]
     use crate::sliding::sliding_velocity;
+    #[pymodule_export]
+    use crate::window_fit::WindowFit;
 
     /// Probability below which parts of a record differ by more than chance.
     #[pymodule_export]

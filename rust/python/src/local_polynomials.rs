@@ -43,11 +43,11 @@ impl Part {
 #[pyclass(frozen, get_all, module = "tvident._core")]
 pub(crate) struct LocalEstimates {
     /// One row a derivative, then the shape of the samples.
-    derivatives: Py<PyArrayDyn<f64>>,
-    order: Py<PyArrayDyn<u8>>,
-    status: Py<PyArrayDyn<u16>>,
+    pub(crate) derivatives: Py<PyArrayDyn<f64>>,
+    pub(crate) order: Py<PyArrayDyn<u8>>,
+    pub(crate) status: Py<PyArrayDyn<u16>>,
     /// Standard deviation of the noise.
-    sigma: Py<PyArrayDyn<f64>>,
+    pub(crate) sigma: Py<PyArrayDyn<f64>>,
 }
 
 /// Derivatives, their standard errors, orders, flags and noise.
@@ -88,13 +88,7 @@ impl LocalPolynomials {
         noise: bool,
         quantisation: f64,
     ) -> PyResult<Self> {
-        let criterion = match criterion {
-            "aicc" => Criterion::Aicc,
-            "aicc-textbook" => Criterion::AiccTextbook,
-            "aic" => Criterion::Aic,
-            "bic" => Criterion::Bic,
-            _ => return Err(PyValueError::new_err(format!("no criterion is called {criterion:?}"))),
-        };
+        let criterion = criterion_of(criterion)?;
         let selection = match selection {
             "window" => Selection::Window,
             "pooled" => Selection::Pooled,
@@ -282,5 +276,16 @@ impl LocalPolynomials {
             status: status.unbind(),
             sigma: sigma.unbind(),
         })
+    }
+}
+
+/// A criterion by its name.
+pub(crate) fn criterion_of(name: &str) -> PyResult<Criterion> {
+    match name {
+        "aicc" => Ok(Criterion::Aicc),
+        "aicc-textbook" => Ok(Criterion::AiccTextbook),
+        "aic" => Ok(Criterion::Aic),
+        "bic" => Ok(Criterion::Bic),
+        _ => Err(PyValueError::new_err(format!("no criterion is called {name:?}"))),
     }
 }

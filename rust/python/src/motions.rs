@@ -4,9 +4,10 @@ use numpy::PyUntypedArray;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tvident::equation::{BuiltInTerm, Coefficient, Measured, Motion, Term};
-use tvident::noise::{AngleNoise, Beside};
+use tvident::noise::{AngleNoise, Beside, PassedNoise as Passed};
 use tvident::record::{Placed, Samples};
 
+use crate::irregular::PassedNoise;
 use crate::records::{StridedSamples, placed};
 
 /// A coefficient of the equation of motion, or a term of it.
@@ -47,6 +48,8 @@ pub(crate) struct Motions {
     /// What was recorded of the motion, where the angle was made of it, and its noise.
     channels: [Option<Vec<Placed<StridedSamples>>>; 3],
     noises: Option<Vec<AngleNoise>>,
+    /// What noise of variance one became where angle and torque were resampled.
+    passed: [Option<Passed>; 2],
     coefficients: [Held; 3],
     terms: Vec<Held>,
     /// Keeps the memory of all of them.
@@ -58,9 +61,9 @@ impl Motions {
     /// Coefficients are unknown (None), a number, or an array; terms are a name or an array. Where the angle was made of the recorded channels
     /// (angle, velocity, acceleration), `noise` holds for every record the variance of the first of them, how often that was integrated, and
     /// which derivatives were fused with it, with their noise. Where arrays hold parts of longer records, `parts` says which samples, one after the
-    /// other, and `samples` how many a record has.
+    /// other, and `samples` how many a record has. `passed` is what noise became where angle and torque were resampled.
     #[new]
-    #[pyo3(signature = (angle, torque, coefficients, terms, *, channels=[None, None, None], noise=None, parts=None, samples=0))]
+    #[pyo3(signature = (angle, torque, coefficients, terms, *, channels=[None, None, None], noise=None, parts=None, samples=0, passed=(None, None)))]
     fn new(
         angle: &Bound<'_, PyUntypedArray>,
         torque: &Bound<'_, PyUntypedArray>,
@@ -70,6 +73,7 @@ impl Motions {
         noise: Option<Vec<NoiseOfAngle>>,
         parts: Option<Vec<(usize, usize)>>,
         samples: usize,
+        passed: (Option<Bound<'_, PassedNoise>>, Option<Bound<'_, PassedNoise>>),
     ) -> PyResult<Self> {
         let records = |array: &Bound<'_, PyUntypedArray>| placed(array, parts.as_deref(), samples);
         let held = |given: &Bound<'_, PyAny>| {
@@ -97,6 +101,7 @@ impl Motions {
             torques: records(torque)?,
             channels: [recorded?, velocity?, acceleration?],
             noises,
+            passed: <[_; 2]>::from(passed).map(|passed| passed.map(|passed| passed.get().0.clone())),
             coefficients: [held(inertia)?, held(damping)?, held(stiffness)?],
             terms: terms.iter().map(held).collect::<PyResult<_>>()?,
             _arrays: arrays.map(|array| array.clone().unbind()).collect(),
@@ -117,6 +122,7 @@ impl Motions {
             measured: Measured {
                 channels: [measured(angle)?, measured(velocity)?, measured(acceleration)?],
                 noise: self.noises.as_ref().and_then(|noises| noises.get(record)),
+                passed: self.passed.each_ref().map(Option::as_ref),
             },
             torque: one(&self.torques, record)?,
             coefficients: [inertia.coefficient(record)?, damping.coefficient(record)?, stiffness.coefficient(record)?],

@@ -6,11 +6,12 @@ use pyo3::prelude::*;
 use tvident::Error;
 use tvident::noise::{
     Beside, fuse as core_fuse, noise as core_noise, noise_coherence as core_coherence, quantisation_step as core_step,
-    searched,
+    searched, variance_after,
 };
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
+use crate::irregular::PassedNoise;
 use crate::records::{placed, records};
 use crate::watch::watched;
 
@@ -24,17 +25,26 @@ pub(crate) struct Noise {
     quantisation: f64,
 }
 
-/// The noise of every record along the last axis, in the order of the leading axes. The quantisation is looked for where it is not given.
+/// The noise of every record along the last axis, in the order of the leading axes. The quantisation is looked for where it is not given. Where records
+/// were resampled, as `passed` was, it is the noise that rows see: its density at low frequencies.
 #[pyfunction]
-#[pyo3(signature = (samples, quantisation=None))]
-pub(crate) fn noise(samples: &Bound<'_, PyUntypedArray>, quantisation: Option<f64>) -> PyResult<Vec<Noise>> {
+#[pyo3(signature = (samples, quantisation=None, passed=None))]
+pub(crate) fn noise(
+    samples: &Bound<'_, PyUntypedArray>,
+    quantisation: Option<f64>,
+    passed: Option<&PassedNoise>,
+) -> PyResult<Vec<Noise>> {
     let records = records(samples)?;
     let instructions = Instructions::current();
     let mut noises = Vec::new();
     watched(samples.py(), None, |watch| {
         for (done, record) in records.iter().enumerate() {
             let found = core_noise(record, quantisation, instructions)?;
-            noises.push(Noise { sigma: found.sigma, quantisation: found.quantisation });
+            let sigma = match passed {
+                Some(passed) => variance_after(Some(&passed.0), record, quantisation, instructions).sqrt(),
+                None => found.sigma,
+            };
+            noises.push(Noise { sigma, quantisation: found.quantisation });
             if !watch(done, records.len()) {
                 return Err(Error::Cancelled);
             }

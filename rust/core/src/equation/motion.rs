@@ -4,6 +4,7 @@
 
 use crate::equation::terms::{BuiltInTerm, TermFunction, signs};
 use crate::noise::fused::AngleNoise;
+use crate::noise::passed::PassedNoise;
 use crate::record::samples::Samples;
 
 /// What is known of inertia, damping or stiffness beforehand.
@@ -33,6 +34,8 @@ pub struct Measured<'a> {
     pub channels: [Option<&'a dyn Samples>; 3],
     /// The noise of an angle that was made of several channels, or integrated from one; `None` where it was measured alone.
     pub noise: Option<&'a AngleNoise>,
+    /// What white noise of variance one became where angle and torque were resampled; `None` where they were not.
+    pub passed: [Option<&'a PassedNoise>; 2],
 }
 
 /// The equation of motion of one record.

@@ -17,6 +17,7 @@
 use crate::error::Error;
 use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
 use crate::local_polynomials::coefficients::{Coefficients, Projected};
+use crate::noise::passed::{CHANCE, PassedNoise, Shown};
 use crate::noise::quantisation::{STRETCHES, quantisation_step};
 use crate::noise::spectrum::power_of_whole_segments;
 use crate::record::samples::{Samples, is_usable};
@@ -40,10 +41,6 @@ const MOST_WINDOWS: usize = 1 << 17;
 const BANDS: usize = 16;
 const SEGMENT: usize = 512;
 const FEWEST_SEGMENTS: usize = 8;
-
-/// So many standard deviations are added to the power of the quietest band: of sixteen bands of white noise one is two
-/// of them too quiet by chance.
-const CHANCE: f64 = 3.0;
 
 /// The noise of a channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,20 +82,50 @@ pub(crate) fn channel_variance(record: &dyn Samples, quantisation: Option<f64>, 
     (found.sigma * found.sigma).min(quietest_band(record)).max(least)
 }
 
+/// The same of a channel that was resampled: what white noise must have had that became what the channel shows, and its density at low frequencies.
+#[must_use]
+pub fn variance_after(
+    passed: Option<&PassedNoise>,
+    record: &dyn Samples,
+    quantisation: Option<f64>,
+    instructions: Instructions,
+) -> f64 {
+    let Some(passed) = passed else { return channel_variance(record, quantisation, instructions) };
+    let variance = shown(record, instructions).over(&passed.shown);
+    if variance.is_nan() {
+        return 0.0;
+    }
+    let quantisation = quantisation.unwrap_or(0.0);
+    passed.gain * variance.max(quantisation * quantisation / 12.0).max((f64::EPSILON * largest(record)).powi(2))
+}
+
+/// What a channel shows where its signal does not reach, or hardly.
+pub(crate) fn shown(record: &dyn Samples, instructions: Instructions) -> Shown {
+    let of = |half: usize| if 2 * half < record.len() { variance(record, half, instructions) } else { f64::NAN };
+    let (bands, powers) = bands(record);
+    Shown { variances: HALVES.map(of).to_vec(), bands, powers }
+}
+
 /// An upper confidence bound of the mean power in the quietest frequency band; infinite for a record that is too short.
 fn quietest_band(record: &dyn Samples) -> f64 {
+    let (bands, powers) = bands(record);
+    let quietest = bands.into_iter().fold(f64::INFINITY, f64::min);
+    // The power at a frequency of a segment scatters by as much as it is.
+    quietest * (1.0 + CHANCE / powers.sqrt())
+}
+
+/// The mean power in every frequency band, and of how many independent powers each is the mean; none for a record that is too short.
+fn bands(record: &dyn Samples) -> (Vec<f64>, f64) {
     if record.len() < FEWEST_SEGMENTS * SEGMENT {
-        return f64::INFINITY;
+        return (Vec::new(), 1.0);
     }
     let (power, segments) = power_of_whole_segments(record, SEGMENT);
     if segments == 0 {
-        return f64::INFINITY;
+        return (Vec::new(), 1.0);
     }
     let width = SEGMENT / 2 / BANDS;
-    let bands = power[1..].chunks_exact(width);
-    let quietest = bands.map(|band| band.iter().sum::<f64>() / band.len() as f64).fold(f64::INFINITY, f64::min);
-    // The power at a frequency of a segment scatters by as much as it is.
-    quietest * (1.0 + CHANCE / ((segments * width) as f64).sqrt())
+    let bands = power[1..].chunks_exact(width).map(|band| band.iter().sum::<f64>() / band.len() as f64);
+    (bands.collect(), (segments * width) as f64)
 }
 
 /// The mean of the squared highest coefficients of windows of one half-width.

@@ -6,14 +6,16 @@ pub(crate) mod colour;
 pub(crate) mod correlated;
 pub(crate) mod defects;
 pub(crate) mod fused;
+pub(crate) mod passed;
 pub(crate) mod quantisation;
 pub(crate) mod spectrum;
 pub(crate) mod transform;
 
-pub use channel::{FEWEST_SAMPLES, noise};
+pub use channel::{FEWEST_SAMPLES, noise, variance_after};
 pub use coherence::{CORRELATED_NOISE, noise_coherence};
 pub use colour::coloured_noise;
 pub use correlated::CorrelatedNoise;
 pub use defects::Defect;
 pub use fused::{AngleNoise, Beside, fuse};
+pub use passed::PassedNoise;
 pub use quantisation::{quantisation_step, searched};

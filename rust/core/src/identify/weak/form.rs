@@ -14,8 +14,9 @@ use crate::identify::weak::options::WeakOptions;
 use crate::identify::weak::scanned::Scan;
 use crate::identify::weak::session::Session;
 use crate::identify::weak::torque_jumps::without_jumps;
-use crate::noise::channel::channel_variance;
+use crate::noise::channel::variance_after;
 use crate::noise::defects::{Defect, defects};
+use crate::noise::passed::PassedNoise;
 use crate::noise::quantisation::quantisation_step;
 use crate::record::samples::Samples;
 use crate::simd::instructions::Instructions;
@@ -40,7 +41,7 @@ pub(crate) fn identify_weak(
     with_record(motion, (mask, lag), (options.delta, options.instructions), (workers, watch), |record, watch| {
         let jumping: Vec<_> = motion.terms.iter().zip(&record.terms).filter_map(jumping).collect();
         let calm = without_jumps(record.torque, &jumping);
-        identify(record, calm.as_deref(), options, workers, watch)
+        identify(record, (calm.as_deref(), motion.measured.passed), options, workers, watch)
     })
     .map(|(found, resting)| {
         let [angle, rates @ ..] = motion.measured.channels;
@@ -106,10 +107,11 @@ fn jumping<'a>((term, samples): (&Term<'a>, &TermSamples<'a>)) -> Option<&'a dyn
     }
 }
 
-/// Identifies one record. The noise of the torque is that of a `calm` one, without jumps, where there is one.
+/// Identifies one record. The noise of the torque is that of a `calm` one, without jumps, where there is one; what was resampled is compared with noise
+/// that `passed` the same way.
 fn identify(
     record: Record<'_>,
-    calm: Option<&[f64]>,
+    (calm, passed): (Option<&[f64]>, [Option<&PassedNoise>; 2]),
     options: &WeakOptions,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
@@ -119,10 +121,13 @@ fn identify(
     let told = record.noise.map(|noise| noise.variance);
     let calm = calm.as_ref().map(|calm| (calm as &dyn Samples, quantisation_step(record.torque)));
     let (torque, step) = calm.map_or((record.torque, None), |(calm, step)| (calm, Some(step)));
-    let channels = [(record.angle, options.noise[0].or(told), options.quantisation), (torque, options.noise[1], step)];
+    let channels = [
+        (record.angle, options.noise[0].or(told), options.quantisation, passed[0]),
+        (torque, options.noise[1], step, passed[1]),
+    ];
     let pieces = channels.map(|channel| Piece { size: samples, content: channel });
-    let level = |(channel, given, step): (_, Option<f64>, _), (): &mut ()| {
-        given.unwrap_or_else(|| channel_variance(channel, step, options.instructions))
+    let level = |(channel, given, step, passed): (_, Option<f64>, _, _), (): &mut ()| {
+        given.unwrap_or_else(|| variance_after(passed, channel, step, options.instructions))
     };
     let levels = stages.map(pieces.into(), || (), level)?;
     let mut session = Session {

@@ -1,0 +1,211 @@
+"""Channels of a record on one uniform grid: by splines where times jitter, by number where only the stamps do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _core
+from tvident._clocks.grid import Grid
+from tvident._clocks.order import chosen_order, longest_bridged
+
+Numbers = npt.NDArray[np.float64]
+
+Kind = Literal["lost", "true", "even"]
+"""Times of a uniform clock that lost samples; true ones that jitter; those of samples that were taken evenly, whatever their stamps say."""
+
+_TELLS = 2.0
+"""A channel is smoother in one way than in the other where its noise there has so much less variance."""
+
+_FEWEST, _COMPARED = 64, 1 << 15
+"""Samples whose roughness is compared, at least and at most."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """How the channels of a record are brought onto a uniform grid.
+
+    Parameters
+    ----------
+    grid : Grid
+    kind : {"lost", "true", "even"}
+    order : int
+        Of the splines.
+    words : str
+        What was done.
+    doubt : str
+        What is wrong with the times; empty where nothing is.
+    """
+
+    grid: Grid
+    kind: Kind
+    order: int
+    words: str = ""
+    doubt: str = ""
+
+    @property
+    def period(self) -> float:
+        """Seconds from one sample of the grid to the next."""
+        return self.grid.even_period if self.kind == "even" else self.grid.period
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What settings keep."""
+        return {"times": self.kind, "spline_order": self.order, "bridged": self.grid.bridged}
+
+    def evened(self, channels: Mapping[str, npt.NDArray[np.number]], *, propagate: bool, workers: int | None) -> Evened:
+        """Return channels on the grid, and what that does to their noise."""
+        grid = self.grid
+        places = grid.numbers.astype(np.float64) if self.kind == "even" else grid.places
+        samples = int(places[-1]) + 1 if self.kind == "even" else grid.samples
+        bridged = 1.5 if self.kind == "even" else grid.bridged
+        resampling = _core.Resampling(
+            places, samples, order=1 if self.kind == "even" else self.order, bridged=bridged, propagate=propagate
+        )
+        passed = None if self.kind == "even" else resampling.passed_noise(workers=workers)
+        found = {name: resampling.onto_grid(values, workers=workers) for name, values in channels.items()}
+        return Evened(found, grid.start + self.period * np.arange(samples, dtype=np.float64), places, passed)
+
+
+@dataclass(frozen=True)
+class Evened:
+    """Channels on a uniform grid.
+
+    Parameters
+    ----------
+    channels : mapping of str to ndarray
+    time : ndarray
+        In seconds.
+    places : ndarray
+        Where the record's samples lie, in periods.
+    passed : PassedNoise, optional
+        What white noise became; None where samples stayed as they are.
+    """
+
+    channels: Mapping[str, Numbers]
+    time: Numbers
+    places: Numbers
+    passed: _core.PassedNoise | None
+
+    def known(self, values: Any) -> Any:
+        """Return what is known at every sample on the grid, along straight lines; anything else as it is."""
+        if isinstance(values, str) or np.ndim(values) == 0 or np.shape(values)[-1] != self.places.size:
+            return values
+        rows = np.asarray(values, dtype=np.float64)
+        grid = np.arange(self.time.size, dtype=np.float64)
+        found = [np.interp(grid, self.places, row) for row in rows.reshape(-1, rows.shape[-1])]
+        return np.reshape(found, (*rows.shape[:-1], grid.size))
+
+    def mask(self, mask: npt.NDArray[np.bool_] | None) -> npt.NDArray[np.bool_] | None:
+        """Return where on the grid the samples on both sides may be used."""
+        if mask is None:
+            return None
+        grid = np.arange(self.time.size)
+        left = np.clip(np.searchsorted(self.places, grid, side="right") - 1, 0, self.places.size - 1)
+        right = np.clip(np.searchsorted(self.places, grid, side="left"), 0, self.places.size - 1)
+        return np.asarray(mask[..., left] & mask[..., right])
+
+
+def clock_of(
+    grid: Grid, channels: Mapping[str, npt.NDArray[np.number]], quantisation: float | None, workers: int | None
+) -> Clock:
+    """Return how channels are brought onto a grid: in their own time, or by number where they are smooth in that."""
+    order = chosen_order(grid, channels)
+    grid = replace(grid, bridged=longest_bridged(grid, channels, order))
+    if grid.jitter == 0:
+        return Clock(grid, "lost", order, _lost(grid, order))
+    share = f"steps of time scatter by {grid.jitter:.2g} of a step"
+    clock = Clock(
+        grid,
+        "true",
+        order,
+        f"{share}: the channels were brought onto a uniform grid of {1 / grid.period:.6g} Hz by splines of order {order}{_gaps(grid)}",
+    )
+    said = _smoother(clock, channels, quantisation, workers)
+    in_time = [name for name, ratio in said.items() if ratio < 1 / _TELLS]
+    in_number = {name: ratio for name, ratio in said.items() if ratio > _TELLS}
+    if not in_number:
+        return clock
+    if in_time:
+        return Clock(
+            grid,
+            "true",
+            order,
+            clock.words,
+            f"{share}, and the {in_time[0]} is smooth in time, but the {next(iter(in_number))} in sample number: the channels seem to be "
+            "of different clocks; do not trust the numbers before each has its own times",
+        )
+    name, ratio = max(in_number.items(), key=lambda one: one[1])
+    rate = 1 / grid.even_period
+    return Clock(
+        grid,
+        "even",
+        0,
+        f"samples were taken to be even at {rate:.9g} Hz{_gaps(grid)}",
+        f"{share}, but the {name} is smooth in sample number and not in time, where its noise is {math.sqrt(ratio):.2g} times as large: "
+        "the stamps jitter, not the samples, as behind a buffer; samples were taken to be even; give "
+        f"sample_rate={rate:.9g} to say so",
+    )
+
+
+def earlier_clock(grid: Grid, earlier: Mapping[str, Any] | None) -> Clock | None:
+    """Return the clock that settings of an earlier result hold; None where they hold none."""
+    kind = None if earlier is None else earlier.get("times")
+    if earlier is None or kind not in {"true", "even", "lost"}:
+        return None
+    order = earlier.get("spline_order")
+    if order not in {0, 1, 3, 5, 7}:
+        raise TypeError(f"spline_order of settings must be 0, 1, 3, 5 or 7; got {order!r}; pass result.settings")
+    if kind == "lost" and grid.jitter > 0:
+        return None
+    bridged = earlier.get("bridged")
+    if isinstance(bridged, int | float) and bridged > 0:
+        grid = replace(grid, bridged=float(bridged))
+    return Clock(grid, kind, order or 1, "channels were brought onto a uniform grid as in the earlier result")
+
+
+def _lost(grid: Grid, order: int) -> str:
+    lost, most = grid.samples - grid.places.size, math.floor(grid.bridged) - 1
+    bridged = f": up to {most} in a row were bridged by splines of order {order}" if most > 0 else ""
+    return f"the clock is uniform, at {1 / grid.period:.6g} Hz, but {lost} of {grid.samples} samples are not there{bridged}{_gaps(grid)}"
+
+
+def _gaps(grid: Grid) -> str:
+    gaps = int((np.diff(grid.places) > grid.bridged).sum())
+    return f"; {gaps} steps of more than {grid.bridged * grid.period:.3g} s are gaps" if gaps else ""
+
+
+def _smoother(
+    clock: Clock, channels: Mapping[str, npt.NDArray[np.number]], quantisation: float | None, workers: int | None
+) -> dict[str, float]:
+    """Return the variance of every channel's noise in time over that in sample number."""
+    grid = clock.grid
+    if grid.places.size < _FEWEST:
+        return {}
+    first = max(0, (grid.places.size - _COMPARED) // 2)
+    part = slice(first, first + _COMPARED)
+    places = grid.places[part] - math.ceil(grid.places[first])
+    grid = replace(grid, places=places, samples=math.floor(places[-1]) + 1)
+    channels = {name: values[..., part] for name, values in channels.items()}
+    clock, numbers = replace(clock, grid=grid), Clock(grid, "even", 0)
+    in_time = clock.evened(channels, propagate=False, workers=workers)
+    in_number = numbers.evened(channels, propagate=False, workers=workers)
+    gain = 1.0 if in_time.passed is None else in_time.passed.gain
+    found = {}
+    for name in channels:
+        step = quantisation if name == "angle" else 0.0
+        pairs = zip(
+            _core.noise(in_time.channels[name], step, in_time.passed),
+            _core.noise(in_number.channels[name], step),
+            strict=True,
+        )
+        ratios = [(one.sigma / other.sigma) ** 2 / gain for one, other in pairs if other.sigma > 0]
+        there = [ratio for ratio in ratios if math.isfinite(ratio) and ratio > 0]
+        if there:
+            found[name] = float(np.median(there))
+    return found

@@ -1,0 +1,126 @@
+"""The uniform grid of times that are not uniform: its period, its gaps, and where on it samples lie."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+
+Numbers = npt.NDArray[np.float64]
+
+_GAP, _RARE, _SHARE = 3.0, 1.5, 0.99
+"""A step is a gap where it is longer than so many usual ones and so many times the longest but a hundredth."""
+
+_EVEN = 1e-3
+"""Periods by which times of a uniform clock may be off, as everywhere."""
+
+_FEW = (1, 10, 100)
+"""Steps of so many periods tell the period to ever more digits."""
+
+_MOST_GRID = 10
+"""Samples of the grid for each that was recorded, at most: beyond, the record is mostly gaps."""
+
+_UNIFORM = math.sqrt(6.0)
+"""Times that lie anywhere within a step have steps that scatter by the step over this."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A uniform grid, and the samples of a record on it.
+
+    Parameters
+    ----------
+    start, period : float
+        Seconds.
+    samples : int
+        Of the grid.
+    places : ndarray, shape (n,)
+        Times of the record's samples in periods from the start on.
+    bridged : float
+        The longest step in periods that is no gap.
+    jitter : float
+        By how much steps scatter, as the share of a period within which times that scatter so lie; 0 where samples lie on the grid.
+    """
+
+    start: float
+    period: float
+    samples: int
+    places: Numbers
+    bridged: float
+    jitter: float
+
+    @property
+    def time(self) -> Numbers:
+        """Time of every sample of the grid in seconds."""
+        return self.start + self.period * np.arange(self.samples, dtype=np.float64)
+
+    @property
+    def even_period(self) -> float:
+        """The period of samples that were taken evenly, by least squares of all stamps."""
+        numbers = self.numbers.astype(np.float64)
+        return self.period * float(np.polynomial.Polynomial.fit(numbers, self.places, 1).deriv()(0.0))
+
+    @property
+    def numbers(self) -> npt.NDArray[np.int64]:
+        """Places on the grid of samples that were taken evenly, whatever their times say; gaps count as the samples that they take."""
+        steps = np.diff(self.places)
+        counts = np.where(steps > self.bridged, np.rint(steps), 1).astype(np.int64)
+        return np.concatenate([[0], np.cumsum(counts)])
+
+
+def grid_of(times: Numbers) -> Grid:
+    """Return the grid of times that increase.
+
+    Times of a uniform clock that lost samples lie on their own grid. Otherwise the period is the mean of the steps that are no gaps.
+
+    Raises
+    ------
+    ValueError
+        If most of the record's time is gaps.
+    """
+    steps = np.diff(times)
+    usual = float(np.median(steps))
+    longest = max(_GAP * usual, _RARE * float(np.quantile(steps, _SHARE, method="lower")))
+    lost = _with_lost_samples(times, steps, usual)
+    if lost is not None:
+        period, places = lost
+        jitter = 0.0
+    else:
+        inner = steps[steps <= longest]
+        period = float(inner.mean())
+        places = (times - times[0]) / period
+        jitter = float(np.sqrt(np.mean((inner / period - 1) ** 2))) * _UNIFORM
+    samples = math.floor(float(places[-1]) + 1e-6) + 1
+    if samples > _MOST_GRID * times.size:
+        place = int(steps.argmax()) + 1
+        raise ValueError(
+            f"t must have no gaps that take nine tenths of the time; steps are {usual:g} s mostly, but the one to t[{place}] is "
+            f"{steps[place - 1]:g} s; identify the parts before and after it on their own"
+        )
+    return Grid(float(times[0]), period, samples, places, longest / period, jitter)
+
+
+def _with_lost_samples(times: Numbers, steps: Numbers, usual: float) -> tuple[float, Numbers] | None:
+    """Return the period of a uniform clock that lost samples, and the number of every sample; None where times are of no such clock."""
+    period = usual
+    # The usual step may be rounded to few digits: short steps tell the period well enough to count what is lost in longer ones, and so on.
+    for most in _FEW:
+        counts = np.rint(steps / period)
+        few = (counts >= 1) & (counts <= most)
+        if not few.any():
+            return None
+        period = float(steps[few].sum() / counts[few].sum())
+    numbers = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(steps / period), 1))])
+    fitted = np.polynomial.Polynomial.fit(numbers, times - times[0], 1)
+    off = float(np.abs(times - times[0] - fitted(numbers)).max())
+    slope = float(fitted.deriv()(0.0))
+    printed = arguments.printed_step(times)
+    allowed = max(_EVEN * slope, printed if printed < slope / 2 else 0.0)
+    if off > allowed:
+        return None
+    exact = float(times[-1] - times[0]) / float(numbers[-1])
+    return exact if off <= _EVEN * slope else slope, numbers

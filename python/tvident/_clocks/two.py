@@ -1,0 +1,123 @@
+"""Angle and torque on clocks of their own: both brought onto one grid, at the rate of the faster."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident import _core
+from tvident._clocks.grid import Grid, Numbers, grid_of
+from tvident._units import times_in_seconds
+
+_ORDER = 5
+"""Of the splines."""
+
+_GAP = 1.5
+"""Periods of a uniform clock beyond which a step is a gap."""
+
+_SAME = 1e-6
+"""Periods by which samples may be off the grid and be its own."""
+
+
+@dataclass(frozen=True)
+class TwoClocks:
+    """The clocks of angle and torque, and the grid that both are brought onto.
+
+    Parameters
+    ----------
+    angle, torque : Grid
+        Each channel's own times.
+    start, period : float
+        Seconds.
+    samples : int
+        Of the grid, from the first to the last time that both have.
+    """
+
+    angle: Grid
+    torque: Grid
+    start: float
+    period: float
+    samples: int
+
+    @property
+    def time(self) -> Numbers:
+        """Time of every sample of the grid in seconds."""
+        return self.start + self.period * np.arange(self.samples, dtype=np.float64)
+
+    @property
+    def words(self) -> str:
+        """What was done."""
+        one, other = 1 / self.angle.period, 1 / self.torque.period
+        return (
+            f"the angle was sampled at {one:.6g} Hz and the torque at {other:.6g} Hz, each by its own clock: both were brought onto "
+            f"a grid of {1 / self.period:.6g} Hz by splines of order {_ORDER}"
+        )
+
+    def on_grid(
+        self, own: Grid, values: npt.NDArray[np.number], late: tuple[float, float] = (0.0, 0.0), *, propagate: bool
+    ) -> tuple[Numbers, _core.PassedNoise | None]:
+        """Return a channel on the grid, and what that makes of noise.
+
+        Parameters
+        ----------
+        own : Grid
+            Its clock.
+        values : ndarray
+        late : (float, float)
+            By how many seconds its stamps are late at the start of the grid, and by how many more each second.
+        propagate : bool
+            Nothing is known beside missing values.
+        """
+        times = own.start + own.period * own.places
+        offset, drift = late
+        true = times - offset - drift * (times - self.start)
+        places = (true - self.start) / self.period
+        whole = np.rint(places)
+        if float(np.abs(places - whole).max()) <= _SAME:
+            places = whole
+        bridged = own.bridged * own.period / self.period
+        resampling = _core.Resampling(places, self.samples, order=_ORDER, bridged=bridged, propagate=propagate)
+        passed = None if places is whole and own.period / self.period < _GAP else resampling.passed_noise()
+        return resampling.onto_grid(values), passed
+
+
+def two_clocks(angle: Any, torque: Any, samples: tuple[int, int], time_unit: str | None = None) -> TwoClocks:
+    """Return the clocks of two channels from times, or from sample rates of channels that begin together.
+
+    Raises
+    ------
+    ValueError
+        If times do not increase, or share no time.
+    """
+    own = [_grid(one, count, time_unit) for one, count in zip((angle, torque), samples, strict=True)]
+    start = max(one.start for one in own)
+    end = min(one.start + one.period * float(one.places[-1]) for one in own)
+    period = min(one.period for one in own)
+    if not end - start > period:
+        raise ValueError(
+            f"the times of angle and torque must overlap; they share {max(0.0, end - start):g} s; check the clocks' units and starts"
+        )
+    # On the faster clock's own samples, so that these stay as they are.
+    faster = min(own, key=lambda one: one.period)
+    start = faster.start + math.ceil((start - faster.start) / period - _SAME) * period
+    return TwoClocks(own[0], own[1], start, period, math.floor((end - start) / period + _SAME) + 1)
+
+
+def _grid(times: Any, samples: int, time_unit: str | None) -> Grid:
+    """Return the clock of one channel."""
+    if np.ndim(times) == 0:
+        period = arguments.sample_period(samples, sample_rate=times)
+        start = 0.0
+    else:
+        times = times_in_seconds(times, time_unit)
+        try:
+            period = arguments.sample_period(samples, t=times)
+        except arguments.NotUniformError as error:
+            return grid_of(error.times)
+        start = float(arguments.times_of(times).flat[0])
+    return Grid(start, period, samples, np.arange(samples, dtype=np.float64), _GAP, 0.0)

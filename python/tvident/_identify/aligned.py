@@ -1,0 +1,179 @@
+"""The clock of the torque beside that of the angle: by how much it is late, and how that grows, from the equation itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._identify.data import Data
+
+Numbers: TypeAlias = npt.NDArray[np.float64]
+Align: TypeAlias = Literal["offset", "drift"] | float | None
+
+Late: TypeAlias = tuple[float, float]
+"""Seconds at the start of the record, and seconds more each second."""
+
+_FARTHEST = 0.1
+"""Part of the record by which the torque may be late, at most."""
+
+_BELIEVED = 0.7
+"""The best alignment leaves at most this part of what alignments leave on the middle."""
+
+_PARTS, _SHORTEST = 6, 1500
+"""Parts of a record whose lags tell a drift, and samples of the shortest."""
+
+_ROUNDS = 3
+"""Rounds of aligning with what was found."""
+
+
+@dataclass(frozen=True)
+class Aligned:
+    """How late the torque's stamps are.
+
+    Parameters
+    ----------
+    late : (float, float)
+    errors : (float, float)
+        Standard errors; NaN where the record does not tell.
+    doubt : str
+        What is wrong; empty where nothing is.
+    """
+
+    late: Late
+    errors: Late
+    doubt: str = ""
+
+
+def aligned(
+    data_of: Callable[[Late], Data], lag_of: Callable[[Data], tuple[float, float]], align: Literal["offset", "drift"]
+) -> Aligned:
+    """Return by how much the torque is late.
+
+    Parameters
+    ----------
+    data_of : callable
+        Gives the record with a torque that is late by so much.
+    lag_of : callable
+        Gives the lag that is left in a record, in seconds, and its standard error.
+    align : {"offset", "drift"}
+    """
+    data = data_of((0.0, 0.0))
+    period, start = data.period, float(data.time[0])
+    shift, share = _coarse(data.angles, data.torques)
+    late: Late = (shift * period, 0.0)
+    errors: Late = (math.nan, math.nan)
+    doubt = ""
+    if not share <= _BELIEVED:
+        doubt = "the record hardly tells how the clocks of angle and torque are aligned: excite several frequencies, or give both times"
+    for _ in range(_ROUNDS):
+        data = data_of(late)
+        count = 1 if align == "offset" else max(2, min(_PARTS, data.time.size // _SHORTEST))
+        parts = [_part(data, part, count) for part in range(count)]
+        lags = [lag_of(part) for part in parts]
+        middles = [float(part.time.mean()) - start for part in parts]
+        left, errors = _line(middles, lags, align)
+        if not all(math.isfinite(one) for one in (*left, errors[0])):
+            return Aligned(late, (math.nan, math.nan), doubt or "no lag could be told from the damping")
+        late = (late[0] + left[0], late[1] + left[1])
+        if abs(left[0]) <= errors[0] / 2 and abs(left[1]) <= (errors[1] / 2 if align == "drift" else 0.0):
+            break
+    return Aligned(late, errors, doubt)
+
+
+def _part(data: Data, part: int, parts: int) -> Data:
+    """Return one of several parts of a record."""
+    if parts == 1:
+        return data
+    samples = data.time.size
+    some = slice(samples * part // parts, samples * (part + 1) // parts)
+    angles = data.angles[..., some]
+    return replace(
+        data,
+        angles=angles,
+        torques=data.torques[..., some],
+        motion=replace(data.motion, angles=angles),
+        time=data.time[some],
+        mask=None,
+        labels=None,
+    )
+
+
+def _line(middles: Sequence[float], lags: Sequence[tuple[float, float]], align: str) -> tuple[Late, Late]:
+    """Return the line through lags, and its errors, which know how far the lags are from it."""
+    there = [
+        (at, lag, error) for at, (lag, error) in zip(middles, lags, strict=True) if math.isfinite(lag) and error > 0
+    ]
+    if len(there) < (1 if align == "offset" else 2):
+        return (math.nan, math.nan), (math.nan, math.nan)
+    at, values, errors = (np.array(one) for one in zip(*there, strict=True))
+    columns = np.stack([np.ones_like(at), at], axis=1)[:, : 1 if align == "offset" else 2]
+    weighted = columns / errors[:, np.newaxis]
+    covariance = np.linalg.pinv(weighted.T @ weighted)
+    found = covariance @ weighted.T @ (values / errors)
+    left = values - columns @ found
+    free = at.size - columns.shape[1]
+    if free > 0:
+        covariance *= max(1.0, float(np.sum((left / errors) ** 2)) / free)
+    spread = np.sqrt(np.diag(covariance))
+    if align == "offset":
+        return (float(found[0]), 0.0), (float(spread[0]), 0.0)
+    return (float(found[0]), float(found[1])), (float(spread[0]), float(spread[1]))
+
+
+def _coarse(angle: npt.NDArray[np.number], torque: npt.NDArray[np.number]) -> tuple[int, float]:
+    """Return by how many samples the torque is late, about, and what that leaves unexplained over the middle of all other alignments.
+
+    The equation of motion in weak form, all constant, by least squares at every alignment: correlations with orthonormal columns.
+    """
+    angle, torque = _filled(angle), _filled(torque)
+    samples = angle.size
+    farthest = int(_FARTHEST * samples)
+    half = _half_width(angle)
+    x = np.arange(-half, half + 1) / half
+    inside = 1 - x**2
+    kernels = [inside**6, 12 * x * inside**5, 12 * inside**4 * (11 * x**2 - 1)]
+    columns = [_convolved(angle, kernel) for kernel in kernels]
+    filtered = _convolved(torque, kernels[0])
+    rows = slice(farthest, columns[0].size - farthest)
+    design = np.stack([*(column[rows] for column in columns), np.ones(columns[0][rows].size)], axis=1)
+    basis, _ = np.linalg.qr(design / np.linalg.norm(design, axis=0))
+    size = 1 << (filtered.size + design.shape[0]).bit_length()
+    spectrum = np.fft.rfft(filtered, size)
+    count = 2 * farthest + 1
+    explained = np.zeros(count)
+    for column in basis.T:
+        products = np.fft.irfft(spectrum * np.conj(np.fft.rfft(column, size)), size)[:count]
+        explained += products**2
+    squares = np.concatenate([[0.0], np.cumsum(filtered**2)])
+    energy = squares[design.shape[0] : design.shape[0] + count] - squares[:count]
+    left = 1 - explained / np.maximum(energy, np.finfo(float).tiny)
+    best = int(left.argmin())
+    return best - farthest, float(left[best] / max(float(np.median(left)), np.finfo(float).tiny))
+
+
+def _half_width(angle: Numbers) -> int:
+    """Return half a typical cycle in samples."""
+    changes = np.diff(angle, n=2)
+    smooth = angle - angle.mean()
+    power, faster = float(smooth @ smooth), float(np.diff(angle) @ np.diff(angle))
+    # Noise makes neighbours differ too; a second difference of six times the variance of white noise tells how much.
+    noise = float(changes @ changes) / 6
+    frequency = math.sqrt(max(faster - 2 * noise, 0.0) / max(power, np.finfo(float).tiny))
+    return int(np.clip(math.pi / max(frequency, 1e-9), 8, angle.size // 16))
+
+
+def _filled(values: npt.NDArray[np.number]) -> Numbers:
+    there = np.flatnonzero(np.isfinite(values))
+    return np.interp(np.arange(values.size), there, values[there].astype(np.float64))
+
+
+def _convolved(values: Numbers, kernel: Numbers) -> Numbers:
+    """Return the sums where the kernel lies within the record."""
+    size = 1 << (values.size + kernel.size).bit_length()
+    product = np.fft.irfft(np.fft.rfft(values, size) * np.fft.rfft(kernel, size), size)
+    return product[kernel.size - 1 : values.size]

@@ -1,0 +1,183 @@
+"""A call whose angle and torque have clocks of their own, or whose clocks are to be aligned."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident import _core
+from tvident._clocks import TwoClocks, two_clocks
+from tvident._identify.aligned import Align, Aligned, Late, aligned
+from tvident._identify.data import Data
+from tvident._units import scaled
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """What settings and words say of two clocks.
+
+    Parameters
+    ----------
+    clocks : TwoClocks
+    late : (float, float)
+        By how many seconds stamps of the torque are late at the start, and by how many more each second.
+    """
+
+    clocks: TwoClocks
+    late: Late
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What settings keep."""
+        return {"times": "own", "clock_offset": self.late[0], "clock_drift": self.late[1]}
+
+    @property
+    def words(self) -> str:
+        """What was done."""
+        offset, drift = self.late
+        late = f"; stamps of the torque were taken to be {offset:.6g} s late" if offset or drift else ""
+        return self.clocks.words + late + (f", and {drift:.3g} s more each second" if drift else "")
+
+
+@dataclass(frozen=True)
+class OwnClocks:
+    """Angle and torque as they were recorded, and their clocks.
+
+    Parameters
+    ----------
+    clocks : TwoClocks
+    recorded : (ndarray, ndarray)
+    align : {"offset", "drift"}, float or None
+    propagate : bool
+    """
+
+    clocks: TwoClocks
+    recorded: tuple[npt.NDArray[np.number], npt.NDArray[np.number]]
+    align: Align
+    propagate: bool
+
+    def channels(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """Return angle and torque on the grid, by their stamps."""
+        return self._angle()[0], self._torque((0.0, 0.0))[0]
+
+    def finished(
+        self,
+        data: Data,
+        factor: float,
+        earlier: Mapping[str, Any] | None,
+        lag_of: Callable[[Data], tuple[float, float]],
+    ) -> Data:
+        """Return the record with a torque in its place.
+
+        Parameters
+        ----------
+        data : Data
+            With the torque by its stamps.
+        factor : float
+            From the torque's unit to that of results.
+        earlier : mapping, optional
+            Settings of an earlier result, whose alignment is taken where none is asked for.
+        lag_of : callable
+            Gives the lag that is left in a record, and its standard error.
+        """
+        passed = self._angle()[1]
+
+        def data_of(late: Late) -> Data:
+            torque, of_torque = self._torque(late)
+            return replace(
+                data, torques=scaled(torque, factor), time=self.clocks.time, passed=(passed, of_torque), labels=None
+            )
+
+        found = Aligned((0.0, 0.0), (0.0, 0.0))
+        if isinstance(self.align, str):
+            found = aligned(data_of, lag_of, self.align)
+        elif self.align is not None:
+            found = Aligned((float(self.align), 0.0), (0.0, 0.0))
+        elif earlier is not None and earlier.get("times") == "own":
+            found = Aligned((float(earlier["clock_offset"]), float(earlier["clock_drift"])), (0.0, 0.0))
+        constants = {"clock_offset": ([found.late[0]], [found.errors[0]])}
+        if self.align == "drift":
+            constants["clock_drift"] = ([found.late[1]], [found.errors[1]])
+        final = data_of(found.late)
+        motion = final.motion
+        if self.align is not None:
+            motion = replace(motion, biases={**motion.biases, **constants})
+        doubts = [*final.doubts, *([(0, found.doubt)] if found.doubt else [])]
+        return replace(final, motion=motion, doubts=doubts, clock=Alignment(self.clocks, found.late))
+
+    def _angle(self) -> tuple[npt.NDArray[np.float64], _core.PassedNoise | None]:
+        return self.clocks.on_grid(self.clocks.angle, self.recorded[0], propagate=self.propagate)
+
+    def _torque(self, late: Late) -> tuple[npt.NDArray[np.float64], _core.PassedNoise | None]:
+        return self.clocks.on_grid(self.clocks.torque, self.recorded[1], late, propagate=self.propagate)
+
+
+def own_clocks(
+    channels: Mapping[str, npt.ArrayLike | None],
+    time: Mapping[str, Any],
+    align: Align,
+    *,
+    time_unit: str | None,
+    propagate: bool,
+) -> OwnClocks | None:
+    """Return the clocks of angle and torque where a call gives each its own, or asks for their alignment; None elsewhere.
+
+    Parameters
+    ----------
+    channels : mapping of str to array_like
+        Everything that was recorded, by the argument's name.
+    time : mapping of str to object
+        `sample_rate`, `delta` and `t` as they were given.
+    align : {"offset", "drift"}, float or None
+    time_unit : str, optional
+    propagate : bool
+    """
+    given = {name: value for name, value in time.items() if value is not None}
+    pairs = {name: value for name, value in given.items() if _is_pair(name, value)}
+    if not pairs and align is None:
+        return None
+    if align is not None and not isinstance(align, str):
+        align = arguments.finite_number("align", align)
+    elif align is not None:
+        arguments.one_of("align", align, ("offset", "drift"))
+    others = [name for name, values in channels.items() if values is not None and name not in {"angle", "torque"}]
+    if others or channels["angle"] is None:
+        raise ValueError(
+            f"clocks are aligned for angle and torque alone; got {' and '.join(others) or 'angle=None'}; leave it out, or resample it"
+        )
+    if len(given) != 1:
+        raise TypeError(
+            f"angle and torque need their clocks; got {' and '.join(given) or 'none'}; give t=(times of the angle, times of the torque) or "
+            "sample_rate=(that of the angle, that of the torque)"
+        )
+    (name, value), *_ = given.items()
+    angle, torque = (arguments.channel(one, values) for one, values in channels.items() if values is not None)
+    for one, array in (("angle", angle), ("torque", torque)):
+        if array.ndim != 1:
+            raise ValueError(
+                f"clocks are aligned for a single record; got {one} of shape {array.shape}; take one at a time"
+            )
+    of_angle, of_torque = value if name in pairs else (value, value)
+    if name == "delta":
+        of_angle, of_torque = (1 / arguments.positive_number("delta", each) for each in (of_angle, of_torque))
+    clocks = two_clocks(of_angle, of_torque, (angle.size, torque.size), time_unit)
+    return OwnClocks(clocks, (angle, torque), align, propagate)
+
+
+def _is_pair(name: str, value: Any) -> bool:
+    """Return whether angle and torque have each its own: two rates, or two arrays of times."""
+    if not isinstance(value, tuple | list) or len(value) != 2:  # noqa: PLR2004 - a pair
+        return False
+    return name != "t" or all(np.ndim(one) > 0 for one in value)
+
+
+def lag_found(settings: Mapping[str, Any]) -> tuple[float, float]:
+    """Return the lag that a result found, and its standard error."""
+    error = settings.get("lag_stderr")
+    return float(settings["lag"]), math.nan if error is None else float(error)

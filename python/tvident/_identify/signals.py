@@ -1,0 +1,89 @@
+"""What was recorded, as it was sampled or brought onto a uniform grid."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _core
+from tvident._clocks import Clock, Grid, clock_of, earlier_clock
+from tvident._derivatives import quantisation_step
+from tvident._identify.settings import Request
+
+_Channels = Mapping[str, npt.NDArray[np.number]]
+
+
+@dataclass(frozen=True)
+class Signals:
+    r"""Channels of records and their times.
+
+    Parameters
+    ----------
+    channels : mapping of str to ndarray, shape (\\*, n)
+        Those of the motion.
+    torques : ndarray, shape (\\*, n)
+    instruments : ndarray, shape (\\*, n), optional
+    mask : ndarray of bool, shape (\\*, n), optional
+    time : ndarray, shape (n,)
+        Seconds.
+    period : float
+        Seconds from one sample to the next.
+    clock : Clock, optional
+        How they were brought onto a grid; None where they were not.
+    passed : PassedNoise, optional
+        What that made of white noise.
+    doubts : sequence of (int, str)
+        What is wrong with the times, of every record.
+    """
+
+    channels: _Channels
+    torques: npt.NDArray[np.number]
+    instruments: npt.NDArray[np.number] | None
+    mask: npt.NDArray[np.bool_] | None
+    time: npt.NDArray[np.float64]
+    period: float
+    clock: Clock | None = None
+    passed: _core.PassedNoise | None = None
+    doubts: Sequence[tuple[int, str]] = ()
+
+    def on_grid(
+        self,
+        grid: Grid,
+        request: Request,
+        earlier: Mapping[str, Any] | None,
+        *,
+        propagate: bool,
+        workers: int | None,
+    ) -> tuple[Signals, Request]:
+        """Return the same on a grid, and the request with what is known at every sample there."""
+        recorded = {**self.channels, "torque": self.torques}
+        if self.instruments is not None:
+            recorded["instrument"] = self.instruments
+        request = with_own_step(request, self.channels)
+        clock = earlier_clock(grid, earlier) or clock_of(grid, recorded, request.quantisation, workers)
+        evened = clock.evened(recorded, propagate=propagate, workers=workers)
+        records = int(np.prod(self.torques.shape[:-1], dtype=int))
+        signals = Signals(
+            {name: evened.channels[name] for name in self.channels},
+            evened.channels["torque"],
+            evened.channels.get("instrument"),
+            evened.mask(self.mask),
+            evened.time,
+            clock.period,
+            clock,
+            evened.passed,
+            [(record, clock.doubt) for record in range(records) if clock.doubt],
+        )
+        known = {name: evened.known(value) for name, value in request.parameters.items()}
+        return signals, replace(request, parameters=known)
+
+
+def with_own_step(request: Request, channels: _Channels) -> Request:
+    """Return a request that knows the step to which the angle was rounded, before that cannot be seen any more."""
+    if "angle" not in channels:
+        return request
+    return replace(request, quantisation=quantisation_step(channels["angle"], request.quantisation))

@@ -1,0 +1,220 @@
+//! Channels with common times that are not uniform, brought onto a uniform grid by splines.
+//!
+//! Times are in periods of the grid from its first sample on. The record is cut into blocks on a grid of absolute sample numbers; each is interpolated with
+//! so many samples before and after it that their ends do not matter (the influence of a sample on the spline falls by 0.54 a sample at order 7 and faster
+//! below), so memory does not grow with the record and the numbers do not depend on threads.
+
+use std::num::NonZeroUsize;
+use std::ops::Range;
+
+use crate::error::Error;
+use crate::exec::pool::{Piece, Watch, map};
+use crate::irregular::spline::Spline;
+use crate::record::samples::is_usable;
+
+/// Samples of a block, and those around it that its spline passes through too.
+const BLOCK: usize = 1 << 13;
+const AROUND: usize = 128;
+
+/// Periods by which a sample may be off the grid and still be the grid's own.
+const SAME: f64 = 1e-9;
+
+/// How channels are brought onto a grid.
+#[derive(Clone, Debug)]
+pub struct Resampling {
+    /// Time of every sample in periods of the grid, from its first sample on; increasing.
+    pub times: Vec<f64>,
+    /// Samples of the grid.
+    pub grid: usize,
+    /// Order of the splines: 1, 3, 5 or 7.
+    pub order: usize,
+    /// The longest step between samples, in periods, that a spline goes over. Longer ones are gaps: nothing is known there.
+    pub bridged: f64,
+    /// Whether nothing is known beside samples that are missing, either.
+    pub propagate: bool,
+}
+
+/// Samples of the grid that one block gives, of every channel.
+struct Block {
+    first: usize,
+    channels: Vec<Vec<f64>>,
+}
+
+impl Resampling {
+    /// The channels at the samples of the grid, NaN where nothing is known.
+    ///
+    /// # Errors
+    /// If the watch cancels.
+    pub fn onto_grid(
+        &self,
+        channels: &[&[f64]],
+        workers: NonZeroUsize,
+        watch: &mut Watch<'_>,
+    ) -> Result<Vec<Vec<f64>>, Error> {
+        let work = |samples: Range<usize>, (): &mut ()| self.block(&samples, channels);
+        let blocks = map(self.blocks(), workers, || (), work, watch)?;
+        let mut found = vec![vec![f64::NAN; self.grid]; channels.len()];
+        for block in blocks {
+            for (found, part) in found.iter_mut().zip(block.channels) {
+                found[block.first..block.first + part.len()].copy_from_slice(&part);
+            }
+        }
+        Ok(found)
+    }
+
+    /// Parts of the record that are interpolated one by one.
+    pub(crate) fn blocks(&self) -> Vec<Piece<Range<usize>>> {
+        let samples = self.times.len();
+        let ranges = (0..samples).step_by(BLOCK).map(|first| first..samples.min(first + BLOCK));
+        ranges.map(|range| Piece { size: range.len(), content: range }).collect()
+    }
+
+    /// Samples of the grid from the first time of a block to the first of the next.
+    fn places(&self, samples: &Range<usize>) -> Range<usize> {
+        let after = |time: f64| {
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "at least zero, at most the grid"
+            )]
+            let place = (time - SAME).ceil().max(0.0).min(self.grid as f64) as usize;
+            place
+        };
+        let begin = if samples.start == 0 { after(self.times[0]) } else { after(self.times[samples.start]) };
+        let end = self.times.get(samples.end).map(|&time| after(time));
+        let last = self.times.last().map_or(0, |&time| after(time + 2.0 * SAME + f64::EPSILON).min(self.grid));
+        begin..end.unwrap_or(last.max(begin))
+    }
+
+    /// Samples that the spline of a block passes through.
+    pub(crate) fn around(&self, samples: &Range<usize>) -> Range<usize> {
+        samples.start.saturating_sub(AROUND)..self.times.len().min(samples.end + AROUND)
+    }
+
+    fn block(&self, samples: &Range<usize>, channels: &[&[f64]]) -> Block {
+        let (places, around) = (self.places(samples), self.around(samples));
+        let mut found = vec![vec![f64::NAN; places.len()]; channels.len()];
+        let whole = |channel: &&[f64]| channel[around.clone()].iter().all(|&value| is_usable(value));
+        let (together, alone): (Vec<usize>, Vec<usize>) =
+            (0..channels.len()).partition(|&place| whole(&channels[place]));
+        let groups = std::iter::once(together).filter(|group| !group.is_empty());
+        for group in groups.chain(alone.into_iter().map(|one| vec![one])) {
+            let usable: Vec<usize> = around.clone().filter(|&sample| is_usable(channels[group[0]][sample])).collect();
+            for part in self.parts(&usable) {
+                self.interpolate(&usable[part], &group, channels, &places, &mut found);
+            }
+        }
+        Block { first: places.start, channels: found }
+    }
+
+    /// Parts of the samples that are there between which nothing is known.
+    fn parts(&self, usable: &[usize]) -> Vec<Range<usize>> {
+        let mut parts = Vec::new();
+        let mut begin = 0;
+        for place in 1..=usable.len() {
+            let apart = usable.get(place).is_none_or(|&sample| {
+                let before = usable[place - 1];
+                self.times[sample] - self.times[before] > self.bridged || (self.propagate && sample - before > 1)
+            });
+            if apart {
+                parts.push(begin..place);
+                begin = place;
+            }
+        }
+        parts
+    }
+
+    /// Fills the samples of the grid that lie between some samples.
+    fn interpolate(
+        &self,
+        samples: &[usize],
+        group: &[usize],
+        channels: &[&[f64]],
+        places: &Range<usize>,
+        found: &mut [Vec<f64>],
+    ) {
+        let (Some(&first), Some(&last)) = (samples.first(), samples.last()) else { return };
+        let times: Vec<f64> = samples.iter().map(|&sample| self.times[sample]).collect();
+        let spline = Spline::new(&times, self.order);
+        let values = |channel: &usize| samples.iter().map(|&sample| channels[*channel][sample]).collect::<Vec<f64>>();
+        let (begin, end) = (self.times[first] - SAME, self.times[last] + SAME);
+        let wanted: Vec<usize> = places.clone().filter(|&place| (begin..=end).contains(&(place as f64))).collect();
+        if wanted.is_empty() {
+            return;
+        }
+        let values: Vec<Vec<f64>> = group.iter().map(values).collect();
+        let coefficients: Vec<Vec<f64>> = values.iter().map(|values| spline.coefficients(values)).collect();
+        let at = wanted.iter().map(|&place| (place as f64).clamp(times[0], times[times.len() - 1]));
+        spline.values(&coefficients, at, |channel, place, value| {
+            found[group[channel]][wanted[place] - places.start] = value;
+        });
+        // What was sampled at the grid's own times stays as it is, to the last bit.
+        let mut place = 0;
+        for (sample, &time) in times.iter().enumerate() {
+            while place < wanted.len() && (wanted[place] as f64) < time - SAME {
+                place += 1;
+            }
+            if let Some(&own) = wanted.get(place).filter(|&&own| (own as f64 - time).abs() <= SAME) {
+                for (channel, values) in group.iter().zip(&values) {
+                    found[*channel][own - places.start] = values[sample];
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn resampled(resampling: &Resampling, channel: &[f64], workers: usize) -> Vec<f64> {
+        let workers = NonZeroUsize::new(workers).unwrap();
+        resampling.onto_grid(&[channel], workers, &mut |_, _| true).unwrap().remove(0)
+    }
+
+    fn jittered(samples: u32) -> Vec<f64> {
+        (0..samples).map(|place| f64::from(place) + 0.15 * (2.9 * f64::from(place)).sin()).collect()
+    }
+
+    #[test]
+    fn blocks_and_threads_change_nothing() {
+        let times = jittered(40_000);
+        let samples: Vec<f64> = times.iter().map(|time| (0.02 * time).sin() + 0.3 * (7.7 * time).sin()).collect();
+        let grid = times.len() - 1;
+        for order in [1, 3, 5, 7] {
+            let whole = Resampling { times: times.clone(), grid, order, bridged: 3.0, propagate: false };
+            let found = resampled(&whole, &samples, 1);
+            assert_eq!(found, resampled(&whole, &samples, 3));
+            // A spline through all samples at once.
+            let spline = Spline::new(&times, order);
+            let mut expected = vec![0.0; grid];
+            let at = (0..grid).map(|place| (place as f64).max(times[0]));
+            spline.values(&[spline.coefficients(&samples)], at, |_, place, value| expected[place] = value);
+            for (one, other) in found.iter().zip(&expected) {
+                assert!((one - other).abs() < 1e-12, "order {order}: {one} {other}");
+            }
+        }
+    }
+
+    #[test]
+    fn gaps_stay_gaps_and_samples_on_the_grid_stay_as_they_are() {
+        let kept: Vec<usize> = (0..1000).filter(|place| !(300..320).contains(place) && *place != 500).collect();
+        let times: Vec<f64> = kept.iter().map(|&place| place as f64).collect();
+        let samples: Vec<f64> = times.iter().map(|time| (0.1 * time).sin()).collect();
+        let mut resampling = Resampling { times, grid: 1000, order: 5, bridged: 3.0, propagate: false };
+        let found = resampled(&resampling, &samples, 1);
+        for (&place, value) in kept.iter().zip(&samples) {
+            assert_eq!(found[place].to_bits(), value.to_bits());
+        }
+        assert!(found[300..320].iter().all(|value| value.is_nan()));
+        assert!((found[500] - 50.0_f64.sin()).abs() < 1e-6);
+        // A sample that is there but missing is as one that is not.
+        let mut holed = samples;
+        holed[100] = f64::NAN;
+        let bridged = resampled(&resampling, &holed, 1);
+        assert!((bridged[100] - 10.0_f64.sin()).abs() < 1e-6);
+        resampling.propagate = true;
+        let kept = resampled(&resampling, &holed, 1);
+        assert!(kept[100].is_nan() && kept[99].to_bits() == bridged[99].to_bits());
+    }
+}

@@ -1,0 +1,115 @@
+"""Windows at the samples' own times, against every order's own least squares."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import tvident
+from reference.own_times import fit, window_of
+from tvident import Status
+
+Array = npt.NDArray[np.float64]
+
+SAME = 1e-8
+"""Of the largest derivative by any order: the condition of Legendre polynomials at jittering times stays below 1e4 at order 8."""
+
+TIE = 1e-6
+"""Scores closer than this may fall either way."""
+
+
+def record(seed: int, samples: int) -> tuple[Array, Array]:
+    generator = np.random.default_rng(seed)
+    times = 3.0 + np.cumsum(generator.uniform(0.3, 1.7, samples)) / 200
+    waves = sum(np.sin(2 * np.pi * f * times + generator.uniform(0, 6)) for f in generator.uniform(1, 8, 3))
+    return times, np.asarray(waves + 0.02 * generator.standard_normal(samples))
+
+
+@settings(max_examples=15)
+@given(
+    seed=st.integers(0, 10_000),
+    samples=st.integers(60, 150),
+    length=st.one_of(st.integers(4, 20).map(lambda half: 2 * half + 1), st.floats(0.08, 0.25)),
+)
+def test_every_window_has_its_own_design(seed: int, samples: int, length: float) -> None:
+    times, y = record(seed, samples)
+    given_length = length if isinstance(length, int) else f"{length!r} s"
+    if not isinstance(length, int):
+        length = float(f"{length!r}")
+    found = tvident.fit_local_polynomials(y, given_length, t=times, max_order=8, workers=1)
+    for sample in range(0, samples, 7):
+        window = window_of(times, sample, length)
+        if window.size < 5:
+            assert found.status[sample] == Status.INVALID
+            assert np.isnan(found.derivatives[:, sample]).all()
+            continue
+        values, gains, residuals, scores = fit(times[window], y[window], times[sample], 2, 8)
+        np.testing.assert_allclose(found.scores(sample)[: scores.size], scores, rtol=1e-6, atol=1e-6)
+        best = int(scores.argmin())
+        if np.sort(scores)[1] - scores[best] < TIE:
+            continue
+        assert found.order[sample] == best
+        sigma = np.sqrt(residuals / (window.size - np.arange(residuals.size) - 1))
+        assert found.sigma[sample] == pytest.approx(sigma[best], rel=1e-6)
+        if found.status[sample] & Status.EDGE:
+            continue
+        scale = np.abs(values).max(axis=0)
+        np.testing.assert_allclose(found.derivatives[:, sample], values[best], rtol=0, atol=SAME * scale.max())
+        shares = np.exp(-(scores - scores[best]) / 2)
+        shares /= shares.sum()
+        error = shares @ np.sqrt((sigma**2)[:, np.newaxis] * gains + (values - values[best]) ** 2)
+        np.testing.assert_allclose(found.stderr[:, sample], error, rtol=1e-4)
+
+
+def test_times_that_are_hardly_irregular_give_what_uniform_ones_do() -> None:
+    count = np.arange(2000)
+    y = np.sin(count / 40) + 1e-3 * np.random.default_rng(0).standard_normal(count.size)
+    uniform = tvident.fit_local_polynomials(y, 101, sample_rate=500)
+    times = (count + 2e-3 * np.sin(count)) / 500
+    found = tvident.fit_local_polynomials(y, 101, t=times)
+    same = found.order == uniform.order
+    assert same.mean() > 0.98
+    inside = same & (found.status & Status.EDGE == 0)
+    # Shifts of two thousandths of a step, twice, move values by as much of what they change in a step.
+    np.testing.assert_allclose(found.derivatives[0, inside], uniform.derivatives[0, inside], rtol=0, atol=2 * 2e-3 / 40)
+    # Weights of orders that are nearly as good move by more.
+    ratio = found.stderr[1, inside] / uniform.stderr[1, inside]
+    assert np.mean(np.abs(ratio - 1) < 0.05) > 0.99
+    edges = (found.status & Status.EDGE).astype(bool)
+    assert np.array_equal(edges, (uniform.status & Status.EDGE).astype(bool))
+    # There each derivative takes an order of its own, which may be another where two are nearly as good.
+    off = np.abs(found.derivatives[1, same & edges] - uniform.derivatives[1, same & edges])
+    assert np.median(off / uniform.stderr[1, same & edges]) < 0.05
+
+
+def test_polynomials_are_exact_and_results_are_at_their_own_times() -> None:
+    times = np.sort(np.random.default_rng(1).uniform(0, 1, 400))
+    y = 1e3 + 2 * times - 3 * times**3
+    found = tvident.fit_local_polynomials(y, "0.2 s", t=times, step=3, nan_policy="propagate")
+    assert np.array_equal(found.time, times[::3])
+    np.testing.assert_allclose(found.derivatives[1], (2 - 9 * times**2)[::3], rtol=0, atol=1e-6)
+    holed = y.copy()
+    holed[200] = np.nan
+    beside = tvident.fit_local_polynomials(holed, 21, t=times)
+    assert np.isnan(beside.derivatives[0, 190:211]).all()
+    assert np.isfinite(beside.derivatives[0, :190]).all()
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        ({"window_length": "auto"}, "window_length='auto' needs uniform times"),
+        ({"window_length": 21, "selection": "pooled"}, "selection must be 'window' where t is not uniform"),
+        ({"window_length": 21, "loss": "huber"}, "loss must be 'squares' where t is not uniform"),
+        ({"window_length": "9 s"}, "less than or equal to the length of the record; got 9 s for a record of"),
+        ({"window_length": 20}, "window_length must be odd"),
+        ({"window_length": 5, "order": 7}, "order must be less than window_length"),
+    ],
+)
+def test_what_needs_uniform_times_says_so(call: dict[str, object], message: str) -> None:
+    times, y = record(2, 100)
+    with pytest.raises(ValueError, match=message):
+        tvident.fit_local_polynomials(y, t=times, **call)  # type: ignore[arg-type]

@@ -1,0 +1,97 @@
+"""Angle and torque with clocks of their own: other rates, other beginnings, drift."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.interpolate import make_interp_spline
+
+import tvident
+
+Array = npt.NDArray[np.float64]
+
+CONSTANT: dict[str, Any] = {"inertia": "constant", "damping": "constant", "stiffness": "constant"}
+DURATION = 12.0
+
+
+@cache
+def rig(seed: int) -> tvident.SimulatedRecording:
+    return tvident.simulate_torsional_rig(
+        duration=DURATION + 1, sample_rate=2000, seed=seed, pattern="constant", torque_snr_db=200, angle_noise=0
+    )
+
+
+def sampled(seed: int, channel: str, t: Array, noise: float) -> Array:
+    simulated = rig(seed)
+    values = make_interp_spline(simulated.time, getattr(simulated, f"true_{channel}"), k=7)(t)
+    return np.asarray(
+        values + noise * values.std() * np.random.default_rng(seed + len(channel)).standard_normal(t.size)
+    )
+
+
+def clock(rate: float, start: float = 0.5) -> Array:
+    return start + np.arange(int((DURATION - 1) * rate)) / rate
+
+
+def within_errors(result: tvident.Identification, seed: int, most: float = 4.0) -> None:
+    """Check that constants are within so many standard errors of the truth, and that these are small."""
+    for name in CONSTANT:
+        value, error = result.constants[name]
+        truth = float(getattr(rig(seed), name)[0])
+        assert abs(value - truth) <= most * error, name
+        assert error < 0.1 * truth, name
+
+
+@pytest.mark.parametrize("rate", [100.0, 2000.0])
+def test_a_torque_of_another_rate(rate: float) -> None:
+    ours, theirs = clock(1000.0), clock(rate, 0.5003)
+    angle, torque = sampled(1, "angle", ours, 1e-3), sampled(1, "torque", theirs, 0.05)
+    result = tvident.identify(angle, torque, t=(ours, theirs), **CONSTANT)
+    within_errors(result, 1)
+    assert result.settings["sample_rate"] == pytest.approx(max(1000.0, rate))
+    assert result.time[0] == pytest.approx(0.5, abs=2e-3)
+    assert "each by its own clock" in result.reasons[0]
+    begun = tvident.identify(angle, sampled(1, "torque", clock(rate), 0.05), sample_rate=(1000.0, rate), **CONSTANT)
+    within_errors(begun, 1)
+
+
+def test_an_offset_is_found_from_the_equation() -> None:
+    ours, theirs = clock(1000.0), clock(1000.0, 0.6)
+    angle, torque = sampled(2, "angle", ours, 1e-3), sampled(2, "torque", theirs, 0.05)
+    for offset in (0.2137, -0.0304):
+        result = tvident.identify(angle, torque, t=(ours, theirs + offset), align="offset", **CONSTANT)
+        found, error = result.constants["clock_offset"]
+        assert abs(found - offset) <= 4 * error
+        assert error < 1e-3
+        within_errors(result, 2)
+    again = tvident.identify(angle, torque, t=(ours, theirs + offset), settings=result.settings)
+    assert again.constants["stiffness"][0] == pytest.approx(result.constants["stiffness"][0], rel=1e-6)
+
+
+def test_a_drift_is_found_from_the_equation() -> None:
+    ours, theirs = clock(1000.0), clock(500.0, 0.6)
+    drift, offset = 3e-4, 0.02
+    angle, torque = sampled(3, "angle", ours, 1e-3), sampled(3, "torque", theirs, 0.05)
+    stamps = theirs + offset + drift * (theirs - theirs[0])
+    result = tvident.identify(angle, torque, t=(ours, stamps), align="drift", **CONSTANT)
+    found, error = result.constants["clock_drift"]
+    assert abs(found - drift) <= 4 * error
+    assert error < drift / 3
+    within_errors(result, 3)
+
+
+def test_what_cannot_be_aligned_is_said() -> None:
+    t = clock(1000.0)
+    angle, torque = sampled(4, "angle", t, 1e-3), sampled(4, "torque", t, 0.05)
+    with pytest.raises(ValueError, match=r"align must be .* got 'always'"):
+        tvident.identify(angle, torque, sample_rate=1000, align="always")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"must overlap; they share 0 s"):
+        tvident.identify(angle, torque, t=(t, t + 100.0))
+    with pytest.raises(ValueError, match=r"angle and torque alone; got velocity"):
+        tvident.identify(angle, torque, velocity=angle, t=(t, t))
+    with pytest.raises(ValueError, match="align needs the weak form"):
+        tvident.identify(angle, torque, sample_rate=1000, align="offset", method="paper")
