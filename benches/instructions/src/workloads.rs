@@ -183,6 +183,7 @@ fn identify(lengths: usize) -> Result<usize, Error> {
         quantisation: None,
         propagate: false,
         step: 1,
+        wanted: None,
         diagnose: false,
         instructions,
     };

@@ -122,7 +122,7 @@ impl StrongForm {
         motions: &Motions,
         rows: Rows,
         workers: Option<NonZeroUsize>,
-    ) -> PyResult<Option<(Vec<f64>, Vec<f64>, f64, f64)>> {
+    ) -> PyResult<Option<ConstantsOfRows>> {
         let (form, motions, rows) = (self.settings(), motions.all()?, summary(&rows)?);
         let motion = motions.first().ok_or_else(|| PyValueError::new_err("there is no record"))?;
         let mut found = None;
@@ -133,6 +133,9 @@ impl StrongForm {
         Ok(found.map(|found| (found.values, found.covariance, found.residual, found.condition)))
     }
 }
+
+/// Values, covariance, residual and condition number.
+type ConstantsOfRows = (Vec<f64>, Vec<f64>, f64, f64);
 
 /// The numbers of a triangular factor, its columns, and how many rows it stands for.
 type Rows = (Vec<f64>, usize, usize);

@@ -179,7 +179,7 @@ impl LocalPolynomials {
         watched(py, progress, |watch| {
             let mut values = vec![0.0; record.len()];
             record.read(0, &mut values);
-            let parts: Vec<std::ops::Range<usize>> = parts.iter().map(|&(first, end)| first..end).collect();
+            let parts: Vec<Range<usize>> = parts.iter().map(|&(first, end)| first..end).collect();
             let record = Incomplete { samples: &values, weights: weights.as_deref(), parts: &parts, least };
             found = self.plan.run_incomplete(&record, &places, threads(workers), watch)?;
             Ok(())

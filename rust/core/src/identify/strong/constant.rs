@@ -123,7 +123,8 @@ pub fn constants_of_rows(
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Option<SharedParameters>, Error> {
-    let solved = solved(form.derivatives, &[motion.clone()], std::slice::from_ref(rows), workers, watch)?;
+    let motions = std::slice::from_ref(motion);
+    let solved = solved(form.derivatives, motions, std::slice::from_ref(rows), workers, watch)?;
     Ok(solved.into_iter().next().flatten())
 }
 
