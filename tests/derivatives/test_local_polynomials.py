@@ -310,8 +310,6 @@ def test_progress_is_told_and_can_cancel() -> None:
 def misuse() -> Iterator[tuple[dict[str, Any], type[Exception], str]]:
     y = np.arange(100.0)
     good: dict[str, Any] = {"y": y, "window_length": 11}
-    uneven = np.arange(100) * 1e-3
-    uneven[60:] += 1e-3
     yield good | {"window_length": 10}, ValueError, "must be odd.*got 10; use 9 or 11"
     yield good | {"window_length": 3}, ValueError, "at least 5 samples; got 3"
     yield (
@@ -330,7 +328,6 @@ def misuse() -> Iterator[tuple[dict[str, Any], type[Exception], str]]:
     yield good | {"sample_rate": -5}, ValueError, "sample_rate must be positive and finite; got -5"
     yield good | {"sample_rate": 5, "delta": 1.0}, TypeError, "only one of delta, sample_rate and t"
     yield good | {"t": y[:-1]}, ValueError, "one time for each of the 100 samples"
-    yield good | {"t": uneven}, ValueError, r"uniform; the step to t\[60\] = 0.061 is 0.002 s"
     yield good | {"t": np.zeros(100)}, ValueError, "must increase"
     yield good | {"max_order": 16}, ValueError, "max_order must be at most 15; got 16"
     yield good | {"order": 16, "window_length": 51}, ValueError, "order must be at most 15; got 16"

@@ -208,7 +208,11 @@ def test_files_that_the_design_names_exist() -> None:
 @pytest.mark.parametrize(
     ("function", "command", "without"),
     [
-        (tvident.identify, "identify", {"share"}),
+        (
+            tvident.identify,
+            "identify",
+            {"share", "ensemble_axis", "phase", "dof_axis", "structure"},
+        ),  # a file is one record
         (tvident.fit_local_polynomials, "derivatives", {"y", "axis"}),
         (tvident.simulate_torsional_rig, "simulate", {"inertia", "damping", "torsional_rigidity"}),
     ],

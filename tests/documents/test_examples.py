@@ -85,4 +85,11 @@ def test_from_the_shell(tmp_path: Path) -> None:
     assert 10 < stiffness < 20
     assert error < 0.1
     written = {path.name for path in tmp_path.iterdir()}
-    assert written == {"rig.csv", "derivatives.csv", "result.csv", "result.png", "known.npz"}
+    assert written == {
+        "rig.csv",
+        "derivatives.csv",
+        "result.csv",
+        "result.csv.settings.json",
+        "result.png",
+        "known.npz",
+    }

@@ -47,7 +47,7 @@ def arrays(result: object) -> dict[str, npt.NDArray[Any]]:
             names = ("derivatives", "order", "sigma", "status", "stderr")
             return {name: getattr(result, name) for name in names}
         case tvident.RollingRegression():
-            return dict(vars(result))
+            return {name: values for name, values in vars(result).items() if isinstance(values, np.ndarray)}
         case tvident.Identification():
             numbers = {
                 f"{name}, {part}": np.asarray(x) for name, two in result.constants.items() for part, x in enumerate(two)

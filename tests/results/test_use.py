@@ -197,7 +197,7 @@ def test_a_result_shows_its_numbers() -> None:
 
 def test_completion_shows_what_users_call_and_the_version() -> None:
     shown = [name for name in dir(tvident) if not name.startswith("__")]
-    assert set(shown) == {*tvident.__all__, "figures", "recordings"}
+    assert set(shown) == {*tvident.__all__, "baselines", "figures", "recordings"}
     assert tvident.__version__.count(".") == 2
     assert json.dumps(tvident.__version__)
     code = (

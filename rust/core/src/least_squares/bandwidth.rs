@@ -75,7 +75,9 @@ mod tests {
         assert_eq!(of(0.0, 1000).rows, 1);
         // Andrews' formula with α = (2 · 0.5 / 0.75)² = 1.778: 1.1447 · (1778)^(1/3) = 13.9.
         assert_eq!(of(0.5, 1000).rows, 14);
-        assert_eq!(of(0.999, 1000).rows, 250);
+        // 0.999 counts as 0.97: 1.1447 · (1000 · (1.94 / 0.0591)²)^(1/3) = 117.4, and at most a quarter of a window.
+        assert_eq!(of(0.999, 1000).rows, 118);
+        assert_eq!(of(0.999, 100).rows, 25);
         // Weights over very many rows keep all, over one row 1/3 of what (1 + 0.5) / (1 - 0.5) would be.
         assert!((kept(0.5, 100_000) - 1.0).abs() < 1e-4);
         assert!((kept(0.5, 1) - 1.0 / 3.0).abs() < 1e-15);

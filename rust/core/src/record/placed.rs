@@ -90,7 +90,7 @@ mod tests {
         for (parts, samples) in [
             (vec![0..2, 1..3], 9),
             (vec![3..5, 0..2], 9),
-            (vec![0..2], 9),
+            (std::iter::once(0..2).collect(), 9),
             (vec![0..2, 7..9], 8),
             (vec![0..4, 4..5], 9),
         ] {
