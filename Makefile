@@ -52,6 +52,16 @@ soak: $(BUILT)  ## the properties of both languages with many more cases, drawn 
 	PROPTEST_CASES=$(CASES) cargo test --workspace --profile checked
 	TVIDENT_HYPOTHESIS=soak $(BIN)/python -m pytest --hypothesis-show-statistics
 
+.PHONY: soak-stream
+soak-stream: SAMPLES ?= 10000000
+soak-stream: $(BUILT)  ## ten million samples through a stream in random pieces: memory flat, no drift; SAMPLES=…
+	TVIDENT_STREAM=$(SAMPLES) $(BIN)/python -m pytest --quiet tests/stream/test_soak.py
+
+.PHONY: test-live
+test-live: SECONDS ?= 60
+test-live: $(BUILT)  ## a minute of the Lab Streaming Layer at 1 kHz, through tvident live and back; SECONDS=…
+	TVIDENT_LIVE=$(SECONDS) $(BIN)/python -m pytest --quiet tests/live
+
 .PHONY: attack
 attack: SECONDS ?= 3600
 attack: $(BUILT)  ## random and hostile calls, files and signals, drawn anew, for an hour or SECONDS=

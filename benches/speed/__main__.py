@@ -9,6 +9,7 @@ from pathlib import Path
 from speed import environment, memory, table
 from speed.corners import CORNERS
 from speed.rows import ROWS, Row
+from speed.streams import STREAMS
 from speed.timing import Effort, alternate
 from tvident import _core
 
@@ -16,7 +17,7 @@ _README = Path(__file__).parents[1] / "README.md"
 _FULL = Effort(seconds=8.0, least=7)
 _QUICK = Effort(seconds=1.0, least=3)
 _QUICK_SHARE = 0.2
-_ALL = [*ROWS, *CORNERS]
+_ALL = [*ROWS, *CORNERS, *STREAMS]
 
 
 def main() -> int:

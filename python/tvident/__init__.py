@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from tvident._results import ExpandedParameter, Identification, IdentifiedRecords, Scan, load
     from tvident._simulate import Recording, simulate_torsional_rig
     from tvident._status import Status
+    from tvident._stream import IdentificationStream, LocalPolynomialStream, RollingStream
     from tvident._units import Channel
 
     __version__: str
@@ -30,13 +31,16 @@ __all__ = [
     "FileIdentification",
     "FileRecording",
     "Identification",
+    "IdentificationStream",
     "IdentifiedRecords",
     "LocalPolynomialFit",
+    "LocalPolynomialStream",
     "Matrix",
     "MergedIdentification",
     "ModelComparison",
     "Recording",
     "RollingRegression",
+    "RollingStream",
     "Scan",
     "Status",
     "StrongForm",
@@ -68,6 +72,7 @@ _ROOMS = {
     "_results": ("ExpandedParameter", "Identification", "IdentifiedRecords", "Scan", "load"),
     "_simulate": ("Recording", "simulate_torsional_rig"),
     "_status": ("Status",),
+    "_stream": ("IdentificationStream", "LocalPolynomialStream", "RollingStream"),
     "_units": ("Channel",),
 }
 """Where each name comes from: a room is entered when a name of it is asked for, so that the command's help need not wait for NumPy."""

@@ -20,9 +20,13 @@ __all__ = [
     "Motions",
     "Noise",
     "OutsideMask",
+    "ParameterStream",
+    "PolynomialStream",
     "Responses",
     "RollingRegressions",
+    "RollingStream",
     "Scan",
+    "StreamedParameters",
     "StrongForm",
     "Suspect",
     "Unknown",
@@ -154,6 +158,86 @@ class LocalEstimates:
     def sigma(self) -> npt.NDArray[np.float64]: ...
 
 @final
+class ParameterStream:
+    def __new__(
+        cls,
+        plan: LocalPolynomials,
+        regression_window: int | None,
+        known: Sequence[float | None],
+        terms: Sequence[str],
+        *,
+        step: int = 1,
+        factors: Sequence[float] | None = None,
+        forgetting: float = 1.0,
+        state: tuple[list[int], list[npt.NDArray[np.float64]]] | None = None,
+    ) -> ParameterStream: ...
+    @property
+    def delay(self) -> int: ...
+    @property
+    def samples(self) -> int: ...
+    def state(self) -> tuple[list[int], list[npt.NDArray[np.float64]]]: ...
+    def hold(self, hold: bool) -> None: ...
+    def reset(self) -> None: ...
+    def push(self, angle: npt.NDArray[np.number], torque: npt.NDArray[np.number]) -> StreamedParameters: ...
+    def finish(self) -> StreamedParameters: ...
+
+@final
+class StreamedParameters:
+    @property
+    def first(self) -> int: ...
+    @property
+    def values(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def stderr(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def residual_std(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def condition(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def status(self) -> npt.NDArray[np.uint16]: ...
+    @property
+    def order(self) -> npt.NDArray[np.uint8]: ...
+
+@final
+class PolynomialStream:
+    def __new__(
+        cls,
+        plan: LocalPolynomials,
+        *,
+        step: int = 1,
+        errors: bool = False,
+        state: tuple[int, npt.NDArray[np.float64], int, bool] | None = None,
+    ) -> PolynomialStream: ...
+    @property
+    def delay(self) -> int: ...
+    @property
+    def samples(self) -> int: ...
+    def state(self) -> tuple[int, npt.NDArray[np.float64], int, bool]: ...
+    def push(self, samples: npt.NDArray[np.number]) -> tuple[int, LocalEstimates, npt.NDArray[np.float64]]: ...
+    def finish(self) -> tuple[int, LocalEstimates, npt.NDArray[np.float64]]: ...
+
+@final
+class RollingStream:
+    def __new__(
+        cls,
+        window: int,
+        regressors: int,
+        rhs_count: int,
+        *,
+        step: int = 1,
+        state: tuple[int, npt.NDArray[np.float64], int, bool] | None = None,
+    ) -> RollingStream: ...
+    @property
+    def delay(self) -> int: ...
+    @property
+    def rows(self) -> int: ...
+    def state(self) -> tuple[int, npt.NDArray[np.float64], int, bool]: ...
+    def push(
+        self, regressors: npt.NDArray[np.number], rhs: npt.NDArray[np.number]
+    ) -> tuple[int, StreamedRegressions]: ...
+    def finish(self) -> tuple[int, StreamedRegressions]: ...
+
+@final
 class AutomaticEstimates:
     @property
     def derivatives(self) -> npt.NDArray[np.float64]: ...
@@ -199,6 +283,19 @@ class Responses:
     def velocity(self) -> npt.NDArray[np.float64]: ...
     @property
     def lost(self) -> list[int | None]: ...
+
+@final
+class StreamedRegressions:
+    @property
+    def params(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def stderr(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def rss(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def condition(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def status(self) -> npt.NDArray[np.uint16]: ...
 
 @final
 class RollingRegressions:

@@ -47,7 +47,8 @@ def assert_same_bits(found: tvident.dask.DaskIdentification, whole: tvident.Iden
     (columns,) = da.compute(dict(found.columns))
     for name, values in columns.items():
         assert values.tobytes() == np.ascontiguousarray(expected[name]).tobytes(), name
-    assert found.settings == whole.settings
+    # How much windows of the whole record scatter is not among the settings of blocks.
+    assert found.settings == {name: one for name, one in whole.settings.items() if name != "stderr_factors"}
     assert np.array_equal(found.time.compute(), whole.time)
 
 

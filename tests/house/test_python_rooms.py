@@ -35,6 +35,8 @@ ROOMS = (
     "_advice",
     "_merged",
     "_identify",
+    "_stream",
+    "_live",
     "_compare",
     "_plan",
     "_baselines",

@@ -30,6 +30,7 @@ ROOMS = (
     "regression",
     "inference",
     "identify",
+    "stream",
     "lib",  # the front door
 )
 """Every room may use those above it. The first two are single files, which everything uses."""

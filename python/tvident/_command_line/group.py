@@ -89,6 +89,7 @@ COMMANDS = {
     "identify": "Identify inertia, damping and stiffness from the angle and torque in FILE.",
     "info": "List the channels of FILE: how many samples, their range, and what is missing.",
     "plan": "Say how long to record, which frequencies and amplitude give a wanted error, or what more of FILE would bring.",
+    "live": "Identify while angle and torque are recorded: from lines on standard input, or from the Lab Streaming Layer.",
     "report": "Identify as identify does, and write a page that shows the recording and the result.",
     "simulate": "Write a simulated recording of the paper's rig, with its truth, to OUTPUT: a CSV file, or of another kind by its ending.",
 }

@@ -5,9 +5,21 @@ from tvident._commands.demo import demo
 from tvident._commands.derivatives import derivatives
 from tvident._commands.identify import identify
 from tvident._commands.info import info
+from tvident._commands.live import live
 from tvident._commands.plan import plan
 from tvident._commands.report import report
 from tvident._commands.settings import options_from_toml
 from tvident._commands.simulate import simulate
 
-__all__ = ["compare", "demo", "derivatives", "identify", "info", "options_from_toml", "plan", "report", "simulate"]
+__all__ = [
+    "compare",
+    "demo",
+    "derivatives",
+    "identify",
+    "info",
+    "live",
+    "options_from_toml",
+    "plan",
+    "report",
+    "simulate",
+]

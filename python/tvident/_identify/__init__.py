@@ -4,7 +4,7 @@ from tvident._identify.call import identify
 from tvident._identify.criterion import aicc, effective_observations
 from tvident._identify.methods import Method, StrongForm, WeakForm
 from tvident._identify.parts import Held, Long, Rows, Span, requested
-from tvident._identify.settings import Request
+from tvident._identify.settings import Request, resolve
 
 __all__ = [
     "Held",
@@ -19,4 +19,5 @@ __all__ = [
     "effective_observations",
     "identify",
     "requested",
+    "resolve",
 ]

@@ -154,6 +154,19 @@ def with_inner(
     )
 
 
+def of_windows(names: Sequence[str], found: Sequence[_core.Identification]) -> dict[str, Any]:
+    """Return the lengths of the strong form's windows, and by how much those of a single record scatter more than least squares say.
+
+    The latter is what a stream cannot know before its end.
+    """
+    lengths = {"window_length": found[0].window_length, "regression_window": found[0].regression_window}
+    if len(found) != 1:
+        return lengths
+    each = zip(names, found[0].unknowns, strict=False)
+    factors = {name: one.factor for name, one in each if one.kind == "windowed" and one.factor is not None}
+    return {**lengths, "stderr_factors": factors} if factors else lengths
+
+
 def _scan_of(found: _core.Scan, names: Sequence[str]) -> Scan:
     """Return estimates by the width of the test function, by name."""
     shape = (len(found.window_length), len(found.unknowns))

@@ -68,6 +68,7 @@ class _NothingFound:
 @dataclass(frozen=True)
 class _Kind:
     kind: str
+    factor: None = None
 
 
 def requested(

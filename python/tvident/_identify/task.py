@@ -15,7 +15,7 @@ from tvident import _core
 from tvident._advice import FoundBySearch
 from tvident._derivatives import SHORTEST_WINDOW, plan, quantisation_step
 from tvident._equation import COEFFICIENTS, Kind, Unknown, all_terms, parameter
-from tvident._identify.batch import estimates, with_inner
+from tvident._identify.batch import estimates, of_windows, with_inner
 from tvident._identify.channels import constants_of
 from tvident._identify.columns import WINDOW_OF_TERMS, Columns, Range, fixed, secant
 from tvident._identify.criterion import criterion_of
@@ -409,7 +409,7 @@ class Task:
         chosen: list[str] = []
         lag: dict[str, Any] = {"lag": by_record(self._each("lag"))}
         if isinstance(request.form, StrongForm):
-            used |= {name: getattr(found[0], name) for name in ("window_length", "regression_window")}
+            used |= of_windows(self._names, found)
             lag = {"lag": request.lag}
         else:
             chosen = [name for name in names if "auto" in self._each(name)]

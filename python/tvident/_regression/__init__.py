@@ -1,8 +1,9 @@
 """Solves least squares in every window of rows."""
 
-from tvident._regression.rolling import RollingRegression, rolling_least_squares
+from tvident._regression.rolling import MOST_REGRESSORS, RollingRegression, rolling_least_squares
 
 __all__ = [
+    "MOST_REGRESSORS",
     "RollingRegression",
     "rolling_least_squares",
 ]

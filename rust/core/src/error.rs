@@ -144,6 +144,14 @@ pub enum Error {
     /// Equations that do not determine what is constant.
     #[error("the record must determine what is constant; it does not; excite the system, or leave a parameter out")]
     NotDetermined,
+    /// Something that needs more of a record than a stream ever holds.
+    #[error("a stream holds no more than its windows need, and {what} needs more; got {what}; {cure}")]
+    NotInAStream {
+        /// What was asked for.
+        what: &'static str,
+        /// What would be right.
+        cure: &'static str,
+    },
     /// The work was cancelled by whoever watched it.
     #[error("the work was cancelled")]
     Cancelled,

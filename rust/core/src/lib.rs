@@ -16,6 +16,7 @@ pub mod regression;
 pub mod response;
 pub mod simd;
 mod status;
+pub mod stream;
 pub mod weak_form;
 
 pub use error::Error;

@@ -20,6 +20,8 @@ mod reserve;
 mod respond;
 mod rolling;
 mod sliding;
+mod streamed_parameters;
+mod streams;
 mod watch;
 mod window_fit;
 
@@ -56,6 +58,10 @@ mod _core {
     use crate::rolling::{RollingRegressions, rolling_least_squares};
     #[pymodule_export]
     use crate::sliding::sliding_velocity;
+    #[pymodule_export]
+    use crate::streamed_parameters::{ParameterStream, StreamedParameters};
+    #[pymodule_export]
+    use crate::streams::{PolynomialStream, RollingStream, StreamedRegressions};
     #[pymodule_export]
     use crate::window_fit::WindowFit;
 

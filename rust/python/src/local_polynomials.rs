@@ -2,6 +2,7 @@
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
+use std::sync::Arc;
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -62,13 +63,18 @@ type IncompleteEstimates<'py> = (
 /// Tables for windows of one length, made once and used for any number of records.
 #[pyclass(frozen, module = "tvident._core")]
 pub(crate) struct LocalPolynomials {
-    plan: Plan,
+    plan: Arc<Plan>,
 }
 
 impl LocalPolynomials {
     /// The plan itself.
     pub(crate) fn plan(&self) -> &Plan {
         &self.plan
+    }
+
+    /// The plan for as long as a stream needs it.
+    pub(crate) fn shared(&self) -> Arc<Plan> {
+        Arc::clone(&self.plan)
     }
 }
 
@@ -112,7 +118,7 @@ impl LocalPolynomials {
             plan = Some(Plan::watched(options, watch)?);
             Ok(())
         })?;
-        plan.map(|plan| Self { plan }).ok_or_else(|| PyValueError::new_err("no plan was made"))
+        plan.map(|plan| Self { plan: Arc::new(plan) }).ok_or_else(|| PyValueError::new_err("no plan was made"))
     }
 
     /// Number of orders in play.

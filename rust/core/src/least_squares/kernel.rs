@@ -9,11 +9,12 @@ use std::ops::Range;
 use crate::exec::pool::GoOn;
 use crate::lanes::output::Outputs;
 use crate::lanes::store::Write;
+use crate::lanes::tile::Tile;
 use crate::least_squares::fading;
 use crate::least_squares::givens_factor::{
     Dimensions, append, covariance, empty, explained, invert, load, merge, solve, squared_norm, store,
 };
-use crate::least_squares::plan::{Equations, Slots};
+use crate::least_squares::plan::{Equations, RollingLeastSquares, Slots};
 use crate::least_squares::side_by_side::{RollingRun, RollingScratch, SEGMENT};
 use crate::simd::vectors::{Kernel, Lanes, MOST_LANES};
 use crate::status::Status;
@@ -85,7 +86,10 @@ impl<H: Dimensions> Kernel for RollingKernel<'_, '_, '_, H> {
                 for offset in some.clone() {
                     let place = (offset - rows.start) * size;
                     suffix.load(simd, self.shape, &self.scratch.suffixes[place..place + size]);
-                    self.finish(simd, &suffix, offset, full, &mut row);
+                    let (freedom, own) = (self.freedom(simd, offset, full), offset + self.run.plan.before);
+                    let RollingScratch { strips, tile, .. } = &mut *self.scratch;
+                    let at = |column: usize| strips[column].in_block(simd, own % window, own / window);
+                    finish(simd, self.shape, self.run.plan, &suffix, freedom, offset, tile, &mut row, at);
                 }
                 // The last windows are written together with some that were written before, to fill the vectors.
                 if some.end % places == 0 || some.end == window {
@@ -100,10 +104,10 @@ impl<H: Dimensions> Kernel for RollingKernel<'_, '_, '_, H> {
 
 /// What some rows of each lane are summarised by.
 #[derive(Clone)]
-struct WindowSummary<F> {
-    factor: F,
+pub(crate) struct WindowSummary<F> {
+    pub(crate) factor: F,
     /// Sums for the errors of windows that fade: see `fading`.
-    sums: Option<F>,
+    pub(crate) sums: Option<F>,
 }
 
 impl<F> WindowSummary<F> {
@@ -195,93 +199,6 @@ impl<H: Dimensions> RollingKernel<'_, '_, '_, H> {
         }
     }
 
-    /// Solves each lane's window.
-    #[inline(always)]
-    fn finish<S: Lanes>(
-        &mut self,
-        simd: S,
-        summary: &WindowSummary<H::Factor<S::f64s>>,
-        offset: usize,
-        full: bool,
-        values: &mut H::Factor<S::f64s>,
-    ) {
-        let (shape, plan, factor) = (self.shape, self.run.plan, &summary.factor);
-        let (p, q) = (shape.regressors(), shape.rhs_count());
-        let slots = Slots::of(plan);
-        let mut freedom = self.freedom(simd, offset, full);
-        let tile = &mut self.scratch.tile;
-        // The condition number comes first: where it exceeds the precision, no result has any digits.
-        invert(simd, shape, factor, values);
-        let mut squares = simd.splat_f64s(0.0);
-        for i in 0..p {
-            let variance = covariance(simd, shape, values, i, i);
-            squares = simd.mul_add_f64s(squared_norm(simd, shape, factor, i), variance, squares);
-        }
-        let condition = simd.sqrt_f64s(simd.mul_f64s(squares, simd.splat_f64s(p as f64)));
-        let greatest = simd.splat_f64s(1.0 / (f64::EPSILON * plan.window as f64));
-        let determined = simd.less_than_f64s(condition, greatest);
-        let ill = simd.greater_than_f64s(condition, simd.splat_f64s(plan.ill_conditioned));
-        let flags = simd.select_f64s(ill, code(simd, Status::ILL_CONDITIONED), simd.splat_f64s(0.0));
-        let deficient = code(simd, Status::INVALID | Status::RANK_DEFICIENT);
-        let condition = simd.select_f64s(determined, condition, simd.splat_f64s(f64::INFINITY));
-        tile.put(simd, slots.condition, offset, condition);
-        tile.put(simd, slots.condition + 1, offset, simd.select_f64s(determined, flags, deficient));
-
-        let faded = summary.sums.as_ref().map(|sums| {
-            let mut normal = shape.factor(simd.splat_f64s(0.0));
-            freedom = simd.div_f64s(simd.splat_f64s(1.0), fading::freedom(simd, shape, values, sums, &mut normal));
-            normal
-        });
-        let nothing = simd.select_f64s(determined, simd.splat_f64s(0.0), simd.splat_f64s(f64::NAN));
-        if plan.normal {
-            let pairs = (0..p).flat_map(|i| (i..p).map(move |k| (i, k)));
-            for (pair, (i, k)) in pairs.enumerate() {
-                let entry = simd.add_f64s(covariance(simd, shape, values, i, k), nothing);
-                tile.put(simd, slots.normal + pair, offset, entry);
-            }
-        }
-        for rhs in 0..q {
-            let residual = simd.add_f64s(factor[shape.row(p) + rhs], nothing);
-            let variance = simd.mul_f64s(residual, freedom);
-            tile.put(simd, slots.residuals + rhs, offset, residual);
-            for (pair, &(i, j)) in plan.covariances.iter().enumerate() {
-                let one = covariance(simd, shape, values, i.min(j), i.max(j));
-                tile.put(simd, slots.covariances + pair * q + rhs, offset, simd.mul_f64s(one, variance));
-            }
-            let deviation = simd.sqrt_f64s(variance);
-            tile.put(simd, slots.deviations + rhs, offset, deviation);
-            for i in 0..p {
-                let over = match &faded {
-                    Some(variances) => variances[shape.row(i)],
-                    None => covariance(simd, shape, values, i, i),
-                };
-                let error = simd.mul_f64s(simd.sqrt_f64s(over), deviation);
-                tile.put(simd, slots.errors + i * q + rhs, offset, error);
-            }
-        }
-        for rhs in 0..q {
-            solve(simd, shape, factor, rhs, values);
-            let tile = &mut self.scratch.tile;
-            for i in 0..p {
-                tile.put(simd, i * q + rhs, offset, simd.add_f64s(values[i], nothing));
-            }
-            if plan.fit {
-                let own = offset + plan.before;
-                let at =
-                    |column: usize| self.scratch.strips[column].in_block(simd, own % plan.window, own / plan.window);
-                let mut residual = simd.add_f64s(at(p + rhs), nothing);
-                for i in 0..p {
-                    residual = simd.negate_mul_add_f64s(at(i), values[i], residual);
-                }
-                let tile = &mut self.scratch.tile;
-                tile.put(simd, slots.own_residuals + rhs, offset, residual);
-                let explained = explained(simd, shape, factor, rhs, usize::from(plan.constant_first));
-                let all = simd.add_f64s(explained, simd.add_f64s(factor[shape.row(p) + rhs], nothing));
-                tile.put(simd, slots.rsquared + rhs, offset, simd.div_f64s(explained, all));
-            }
-        }
-    }
-
     /// One over the degrees of freedom of each lane's window.
     #[inline(always)]
     fn freedom<S: Lanes>(&self, simd: S, offset: usize, full: bool) -> S::f64s {
@@ -319,4 +236,89 @@ impl<H: Dimensions> RollingKernel<'_, '_, '_, H> {
 #[inline(always)]
 fn code<S: Lanes>(simd: S, status: Status) -> S::f64s {
     simd.splat_f64s(256.0 * f64::from(status.bits()))
+}
+
+/// Solves each lane's window: what is known of it goes to place `offset` of the tile. `values` is scratch memory; `own` gives columns of the
+/// window's own row, where what is left of that is asked for.
+#[inline(always)]
+#[allow(clippy::too_many_arguments, reason = "a window, its place and where its results go")]
+pub(crate) fn finish<S: Lanes, H: Dimensions>(
+    simd: S,
+    shape: H,
+    plan: &RollingLeastSquares,
+    summary: &WindowSummary<H::Factor<S::f64s>>,
+    mut freedom: S::f64s,
+    offset: usize,
+    tile: &mut Tile,
+    values: &mut H::Factor<S::f64s>,
+    own: impl Fn(usize) -> S::f64s,
+) {
+    let factor = &summary.factor;
+    let (p, q) = (shape.regressors(), shape.rhs_count());
+    let slots = Slots::of(plan);
+    // The condition number comes first: where it exceeds the precision, no result has any digits.
+    invert(simd, shape, factor, values);
+    let mut squares = simd.splat_f64s(0.0);
+    for i in 0..p {
+        let variance = covariance(simd, shape, values, i, i);
+        squares = simd.mul_add_f64s(squared_norm(simd, shape, factor, i), variance, squares);
+    }
+    let condition = simd.sqrt_f64s(simd.mul_f64s(squares, simd.splat_f64s(p as f64)));
+    let greatest = simd.splat_f64s(1.0 / (f64::EPSILON * plan.window as f64));
+    let determined = simd.less_than_f64s(condition, greatest);
+    let ill = simd.greater_than_f64s(condition, simd.splat_f64s(plan.ill_conditioned));
+    let flags = simd.select_f64s(ill, code(simd, Status::ILL_CONDITIONED), simd.splat_f64s(0.0));
+    let deficient = code(simd, Status::INVALID | Status::RANK_DEFICIENT);
+    let condition = simd.select_f64s(determined, condition, simd.splat_f64s(f64::INFINITY));
+    tile.put(simd, slots.condition, offset, condition);
+    tile.put(simd, slots.condition + 1, offset, simd.select_f64s(determined, flags, deficient));
+
+    let faded = summary.sums.as_ref().map(|sums| {
+        let mut normal = shape.factor(simd.splat_f64s(0.0));
+        freedom = simd.div_f64s(simd.splat_f64s(1.0), fading::freedom(simd, shape, values, sums, &mut normal));
+        normal
+    });
+    let nothing = simd.select_f64s(determined, simd.splat_f64s(0.0), simd.splat_f64s(f64::NAN));
+    if plan.normal {
+        let pairs = (0..p).flat_map(|i| (i..p).map(move |k| (i, k)));
+        for (pair, (i, k)) in pairs.enumerate() {
+            let entry = simd.add_f64s(covariance(simd, shape, values, i, k), nothing);
+            tile.put(simd, slots.normal + pair, offset, entry);
+        }
+    }
+    for rhs in 0..q {
+        let residual = simd.add_f64s(factor[shape.row(p) + rhs], nothing);
+        let variance = simd.mul_f64s(residual, freedom);
+        tile.put(simd, slots.residuals + rhs, offset, residual);
+        for (pair, &(i, j)) in plan.covariances.iter().enumerate() {
+            let one = covariance(simd, shape, values, i.min(j), i.max(j));
+            tile.put(simd, slots.covariances + pair * q + rhs, offset, simd.mul_f64s(one, variance));
+        }
+        let deviation = simd.sqrt_f64s(variance);
+        tile.put(simd, slots.deviations + rhs, offset, deviation);
+        for i in 0..p {
+            let over = match &faded {
+                Some(variances) => variances[shape.row(i)],
+                None => covariance(simd, shape, values, i, i),
+            };
+            let error = simd.mul_f64s(simd.sqrt_f64s(over), deviation);
+            tile.put(simd, slots.errors + i * q + rhs, offset, error);
+        }
+    }
+    for rhs in 0..q {
+        solve(simd, shape, factor, rhs, values);
+        for i in 0..p {
+            tile.put(simd, i * q + rhs, offset, simd.add_f64s(values[i], nothing));
+        }
+        if plan.fit {
+            let mut residual = simd.add_f64s(own(p + rhs), nothing);
+            for i in 0..p {
+                residual = simd.negate_mul_add_f64s(own(i), values[i], residual);
+            }
+            tile.put(simd, slots.own_residuals + rhs, offset, residual);
+            let explained = explained(simd, shape, factor, rhs, usize::from(plan.constant_first));
+            let all = simd.add_f64s(explained, simd.add_f64s(factor[shape.row(p) + rhs], nothing));
+            tile.put(simd, slots.rsquared + rhs, offset, simd.div_f64s(explained, all));
+        }
+    }
 }

@@ -5,6 +5,7 @@ pub(crate) mod correlated;
 pub(crate) mod fading;
 pub(crate) mod givens_factor;
 pub(crate) mod kernel;
+pub(crate) mod one_by_one;
 pub(crate) mod plan;
 pub(crate) mod rolling;
 pub(crate) mod side_by_side;

@@ -131,7 +131,7 @@ impl RollingRun<'_> {
     }
 
     /// How many equations a window spans, whether they count or not.
-    fn spanned(&self, window: usize) -> usize {
+    pub(crate) fn spanned(&self, window: usize) -> usize {
         let first = window.max(self.rows.start + self.plan.window);
         let end = (window + self.plan.window).min(self.rows.end + self.plan.window);
         end.saturating_sub(first)
@@ -159,12 +159,24 @@ impl RollingRun<'_> {
         if full && unusable.is_empty() {
             return;
         }
+        let count = |window| if full { self.spanned(window) } else { self.count(scratch, window) };
+        self.mark_windows(unusable, missing, count, outputs);
+        self.forget_residuals(&scratch.left_out, outputs);
+    }
+
+    /// The same with places that are unusable or missing, in order, and rows of a window that count.
+    pub(crate) fn mark_windows(
+        &self,
+        unusable: &[usize],
+        missing: &[usize],
+        count: impl Fn(usize) -> usize,
+        outputs: &mut Outputs<'_>,
+    ) {
         let plan = self.plan;
         let (mut next_unusable, mut next_missing) = (0, 0);
         for window in self.windows.clone() {
             let row = window + plan.before - plan.window;
-            let spanned = self.spanned(window);
-            let count = if full { spanned } else { self.count(scratch, window) };
+            let (spanned, count) = (self.spanned(window), count(window));
             let rows = window - self.base..window - self.base + plan.window;
             let mut flags = if spanned < plan.window { Status::EDGE } else { Status::GOOD };
             if is_among(missing, &mut next_missing, &rows) {
@@ -186,7 +198,6 @@ impl RollingRun<'_> {
                 }
             }
         }
-        self.forget_residuals(&scratch.left_out, outputs);
     }
 
     /// Rows that are left out have no residual: nothing is known of what they hold.

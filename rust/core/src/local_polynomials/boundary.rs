@@ -97,8 +97,7 @@ impl Ends {
         let elements = estimates.elements.of(samples);
         let Some(fit) = fit else {
             for element in elements {
-                estimates.invalidate(element);
-                estimates.diagnose(element, 0, Status::EDGE | Status::INVALID, f64::NAN);
+                estimates.nothing(element);
             }
             return;
         };

@@ -34,6 +34,8 @@ const STRETCH: usize = 1 << 13;
 /// What an engine can do, whatever the number of its degrees.
 pub(crate) trait Walk: Debug + Send + Sync {
     fn block(&self) -> usize;
+    /// Windows of a span that come before its start: they are reached backwards from it.
+    fn backward(&self) -> usize;
     /// Windows from one piece of work to the next, where every `step`-th is wanted: multiples of it waste no work.
     fn stride(&self, step: usize) -> usize;
     fn scratch(&self) -> EngineScratch;
@@ -105,6 +107,10 @@ impl<const D: usize, const RESIDUAL: bool> Engine<D, RESIDUAL> {
 impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
     fn block(&self) -> usize {
         self.projection.block()
+    }
+
+    fn backward(&self) -> usize {
+        self.projection.backward()
     }
 
     fn stride(&self, step: usize) -> usize {

@@ -32,6 +32,12 @@ impl Estimates<'_> {
         self.diagnose(element, 0, Status::INVALID, f64::NAN);
     }
 
+    /// Makes an element NaN around which no full window lies.
+    pub(crate) fn nothing(&mut self, element: usize) {
+        self.invalidate(element);
+        self.diagnose(element, 0, Status::EDGE | Status::INVALID, f64::NAN);
+    }
+
     /// Cuts off what belongs to the samples before `sample`.
     pub(crate) fn split_off_before(&mut self, sample: usize) -> Self {
         let (elements, count) = (self.elements, self.elements.of(0..sample).len());

@@ -119,6 +119,30 @@ impl LocalPolynomials {
         (self.options.window_length - 1) / 2
     }
 
+    /// Samples after one that settle its estimates, whatever follows: the rest of its window, and as many as its window may lie before
+    /// the start that it is reached from. Where neighbours choose the order there is no such number.
+    #[must_use]
+    pub fn lookahead(&self) -> usize {
+        self.options.window_length - 1 - self.before_centre() + self.engine.backward()
+    }
+
+    /// How many of a record's estimates are settled by its first `samples` samples, in steps of half a span: a span costs its start
+    /// once for each half.
+    #[must_use]
+    pub fn settled(&self, samples: usize) -> usize {
+        let Some(last) = samples.checked_sub(self.options.window_length) else { return 0 };
+        let half = self.engine.backward();
+        // The first window settles the samples before its centre.
+        self.before_centre() + last.checked_div(half).map_or(last + 1, |halves| halves * half)
+    }
+
+    /// The first sample that estimates of a sample and those after it read.
+    #[must_use]
+    pub fn reads_from(&self, sample: usize) -> usize {
+        // A span's first window, or one half of a span before it where the start of the last one moves.
+        sample.saturating_sub(self.before_centre() + self.engine.block() + self.engine.backward())
+    }
+
     /// Memory for one thread.
     #[must_use]
     pub fn scratch(&self) -> PolynomialScratch {
@@ -141,6 +165,27 @@ impl LocalPolynomials {
     #[must_use]
     pub fn stride(&self) -> usize {
         self.engine.block() * self.options.instructions.lanes()
+    }
+
+    /// Standard errors in the place of derivatives, as [`LocalPolynomials::errors`] gives them, at some samples of a record that is at least
+    /// one window long, on memory made by [`LocalPolynomials::scratch_of_errors`].
+    ///
+    /// # Errors
+    /// If the record is shorter than the window.
+    pub fn errors_at(
+        &self,
+        record: &dyn Samples,
+        samples: Range<usize>,
+        estimates: &mut Estimates<'_>,
+        scratch: &mut PolynomialScratch,
+    ) -> Result<(), Error> {
+        self.everywhere(record, samples, Wanted::Errors, estimates, scratch)
+    }
+
+    /// Memory for one thread that computes standard errors.
+    #[must_use]
+    pub fn scratch_of_errors(&self) -> PolynomialScratch {
+        self.scratch_for(Wanted::Errors)
     }
 
     /// Estimates at the samples `samples` of a record that is at least one window long, with equations (2), (8) and (9).

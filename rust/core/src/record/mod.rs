@@ -4,6 +4,7 @@ pub(crate) mod buffer;
 pub(crate) mod delayed;
 pub(crate) mod derived;
 pub(crate) mod placed;
+pub(crate) mod retained;
 pub(crate) mod samples;
 pub(crate) mod subsample;
 

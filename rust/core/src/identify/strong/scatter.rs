@@ -196,6 +196,86 @@ pub(crate) fn compared_windows(derivatives: &LocalPolynomials, window: usize, sa
     Compared::new(derivatives, window, samples).stretches()
 }
 
+/// The scatter of windows that go on coming: the factors so far, from the latest windows.
+///
+/// They change at windows that follow from their numbers alone, so they do not depend on the pieces that windows come in. After a
+/// record that is no longer than what is kept, they are those of [`scatter_of`].
+#[derive(Clone, Debug)]
+pub(crate) struct Scattering {
+    step: usize,
+    /// The next window that is looked at, and how many more are until factors change.
+    next: usize,
+    patience: usize,
+    values: Vec<Vec<f64>>,
+    errors: Vec<Vec<f64>>,
+    factors: Option<Vec<f64>>,
+}
+
+impl Scattering {
+    /// Of so many unknowns in windows of so many rows.
+    pub(crate) fn new(derivatives: &LocalPolynomials, window: usize, unknowns: usize) -> Self {
+        let compared = Compared::new(derivatives, window, 0);
+        let nothing = vec![Vec::new(); unknowns];
+        let (step, next) = (compared.distance / DENSITY, compared.inside.start);
+        Self { step, next, patience: 3 * DENSITY, values: nothing.clone(), errors: nothing, factors: None }
+    }
+
+    /// The next window that is looked at.
+    pub(crate) fn next(&self) -> usize {
+        self.next
+    }
+
+    /// Looks at that window, or at the one after it that there is.
+    pub(crate) fn see<'a>(&mut self, values: impl Iterator<Item = &'a f64>, errors: impl Iterator<Item = &'a f64>) {
+        self.values.iter_mut().zip(values).for_each(|(column, value)| column.push(*value));
+        self.errors.iter_mut().zip(errors).for_each(|(column, error)| column.push(*error));
+        self.next += self.step;
+        self.patience -= 1;
+        if self.patience == 0 {
+            self.settle();
+            self.patience = DENSITY.max(self.count() / DENSITY);
+        }
+    }
+
+    /// What standard errors are multiplied by; NaN until windows that share no equation can be compared.
+    pub(crate) fn factor(&self, unknown: usize) -> f64 {
+        self.factors.as_ref().map_or(f64::NAN, |factors| factors[unknown])
+    }
+
+    fn count(&self) -> usize {
+        self.values.first().map_or(0, Vec::len)
+    }
+
+    fn settle(&mut self) {
+        let most = MOST_WINDOWS.max(12 * DENSITY * self.step) / self.step;
+        let gone = self.count().saturating_sub(most);
+        self.values.iter_mut().chain(&mut self.errors).for_each(|column| drop(column.drain(..gone)));
+        let taken = Taken { around: 0..0, step: self.step, values: self.values.clone(), errors: self.errors.clone() };
+        self.factors = factors(self.values.len(), [taken]).or(self.factors.take());
+    }
+
+    /// The numbers that it resumes from: what was seen, window by window, and the factors.
+    pub(crate) fn state(&self) -> (usize, usize, Vec<f64>) {
+        let seen =
+            (0..self.count()).flat_map(|place| self.values.iter().chain(&self.errors).map(move |one| one[place]));
+        let factors = (0..self.values.len()).map(|unknown| self.factor(unknown));
+        (self.next, self.patience, factors.chain(seen).collect())
+    }
+
+    /// Goes on from there.
+    pub(crate) fn resume(&mut self, (next, patience, numbers): (usize, usize, &[f64])) {
+        let unknowns = self.values.len();
+        let (factors, seen) = numbers.split_at(unknowns.min(numbers.len()));
+        self.factors =
+            (factors.len() == unknowns && factors.iter().all(|factor| !factor.is_nan())).then(|| factors.to_vec());
+        (self.next, self.patience) = (next, patience);
+        for window in seen.chunks_exact(2 * unknowns.max(1)) {
+            let columns = self.values.iter_mut().chain(&mut self.errors);
+            columns.zip(window).for_each(|(column, value)| column.push(*value));
+        }
+    }
+}
+
 /// The scatter of windows around every sample of a record over their standard errors, or `None` if the record is too short.
 pub(crate) fn scatter_of(
     derivatives: &LocalPolynomials,

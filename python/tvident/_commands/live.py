@@ -1,0 +1,128 @@
+"""The command ``tvident live``."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import click
+import numpy as np
+
+import tvident
+from tvident._commands.equation import lag_of, terms_of
+from tvident._commands.given import given, length
+from tvident._commands.method import NAMES, method_of
+from tvident._commands.settings import read_settings
+from tvident._equation import COEFFICIENTS
+from tvident._live import Inlet, JsonLines, Lines, Outlet, Session, Table, Udp
+
+_WAIT = 0.05
+"""Seconds between two looks at the clock while nothing comes."""
+
+
+# Options that need work before they are passed on are parameters of their own.
+def live(
+    source: str,
+    lsl: str | None,
+    angle: str,
+    torque: str,
+    time_channel: str | None,
+    counter: str | None,
+    sample_rate: float | None,
+    method: str | None,
+    terms: tuple[str, ...],
+    lag: str | None,
+    half_life: str | None,
+    settings: str | None,
+    shown: str | None,
+    every: float,
+    udp: str | None,
+    lsl_output: str | None,
+    duration: float | None,
+    **options: Any,
+) -> None:
+    """Identify what comes, and give parameters to who watches."""
+    del source
+    names = [name for name in (time_channel, angle, torque, counter) if name is not None]
+    inlet = None if lsl is None else Inlet(lsl, names if time_channel is None else names[1:])
+    if inlet is not None and time_channel is not None:
+        raise click.UsageError("--time is for lines; got it with --lsl, whose samples have stamps; leave it out")
+    rate = sample_rate or (inlet.nominal_rate if inlet is not None else 0.0)
+    if not rate > 0:
+        raise click.UsageError("a live recording needs its sample rate; got none; give --sample-rate")
+    of_method = {name: value for name, value in given(options).items() if name in NAMES}
+    has_settings = settings is not None
+    chosen = "paper" if method is None and not of_method and not has_settings else method
+    others: dict[str, Any] = {
+        name: _parameter(value) if name in COEFFICIENTS else value
+        for name, value in given(options).items()
+        if name not in NAMES
+    }
+    stream = tvident.IdentificationStream(
+        sample_rate=rate,
+        method=method_of(chosen, of_method, has_settings=has_settings),
+        settings=None if settings is None else read_settings(settings),
+        terms=terms_of(terms),
+        lag=None if lag is None else lag_of(lag),  # type: ignore[arg-type] # refused with what to do instead
+        half_life=None if half_life is None else length(half_life),
+        **others,
+    )
+    unknown = stream.units
+    shows: list[Any] = []
+    kind = shown or ("table" if sys.stdout.isatty() else "json")
+    if kind != "nothing":
+        shows.append((Table(sys.stdout, every, unknown) if kind == "table" else JsonLines(sys.stdout)).show)
+    if udp is not None:
+        shows.append(Udp(udp).show)
+    outlet: Outlet | None = None
+    if lsl_output is not None:
+        channels = [one for name, unit in unknown.items() for one in ((name, unit), (f"{name}_stderr", unit))]
+        outlet = Outlet(lsl_output, [*channels, ("status", "")], rate / int(options["step"]))
+        send = outlet.show
+        shows.append(lambda stamps, columns: send(stamps, [columns[name] for name, _ in [*channels, ("status", "")]]))
+    session = Session(stream, 1 / rate, shows)
+    lines = Lines(sys.stdin.fileno(), names) if inlet is None else None
+    pieces = inlet.pieces(_WAIT) if inlet is not None else _with_stamps(lines, has_time=time_channel is not None)
+    _run(session, pieces, duration, has_counter=counter is not None)
+    if outlet is not None:
+        outlet.close()
+    for words in session.words():
+        click.echo(words, err=True)
+    if lines is not None and lines.unreadable:
+        click.echo(
+            f"{lines.unreadable} lines could not be read and count as missing; the first is {lines.first_unreadable!r}",
+            err=True,
+        )
+
+
+def _parameter(value: str) -> str | float:
+    """Return a kind or a number."""
+    try:
+        return float(value)
+    except ValueError:
+        return value
+
+
+def _with_stamps(lines: Lines | None, *, has_time: bool) -> Iterator[list[list[float]]]:
+    """Give rows that begin with a stamp, NaN where lines have none."""
+    for piece in lines.pieces(_WAIT) if lines is not None else ():
+        yield piece if has_time else [[math.nan, *row] for row in piece]
+
+
+def _run(
+    session: Session, pieces: Iterator[Sequence[Sequence[float]]], duration: float | None, *, has_counter: bool
+) -> None:
+    """Take pieces until the source ends, time is up, or Ctrl-C."""
+    end = math.inf if duration is None else time.monotonic() + duration
+    try:
+        for piece in pieces:
+            session.take(piece, has_counter=has_counter)
+            if time.monotonic() >= end:
+                break
+    except KeyboardInterrupt:
+        click.echo("ended by Ctrl-C", err=True)
+    with np.errstate(all="ignore"):
+        session.finish()

@@ -1,0 +1,177 @@
+"""The clock of a live recording: its rate, its drift, and which samples were lost."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+Row = tuple[float, float, float]
+"""Time, angle, torque."""
+
+_WAIT = 16
+"""Samples that decide whether a late stamp was late alone, or samples were lost before it."""
+
+_HALF = 0.5
+"""Periods: a stamp that is later belongs to the next sample."""
+
+_FOLLOW = 0.05
+"""Part of a stamp's lateness by which the next one is expected later: the clock is followed over some 20 samples."""
+
+_KNOWN, _NO_MISTAKE = 1e-3, 0.1
+"""Relative error of a period that is known well, and how far it may be from the nominal one without being a mistake."""
+
+_MOST_LOST = 1_000_000
+"""A longer gap is no loss, but another recording."""
+
+_NOTABLE = 1e-3
+"""Of the rate: inertia goes with its square."""
+
+
+@dataclass
+class Rate:
+    """The line through times over sample numbers: its sums, kept so that nothing large is subtracted."""
+
+    count: int = 0
+    number: float = 0.0
+    time: float = 0.0
+    squares: float = 0.0
+    products: float = 0.0
+    times: float = 0.0
+
+    def see(self, number: float, time: float) -> None:
+        """Add a sample."""
+        self.count += 1
+        by, late = number - self.number, time - self.time
+        self.number += by / self.count
+        self.time += late / self.count
+        self.squares += by * (number - self.number)
+        self.products += by * (time - self.time)
+        self.times += late * (time - self.time)
+
+    @property
+    def period(self) -> float:
+        """Seconds from sample to sample; NaN before there are two."""
+        return self.products / self.squares if self.squares else math.nan
+
+    @property
+    def error(self) -> float:
+        """Standard error of the period, if stamps scatter independently."""
+        if self.count < 3:  # noqa: PLR2004 - a line goes through two
+            return math.nan
+        left = max(self.times - self.products**2 / self.squares, 0.0)
+        return math.sqrt(left / (self.count - 2) / self.squares)
+
+
+class Clock:
+    """Puts samples in order by their stamps, and what was lost between them as NaN.
+
+    A stamp that is late alone, since a driver held it back, is followed by ones that are not; after a loss all are late. So a late stamp
+    waits for the next 16, and whole periods that all of them are late are lost samples. With a counter nothing has to wait.
+
+    Parameters
+    ----------
+    period : float
+        Nominal seconds from sample to sample.
+    """
+
+    def __init__(self, period: float) -> None:
+        self._period = period
+        self._waiting: list[Row] = []
+        self._next = 0
+        self._expected = math.nan
+        self._counter: int | None = None
+        self.rate = Rate()
+        self.lost = 0
+        self.jumps = 0
+
+    def rows(self, row: Row, counter: float | None = None) -> list[Row]:
+        """Take a sample, and return those that are in order now."""
+        if counter is not None:
+            return self._counted(row, counter)
+        if not math.isfinite(row[0]):
+            return [self._taken(row)]
+        if not self._waiting and not self._late(row, 0) >= _HALF:
+            return [self._taken(row)]
+        self._waiting.append(row)
+        is_settled = len(self._waiting) > _WAIT or self._late(row, len(self._waiting) - 1) < _HALF
+        return self._settled() if is_settled else []
+
+    def rest(self) -> list[Row]:
+        """Return what still waits, at the end."""
+        found: list[Row] = []
+        while self._waiting:
+            found += self._settled()
+        return found
+
+    def _counted(self, row: Row, counter: float) -> list[Row]:
+        """Take a sample that says its number."""
+        if not math.isfinite(counter):
+            return [self._taken(row)]
+        missing = 0 if self._counter is None else int(counter) - self._counter - 1
+        if not 0 <= missing <= _MOST_LOST:
+            self.jumps += 1
+            missing = 0
+        self._counter = int(counter)
+        return [*self._gap(missing), self._taken(row)]
+
+    def _late(self, row: Row, place: int) -> float:
+        """Return by how many periods a stamp comes late, with so many samples before it that wait."""
+        return (row[0] - self._expected) / self._seconds() - place
+
+    def _seconds(self) -> float:
+        """Return the period by which stamps are judged: what they show once they show it well."""
+        shown, error = self.rate.period, self.rate.error
+        is_known = error < _KNOWN * self._period and abs(shown - self._period) < _NO_MISTAKE * self._period
+        return shown if is_known else self._period
+
+    def _settled(self) -> list[Row]:
+        """Return what waits up to the sample that is least late, after what was lost before them."""
+        late = [self._late(row, place) for place, row in enumerate(self._waiting)]
+        least = min(range(len(late)), key=late.__getitem__)
+        missing = max(math.floor(late[least] + _HALF), 0)
+        if missing > _MOST_LOST:
+            self.jumps += 1
+            self._expected, missing = self._waiting[0][0], 0
+        found = self._gap(missing)
+        found += [self._taken(row) for row in self._waiting[: least + 1]]
+        del self._waiting[: least + 1]
+        return found
+
+    def _gap(self, missing: int) -> list[Row]:
+        """Return so many samples that were lost."""
+        found = [(self._expected + place * self._seconds(), math.nan, math.nan) for place in range(missing)]
+        self.lost += missing
+        self._next += missing
+        self._expected += missing * self._seconds()
+        return found
+
+    def _taken(self, row: Row) -> Row:
+        """Note a sample's stamp, and follow the clock with it."""
+        if math.isfinite(row[0]):
+            self.rate.see(self._next, row[0])
+            if math.isnan(self._expected):
+                self._expected = row[0]
+            late = max(-_HALF, min(_HALF, self._late(row, 0)))
+            self._expected += _FOLLOW * late * self._seconds()
+        self._next += 1
+        self._expected += self._seconds()
+        return row
+
+    def words(self) -> list[str]:
+        """Return what there is to say of the clock."""
+        nominal, period, error = 1 / self._period, self.rate.period, self.rate.error
+        if not (math.isfinite(period) and period > 0 and math.isfinite(error)):
+            said = [f"rate: {nominal:.6g} Hz nominal; no stamps to compare it with"]
+        else:
+            drift, of_drift = (self._period / period - 1) * 1e6, error / period * 1e6
+            said = [
+                f"rate: {nominal:.6g} Hz nominal, {1 / period:.7g} Hz effective; drift {drift:+.1f} ± {of_drift:.1f} ppm"
+            ]
+            if abs(drift) > max(_NOTABLE * 1e6, 3 * of_drift):
+                said.append(
+                    f"the rate differs by {drift / 1e4:+.2g} %: inertia is off by twice that; give --sample-rate {1 / period:.7g}"
+                )
+        said.append(
+            f"lost samples: {self.lost}" + (f"; the counter or clock jumped {self.jumps} times" if self.jumps else "")
+        )
+        return said

@@ -1,0 +1,240 @@
+"""Derivatives of samples that come piece by piece."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident import _core
+from tvident._choices import Criterion, Selection
+from tvident._derivatives import HIGHEST_ORDER, SHORTEST_WINDOW, plan
+from tvident._stream.pieces import check_finite, check_open, piece
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class StreamedDerivatives:
+    """What a :class:`LocalPolynomialStream` gives for some samples, each with one element of every array.
+
+    Attributes
+    ----------
+    time : ndarray of float64, shape (k,)
+        Times of the samples, in seconds.
+    derivatives : ndarray of float64, shape (max_deriv + 1, k)
+        Value, first, second, … derivative.
+    stderr : ndarray of float64, shape (max_deriv + 1, k), or None
+        Standard errors, where they were asked for.
+    order : ndarray of uint8, shape (k,)
+    sigma : ndarray of float64, shape (k,)
+    status : ndarray of uint16, shape (k,)
+        As in :class:`tvident.LocalPolynomialFit`.
+    """
+
+    time: npt.NDArray[np.float64]
+    derivatives: npt.NDArray[np.float64]
+    stderr: npt.NDArray[np.float64] | None
+    order: npt.NDArray[np.uint8]
+    sigma: npt.NDArray[np.float64]
+    status: npt.NDArray[np.uint16]
+
+
+class LocalPolynomialStream:
+    """Differentiate samples as they come: :func:`fit_local_polynomials`, piece by piece.
+
+    Pieces may hold one sample or millions. The numbers are those of one call with all samples, bit for bit, however the stream is cut;
+    the estimate of a sample is given with the sample :attr:`delay` samples later, and none before the first window is full. Memory does
+    not grow with what has come.
+
+    Parameters
+    ----------
+    window_length : int or str
+        Samples in a window, odd, at least 5; or a duration such as ``"0.2 s"``. ``"auto"`` needs the whole record.
+    delta, sample_rate : float, optional
+        Sample period in seconds, or samples per second. Give at most one; by default the period is 1.
+    max_order, order, criterion, max_deriv, step
+        As in :func:`fit_local_polynomials`.
+    selection : {"window", "average"}, optional
+        As in :func:`fit_local_polynomials`; ``"pooled"`` looks at neighbours on both sides, and is not for streams.
+    nan_policy : {"propagate", "raise"}, optional
+        As in :func:`fit_local_polynomials`.
+    quantisation : float, optional
+        Step to which samples were rounded; by default 0, none: it cannot be found before the samples are there. That of an earlier
+        recording is in ``fit.settings["quantisation"]``.
+    stderr : bool, optional
+        Give standard errors too. Where the order is chosen they cost far more than the estimates.
+    start : float, optional
+        Time of the first sample in seconds.
+
+    Attributes
+    ----------
+    delay : int
+        Samples from one to its estimate: half a window, and half of the span of windows that are reached from one start.
+    samples : int
+        Samples that have come so far.
+
+    Raises
+    ------
+    ValueError
+        If the window is even, shorter than 5 samples or ``"auto"``, an order is too high, or a name is unknown.
+    TypeError
+        If a number is not whole, or both `delta` and `sample_rate` are given.
+
+    See Also
+    --------
+    fit_local_polynomials : the same for a whole record.
+    IdentificationStream : parameters of the equation of motion as they come.
+
+    Notes
+    -----
+    Work is done for half a span of windows at a time (a span is 8 to 256 windows, or a quarter of a long window): most pushes of one
+    sample only hand over what was made before. A stream pickles with all that it still needs, some windows of samples, and goes on
+    where it was, on another machine too; the bits are the batch's where both have the same vector instructions or any others.
+
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tvident
+    >>> y = np.sin(np.arange(2000) / 50) + 1e-3 * np.random.default_rng(0).standard_normal(2000)
+    >>> stream = tvident.LocalPolynomialStream(101, sample_rate=1000)
+    >>> pieces = [stream.push(some).derivatives for some in np.array_split(y, 37)]
+    >>> pieces.append(stream.finish().derivatives)
+    >>> batch = tvident.fit_local_polynomials(y, 101, sample_rate=1000, quantisation=0)
+    >>> np.array_equal(np.concatenate(pieces, axis=1), batch.derivatives)
+    True
+    """
+
+    # All are options, as users call it.
+    def __init__(
+        self,
+        window_length: int | str,
+        *,
+        delta: float | None = None,
+        sample_rate: float | None = None,
+        max_order: int = HIGHEST_ORDER,
+        order: int | None = None,
+        criterion: Criterion = "aicc",
+        selection: Selection = "window",
+        max_deriv: int = 2,
+        step: int = 1,
+        nan_policy: arguments.NanPolicy = "propagate",
+        quantisation: float | None = None,
+        stderr: bool = False,
+        start: float = 0.0,
+    ) -> None:
+        period = arguments.sample_period(0, delta=delta, sample_rate=sample_rate)
+        if arguments.is_word(window_length, "auto"):
+            raise ValueError(
+                "window_length must be known before samples come; got 'auto', which needs the whole record; give window_length of an "
+                "earlier fit"
+            )
+        if arguments.one_of("selection", selection, get_args(Selection)) == "pooled":
+            raise ValueError(
+                "selection must be 'window' or 'average' in a stream; got 'pooled', which needs the windows after; use one of these"
+            )
+        length = arguments.window_length("window_length", window_length, period, odd=True)
+        if length < SHORTEST_WINDOW:
+            raise ValueError(
+                f"window_length must be at least {SHORTEST_WINDOW} samples; got {length}; use {SHORTEST_WINDOW} or more"
+            )
+        highest = arguments.whole_number("max_deriv", max_deriv, least=0, most=HIGHEST_ORDER)
+        arguments.check_power("max_deriv", highest, period)
+        self._plan: dict[str, Any] = {
+            "window_length": length,
+            "order": None if order is None else arguments.whole_number("order", order, least=0, most=HIGHEST_ORDER),
+            "max_order": arguments.whole_number("max_order", max_order, least=0, most=HIGHEST_ORDER),
+            "criterion": arguments.one_of("criterion", criterion, get_args(Criterion)),
+            "selection": selection,
+            "derivatives": tuple(range(highest + 1)),
+            "delta": period,
+            "noise": True,
+            "quantisation": 0.0 if not quantisation else arguments.positive_number("quantisation", quantisation),
+        }
+        self._step = arguments.whole_number("step", step, least=1)
+        self._stderr = arguments.flag("stderr", stderr)
+        self._policy = arguments.one_of("nan_policy", nan_policy, get_args(arguments.NanPolicy))
+        self._start = arguments.finite_number("start", start)
+        self._ended = False
+        self._stream = self._begun(None)
+
+    def _begun(self, state: tuple[int, npt.NDArray[np.float64], int, bool] | None) -> _core.PolynomialStream:
+        """Return a stream that begins, or goes on from a state."""
+        return _core.PolynomialStream(plan(**self._plan), step=self._step, errors=self._stderr, state=state)
+
+    @property
+    def delay(self) -> int:
+        """Samples from one to its estimate."""
+        return self._stream.delay
+
+    @property
+    def samples(self) -> int:
+        """Samples that have come so far."""
+        return self._stream.samples
+
+    def push(self, y: npt.ArrayLike) -> StreamedDerivatives:
+        """Take the next samples, and give what they settle.
+
+        Parameters
+        ----------
+        y : float or array_like, shape (m,)
+            The next samples, any number of them.
+
+        Returns
+        -------
+        StreamedDerivatives
+            Estimates of the next samples up to :attr:`delay` before the last one that has come; empty at first.
+
+        Raises
+        ------
+        ValueError
+            If the stream has ended, `y` has more than one axis, or holds what is no number where `nan_policy` is ``"raise"``.
+        TypeError
+            If `y` is complex or holds no numbers.
+        """
+        check_open(ended=self._ended)
+        samples = piece("y", y)
+        check_finite("y", samples, self._policy, self._stream.samples)
+        return self._given(self._stream.push(samples))
+
+    def finish(self) -> StreamedDerivatives:
+        """End the stream, and give the last samples: the status says EDGE, as at the end of a record.
+
+        Raises
+        ------
+        ValueError
+            If the stream has ended before.
+        """
+        check_open(ended=self._ended)
+        self._ended = True
+        return self._given(self._stream.finish())
+
+    def _given(self, found: tuple[int, _core.LocalEstimates, npt.NDArray[np.float64]]) -> StreamedDerivatives:
+        first, estimates, errors = found
+        count = estimates.status.size
+        time = np.arange(first, first + count * self._step, self._step) * self._plan["delta"]
+        return StreamedDerivatives(
+            time if self._start == 0 else time + self._start,
+            estimates.derivatives,
+            errors if self._stderr else None,
+            estimates.order,
+            estimates.sigma,
+            estimates.status,
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_stream": self._stream.state()}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._stream = self._begun(state["_stream"])
+
+    def __repr__(self) -> str:
+        length, state = self._plan["window_length"], "ended" if self._ended else f"delay {self.delay}"
+        return f"<LocalPolynomialStream after {self.samples} samples, windows of {length}, {state}>"

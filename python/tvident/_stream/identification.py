@@ -1,0 +1,339 @@
+"""Parameters of the equation of motion of a recording that comes piece by piece."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident import _core
+from tvident._derivatives import plan
+from tvident._equation import COEFFICIENTS, LINEAR_UNITS, UNITS, GivenTerm, Parameter
+from tvident._identify import Method
+from tvident._status import DOUBTFUL
+from tvident._stream.asked import Asked, asked_of
+from tvident._stream.pieces import check_finite, check_open, piece
+from tvident._units import ROTARY, axis_of, scaled
+
+Numbers = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class StreamedIdentification:
+    """What an :class:`IdentificationStream` gives for some samples, each with one element of every array.
+
+    Attributes
+    ----------
+    time : ndarray of float64, shape (k,)
+        Times of the samples, in seconds.
+    values : mapping of str to ndarray, shape (k,)
+        Inertia, damping, stiffness and terms, unknown or known.
+    stderr : mapping of str to ndarray, shape (k,)
+        Their standard errors; NaN where none can be said yet.
+    residual_std, condition : ndarray of float64, shape (k,)
+    order : ndarray of uint8, shape (k,)
+    status : ndarray of uint16, shape (k,)
+        As in :class:`tvident.Identification`.
+    """
+
+    time: Numbers
+    values: Mapping[str, Numbers]
+    stderr: Mapping[str, Numbers]
+    residual_std: Numbers
+    condition: Numbers
+    order: npt.NDArray[np.uint8]
+    status: npt.NDArray[np.uint16]
+
+    @property
+    def inertia(self) -> Numbers:
+        """Inertia, in kg m²."""
+        return self.values["inertia"]
+
+    @property
+    def damping(self) -> Numbers:
+        """Damping, in N m s/rad."""
+        return self.values["damping"]
+
+    @property
+    def stiffness(self) -> Numbers:
+        """Stiffness, in N m/rad."""
+        return self.values["stiffness"]
+
+    @property
+    def terms(self) -> dict[str, Numbers]:
+        """Factors of further terms, by name."""
+        return {name: value for name, value in self.values.items() if name not in COEFFICIENTS}
+
+    @property
+    def trusted(self) -> npt.NDArray[np.bool_]:
+        """Where there are numbers, and the status does not say that they are not to be trusted."""
+        there = np.all([np.isfinite(value) for value in self.values.values()], axis=0)
+        return np.asarray(there & (self.status & np.uint16(DOUBTFUL) == 0))
+
+
+class IdentificationStream:
+    r"""Identify I, C and K in I θ̈ + C θ̇ + K θ = T while angle and torque are recorded: :func:`identify`, piece by piece.
+
+    Pieces may hold one sample or millions; memory does not grow with what has come. Parameters in windows have the bits of
+    ``identify(…, nan_policy="propagate")`` with all samples, however the stream is cut; those of a sample are given with the sample
+    :attr:`delay` samples later. Constants are given from all samples so far, or with older ones forgotten; after the last sample they are
+    those of :func:`identify` to rounding.
+
+    A stream holds no more than its windows need. What is chosen from a whole record (``method="auto"``, a lag, constants beside windowed
+    parameters) raises: pass settings of an earlier result of the strong form, or what it found as numbers.
+
+    Parameters
+    ----------
+    sample_rate, delta : float
+        Samples per second, or the sample period in seconds. Give exactly one.
+    angle_unit, torque_unit : str, optional
+        As in :func:`identify`.
+    method : {"paper"} or StrongForm
+        The strong form, with settings of the paper or of your own; without ``selection="pooled"``, ``filter_torque`` and linear variation.
+    inertia, damping, stiffness : {"windowed", "constant"} or float, optional
+        As in :func:`identify`, numbers where they are known. What is unknown is all windowed or all constant.
+    terms : sequence, optional
+        Built-in terms, as in :func:`identify`.
+    quantisation : float, optional
+        Step to which the angle was rounded; by default none.
+    nan_policy : {"propagate", "raise"}, optional
+        Missing samples: windows that hold one are NaN, or an error. Constants leave their equations out.
+    step : int, optional
+        Every how many samples a result is wanted.
+    settings : mapping, optional
+        Settings of an earlier result: its choices are used, and what it found of the scatter of windows is in the standard errors.
+    half_life : float or str, optional
+        For constants: after how many samples, or after which time, ``"10 s"``, an equation counts half. By default all count the same.
+    start : float, optional
+        Time of the first sample in seconds.
+
+    Attributes
+    ----------
+    delay : int
+        Samples from one to its parameters: half a window of the polynomials, half of the span of windows that are reached from one
+        start, and half a regression window where parameters are windowed.
+    samples : int
+        Samples that have come so far.
+    names : list of str
+        What is unknown.
+    units : dict of str to str
+        Their units.
+    hold : bool
+        While it is true, equations that come are left out, and constants stay as they are.
+
+    Raises
+    ------
+    ValueError
+        If something needs the whole record, windows are too short, nothing is unknown, or a name is unknown.
+    TypeError
+        If there is no sample period, or a number is not whole.
+
+    See Also
+    --------
+    identify : the same for a whole record.
+    LocalPolynomialStream : derivatives alone.
+    RollingStream : least squares alone.
+
+    Notes
+    -----
+    Equations (2) to (4), (8) and (9) of the paper, in the order in which samples come. Standard errors of windowed parameters are those of
+    least squares times the scatter of windows that share no equation, as far as it is known: NaN before there are enough of them, about
+    three times the regression window and a half of the other. Those of constants know of neighbouring equations that share samples, from
+    the latest 16 384; they are renewed each time that the number of equations has doubled.
+
+    ``half_life``, :attr:`hold` and :meth:`reset` are what MATLAB's ``recursiveLS`` has as ``ForgettingFactor`` (2 to the power
+    of minus one over the half-life in samples), ``EnableAdaptation`` and ``reset``.
+
+    A stream pickles with what it still needs and goes on where it was, on another machine too.
+
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
+    L. Ljung: System Identification, 2nd edition, 1999, section 11.2: recursive least squares with forgetting.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tvident
+    >>> rig = tvident.simulate_torsional_rig(duration=3.0)
+    >>> stream = tvident.IdentificationStream(sample_rate=1000, method="paper")
+    >>> stream.push(rig.angle[:1000], rig.torque[:1000]).time.size == 1000 - stream.delay
+    True
+    >>> out = stream.push(rig.angle[1000:], rig.torque[1000:])
+    >>> batch = tvident.identify(rig.angle, rig.torque, sample_rate=1000, method="paper")
+    >>> places = np.round(out.time * 1000).astype(int)
+    >>> np.array_equal(out.stiffness, batch.stiffness[places])
+    True
+    """
+
+    # All are options, as users call it.
+    def __init__(
+        self,
+        *,
+        sample_rate: float | None = None,
+        delta: float | None = None,
+        angle_unit: str | None = None,
+        torque_unit: str | None = None,
+        method: Method = "auto",
+        inertia: Parameter | None = None,
+        damping: Parameter | None = None,
+        stiffness: Parameter | None = None,
+        terms: Sequence[GivenTerm] | None = None,
+        lag: float | None = None,
+        quantisation: float | None = None,
+        period: float | None = None,
+        nan_policy: str = "propagate",
+        step: int = 1,
+        settings: Mapping[str, Any] | None = None,
+        half_life: float | str | None = None,
+        start: float = 0.0,
+    ) -> None:
+        if sample_rate is None and delta is None:
+            raise TypeError("a stream needs the sample period; got none; give sample_rate= or delta=")
+        self._period = arguments.sample_period(0, delta=delta, sample_rate=sample_rate)
+        self._axis = axis_of(None, None, angle_unit=angle_unit, torque_unit=torque_unit)
+        given = {
+            "inertia": inertia,
+            "damping": damping,
+            "stiffness": stiffness,
+            "terms": terms,
+            "lag": lag,
+            "quantisation": None if quantisation is None else quantisation * self._axis.angle,
+            "period": period,
+        }
+        self._asked: Asked = asked_of(method, given, settings, self._period, half_life)
+        if nan_policy == "omit":
+            raise ValueError(
+                "nan_policy must be 'propagate' or 'raise' in a stream; got 'omit', which needs the whole record; use one of these"
+            )
+        self._policy = arguments.one_of("nan_policy", nan_policy, ("propagate", "raise"))
+        self._step = arguments.whole_number("step", step, least=1)
+        self._start = arguments.finite_number("start", start)
+        self._ended = self._hold = False
+        self._stream = self._begun(None)
+
+    def _begun(self, state: Any) -> _core.ParameterStream:
+        """Return a stream that begins, or goes on from a state."""
+        asked = self._asked
+        return _core.ParameterStream(
+            plan(**asked.plan),
+            asked.regression_window,
+            asked.known,
+            asked.terms,
+            step=self._step,
+            factors=asked.factors,
+            forgetting=asked.forgetting,
+            state=state,
+        )
+
+    @property
+    def delay(self) -> int:
+        """Samples from one to its parameters."""
+        return self._stream.delay
+
+    @property
+    def samples(self) -> int:
+        """Samples that have come so far."""
+        return self._stream.samples
+
+    @property
+    def names(self) -> list[str]:
+        """What is unknown, by name."""
+        return list(self._asked.names)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of what is unknown."""
+        units = UNITS if self._axis.system is ROTARY else LINEAR_UNITS
+        return {name: units.get(name, "") for name in self._asked.names}
+
+    @property
+    def hold(self) -> bool:
+        """Whether constants stay as they are."""
+        return self._hold
+
+    @hold.setter
+    def hold(self, value: bool) -> None:
+        self._hold = arguments.flag("hold", value)
+        self._stream.hold(self._hold)
+
+    def reset(self) -> None:
+        """Forget all equations so far: constants are those of the equations that follow. Windows forget by themselves."""
+        self._stream.reset()
+
+    def push(self, angle: npt.ArrayLike, torque: npt.ArrayLike) -> StreamedIdentification:
+        """Take the next samples, and give the parameters that they settle.
+
+        Parameters
+        ----------
+        angle, torque : float or array_like, shape (m,)
+            The next samples, any number of them.
+
+        Returns
+        -------
+        StreamedIdentification
+            Parameters of the next samples up to :attr:`delay` before the last one that has come; empty at first.
+
+        Raises
+        ------
+        ValueError
+            If the stream has ended, angle and torque have not the same length, or hold what is no number where `nan_policy` is ``"raise"``.
+        TypeError
+            If an array is complex or holds no numbers.
+        """
+        check_open(ended=self._ended)
+        angles, torques = piece("angle", angle), piece("torque", torque)
+        if angles.size != torques.size:
+            raise ValueError(
+                f"angle and torque must have as many samples as each other; got {angles.size} and {torques.size}; push them together"
+            )
+        for name, values in (("angle", angles), ("torque", torques)):
+            check_finite(name, values, self._policy, self._stream.samples)
+        return self._given(self._stream.push(scaled(angles, self._axis.angle), scaled(torques, self._axis.torque)))
+
+    def finish(self) -> StreamedIdentification:
+        """End the stream, and give the parameters of the last samples: the status says EDGE, as at the end of a record.
+
+        Raises
+        ------
+        ValueError
+            If the stream has ended before.
+        """
+        check_open(ended=self._ended)
+        self._ended = True
+        return self._given(self._stream.finish())
+
+    def _given(self, found: _core.StreamedParameters) -> StreamedIdentification:
+        count = found.status.size
+        numbers = np.arange(found.first, found.first + count * self._step, self._step)
+        time = numbers.astype(np.float64) * self._period
+        values = dict(zip(self._asked.names, found.values, strict=True))
+        errors = dict(zip(self._asked.names, found.stderr, strict=True))
+        for name, known in zip(COEFFICIENTS, self._asked.known, strict=True):
+            if known is not None:
+                values[name], errors[name] = np.full(count, known), np.zeros(count)
+        return StreamedIdentification(
+            time if self._start == 0 else time + self._start,
+            values,
+            errors,
+            found.residual_std,
+            found.condition,
+            found.order,
+            found.status,
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_stream": self._stream.state()}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._stream = self._begun(state["_stream"])
+        self._stream.hold(self._hold)
+
+    def __repr__(self) -> str:
+        state = "ended" if self._ended else f"delay {self.delay}"
+        return f"<IdentificationStream of {', '.join(self._asked.names)} after {self.samples} samples, {state}>"

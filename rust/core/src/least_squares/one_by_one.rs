@@ -1,0 +1,217 @@
+//! The same windows one by one, as their rows come.
+//!
+//! When a block of rows is complete the factors of its suffixes are built; from then on every row that comes costs one merge, one
+//! solution and one append. These are the operations of `kernel.rs` on the same rows in the same order, so the bits are the same; lanes
+//! all hold the same window.
+
+use std::ops::Range;
+
+use crate::lanes::output::Outputs;
+use crate::lanes::store::Write;
+use crate::lanes::tile::Tile;
+use crate::least_squares::givens_factor::{Dimensions, Few, Many, append, empty, load, merge, store};
+use crate::least_squares::kernel::{WindowSummary, finish};
+use crate::least_squares::plan::{Regressions, RollingLeastSquares, Slots};
+use crate::least_squares::side_by_side::{RollingRun, SEGMENT};
+use crate::record::samples::is_usable;
+use crate::simd::aligned::Aligned;
+use crate::simd::vectors::{Kernel, Lanes, dispatch};
+
+/// Rows by their numbers.
+pub(crate) trait RowSource {
+    /// A row that exists: regressors, then right-hand sides.
+    fn row(&self, row: usize) -> &[f64];
+    /// Numbers of the rows that hold an unusable value, in order.
+    fn unusable(&self) -> &[usize];
+}
+
+/// Where the walk is, and its memory.
+#[derive(Debug)]
+pub(crate) struct OneByOne {
+    /// The block in hand: the window that begins in its first row.
+    base: Option<usize>,
+    /// Rows of the next block that the prefix holds, and the segment whose suffixes are held.
+    done: usize,
+    segment: usize,
+    prefix: Aligned,
+    suffixes: Aligned,
+    checkpoints: Aligned,
+    tile: Tile,
+    unusable: Vec<usize>,
+}
+
+impl OneByOne {
+    pub(crate) fn new(plan: &RollingLeastSquares) -> Self {
+        let lanes = plan.instructions.lanes();
+        let factor = Many { regressors: plan.regressors, rhs_count: plan.rhs_count }.size() * lanes;
+        Self {
+            base: None,
+            done: 0,
+            segment: usize::MAX,
+            prefix: Aligned::zeros(factor),
+            suffixes: Aligned::zeros(plan.window.min(SEGMENT) * factor),
+            checkpoints: Aligned::zeros((plan.window.div_ceil(SEGMENT) - 1) * factor),
+            tile: Tile::new(Slots::of(plan).fields(), lanes.next_multiple_of(8), lanes),
+            unusable: Vec::new(),
+        }
+    }
+}
+
+impl RollingLeastSquares {
+    /// The first row that windows around a row and those after it need here: that of the block in hand.
+    pub(crate) fn reads_from(&self, row: usize) -> usize {
+        let window = self.first_row(row);
+        (window - window % self.window).saturating_sub(self.window)
+    }
+
+    /// Solves the windows around some rows one by one. `equations` are the rows that exist and are equations.
+    pub(crate) fn solve_one_by_one(
+        &self,
+        source: &dyn RowSource,
+        equations: &Range<usize>,
+        around: Range<usize>,
+        regressions: &mut Regressions<'_>,
+        state: &mut OneByOne,
+    ) {
+        let mut outputs = Slots::of(self).outputs(regressions);
+        let (mut window, end) = (self.first_row(around.start), self.first_row(around.end));
+        while window < end {
+            let base = window - window % self.window;
+            let next = end.min(base + self.window);
+            let run = RollingRun { plan: self, base, windows: window..next, rows: equations.clone() };
+            let outputs = &mut outputs;
+            let instructions = self.instructions;
+            match (self.regressors, self.rhs_count) {
+                (1, 1) => dispatch(instructions, OneByOneKernel { run, shape: Few::<1>, source, state, outputs }),
+                (2, 1) => dispatch(instructions, OneByOneKernel { run, shape: Few::<2>, source, state, outputs }),
+                (3, 1) => dispatch(instructions, OneByOneKernel { run, shape: Few::<3>, source, state, outputs }),
+                (4, 1) => dispatch(instructions, OneByOneKernel { run, shape: Few::<4>, source, state, outputs }),
+                (regressors, rhs_count) => {
+                    let shape = Many { regressors, rhs_count };
+                    dispatch(instructions, OneByOneKernel { run, shape, source, state, outputs });
+                }
+            }
+            window = next;
+        }
+    }
+}
+
+/// The kernel for windows of one block.
+struct OneByOneKernel<'a, 'b, 'c, H: Dimensions> {
+    run: RollingRun<'a>,
+    shape: H,
+    source: &'a dyn RowSource,
+    state: &'b mut OneByOne,
+    outputs: &'b mut Outputs<'c>,
+}
+
+impl<H: Dimensions> Kernel for OneByOneKernel<'_, '_, '_, H> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(mut self, simd: S) {
+        let window = self.run.plan.window;
+        let offsets = self.run.windows.start - self.run.base..self.run.windows.end - self.run.base;
+        if self.state.base != Some(self.run.base) || self.state.done > offsets.start {
+            self.begin(simd);
+        }
+        let (shape, places) = (self.shape, self.state.tile.places());
+        let size = shape.size() * S::F64_LANES;
+        let mut row = shape.factor(simd.splat_f64s(0.0));
+        let mut prefix = empty(simd, shape);
+        load(simd, shape, &self.state.prefix, &mut prefix);
+        let ahead = (window / 2).cast_signed() - window.cast_signed();
+        for offset in offsets.clone() {
+            // Only now: the row after a window need not have come.
+            for done in self.state.done..offset {
+                self.append(simd, &mut prefix, window + done, &mut row);
+            }
+            self.state.done = offset;
+            let centre = (self.run.base + offset).cast_signed() + ahead;
+            let centre = centre.unsigned_abs();
+            if !self.outputs.elements.of(centre..centre + 1).is_empty() {
+                self.hold_suffixes(simd, offset / SEGMENT, &mut row);
+                let mut factor = empty(simd, shape);
+                load(simd, shape, &self.state.suffixes[offset % SEGMENT * size..], &mut factor);
+                merge(simd, shape, &mut factor, &prefix, &mut row);
+                let count = self.run.spanned(self.run.base + offset);
+                let freedom = simd.splat_f64s(1.0 / count.saturating_sub(shape.regressors()) as f64);
+                let summary = WindowSummary { factor, sums: None };
+                let none = |_: usize| simd.splat_f64s(f64::NAN);
+                finish(simd, shape, self.run.plan, &summary, freedom, offset, &mut self.state.tile, &mut row, none);
+            }
+            if (offset + 1) % places == 0 || offset + 1 == offsets.end {
+                let rows = offset - (offset - offsets.start).min(offset % places)..offset + 1;
+                let windows = self.run.base + rows.start..self.run.base + rows.end;
+                let (tile, base) = (&self.state.tile, self.run.base.cast_signed());
+                let outputs = &mut *self.outputs;
+                Write { tile, rows, base, block: window, windows, ahead, fixed_order: None, outputs }.run(simd);
+            }
+        }
+        store(simd, shape, &mut self.state.prefix, &prefix);
+        self.mark();
+    }
+}
+
+impl<H: Dimensions> OneByOneKernel<'_, '_, '_, H> {
+    /// Begins a block: nothing of the next one came yet, and the suffixes that others are built from.
+    #[inline(always)]
+    fn begin<S: Lanes>(&mut self, simd: S) {
+        let (shape, window) = (self.shape, self.run.plan.window);
+        let size = shape.size() * S::F64_LANES;
+        let mut row = shape.factor(simd.splat_f64s(0.0));
+        let mut suffix = empty(simd, shape);
+        store(simd, shape, &mut self.state.prefix, &suffix);
+        for segment in (1..window.div_ceil(SEGMENT)).rev() {
+            for offset in (segment * SEGMENT..window.min((segment + 1) * SEGMENT)).rev() {
+                self.append(simd, &mut suffix, offset, &mut row);
+            }
+            store(simd, shape, &mut self.state.checkpoints[(segment - 1) * size..], &suffix);
+        }
+        self.state.base = Some(self.run.base);
+        self.state.done = 0;
+        self.state.segment = usize::MAX;
+    }
+
+    /// Builds the suffixes of a segment, unless they are held.
+    #[inline(always)]
+    fn hold_suffixes<S: Lanes>(&mut self, simd: S, segment: usize, row: &mut H::Factor<S::f64s>) {
+        if self.state.segment == segment {
+            return;
+        }
+        let (shape, window) = (self.shape, self.run.plan.window);
+        let size = shape.size() * S::F64_LANES;
+        let mut suffix = empty(simd, shape);
+        if segment + 1 < window.div_ceil(SEGMENT) {
+            load(simd, shape, &self.state.checkpoints[segment * size..], &mut suffix);
+        }
+        for offset in (segment * SEGMENT..window.min((segment + 1) * SEGMENT)).rev() {
+            self.append(simd, &mut suffix, offset, row);
+            store(simd, shape, &mut self.state.suffixes[offset % SEGMENT * size..], &suffix);
+        }
+        self.state.segment = segment;
+    }
+
+    /// Appends the row at an offset from the block's first. One that is no equation or holds an unusable value is zero.
+    #[inline(always)]
+    fn append<S: Lanes>(&self, simd: S, factor: &mut H::Factor<S::f64s>, offset: usize, row: &mut H::Factor<S::f64s>) {
+        let (shape, place) = (self.shape, self.run.base + offset);
+        let number = place.checked_sub(self.run.plan.window).filter(|number| self.run.rows.contains(number));
+        let values = number.map(|number| self.source.row(number));
+        let values = values.filter(|values| values.iter().all(|value| is_usable(*value)));
+        for column in 0..shape.regressors() + shape.rhs_count() {
+            row[column] = simd.splat_f64s(values.map_or(0.0, |values| values[column]));
+        }
+        append(simd, shape, factor, row, 0, simd.splat_f64s(1.0));
+    }
+
+    /// Flags windows that are incomplete or hold an unusable value.
+    fn mark(&mut self) {
+        let (base, before) = (self.run.base, self.run.plan.window);
+        let unusable = &mut self.state.unusable;
+        unusable.clear();
+        let bad = self.source.unusable().iter().filter(|row| self.run.rows.contains(row));
+        unusable.extend(bad.filter_map(|row| (row + before).checked_sub(base)));
+        self.run.mark_windows(unusable, &[], |window| self.run.spanned(window), self.outputs);
+    }
+}

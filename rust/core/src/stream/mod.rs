@@ -1,0 +1,12 @@
+//! Streams: the batch's numbers while a record goes on, in constant memory and with a fixed delay.
+
+pub(crate) mod constants;
+pub(crate) mod polynomials;
+pub(crate) mod rolling;
+pub(crate) mod rows;
+pub(crate) mod windowed;
+
+pub use constants::{ConstantState, ConstantStream};
+pub use polynomials::{PolynomialState, PolynomialStream};
+pub use rolling::{RollingState, RollingStream};
+pub use windowed::{Parameters, RowsState, StreamedMotion, WindowedState, WindowedStream};

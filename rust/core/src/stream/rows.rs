@@ -1,0 +1,101 @@
+//! The latest rows of equations, known by their absolute numbers.
+
+use crate::least_squares::one_by_one::RowSource;
+use crate::record::samples::{Samples, is_usable};
+
+/// Rows that are still needed, row by row.
+#[derive(Clone, Debug)]
+pub(crate) struct RecentRows {
+    columns: usize,
+    /// Number of the first row in `values`.
+    first: usize,
+    values: Vec<f64>,
+    /// Numbers of the rows that hold an unusable value, in order.
+    unusable: Vec<usize>,
+}
+
+impl RecentRows {
+    /// Rows of so many columns from number `first` on.
+    pub(crate) fn new(columns: usize, first: usize, values: Vec<f64>) -> Self {
+        let mut rows = Self { columns, first, values, unusable: Vec::new() };
+        rows.note_unusable(first);
+        rows
+    }
+
+    /// Number of rows so far, those that were forgotten included.
+    pub(crate) fn len(&self) -> usize {
+        self.first + self.values.len() / self.columns
+    }
+
+    /// Appends rows that are given column by column.
+    pub(crate) fn extend<'a>(&mut self, count: usize, columns: impl Iterator<Item = &'a [f64]>) {
+        if count == 0 {
+            return;
+        }
+        let (from, held) = (self.len(), self.values.len());
+        self.values.resize(held + count * self.columns, 0.0);
+        for (column, values) in columns.enumerate() {
+            for (place, &value) in self.values[held + column..].iter_mut().step_by(self.columns).zip(values) {
+                *place = value;
+            }
+        }
+        self.note_unusable(from);
+    }
+
+    /// Forgets rows before one, as [`crate::record::retained::Retained`] does.
+    pub(crate) fn forget_before(&mut self, row: usize) {
+        let gone = row.saturating_sub(self.first).min(self.values.len() / self.columns);
+        if 2 * gone * self.columns > self.values.len() {
+            self.values.drain(..gone * self.columns);
+            self.first += gone;
+            let first = self.first;
+            self.unusable.retain(|&bad| bad >= first);
+        }
+    }
+
+    /// The rows from one on and its number: what resuming needs.
+    pub(crate) fn from(&self, row: usize) -> (usize, &[f64]) {
+        let gone = row.saturating_sub(self.first).min(self.values.len() / self.columns);
+        (self.first + gone, &self.values[gone * self.columns..])
+    }
+
+    /// Every column as a record.
+    pub(crate) fn columns(&self) -> Vec<ColumnOf<'_>> {
+        (0..self.columns).map(|column| ColumnOf { rows: self, column }).collect()
+    }
+
+    fn note_unusable(&mut self, from: usize) {
+        let place = (from - self.first) * self.columns;
+        let new = (from..).zip(self.values[place..].chunks_exact(self.columns));
+        self.unusable
+            .extend(new.filter(|(_, row)| !row.iter().all(|value| is_usable(*value))).map(|(number, _)| number));
+    }
+}
+
+impl RowSource for RecentRows {
+    fn row(&self, row: usize) -> &[f64] {
+        &self.values[(row - self.first) * self.columns..][..self.columns]
+    }
+
+    fn unusable(&self) -> &[usize] {
+        &self.unusable
+    }
+}
+
+/// One column of the rows.
+pub(crate) struct ColumnOf<'a> {
+    rows: &'a RecentRows,
+    column: usize,
+}
+
+impl Samples for ColumnOf<'_> {
+    fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    fn read(&self, first: usize, into: &mut [f64]) {
+        for (row, value) in (first..).zip(into) {
+            *value = if row < self.rows.first { 0.0 } else { self.rows.row(row)[self.column] };
+        }
+    }
+}

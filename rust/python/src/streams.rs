@@ -1,0 +1,332 @@
+//! `tvident._core.PolynomialStream` and `RollingStream`: records that go on.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyUntypedArray};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use tvident::lanes::Elements;
+use tvident::least_squares::{HALF_OF_THE_DIGITS, Regressions, RollingLeastSquares};
+use tvident::local_polynomials::{Estimates, LocalPolynomials as Plan};
+use tvident::record::Samples;
+use tvident::simd::Instructions;
+use tvident::stream::{PolynomialState, PolynomialStream as Polynomials, RollingState, RollingStream as Rolling};
+
+use crate::arrays::zeros;
+use crate::local_polynomials::{LocalEstimates, LocalPolynomials};
+use crate::records::{StridedSamples, records};
+use crate::watch::exception;
+
+/// Samples between two looks for Ctrl-C; shorter pieces keep the interpreter's lock, which costs less than giving it back.
+const PIECE: usize = 1 << 14;
+const SHORT: usize = 64;
+
+/// Some samples of a record.
+struct Part<'a> {
+    record: &'a StridedSamples,
+    samples: Range<usize>,
+}
+
+impl Samples for Part<'_> {
+    fn len(&self) -> usize {
+        self.samples.len()
+    }
+
+    fn read(&self, first: usize, into: &mut [f64]) {
+        self.record.read(self.samples.start + first, into);
+    }
+}
+
+/// Does work piece by piece, without the interpreter's lock where a piece is long, and hears Ctrl-C in between.
+pub(crate) fn in_pieces(py: Python<'_>, count: usize, mut work: impl FnMut(Range<usize>) + Send) -> PyResult<()> {
+    let mut first = 0;
+    while first < count {
+        let end = count.min(first + PIECE);
+        if count <= SHORT {
+            work(first..end);
+        } else {
+            py.detach(|| work(first..end));
+            py.check_signals()?;
+        }
+        first = end;
+    }
+    Ok(())
+}
+
+/// The elements of some samples, every so many, and how many there are.
+pub(crate) fn elements(samples: &Range<usize>, step: usize) -> (Elements, usize) {
+    let grid = Elements { first: 0, step };
+    let some = grid.of(samples.clone());
+    (Elements { first: grid.sample(some.start), step }, some.len())
+}
+
+/// Number, samples or rows, what was given, whether it has ended.
+type State<'py> = (usize, Bound<'py, PyArray1<f64>>, usize, bool);
+
+/// A state as it was pickled.
+type Stored<'py> = (usize, PyReadonlyArray1<'py, f64>, usize, bool);
+
+/// Local polynomials of a signal that comes piece by piece.
+#[pyclass(module = "tvident._core")]
+pub(crate) struct PolynomialStream {
+    plan: Arc<Plan>,
+    step: usize,
+    errors: bool,
+    stream: Polynomials,
+}
+
+#[pymethods]
+impl PolynomialStream {
+    #[new]
+    #[pyo3(signature = (plan, *, step=1, errors=false, state=None))]
+    fn new(plan: &LocalPolynomials, step: usize, errors: bool, state: Option<Stored<'_>>) -> PyResult<Self> {
+        let plan = plan.shared();
+        let state = match state {
+            None => PolynomialState::default(),
+            Some((first, samples, given, ended)) => {
+                PolynomialState { first, samples: samples.as_slice()?.to_vec(), given, ended }
+            }
+        };
+        let stream = Polynomials::resume(Arc::clone(&plan), step, errors, state).map_err(|error| exception(&error))?;
+        Ok(Self { plan, step, errors, stream })
+    }
+
+    /// Samples from one to its estimate.
+    #[getter]
+    fn delay(&self) -> usize {
+        self.stream.delay()
+    }
+
+    /// Samples taken in so far.
+    #[getter]
+    fn samples(&self) -> usize {
+        self.stream.samples()
+    }
+
+    /// What resuming needs.
+    fn state<'py>(&self, py: Python<'py>) -> State<'py> {
+        let state = self.stream.state();
+        (state.first, PyArray1::from_vec(py, state.samples), state.given, state.ended)
+    }
+
+    /// Takes in samples. Returns the number of the first sample that is given, its estimates and those after it, and their standard errors.
+    fn push<'py>(&mut self, samples: &Bound<'py, PyUntypedArray>) -> PyResult<Given<'py>> {
+        let py = samples.py();
+        let record = one(samples)?;
+        let given = self.stream.upcoming(record.len());
+        let stream = &mut self.stream;
+        outputs(py, &self.plan, given, self.step, self.errors, |estimates, errors| {
+            in_pieces(py, record.len(), |samples| stream.push(&Part { record: &record, samples }, estimates, errors))
+        })
+    }
+
+    /// Ends the stream and returns the rest, as `push` does.
+    fn finish<'py>(&mut self, py: Python<'py>) -> PyResult<Given<'py>> {
+        let given = self.stream.at_end();
+        let stream = &mut self.stream;
+        outputs(py, &self.plan, given, self.step, self.errors, |estimates, errors| {
+            stream.finish(estimates, errors);
+            Ok(())
+        })
+    }
+}
+
+/// The number of the first sample, estimates, and standard errors by derivative (none where they are not wanted).
+type Given<'py> = (usize, LocalEstimates, Bound<'py, PyArrayDyn<f64>>);
+
+/// Makes the arrays and has them filled.
+fn outputs<'py>(
+    py: Python<'py>,
+    plan: &Plan,
+    given: Range<usize>,
+    step: usize,
+    with_errors: bool,
+    fill: impl FnOnce(&mut Estimates<'_>, &mut [&mut [f64]]) -> PyResult<()>,
+) -> PyResult<Given<'py>> {
+    let (elements, count) = elements(&given, step);
+    let kinds = plan.options().derivatives.len();
+    let derivatives = zeros::<f64>(py, &[kinds, count])?;
+    let errors = zeros::<f64>(py, &[if with_errors { kinds } else { 0 }, count])?;
+    let sigma = zeros::<f64>(py, &[count])?;
+    let order = zeros::<u8>(py, &[count])?;
+    let status = zeros::<u16>(py, &[count])?;
+    {
+        let (mut derivatives, mut errors, mut sigma) = (derivatives.readwrite(), errors.readwrite(), sigma.readwrite());
+        let (mut order, mut status) = (order.readwrite(), status.readwrite());
+        let mut estimates = Estimates {
+            elements,
+            derivatives: rows(derivatives.as_slice_mut()?, kinds, count),
+            order: order.as_slice_mut()?,
+            status: status.as_slice_mut()?,
+            sigma: sigma.as_slice_mut()?,
+        };
+        let mut errors = rows(errors.as_slice_mut()?, if with_errors { kinds } else { 0 }, count);
+        fill(&mut estimates, &mut errors)?;
+    }
+    let estimates = LocalEstimates {
+        derivatives: derivatives.unbind(),
+        order: order.unbind(),
+        status: status.unbind(),
+        sigma: sigma.unbind(),
+    };
+    Ok((elements.first, estimates, errors))
+}
+
+/// So many rows of so many values.
+pub(crate) fn rows(values: &mut [f64], rows: usize, count: usize) -> Vec<&mut [f64]> {
+    if count == 0 {
+        return std::iter::repeat_with(Default::default).take(rows).collect();
+    }
+    values.chunks_exact_mut(count).collect()
+}
+
+/// The only record of an array.
+pub(crate) fn one(samples: &Bound<'_, PyUntypedArray>) -> PyResult<StridedSamples> {
+    match &records(samples)?[..] {
+        [record] => Ok(*record),
+        _ => Err(PyTypeError::new_err("a stream takes one record: an array with one axis")),
+    }
+}
+
+/// Least squares in windows of rows that come piece by piece.
+#[pyclass(module = "tvident._core")]
+pub(crate) struct RollingStream {
+    regressors: usize,
+    rhs_count: usize,
+    step: usize,
+    stream: Rolling,
+}
+
+#[pymethods]
+impl RollingStream {
+    #[new]
+    #[pyo3(signature = (window, regressors, rhs_count, *, step=1, state=None))]
+    fn new(
+        window: usize,
+        regressors: usize,
+        rhs_count: usize,
+        step: usize,
+        state: Option<Stored<'_>>,
+    ) -> PyResult<Self> {
+        let instructions = Instructions::current();
+        let plan =
+            RollingLeastSquares::new(window, regressors, rhs_count, Vec::new(), HALF_OF_THE_DIGITS, instructions);
+        let plan = plan.map_err(|error| exception(&error))?;
+        let state = match state {
+            None => RollingState::default(),
+            Some((first, rows, given, ended)) => RollingState { first, rows: rows.as_slice()?.to_vec(), given, ended },
+        };
+        Ok(Self { regressors, rhs_count, step, stream: Rolling::resume(plan, step, state) })
+    }
+
+    /// Rows from one to its window.
+    #[getter]
+    fn delay(&self) -> usize {
+        self.stream.delay()
+    }
+
+    /// Rows taken in so far.
+    #[getter]
+    fn rows(&self) -> usize {
+        self.stream.rows()
+    }
+
+    /// What resuming needs.
+    fn state<'py>(&self, py: Python<'py>) -> State<'py> {
+        let state = self.stream.state();
+        (state.first, PyArray1::from_vec(py, state.rows), state.given, state.ended)
+    }
+
+    /// Takes in rows, one row of each array a column. Returns the number of the first row that is given, and the windows from there on.
+    fn push<'py>(
+        &mut self,
+        regressors: &Bound<'py, PyUntypedArray>,
+        rhs: &Bound<'py, PyUntypedArray>,
+    ) -> PyResult<(usize, StreamedRegressions)> {
+        let py = regressors.py();
+        let (regressors, rhs) = (records(regressors)?, records(rhs)?);
+        if (regressors.len(), rhs.len()) != (self.regressors, self.rhs_count) {
+            return Err(PyValueError::new_err(format!(
+                "rows must have {} regressors and {} right-hand sides as before; got {} and {}; begin another stream for others",
+                self.regressors,
+                self.rhs_count,
+                regressors.len(),
+                rhs.len()
+            )));
+        }
+        let columns: Vec<StridedSamples> = regressors.into_iter().chain(rhs).collect();
+        let count = columns.first().map_or(0, Samples::len);
+        let given = self.stream.upcoming(count);
+        let stream = &mut self.stream;
+        windows(py, (self.regressors, self.rhs_count), given, self.step, |regressions| {
+            in_pieces(py, count, |samples| {
+                let parts: Vec<Part<'_>> =
+                    columns.iter().map(|record| Part { record, samples: samples.clone() }).collect();
+                let parts: Vec<&dyn Samples> = parts.iter().map(|part| part as &dyn Samples).collect();
+                stream.push(&parts, regressions);
+            })
+        })
+    }
+
+    /// Ends the stream and returns the rest, as `push` does.
+    fn finish(&mut self, py: Python<'_>) -> PyResult<(usize, StreamedRegressions)> {
+        let given = self.stream.at_end();
+        let stream = &mut self.stream;
+        windows(py, (self.regressors, self.rhs_count), given, self.step, |regressions| {
+            stream.finish(regressions);
+            Ok(())
+        })
+    }
+}
+
+/// Windows of rows that came: what [`crate::rolling`] gives of a batch, but for what needs all of it.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+pub(crate) struct StreamedRegressions {
+    /// By regressor, right-hand side and window.
+    params: Py<PyArrayDyn<f64>>,
+    stderr: Py<PyArrayDyn<f64>>,
+    /// Residual sums of squares by right-hand side and window.
+    rss: Py<PyArrayDyn<f64>>,
+    condition: Py<PyArrayDyn<f64>>,
+    status: Py<PyArrayDyn<u16>>,
+}
+
+/// Makes the arrays and has them filled.
+fn windows(
+    py: Python<'_>,
+    (p, q): (usize, usize),
+    given: Range<usize>,
+    step: usize,
+    fill: impl FnOnce(&mut Regressions<'_>) -> PyResult<()>,
+) -> PyResult<(usize, StreamedRegressions)> {
+    let (elements, count) = elements(&given, step);
+    let parameters = zeros::<f64>(py, &[p, q, count])?;
+    let errors = zeros::<f64>(py, &[p, q, count])?;
+    let residuals = zeros::<f64>(py, &[q, count])?;
+    let condition = zeros::<f64>(py, &[count])?;
+    let status = zeros::<u16>(py, &[count])?;
+    {
+        let (mut parameters, mut errors) = (parameters.readwrite(), errors.readwrite());
+        let (mut residuals, mut condition, mut status) =
+            (residuals.readwrite(), condition.readwrite(), status.readwrite());
+        let mut regressions = Regressions {
+            elements,
+            parameters: rows(parameters.as_slice_mut()?, p * q, count),
+            errors: rows(errors.as_slice_mut()?, p * q, count),
+            residuals: rows(residuals.as_slice_mut()?, q, count),
+            condition: condition.as_slice_mut()?,
+            status: status.as_slice_mut()?,
+            ..Regressions::default()
+        };
+        fill(&mut regressions)?;
+    }
+    let found = StreamedRegressions {
+        params: parameters.unbind(),
+        stderr: errors.unbind(),
+        rss: residuals.unbind(),
+        condition: condition.unbind(),
+        status: status.unbind(),
+    };
+    Ok((elements.first, found))
+}

@@ -1,0 +1,185 @@
+"""``tvident live``: lines and the Lab Streaming Layer in, tables, JSON lines and another stream out."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+import tvident
+from tvident._live import Clock, Inlet, Outlet
+
+SECONDS = float(os.environ.get("TVIDENT_LIVE", "4"))
+"""Of the test with a real outlet at 1 kHz; a minute in ``make test-live``."""
+
+RIG = tvident.simulate_torsional_rig(duration=2.0, seed=2)
+
+
+def run(text: str, *options: str) -> tuple[list[dict[str, Any]], str]:
+    """Give the JSON lines and the words of a run on these lines."""
+    command = [sys.executable, "-c", "from tvident._command_line import main; main()", "live", "-", *options]
+    done = subprocess.run(command, input=text, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return [json.loads(line) for line in done.stdout.splitlines()], done.stderr
+
+
+def test_csv_and_json_lines_become_json_lines_with_the_batchs_numbers() -> None:
+    t, angle, torque = (np.asarray(each) for each in (RIG.time, RIG.angle, RIG.torque))
+    csv = "t,torque [N m],angle\n" + "".join(
+        f"{a!r},{c!r},{b!r}\n" for a, b, c in zip(t.tolist(), angle.tolist(), torque.tolist(), strict=True)
+    )
+    lines = "".join(
+        json.dumps({"stamp": a, "joint": {"angle": b, "torque": c}}) + "\n"
+        for a, b, c in zip(t.tolist(), angle.tolist(), torque.tolist(), strict=True)
+    )
+    batch = tvident.identify(angle, torque, sample_rate=1000, method="paper")
+    cases = ((csv, ("angle", "torque", "t")), (lines, ("joint.angle", "joint.torque", "stamp")))
+    for text, (one, other, stamp) in cases:
+        found, words = run(text, "--angle", one, "--torque", other, "--time", stamp, "--sample-rate", "1000")
+        assert np.allclose([row["timestamp"] for row in found], t, atol=1e-9)
+        stiffness = np.array([row["stiffness"] for row in found], dtype=float)
+        assert np.array_equal(stiffness, batch.stiffness, equal_nan=True)
+        assert [row["status"] for row in found] == batch.status.tolist()
+        assert "1000 Hz nominal, 1000 Hz effective" in words
+        assert "lost samples: 0" in words
+
+
+def test_a_table_and_a_counter() -> None:
+    rows = [f"{k} {a!r} {b!r}\n" for k, (a, b) in enumerate(zip(RIG.angle.tolist(), RIG.torque.tolist(), strict=True))]
+    del rows[700:703]
+    command = [
+        sys.executable,
+        "-c",
+        "from tvident._command_line import main; main()",
+        "live",
+        "--to",
+        "table",
+        "--every",
+        "0.5",
+    ]
+    command += ["--angle", "1", "--torque", "2", "--counter", "0", "--sample-rate", "1000"]
+    done = subprocess.run(command, input="".join(rows), capture_output=True, text=True, check=False, timeout=120)
+    assert "stiffness [N m/rad]" in done.stdout.splitlines()[0]
+    assert 3 <= len(done.stdout.splitlines()) <= 8
+    assert "lost samples: 3" in done.stderr
+    assert "samples: 2000 taken in" in done.stderr
+
+
+def clocked(stamps: Sequence[float], period: float = 1e-3) -> tuple[Clock, list[float]]:
+    """Give a clock that saw these stamps, and which samples came out: NaN for lost ones."""
+    clock = Clock(period)
+    rows = [row for number, stamp in enumerate(stamps) for row in clock.rows((stamp, float(number), 0.0))]
+    return clock, [row[1] for row in [*rows, *clock.rest()]]
+
+
+def test_losses_are_found_where_they_are_and_jitter_is_none() -> None:
+    generator = np.random.default_rng(1)
+    stamps = np.arange(20_000) * 1e-3 * (1 + 80e-6) + 7.0
+    jittered = stamps + 0.2e-3 * generator.uniform(-1, 1, stamps.size)
+    held = jittered.copy()
+    held[5000:5006] = held[5006]  # a driver that gives six at once
+    clock, numbers = clocked(held.tolist())
+    assert (clock.lost, len(numbers)) == (0, 20_000)
+    assert clock.rate.period == pytest.approx(1e-3 * (1 + 80e-6), abs=5 * clock.rate.error)
+    assert clock.rate.error < 1e-8
+    gone = np.delete(jittered, [*range(3000, 3004), 12_000])
+    clock, numbers = clocked(gone.tolist())
+    assert clock.lost == 5
+    lost = np.flatnonzero(np.isnan(numbers))
+    assert np.array_equal(lost, [3000, 3001, 3002, 3003, 12_000])
+    assert clock.rate.period == pytest.approx(1e-3 * (1 + 80e-6), abs=5 * clock.rate.error)
+    assert re.search(r"drift -(79|80)\.", "\n".join(clock.words()))
+
+
+def test_a_rate_that_is_not_the_nominal_one_is_said() -> None:
+    clock, _ = clocked((np.arange(5000) / 990).tolist())
+    assert "give --sample-rate 990" in "\n".join(clock.words())
+
+
+def test_what_cannot_be_read_is_missing_and_said() -> None:
+    rows = [f"{a!r},{b!r}\n" for a, b in zip(RIG.angle[:900].tolist(), RIG.torque[:900].tolist(), strict=True)]
+    rows[300] = "1.0;oops\n"
+    found, words = run("".join(rows), "--angle", "0", "--torque", "1", "--sample-rate", "1000")
+    assert len(found) == 900
+    assert found[300]["stiffness"] is None
+    assert "1 lines could not be read" in words
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--sample-rate", "1000", "--method", "auto"], "whole record"),
+        ([], "needs its sample rate"),
+        (["--sample-rate", "1000", "--time", "9"], "there are"),
+    ],
+)
+def test_wrong_calls_say_what_would_be_right(options: list[str], words: str) -> None:
+    command = [
+        sys.executable,
+        "-c",
+        "from tvident._command_line import main; main()",
+        "live",
+        "--angle",
+        "0",
+        "--torque",
+        "1",
+    ]
+    done = subprocess.run(
+        [*command, *options], input="1,2\n3,4\n", capture_output=True, text=True, check=False, timeout=120
+    )
+    assert done.returncode == 2
+    assert words in done.stderr
+
+
+def test_a_real_outlet_loses_nothing_and_comes_back_with_the_stated_delay() -> None:
+    pylsl = pytest.importorskip("pylsl")
+    name = f"tvident-test-{os.getpid()}"
+    count, block = int(1000 * SECONDS), 20
+    t = np.arange(count) / 1000
+    angle = 0.2 * np.sin(2 * np.pi * 2 * t) + 0.1 * np.sin(2 * np.pi * 7 * t)
+    torque = 15 * angle + 0.05 * np.gradient(angle, t) + 0.01 * np.gradient(np.gradient(angle, t), t)
+    outlet = Outlet(name, [("angle", "rad"), ("torque", "N m")], 1000.0)
+    code = "from tvident._command_line import main; main()"
+    command = [sys.executable, "-c", code, "live", "--lsl", name, "--angle", "angle", "--torque", "torque"]
+    command += ["--to", "nothing", "--lsl-output", f"{name}-out", "--duration", str(SECONDS + 6)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+        back = Inlet(f"{name}-out", ["stiffness", "stiffness_stderr", "status"], timeout=30.0)
+        came: list[list[float]] = []
+
+        def listen() -> None:
+            for piece in back.pieces(0.2):
+                came.extend(piece)
+                if len(came) >= count or program.poll() is not None:
+                    return
+
+        listener = threading.Thread(target=listen)
+        listener.start()
+        while not outlet._outlet.have_consumers():  # noqa: SLF001 - the program looks for it
+            time.sleep(0.05)
+        begin = pylsl.local_clock() + 0.2
+        for first in range(0, count, block):
+            time.sleep(max(0.0, begin + t[min(first + block, count) - 1] - pylsl.local_clock()))
+            some = slice(first, first + block)
+            outlet.show((begin + t[some]).tolist(), [angle[some].tolist(), torque[some].tolist()])
+        listener.join(timeout=30)
+        _, words = program.communicate(timeout=60)
+    delay = tvident.IdentificationStream(sample_rate=1000, method="paper").delay
+    assert f"samples: {count} taken in, parameters of {count} given, each {delay} samples" in words, words
+    assert "lost samples: 0" in words
+    stamps = np.array([row[0] for row in came])
+    assert stamps.size == count
+    # Both clocks are this machine's: LSL's synchronisation of stamps is good to a millisecond.
+    assert np.abs(stamps - begin - t).max() < 2e-3
+    found = np.array([row[1] for row in came])
+    assert np.nanmedian(np.abs(found[300:-300] - 15)) < 0.05
+    assert not math.isnan(found[count // 2])
