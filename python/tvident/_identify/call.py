@@ -149,10 +149,10 @@ def identify(
         True where a sample may be the centre of an equation.
     loss : {"squares", "huber", "auto"}, optional
         ``"squares"``: least squares. ``"huber"``: residuals of the torque's samples beyond 2.5 standard deviations count linearly, so that
-        spikes and touches move parameters by little, however large they are (Huber 1981, modified residuals): the torque that the equation
-        predicts takes the place of such a sample, with 2.5 standard deviations at most, and the record is identified again until nothing
-        changes, 3 to 10 times. ``"auto"``: that, where many more residuals are far from zero than of normal noise; ``settings["loss"]``
-        says what was used.
+        spikes of few samples move parameters by little, however large they are (Huber 1981, modified residuals): the torque that the
+        equation predicts takes the place of such a sample, with 2.5 standard deviations at most, and the record is identified again until
+        nothing changes, 3 to 10 times. A touch that lasts as long as the motion is not told from it. ``"auto"``: ``"huber"`` where many
+        more residuals are far from zero than of normal noise; ``settings["loss"]`` says what was used.
     period : float, optional
         Period of a wrapped angle in rad, 2π mostly: whole periods are added first so that steps are the shortest that are possible. A
         sample after a step of 0.4 to 0.6 periods, which may go either way, counts as missing. Across a gap the angle goes the shortest
