@@ -321,7 +321,7 @@ def identify(
         torques,
         instruments,
         arguments.mask("mask", mask, torques.shape),
-        begin + np.arange(samples, dtype=np.float64) * seconds,
+        _times(samples, seconds, begin),
         seconds,
     )
     if grid is not None:
@@ -394,6 +394,14 @@ def _sampling(
         grid = grid_of(error.times)
         return arguments.sample_period(samples, delta=grid.period), grid, grid.start
     return seconds, None, arguments.begin_of(times)
+
+
+def _times(samples: int, seconds: float, begin: float) -> npt.NDArray[np.float64]:
+    """Return the times of samples, in the memory of one array: records may be hours long."""
+    times = np.arange(samples, dtype=np.float64)
+    times *= seconds
+    times += begin
+    return times
 
 
 def _in_units_of_results(name: str, value: float | None, factor: float) -> float | None:
