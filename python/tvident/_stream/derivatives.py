@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, get_args
 
@@ -13,7 +12,7 @@ from tvident import _arguments as arguments
 from tvident import _core
 from tvident._choices import Criterion, Selection
 from tvident._derivatives import HIGHEST_ORDER, SHORTEST_WINDOW, plan
-from tvident._stream.pieces import check_finite, check_open, piece
+from tvident._stream.pieces import SampleStream
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -42,7 +41,7 @@ class StreamedDerivatives:
     status: npt.NDArray[np.uint16]
 
 
-class LocalPolynomialStream:
+class LocalPolynomialStream(SampleStream[StreamedDerivatives]):
     """Differentiate samples as they come: :func:`fit_local_polynomials`, piece by piece.
 
     Pieces may hold one sample or millions. The numbers are those of one call with all samples, bit for bit, however the stream is cut;
@@ -129,7 +128,7 @@ class LocalPolynomialStream:
         stderr: bool = False,
         start: float = 0.0,
     ) -> None:
-        period = arguments.sample_period(0, delta=delta, sample_rate=sample_rate)
+        period = self._period = arguments.sample_period(0, delta=delta, sample_rate=sample_rate)
         if arguments.is_word(window_length, "auto"):
             raise ValueError(
                 "window_length must be known before samples come; got 'auto', which needs the whole record; give window_length of an "
@@ -161,22 +160,11 @@ class LocalPolynomialStream:
         self._stderr = arguments.flag("stderr", stderr)
         self._policy = arguments.one_of("nan_policy", nan_policy, get_args(arguments.NanPolicy))
         self._start = arguments.finite_number("start", start)
-        self._ended = False
         self._stream = self._begun(None)
 
     def _begun(self, state: tuple[int, npt.NDArray[np.float64], int, bool] | None) -> _core.PolynomialStream:
         """Return a stream that begins, or goes on from a state."""
         return _core.PolynomialStream(plan(**self._plan), step=self._step, errors=self._stderr, state=state)
-
-    @property
-    def delay(self) -> int:
-        """Samples from one to its estimate."""
-        return self._stream.delay
-
-    @property
-    def samples(self) -> int:
-        """Samples that have come so far."""
-        return self._stream.samples
 
     def push(self, y: npt.ArrayLike) -> StreamedDerivatives:
         """Take the next samples, and give what they settle.
@@ -198,29 +186,13 @@ class LocalPolynomialStream:
         TypeError
             If `y` is complex or holds no numbers.
         """
-        check_open(ended=self._ended)
-        samples = piece("y", y)
-        check_finite("y", samples, self._policy, self._stream.samples)
-        return self._given(self._stream.push(samples))
-
-    def finish(self) -> StreamedDerivatives:
-        """End the stream, and give the last samples: the status says EDGE, as at the end of a record.
-
-        Raises
-        ------
-        ValueError
-            If the stream has ended before.
-        """
-        check_open(ended=self._ended)
-        self._ended = True
-        return self._given(self._stream.finish())
+        self._check_open()
+        return self._given(self._stream.push(self._piece("y", y)))
 
     def _given(self, found: tuple[int, _core.LocalEstimates, npt.NDArray[np.float64]]) -> StreamedDerivatives:
         first, estimates, errors = found
-        count = estimates.status.size
-        time = np.arange(first, first + count * self._step, self._step) * self._plan["delta"]
         return StreamedDerivatives(
-            time if self._start == 0 else time + self._start,
+            self._times(first, estimates.status.size),
             estimates.derivatives,
             errors if self._stderr else None,
             estimates.order,
@@ -228,13 +200,6 @@ class LocalPolynomialStream:
             estimates.status,
         )
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_stream": self._stream.state()}
-
-    def __setstate__(self, state: Mapping[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._stream = self._begun(state["_stream"])
-
     def __repr__(self) -> str:
-        length, state = self._plan["window_length"], "ended" if self._ended else f"delay {self.delay}"
-        return f"<LocalPolynomialStream after {self.samples} samples, windows of {length}, {state}>"
+        length = self._plan["window_length"]
+        return f"<LocalPolynomialStream after {self.samples} samples, windows of {length}, {self._progress()}>"

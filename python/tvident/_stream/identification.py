@@ -16,7 +16,7 @@ from tvident._equation import COEFFICIENTS, LINEAR_UNITS, UNITS, GivenTerm, Para
 from tvident._identify import Method
 from tvident._status import DOUBTFUL
 from tvident._stream.asked import Asked, asked_of
-from tvident._stream.pieces import check_finite, check_open, piece
+from tvident._stream.pieces import SampleStream
 from tvident._units import ROTARY, axis_of, scaled
 
 Numbers = npt.NDArray[np.float64]
@@ -75,7 +75,7 @@ class StreamedIdentification:
         return np.asarray(there & (self.status & np.uint16(DOUBTFUL) == 0))
 
 
-class IdentificationStream:
+class IdentificationStream(SampleStream[StreamedIdentification]):
     r"""Identify I, C and K in I θ̈ + C θ̇ + K θ = T while angle and torque are recorded: :func:`identify`, piece by piece.
 
     Pieces may hold one sample or millions; memory does not grow with what has come. Parameters in windows have the bits of
@@ -213,13 +213,13 @@ class IdentificationStream:
         self._policy = arguments.one_of("nan_policy", nan_policy, ("propagate", "raise"))
         self._step = arguments.whole_number("step", step, least=1)
         self._start = arguments.finite_number("start", start)
-        self._ended = self._hold = False
+        self._hold = False
         self._stream = self._begun(None)
 
     def _begun(self, state: Any) -> _core.ParameterStream:
         """Return a stream that begins, or goes on from a state."""
         asked = self._asked
-        return _core.ParameterStream(
+        stream = _core.ParameterStream(
             plan(**asked.plan),
             asked.regression_window,
             asked.known,
@@ -229,16 +229,8 @@ class IdentificationStream:
             forgetting=asked.forgetting,
             state=state,
         )
-
-    @property
-    def delay(self) -> int:
-        """Samples from one to its parameters."""
-        return self._stream.delay
-
-    @property
-    def samples(self) -> int:
-        """Samples that have come so far."""
-        return self._stream.samples
+        stream.hold(self._hold)
+        return stream
 
     @property
     def names(self) -> list[str]:
@@ -285,39 +277,23 @@ class IdentificationStream:
         TypeError
             If an array is complex or holds no numbers.
         """
-        check_open(ended=self._ended)
-        angles, torques = piece("angle", angle), piece("torque", torque)
+        self._check_open()
+        angles, torques = self._piece("angle", angle), self._piece("torque", torque)
         if angles.size != torques.size:
             raise ValueError(
                 f"angle and torque must have as many samples as each other; got {angles.size} and {torques.size}; push them together"
             )
-        for name, values in (("angle", angles), ("torque", torques)):
-            check_finite(name, values, self._policy, self._stream.samples)
         return self._given(self._stream.push(scaled(angles, self._axis.angle), scaled(torques, self._axis.torque)))
-
-    def finish(self) -> StreamedIdentification:
-        """End the stream, and give the parameters of the last samples: the status says EDGE, as at the end of a record.
-
-        Raises
-        ------
-        ValueError
-            If the stream has ended before.
-        """
-        check_open(ended=self._ended)
-        self._ended = True
-        return self._given(self._stream.finish())
 
     def _given(self, found: _core.StreamedParameters) -> StreamedIdentification:
         count = found.status.size
-        numbers = np.arange(found.first, found.first + count * self._step, self._step)
-        time = numbers.astype(np.float64) * self._period
         values = dict(zip(self._asked.names, found.values, strict=True))
         errors = dict(zip(self._asked.names, found.stderr, strict=True))
         for name, known in zip(COEFFICIENTS, self._asked.known, strict=True):
             if known is not None:
                 values[name], errors[name] = np.full(count, known), np.zeros(count)
         return StreamedIdentification(
-            time if self._start == 0 else time + self._start,
+            self._times(found.first, count),
             values,
             errors,
             found.residual_std,
@@ -326,14 +302,6 @@ class IdentificationStream:
             found.status,
         )
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_stream": self._stream.state()}
-
-    def __setstate__(self, state: Mapping[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._stream = self._begun(state["_stream"])
-        self._stream.hold(self._hold)
-
     def __repr__(self) -> str:
-        state = "ended" if self._ended else f"delay {self.delay}"
-        return f"<IdentificationStream of {', '.join(self._asked.names)} after {self.samples} samples, {state}>"
+        names = ", ".join(self._asked.names)
+        return f"<IdentificationStream of {names} after {self.samples} samples, {self._progress()}>"

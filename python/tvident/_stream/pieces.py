@@ -1,8 +1,9 @@
-"""Pieces of a recording: one sample or many."""
+"""Pieces of a recording, one sample or many, and what all streams have that take them."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +11,97 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 
 _FLOAT64 = np.dtype(np.float64)
+
+Out = TypeVar("Out")
+
+
+class Stream(Generic[Out]):
+    """A recording that goes on: it ends once, and pickles with what it still needs."""
+
+    _stream: Any
+    _ended = False
+
+    def _begun(self, state: Any) -> Any:
+        """Return the work that begins, or goes on from a state; None before it is known what to do."""
+        raise NotImplementedError
+
+    def _given(self, found: Any) -> Out:
+        """Return what was found, with names."""
+        raise NotImplementedError
+
+    def finish(self) -> Out:
+        """End the stream, and give what is left: the status says EDGE, as at the end of a record.
+
+        Raises
+        ------
+        ValueError
+            If the stream has ended before, or nothing has come that could end.
+        """
+        self._check_open()
+        self._check_end()
+        self._ended = True
+        return self._given(self._stream.finish())
+
+    def _check_open(self) -> None:
+        """Check that the stream goes on."""
+        if self._ended:
+            raise ValueError("a stream takes no samples after its end; got some after finish(); make another stream")
+
+    def _check_end(self) -> None:
+        """Check that there is something to end."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_stream": None if self._stream is None else self._stream.state()}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._stream = self._begun(state["_stream"])
+
+    def _progress(self) -> str:
+        """Return in a word whether the stream goes on, and how late its numbers are."""
+        return "ended" if self._ended else f"delay {self.delay}"
+
+    @property
+    def delay(self) -> int:
+        """Samples, or rows, from one to its numbers."""
+        return int(self._stream.delay)
+
+
+class SampleStream(Stream[Out]):
+    """Samples with times: the number of one is its time."""
+
+    _period: float
+    _start: float
+    _step: int
+    _policy: str
+
+    @property
+    def samples(self) -> int:
+        """Samples that have come so far."""
+        return int(self._stream.samples)
+
+    def _piece(self, name: str, values: npt.ArrayLike) -> npt.NDArray[Any]:
+        """Return the next samples of a channel.
+
+        Raises
+        ------
+        ValueError
+            If one is no number, and the policy says that this must not be.
+        """
+        samples = piece(name, values)
+        if self._policy == "raise" and samples.dtype.kind == "f" and not np.isfinite(samples).all():
+            place = int(np.flatnonzero(~np.isfinite(samples))[0])
+            raise ValueError(
+                f"{name} must hold finite numbers where nan_policy='raise'; sample {self.samples + place} is {samples[place]}; "
+                "repair it or use nan_policy='propagate'"
+            )
+        return samples
+
+    def _times(self, first: int, count: int) -> npt.NDArray[np.float64]:
+        """Return the times of some samples, every so many of them."""
+        numbers = np.arange(first, first + count * self._step, self._step)
+        times = numbers.astype(np.float64) * self._period
+        return times if self._start == 0 else times + self._start
 
 
 def piece(name: str, values: npt.ArrayLike) -> npt.NDArray[Any]:
@@ -25,19 +117,3 @@ def piece(name: str, values: npt.ArrayLike) -> npt.NDArray[Any]:
             f"{name} must be one sample or several along one axis; got shape {array.shape}; make a stream for every record"
         )
     return np.atleast_1d(array)
-
-
-def check_open(*, ended: bool) -> None:
-    """Check that a stream goes on."""
-    if ended:
-        raise ValueError("a stream takes no samples after its end; got some after finish(); make another stream")
-
-
-def check_finite(name: str, values: npt.NDArray[Any], policy: str, begin: int) -> None:
-    """Refuse values that are no number where the policy says so."""
-    if policy == "raise" and values.dtype.kind == "f" and not np.isfinite(values).all():
-        place = int(np.flatnonzero(~np.isfinite(values))[0])
-        raise ValueError(
-            f"{name} must hold finite numbers where nan_policy='raise'; sample {begin + place} is {values[place]}; "
-            "repair it or use nan_policy='propagate'"
-        )

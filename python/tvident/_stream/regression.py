@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +11,7 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident import _core
 from tvident._regression import MOST_REGRESSORS
-from tvident._stream.pieces import check_open
+from tvident._stream.pieces import Stream
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -38,7 +37,7 @@ class StreamedRegression:
     status: npt.NDArray[np.uint16]
 
 
-class RollingStream:
+class RollingStream(Stream[StreamedRegression]):
     """Solve least squares in windows of rows as they come: :func:`rolling_least_squares`, piece by piece.
 
     Pieces may hold one row or millions. The numbers are those of one call with all rows, bit for bit (to rounding where a column of ``A``
@@ -100,8 +99,7 @@ class RollingStream:
         self._step = arguments.whole_number("step", step, least=1)
         self._shape: tuple[int, int] | None = None
         self._one_side = True
-        self._ended = False
-        self._stream: _core.RollingStream | None = None
+        self._stream = self._begun(None)
 
     @property
     def delay(self) -> int:
@@ -135,7 +133,7 @@ class RollingStream:
         TypeError
             If an array is complex or holds no numbers.
         """
-        check_open(ended=self._ended)
+        self._check_open()
         sides = arguments.any_array("b", b)
         regressors = arguments.any_array("A", A)
         if sides.ndim == 0:
@@ -150,31 +148,23 @@ class RollingStream:
             raise ValueError(
                 f"A and b must have as many rows as each other; got {regressors.shape[0]} and {sides.shape[0]}; push them together"
             )
-        return self._given(self._begun(regressors, sides).push(regressors.T, sides.reshape(sides.shape[0], -1).T))
+        if self._stream is None:
+            self._shape, self._one_side = _shape_of(regressors, sides), sides.ndim == 1
+            self._stream = self._begun(None)
+        return self._given(self._stream.push(regressors.T, sides.reshape(sides.shape[0], -1).T))
 
-    def finish(self) -> StreamedRegression:
-        """End the stream, and give the last windows, which lack rows: the status says EDGE.
-
-        Raises
-        ------
-        ValueError
-            If the stream has ended before, or no row has come.
-        """
-        check_open(ended=self._ended)
+    def _check_end(self) -> None:
+        """Check that rows have come."""
         if self._stream is None:
             raise ValueError("a stream must have rows before it ends; got none; push some")
-        self._ended = True
-        return self._given(self._stream.finish())
 
-    def _begun(self, regressors: npt.NDArray[Any], sides: npt.NDArray[Any]) -> _core.RollingStream:
+    def _begun(self, state: Any) -> _core.RollingStream | None:
         """Return the stream, which begins with the first rows."""
-        if self._stream is None:
-            count, others = regressors.shape[1], 1 if sides.ndim == 1 else sides.shape[1]
-            if count > MOST_REGRESSORS:
-                raise ValueError(f"A must have at most {MOST_REGRESSORS} columns; got {count}; drop or combine some")
-            self._stream = _core.RollingStream(self._window, count, others, step=self._step)
-            self._shape, self._one_side = (count, others), sides.ndim == 1
-        return self._stream
+        return (
+            None
+            if self._shape is None
+            else _core.RollingStream(self._window, *self._shape, step=self._step, state=state)
+        )
 
     def _given(self, answer: tuple[int, _core.StreamedRegressions]) -> StreamedRegression:
         first, found = answer
@@ -185,13 +175,13 @@ class RollingStream:
             params, stderr, rss = np.moveaxis(found.params, -1, 0), np.moveaxis(found.stderr, -1, 0), found.rss.T
         return StreamedRegression(row, params, stderr, rss, found.condition, found.status)
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_stream": None if self._stream is None else self._stream.state()}
-
-    def __setstate__(self, state: Mapping[str, Any]) -> None:
-        self.__dict__.update(state)
-        if self._shape is not None:
-            self._stream = _core.RollingStream(self._window, *self._shape, step=self._step, state=state["_stream"])
-
     def __repr__(self) -> str:
-        return f"<RollingStream after {self.rows} rows, windows of {self._window}, {'ended' if self._ended else f'delay {self.delay}'}>"
+        return f"<RollingStream after {self.rows} rows, windows of {self._window}, {self._progress()}>"
+
+
+def _shape_of(regressors: npt.NDArray[Any], sides: npt.NDArray[Any]) -> tuple[int, int]:
+    """Return how many regressors and right-hand sides there are."""
+    count = regressors.shape[1]
+    if count > MOST_REGRESSORS:
+        raise ValueError(f"A must have at most {MOST_REGRESSORS} columns; got {count}; drop or combine some")
+    return count, 1 if sides.ndim == 1 else sides.shape[1]
