@@ -35,6 +35,7 @@ ROOMS = (
     "_advice",
     "_merged",
     "_identify",
+    "_pieces",
     "_stream",
     "_live",
     "_compare",

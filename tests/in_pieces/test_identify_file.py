@@ -155,6 +155,7 @@ def test_a_constant_that_drifts_from_piece_to_piece_is_contradicted(rig: tvident
     acceleration = tvident.fit_local_polynomials(rig.angle, 101, sample_rate=1000).derivatives[2]
     torque += np.repeat([0.0, 0.002], [40_000, SAMPLES - 40_000]) * acceleration
     source = write("in.npy", rig.angle, torque)
+    earlier = tvident.identify(rig.angle[:8000], rig.torque[:8000], sample_rate=1000)
     found = tvident.identify_file(
         source,
         "out.npy",
@@ -164,7 +165,10 @@ def test_a_constant_that_drifts_from_piece_to_piece_is_contradicted(rig: tvident
         method=tvident.WeakForm(window_length=41, exponent=9),
         inertia="constant",
         damping="constant",
+        settings=earlier.settings,
     )
+    # What is given goes before what an earlier result chose.
+    assert (earlier.settings["window_length"], found.settings["window_length"]) == (33, 41)
     assert found.record_status & Status.KIND_CONTRADICTED
     assert any("inertia" in line for line in found.advice)
     inertia = columns_of("out.npy")["inertia"]

@@ -13,7 +13,7 @@ from tvident._dask.found import DaskIdentification
 from tvident._dask.records import record_of
 from tvident._equation import LINEAR_UNITS, UNITS, GivenTerm
 from tvident._identify import Method
-from tvident._in_pieces import Given
+from tvident._pieces import Given
 from tvident._units import ROTARY, axis_of
 
 

@@ -12,22 +12,19 @@ from tvident import _core
 from tvident._dask.blocks import blocks, imported, joined, rows, tree
 from tvident._dask.polynomials import rounding
 from tvident._identify import Held, Long, Request, Span, WeakForm, requested
-from tvident._in_pieces import (
-    Choices,
+from tvident._in_pieces import Choices, chosen, stretches
+from tvident._pieces import (
+    Columns,
     Given,
     Mean,
-    chosen,
     columns_of,
     finished,
     means_of,
     part_alone,
     reach_of,
-    stretches,
     with_neighbours,
 )
 from tvident._status import Status
-
-Columns = dict[str, Any]
 
 _LEAST_BLOCK = 1 << 12
 """Samples of a block: a task costs as much as some thousand of them."""
@@ -216,9 +213,9 @@ def _alone(record: _Record) -> Identified:
     given = asked.given
     choices: Any = None
     reach = _REACH
-    if given.settings is not None:
-        reach = reach_of(given.settings)
-        choices = dask.delayed(Choices(dict(given.settings), 0, []))
+    if given.frozen is not None:
+        reach = reach_of(given.frozen)
+        choices = dask.delayed(Choices(dict(given.frozen), 0, []))
     elif not isinstance(asked.request.form, WeakForm):
         reach = reach_of(record.plain.settings())
     found = record.blocks(_NEIGHBOURS * reach)

@@ -17,12 +17,12 @@ from tvident._files import check_apart, full_name, is_time
 from tvident._identify import Method
 from tvident._in_pieces.copied import copied
 from tvident._in_pieces.found import FileIdentification
-from tvident._in_pieces.given import Given
 from tvident._in_pieces.kept import Kept, mark_of
 from tvident._in_pieces.outputs import check_output
 from tvident._in_pieces.recorded import Recording, uniform, units_of
 from tvident._in_pieces.run import Asked, Run
 from tvident._in_pieces.sources import TEXT, Source, opened
+from tvident._pieces import Given
 from tvident._units import Channel as Said
 from tvident._units import named_unit, times_in_seconds
 

@@ -16,12 +16,11 @@ from tvident._equation import LINEAR_UNITS, UNITS
 from tvident._identify import Long, Span, WeakForm, requested
 from tvident._in_pieces.choices import chosen, stretches
 from tvident._in_pieces.found import FileIdentification
-from tvident._in_pieces.given import Given
 from tvident._in_pieces.kept import Kept
-from tvident._in_pieces.merged import Mean, means_of
 from tvident._in_pieces.outputs import CHUNK, Table, writer
 from tvident._in_pieces.recorded import Recording
-from tvident._in_pieces.work import SHARED, Alone, Columns, Windows, Work, reach_of
+from tvident._in_pieces.work import Alone, Windows, Work
+from tvident._pieces import SHARED, Columns, Given, Mean, means_of, reach_of
 from tvident._status import Status
 from tvident._units import ROTARY
 
@@ -138,8 +137,8 @@ class Run:
     def _choose(self) -> None:
         """Take the settings of an earlier result, or choose from stretches of the recording."""
         asked = self._asked
-        if asked.given.settings is not None:
-            self._kept.note_fact("settings", dict(asked.given.settings))
+        if asked.given.frozen is not None:
+            self._kept.note_fact("settings", dict(asked.given.frozen))
             return
         spans = stretches(self._samples, asked.step)
         choices = chosen(spans, asked.recording.held, asked.given.identified, asked.recording.period)

@@ -38,6 +38,11 @@ class Given:
     axis: Axis
     workers: int | None
 
+    @property
+    def frozen(self) -> Mapping[str, Any] | None:
+        """Settings of an earlier result that all parts take as they are; None where a form is given beside them."""
+        return self.settings if arguments.is_word(self.method, "auto") else None
+
     def identified(
         self, held: Held, report: Any = None, *, chosen: Mapping[str, Any] | None = None, step: int = 1
     ) -> Identification:
@@ -47,7 +52,7 @@ class Given:
         if chosen is not None:
             # What was chosen is in the settings; what was given to choose from is not asked again.
             equation = {} if settings is None else equation
-            method, settings = "auto" if isinstance(method, WeakForm) or method == "auto" else method, chosen
+            method, settings = "auto" if isinstance(method, WeakForm) else method, chosen
         units: dict[str, Any] = {} if self.axis.system is ROTARY else {"angle_unit": "m", "torque_unit": "N"}
         return identify(
             held.angle,
