@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -52,6 +53,18 @@ def test_csv_and_json_lines_become_json_lines_with_the_batchs_numbers() -> None:
         assert [row["status"] for row in found] == batch.status.tolist()
         assert "1000 Hz nominal, 1000 Hz effective" in words
         assert "lost samples: 0" in words
+
+
+def test_settings_of_a_result_in_weak_form_give_its_stream(tmp_path: Path) -> None:
+    earlier = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000)
+    (tmp_path / "chosen.json").write_text(json.dumps(earlier.settings))
+    text = "".join(f"{a!r} {b!r}\n" for a, b in zip(RIG.angle.tolist(), RIG.torque.tolist(), strict=True))
+    options = ("--angle", "0", "--torque", "1", "--sample-rate", "1000", "--settings", str(tmp_path / "chosen.json"))
+    found, words = run(text, *options)
+    stream = tvident.IdentificationStream(sample_rate=1000, settings=earlier.settings)
+    expected = np.concatenate([stream.push(RIG.angle, RIG.torque).stiffness, stream.finish().stiffness])
+    assert np.array_equal(np.array([row["stiffness"] for row in found], dtype=float), expected, equal_nan=True)
+    assert f"each {stream.delay} samples" in words
 
 
 def test_a_table_and_a_counter() -> None:

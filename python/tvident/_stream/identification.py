@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident import _core
-from tvident._derivatives import plan
 from tvident._equation import COEFFICIENTS, LINEAR_UNITS, UNITS, GivenTerm, Parameter
 from tvident._identify import Method
-from tvident._status import DOUBTFUL
-from tvident._stream.asked import Asked, asked_of
+from tvident._pieces import Given
+from tvident._status import DOUBTFUL, Status
+from tvident._stream.asked import Work, asked_of
 from tvident._stream.pieces import SampleStream
+from tvident._stream.weak import WeakStream
 from tvident._units import ROTARY, axis_of, scaled
 
 Numbers = npt.NDArray[np.float64]
@@ -83,8 +83,10 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
     :attr:`delay` samples later. Constants are given from all samples so far, or with older ones forgotten; after the last sample they are
     those of :func:`identify` to rounding.
 
-    A stream holds no more than its windows need. What is chosen from a whole record (``method="auto"``, a lag, constants beside windowed
-    parameters) raises: pass settings of an earlier result of the strong form, or what it found as numbers.
+    A stream holds no more than its windows need. What is chosen from a whole record raises and says so: pass ``settings`` of an earlier
+    result, and ``method="auto"`` goes by what that one chose. In weak form blocks of the recording are then identified as records of
+    their own, with neighbours on both sides; constants are those of all blocks so far, and pieces change no bit. A recording of one block
+    has the bits of :func:`identify`; see Notes for longer ones.
 
     Parameters
     ----------
@@ -92,16 +94,17 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         Samples per second, or the sample period in seconds. Give exactly one.
     angle_unit, torque_unit : str, optional
         As in :func:`identify`.
-    method : {"paper"} or StrongForm
-        The strong form, with settings of the paper or of your own; without ``selection="pooled"``, ``filter_torque`` and linear variation.
+    method : {"auto", "paper"} or StrongForm
+        ``"auto"`` with settings of an earlier result. The strong form, with settings of the paper or of your own, without
+        ``selection="pooled"``, ``filter_torque`` and linear variation.
     inertia, damping, stiffness : {"windowed", "constant"} or float, optional
-        As in :func:`identify`, numbers where they are known. What is unknown is all windowed or all constant.
+        As in :func:`identify`, numbers where they are known. In strong form what is unknown is all windowed or all constant.
     terms : sequence, optional
         Built-in terms, as in :func:`identify`.
     quantisation : float, optional
         Step to which the angle was rounded; by default none.
-    nan_policy : {"propagate", "raise"}, optional
-        Missing samples: windows that hold one are NaN, or an error. Constants leave their equations out.
+    nan_policy : {"propagate", "raise", "omit"}, optional
+        Missing samples: windows that hold one are NaN, or an error. Constants leave their equations out. ``"omit"`` in weak form alone.
     step : int, optional
         Every how many samples a result is wanted.
     settings : mapping, optional
@@ -114,8 +117,9 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
     Attributes
     ----------
     delay : int
-        Samples from one to its parameters: half a window of the polynomials, half of the span of windows that are reached from one
-        start, and half a regression window where parameters are windowed.
+        Samples from one to its parameters. In strong form half a window of the polynomials, half of the span of windows that are
+        reached from one start, and half a regression window where parameters are windowed. In weak form twice the sum of the window and
+        four regression windows, less one.
     samples : int
         Samples that have come so far.
     names : list of str
@@ -124,6 +128,8 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         Their units.
     hold : bool
         While it is true, equations that come are left out, and constants stay as they are.
+    record_status : Status
+        In weak form flags of the latest block, and KIND_CONTRADICTED where constants of blocks differ by more than chance.
 
     Raises
     ------
@@ -144,6 +150,11 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
     least squares times the scatter of windows that share no equation, as far as it is known: NaN before there are enough of them, about
     three times the regression window and a half of the other. Those of constants know of neighbouring equations that share samples, from
     the latest 16 384; they are renewed each time that the number of equations has doubled.
+
+    In weak form a whole record knows what a block does not: its noise, constants from samples to come, and which lengths of windows
+    predict best over all of it. With ``averaging=False`` and numbers for what is constant, windows differ by the noise alone, on the whole
+    a hundredth of their standard error; otherwise by some 0.4 of it, as their errors say, which are made from the block. A block is as
+    long as windows reach, and has at least 4096 samples before it, so that one sample costs some 70 µs, 50 ms a block.
 
     ``half_life``, :attr:`hold` and :meth:`reset` are what MATLAB's ``recursiveLS`` has as ``ForgettingFactor`` (2 to the power
     of minus one over the half-life in samples), ``EnableAdaptation`` and ``reset``.
@@ -168,6 +179,14 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
     >>> places = np.round(out.time * 1000).astype(int)
     >>> np.array_equal(out.stiffness, batch.stiffness[places])
     True
+
+    In weak form, with what an earlier recording chose:
+
+    >>> earlier = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
+    >>> stream = tvident.IdentificationStream(sample_rate=1000, settings=earlier.settings)
+    >>> out = stream.push(rig.angle, rig.torque)
+    >>> bool(abs(out.inertia[-1] - rig.inertia[-1]) < 3 * out.stderr["inertia"][-1])
+    True
     """
 
     # All are options, as users call it.
@@ -186,7 +205,7 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         lag: float | None = None,
         quantisation: float | None = None,
         period: float | None = None,
-        nan_policy: str = "propagate",
+        nan_policy: arguments.RowPolicy = "propagate",
         step: int = 1,
         settings: Mapping[str, Any] | None = None,
         half_life: float | str | None = None,
@@ -196,7 +215,7 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
             raise TypeError("a stream needs the sample period; got none; give sample_rate= or delta=")
         self._period = arguments.sample_period(0, delta=delta, sample_rate=sample_rate)
         self._axis = axis_of(None, None, angle_unit=angle_unit, torque_unit=torque_unit)
-        given = {
+        equation = {
             "inertia": inertia,
             "damping": damping,
             "stiffness": stiffness,
@@ -205,43 +224,35 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
             "quantisation": None if quantisation is None else quantisation * self._axis.angle,
             "period": period,
         }
-        self._asked: Asked = asked_of(method, given, settings, self._period, half_life)
-        if nan_policy == "omit":
-            raise ValueError(
-                "nan_policy must be 'propagate' or 'raise' in a stream; got 'omit', which needs the whole record; use one of these"
-            )
-        self._policy = arguments.one_of("nan_policy", nan_policy, ("propagate", "raise"))
+        self._policy = arguments.one_of("nan_policy", nan_policy, get_args(arguments.RowPolicy))
+        given = Given(method, equation, settings, nan_policy, self._period, self._axis, workers=1)
+        self._asked = asked_of(given, half_life)
         self._step = arguments.whole_number("step", step, least=1)
         self._start = arguments.finite_number("start", start)
         self._hold = False
         self._stream = self._begun(None)
 
-    def _begun(self, state: Any) -> _core.ParameterStream:
+    def _begun(self, state: Any) -> Work:
         """Return a stream that begins, or goes on from a state."""
-        asked = self._asked
-        stream = _core.ParameterStream(
-            plan(**asked.plan),
-            asked.regression_window,
-            asked.known,
-            asked.terms,
-            step=self._step,
-            factors=asked.factors,
-            forgetting=asked.forgetting,
-            state=state,
-        )
+        stream = self._asked.begun(self._step, state)
         stream.hold(self._hold)
         return stream
 
     @property
     def names(self) -> list[str]:
         """What is unknown, by name."""
-        return list(self._asked.names)
+        return list(self._asked.equation.names)
 
     @property
     def units(self) -> dict[str, str]:
         """Units of what is unknown."""
         units = UNITS if self._axis.system is ROTARY else LINEAR_UNITS
-        return {name: units.get(name, "") for name in self._asked.names}
+        return {name: units.get(name, "") for name in self._asked.equation.names}
+
+    @property
+    def record_status(self) -> Status:
+        """Flags of the recording, in weak form: of the latest block, and of constants so far. The strong form judges nothing of it."""
+        return self._stream.record_status if isinstance(self._stream, WeakStream) else Status(0)
 
     @property
     def hold(self) -> bool:
@@ -285,11 +296,11 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
             )
         return self._given(self._stream.push(scaled(angles, self._axis.angle), scaled(torques, self._axis.torque)))
 
-    def _given(self, found: _core.StreamedParameters) -> StreamedIdentification:
+    def _given(self, found: Any) -> StreamedIdentification:
         count = found.status.size
-        values = dict(zip(self._asked.names, found.values, strict=True))
-        errors = dict(zip(self._asked.names, found.stderr, strict=True))
-        for name, known in zip(COEFFICIENTS, self._asked.known, strict=True):
+        values = dict(zip(self._asked.equation.names, found.values, strict=True))
+        errors = dict(zip(self._asked.equation.names, found.stderr, strict=True))
+        for name, known in zip(COEFFICIENTS, self._asked.equation.known, strict=True):
             if known is not None:
                 values[name], errors[name] = np.full(count, known), np.zeros(count)
         return StreamedIdentification(
@@ -303,5 +314,5 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         )
 
     def __repr__(self) -> str:
-        names = ", ".join(self._asked.names)
+        names = ", ".join(self._asked.equation.names)
         return f"<IdentificationStream of {names} after {self.samples} samples, {self._progress()}>"
