@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from tvident._files import FileRecording, read_recording
     from tvident._identify import StrongForm, WeakForm, identify
     from tvident._in_pieces import FileIdentification, identify_file
-    from tvident._merged import Chain, Matrix, MergedIdentification
+    from tvident._merged import Chain, Matrix, Mechanism, MergedIdentification
     from tvident._plan import ExperimentPlan, plan_experiment
     from tvident._regression import RollingRegression, rolling_least_squares
     from tvident._results import ExpandedParameter, Identification, IdentifiedRecords, Scan, load
@@ -36,6 +36,7 @@ __all__ = [
     "LocalPolynomialFit",
     "LocalPolynomialStream",
     "Matrix",
+    "Mechanism",
     "MergedIdentification",
     "ModelComparison",
     "Recording",
@@ -65,7 +66,7 @@ _ROOMS = {
     "_equation": ("Term",),
     "_files": ("FileRecording", "read_recording"),
     "_identify": ("StrongForm", "WeakForm", "identify"),
-    "_merged": ("Chain", "Matrix", "MergedIdentification"),
+    "_merged": ("Chain", "Matrix", "Mechanism", "MergedIdentification"),
     "_plan": ("ExperimentPlan", "plan_experiment"),
     "_in_pieces": ("FileIdentification", "identify_file"),
     "_regression": ("RollingRegression", "rolling_least_squares"),

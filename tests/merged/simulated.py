@@ -123,3 +123,53 @@ def chain(
         list(damping),
         list(inertia),
     )
+
+
+@dataclass(frozen=True)
+class Pendulum:
+    """Channels of a double pendulum with noise, at times that jitter, and its true factors."""
+
+    time: Array
+    angle: Array
+    torque: Array
+    factors: dict[str, float]
+
+
+def double_pendulum(samples: int, *, seed: int, noise: float = 1e-4) -> Pendulum:
+    """Give a pendulum whose second angle is relative to the first, with viscous and dry friction, moved by torques at both joints.
+
+    The equations are written out here, not derived from energies.
+    """
+    rng = np.random.default_rng(seed)
+    names = ("A", "I2", "h", "g1", "g2", "damping_0_0", "damping_1_1", "coulomb_0", "coulomb_1")
+    truth = np.array([0.06, 0.05, 0.03, 2.2, 1.5, 0.03, 0.02, 0.15, 0.1]) * rng.uniform(0.8, 1.2, len(names))
+    A, I2, h, g1, g2, b1, b2, c1, c2 = truth
+    period = 2e-3
+    time = (np.arange(samples) + 0.1 * rng.uniform(-0.5, 0.5, samples)) * period
+    middle = np.repeat(time, 2)[1:] / 2 + np.repeat(time, 2)[:-1] / 2
+    drives = 30 * drive(rng, 2, middle, 4.0)
+
+    def slope(state: Array, force: Array) -> Array:
+        q1, q2, v1, v2 = state
+        cosine, sine = h * np.cos(q2), h * np.sin(q2)
+        both = g2 * np.sin(q1 + q2)
+        left = force[0] + sine * v2 * (2 * v1 + v2) - g1 * np.sin(q1) - both - b1 * v1 - c1 * np.sign(v1)
+        right = force[1] - sine * v1**2 - both - b2 * v2 - c2 * np.sign(v2)
+        m11, m12 = A + I2 + 2 * cosine, I2 + cosine
+        determinant = m11 * I2 - m12**2
+        return np.array([v1, v2, (I2 * left - m12 * right) / determinant, (m11 * right - m12 * left) / determinant])
+
+    state, angle = np.zeros(4), np.empty((2, samples))
+    for sample in range(samples):
+        angle[:, sample] = state[:2]
+        if sample + 1 == samples:
+            break
+        step = time[sample + 1] - time[sample]
+        now, half, then = drives[:, 2 * sample : 2 * sample + 3].T
+        one = slope(state, now)
+        two = slope(state + step / 2 * one, half)
+        three = slope(state + step / 2 * two, half)
+        state = state + step / 6 * (one + 2 * two + 2 * three + slope(state + step * three, then))
+    noisy_angle = angle + noise * rng.standard_normal(angle.shape)
+    torque = noisy(rng, drives[:, ::2], 0.03)
+    return Pendulum(time, noisy_angle, torque, dict(zip(names, map(float, truth), strict=True)))

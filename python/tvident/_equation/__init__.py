@@ -3,6 +3,7 @@
 from tvident._choices import BUILT_IN, TERM_NAMES, Kind
 from tvident._equation.inner import InnerParameter, expected_stribeck
 from tvident._equation.kinds import COEFFICIENTS, Parameter, parameter
+from tvident._equation.names import name_of_term
 from tvident._equation.terms import FixedTerm, GivenTerm, Term, Unknown, all_terms
 from tvident._equation.units import LINEAR_UNITS, UNITS
 
@@ -21,5 +22,6 @@ __all__ = [
     "Unknown",
     "all_terms",
     "expected_stribeck",
+    "name_of_term",
     "parameter",
 ]

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._equation import COEFFICIENTS
-from tvident._results import Estimates, Scan
+from tvident._results import Estimates, scan_of
 from tvident._status import Status
 
 _Numbers: TypeAlias = npt.NDArray[np.float64]
@@ -97,7 +97,7 @@ def estimates(
         residual_std=joined([one.residual_std for one in found]),
         order=joined([one.order for one in found]) if has_orders else np.zeros((*shape, count), np.uint8),
         status=status,
-        scans=tuple(_scan_of(one.scan, names) for one in found if one.scan is not None),
+        scans=tuple(scan_of(one.scan, names) for one in found if one.scan is not None),
         kinds={
             name: np.array([one.unknowns[place].kind for one in found]).reshape(shape)
             for place, name in enumerate(names)
@@ -165,24 +165,6 @@ def of_windows(names: Sequence[str], found: Sequence[_core.Identification]) -> d
     each = zip(names, found[0].unknowns, strict=False)
     factors = {name: one.factor for name, one in each if one.kind == "windowed" and one.factor is not None}
     return {**lengths, "stderr_factors": factors} if factors else lengths
-
-
-def _scan_of(found: _core.Scan, names: Sequence[str]) -> Scan:
-    """Return estimates by the width of the test function, by name."""
-    shape = (len(found.window_length), len(found.unknowns))
-    values, errors = np.array(found.values).reshape(shape), np.array(found.stderr).reshape(shape)
-    called = [names[place] for place in found.unknowns]
-    length = np.array(found.window_length, dtype=np.int64)
-    plateau = None if found.plateau is None else (int(length[found.plateau[0]]), int(length[found.plateau[1]]))
-    return Scan(
-        window_length=length,
-        band=np.array(found.band),
-        estimates={name: values[:, place] for place, name in enumerate(called)},
-        stderr={name: errors[:, place] for place, name in enumerate(called)},
-        plateau=plateau,
-        corrected=found.corrected,
-        moved=found.moved,
-    )
 
 
 def _leave_out_what_has_no_error(

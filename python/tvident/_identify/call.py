@@ -25,7 +25,7 @@ from tvident._identify.settings import Request, resolve
 from tvident._identify.signals import Signals, with_own_step
 from tvident._identify.task import Task
 from tvident._identify.together import Options, identify_together, sampled
-from tvident._merged import Chain
+from tvident._merged import Chain, Mechanism
 from tvident._results import Identification
 from tvident._units import ROTARY, Axis, axis_of, factor_between, scaled, unit_said
 
@@ -56,7 +56,7 @@ def identify(
     period: float | None = None,
     share: str | Sequence[str] = (),
     dof_axis: int | None = None,
-    structure: Chain | None = None,
+    structure: Chain | Mechanism | None = None,
     ensemble_axis: int | None = None,
     phase: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None,
     align: Align = None,
@@ -166,8 +166,8 @@ def identify(
         The axis of the masses, 0: angle and torque have shape (masses, n), and M q̈ + C q̇ + K q + terms = f is identified. Every entry of
         the matrices is ``"auto"``, unless a parameter is a kind, nested lists of kinds and numbers, or a :class:`Matrix`. A row of the
         torque that is NaN was not measured; one that is zero says that no force acts. Returns a :class:`MergedIdentification`.
-    structure : Chain, optional
-        Springs and dampers between masses, in place of full matrices.
+    structure : Chain or Mechanism, optional
+        Springs and dampers between masses, or bodies whose equations follow from their energies, in place of full matrices.
     ensemble_axis : int, optional
         The axis of repeated trials that share I(t), C(t) and K(t), 0: angle and torque have shape (trials, n), or are lists of
         records whose lengths may differ. Equations are merged window by window. Returns a :class:`MergedIdentification`.

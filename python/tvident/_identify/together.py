@@ -10,11 +10,20 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident._clocks import grid_of
 from tvident._derivatives import plan
 from tvident._equation import LINEAR_UNITS, UNITS, Unknown, all_terms
 from tvident._identify.columns import WINDOW_OF_TERMS, Columns
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, WeakForm, exponent_of
-from tvident._merged import Asked, MergedIdentification, identify_masses, identify_trials, masses_of, trials_of
+from tvident._merged import (
+    Asked,
+    MergedIdentification,
+    Sampling,
+    identify_masses,
+    identify_trials,
+    masses_of,
+    trials_of,
+)
 from tvident._units import ROTARY, Axis, axis_of, times_in_seconds
 
 Numbers = npt.NDArray[np.number]
@@ -121,31 +130,44 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
         trials = trials_of(angle, torque, options.ensemble_axis or 0, phase=options.phase, mask=options.mask)
         trials = trials.scaled(axis.angle, axis.torque)
         channels: Sequence[tuple[str, Sequence[Numbers]]] = (("angle", trials.angles), ("torque", trials.torques))
-        longest = max(trials.angles, key=len)
     else:
         masses = masses_of(angle, torque, options.dof_axis, options.structure, mask=options.mask)
         masses = masses.scaled(axis.angle, axis.torque)
         channels = (("angle", masses.angles),)
-        longest = masses.angles[0]
     for name, arrays in channels:
         for one in arrays:
             arguments.check_nan(name, one, options.alone["nan_policy"], arguments.RowPolicy)
-    period, _ = sampled(options.time, longest.size, axis, options.units["time_unit"])
+    recorded = (
+        (trials.angles, trials.torques)
+        if options.dof_axis is None
+        else (masses.angles, [one for one in masses.torques if one is not None])
+    )
+    sampling = _sampling(options, axis, *recorded)
     with arguments.reporter(options.progress, "identification") as report:
         asked = Asked(
-            period=period,
+            sampling=sampling,
             parameters={name: value for name, value in options.parameters.items() if value is not None},
             terms=[(one.name, one.kind) for one in terms],
-            form=_lengths(form, period, longest.size),
+            form=_lengths(form, sampling.period, max(map(len, recorded[0]))),
             units=UNITS if axis.system is ROTARY else LINEAR_UNITS,
             step=arguments.whole_number("step", options.step, least=1),
             workers=arguments.worker_count(options.workers),
             report=report,
         )
-        values = _Terms(terms, period, asked.workers)
+        values = _Terms(terms, sampling.period, asked.workers)
         if options.dof_axis is None:
-            return identify_trials(trials, asked, values)
-        return identify_masses(masses, asked, values)
+            return identify_trials(trials if sampling.clock is None else trials.on_grid(sampling), asked, values)
+        return identify_masses(masses if sampling.clock is None else masses.on_grid(sampling), asked, values)
+
+
+def _sampling(options: Options, axis: Axis, angles: Sequence[Numbers], torques: Sequence[Numbers]) -> Sampling:
+    """Return when samples were taken."""
+    samples, workers = max(map(len, angles)), arguments.worker_count(options.workers)
+    try:
+        period, times = sampled(options.time, samples, axis, options.units["time_unit"])
+    except arguments.NotUniformError as error:
+        return Sampling.of_grid(grid_of(error.times), angles, torques, workers)
+    return Sampling(period, arguments.begin_of(times))
 
 
 class _Terms:
@@ -158,13 +180,25 @@ class _Terms:
 
     def __call__(self, name: str, angle: Numbers) -> npt.NDArray[np.float64]:
         time = np.arange(angle.size, dtype=np.float64) * self._period
-        length = min(WINDOW_OF_TERMS, (angle.size - 1) // 2 * 2 + 1)
-
-        def polynomials() -> Any:
-            return plan(length, order=None, derivatives=(0, 1, 2), delta=self._period, noise=True)
-
-        columns = Columns([self._terms[name]], angle, time, self._period, polynomials, weak=True, workers=self._workers)
+        columns = Columns(
+            [self._terms[name]],
+            angle,
+            time,
+            self._period,
+            lambda: self._plan(angle.size),
+            weak=True,
+            workers=self._workers,
+        )
         return np.asarray(columns.all_samples({})[name], np.float64)
+
+    def motion(self, angles: Numbers) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """Return smoothed angles and velocities, of the angles' shape."""
+        angle, velocity, _ = self._plan(angles.shape[-1]).estimate(angles, workers=self._workers).derivatives
+        return angle, velocity
+
+    def _plan(self, samples: int) -> Any:
+        length = min(WINDOW_OF_TERMS, (samples - 1) // 2 * 2 + 1)
+        return plan(length, order=None, derivatives=(0, 1, 2), delta=self._period, noise=True)
 
 
 def _check(angle: Any, options: Options) -> None:

@@ -2,7 +2,10 @@
 
 from tvident._merged.call import Asked, identify_trials
 from tvident._merged.masses import Masses, identify_masses, masses_of
-from tvident._merged.result import Identifiable, MergedIdentification
+from tvident._merged.mechanism import Mechanism
+from tvident._merged.merging import Identifiable
+from tvident._merged.result import MergedIdentification
+from tvident._merged.sampling import Sampling
 from tvident._merged.structure import Chain, Matrix
 from tvident._merged.trials import Trials, trials_of
 
@@ -12,7 +15,9 @@ __all__ = [
     "Identifiable",
     "Masses",
     "Matrix",
+    "Mechanism",
     "MergedIdentification",
+    "Sampling",
     "Trials",
     "identify_masses",
     "identify_trials",

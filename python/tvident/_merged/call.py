@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -12,13 +12,23 @@ import numpy.typing as npt
 from tvident import _core
 from tvident._equation import COEFFICIENTS
 from tvident._merged.elements import Element, kind_or_number
-from tvident._merged.result import MergedIdentification, Merging, Part
+from tvident._merged.merging import Merging, Part
+from tvident._merged.predicted import Equations
+from tvident._merged.result import MergedIdentification
+from tvident._merged.sampling import Sampling, variances
 from tvident._merged.trials import Trials
 
 Numbers = npt.NDArray[np.number]
 
-TermValues = Callable[[str, Numbers], npt.NDArray[np.float64]]
-"""Gives a term, by its name, of an angle at every sample."""
+
+class TermValues(Protocol):
+    """Gives terms of an angle."""
+
+    def __call__(self, name: str, angle: Numbers) -> npt.NDArray[np.float64]:
+        """Return a term, by its name, at every sample."""
+
+    def motion(self, angles: Numbers) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """Return smoothed angles and velocities."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +37,8 @@ class Asked:
 
     Parameters
     ----------
-    period : float
-        Seconds from one sample to the next.
+    sampling : Sampling
+        When samples were taken.
     parameters : mapping of str to object
         What was given of inertia, damping and stiffness.
     terms : sequence of (str, str)
@@ -43,7 +53,7 @@ class Asked:
         Takes the samples done and all of them.
     """
 
-    period: float
+    sampling: Sampling
     parameters: Mapping[str, Any]
     terms: Sequence[tuple[str, str]]
     form: Mapping[str, int | None]
@@ -52,13 +62,19 @@ class Asked:
     workers: int | None
     report: Callable[[int, int], object] | None
 
-    def part(self, trials: list[Any], elements: Sequence[Element], samples: int) -> Part:
-        """Call the core."""
+    def part(
+        self,
+        equations: Equations,
+        samples: int,
+        noise: tuple[list[float], list[float]] | None = None,
+    ) -> Part:
+        """Call the core; the noise is that of every angle and every torque, as variances, where it is not to be estimated."""
         found = _core.identify_merged(
-            trials,
-            [element.given() for element in elements],
+            list(equations.trials),
+            [element.given() for element in equations.elements],
             samples,
-            delta=self.period,
+            delta=self.sampling.period,
+            noise=noise,
             window_length=self.form["window_length"],
             exponent=self.form["exponent"],
             regression_window=self.form["regression_window"],
@@ -66,7 +82,7 @@ class Asked:
             workers=self.workers,
             progress=self.report,
         )
-        return Part(found, [element.name for element in elements])
+        return Part(found, equations)
 
     def units_of(self, elements: Sequence[Element]) -> dict[str, str]:
         """Return the units of everything by name."""
@@ -91,10 +107,14 @@ def identify_trials(trials: Trials, asked: Asked, term_values: TermValues) -> Me
         mask = None if trials.masks is None else trials.masks[place]
         position = None if trials.positions is None else np.ascontiguousarray(trials.positions[place])
         given.append((angle[np.newaxis], torque[np.newaxis], terms, mask, position))
+    passed, noise = asked.sampling.passed, None
+    if passed is not None:
+        angles, torques = ([float(np.mean(variances(one, passed)))] for one in (trials.angles, trials.torques))
+        noise = angles, torques
     merging = Merging(
         elements,
-        [asked.part(given, elements, trials.samples)],
-        period=asked.period,
+        [asked.part(Equations(elements, [0], given), trials.samples, noise)],
+        sampling=asked.sampling,
         step=asked.step,
         samples=trials.samples,
         trials=len(given),

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident import _core
+from tvident._equation import COEFFICIENTS
 from tvident._merged.call import Asked, TermValues
 from tvident._merged.elements import Element, kind_or_number
-from tvident._merged.result import MergedIdentification, Merging
+from tvident._merged.mechanism import Mechanism
+from tvident._merged.merging import Merging
+from tvident._merged.predicted import Equations
+from tvident._merged.result import MergedIdentification
+from tvident._merged.sampling import Sampling, variances
 from tvident._merged.structure import Chain, matrices
 from tvident._units import scaled
 
@@ -31,14 +37,23 @@ class Masses:
     angles : sequence of ndarray, shape (n,)
         One a mass, then the base where it moves.
     torques : sequence of ndarray, or None for a force that was not measured
-    structure : Chain, optional
+    structure : Chain or Mechanism, optional
     mask : ndarray of bool, shape (n,), optional
+    momenta : sequence of ndarray, shape (n,)
+        Of a mechanism: channels that follow the angles.
+    forces : sequence of ndarray, shape (n,)
+        Of a mechanism: terms before those that were asked for.
+    inertia : mapping of str to ndarray, shape (masses, masses, n)
+        Of a mechanism: by how much factors enter the matrix of inertia.
     """
 
     angles: Sequence[Numbers]
     torques: Sequence[Numbers | None]
-    structure: Chain | None
+    structure: Chain | Mechanism | None
     mask: npt.NDArray[np.bool_] | None
+    momenta: Sequence[npt.NDArray[np.float64]] = ()
+    forces: Sequence[npt.NDArray[np.float64]] = ()
+    inertia: Mapping[str, npt.NDArray[np.float64]] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -50,16 +65,52 @@ class Masses:
         torques = [None if one is None else scaled(one, torque) for one in self.torques]
         return replace(self, angles=[scaled(one, angle) for one in self.angles], torques=torques)
 
-    def elements(self, asked: Asked) -> list[Element]:
-        """Return the elements of the equations, those of terms last: one a term and mass on which a force acts."""
-        given = asked.parameters
-        found = matrices(given, self.count) if self.structure is None else self.structure.elements(given)
-        place = 0
+    def with_elements(self, asked: Asked, term_values: TermValues) -> tuple[Masses, list[Element]]:
+        """Return the masses with all that enters their equations, and the elements, those of terms last.
+
+        There is one a term and mass on which a force acts; a mechanism ties equations to each other, so there it is one a mass.
+        """
+        given, place, driven, whole = asked.parameters, 0, self.driven, self
+        if isinstance(self.structure, Chain):
+            found = self.structure.elements(given)
+        elif self.structure is None:
+            found = matrices(given, self.count)
+        else:
+            rows = self.structure.regressors(*term_values.motion(np.stack(self.angles)))
+            # Inertia, damping and stiffness are beside what energies say.
+            found = [*rows.elements, *matrices({**dict.fromkeys(COEFFICIENTS, 0.0), **given}, self.count)]
+            found = [one for one in found if not one.is_known or one.value]
+            whole = replace(self, momenta=rows.momenta, forces=rows.forces, inertia=rows.inertia)
+            place, driven = len(rows.forces), self.measured
         for name, kind in asked.terms:
-            for mass in self.driven:
+            for mass in driven:
                 found.append(Element(f"{name}_{mass}", name, ((mass, None, place, 1.0),), kind_or_number(name, kind)))
                 place += 1
-        return found
+        return whole, found
+
+    @property
+    def channels(self) -> list[Numbers]:
+        """All that moves: angles, then momenta."""
+        return [*self.angles, *self.momenta]
+
+    def noise(
+        self, channels: Sequence[int], equations: Sequence[int], passed: _core.PassedNoise | None
+    ) -> tuple[list[float], list[float]] | None:
+        """Return the variances of the noise of some channels and torques; None where they are to be estimated.
+
+        That of momenta is not known, and smoothness says nothing of it: they are functions of smooth velocities.
+        """
+        if not self.momenta and passed is None:
+            return None
+        known = variances(self.angles, passed)
+        torques = variances([np.asarray(self.torques[one]) for one in equations], passed)
+        return [known[one] if one < len(known) else 0.0 for one in channels], torques
+
+    def on_grid(self, sampling: Sampling) -> Masses:
+        """Return the masses with their channels on a uniform grid."""
+        torques = [None if one is None else sampling.channel(one) for one in self.torques]
+        mask = None if self.mask is None else sampling.mask(self.mask)
+        return replace(self, angles=[sampling.channel(one) for one in self.angles], torques=torques, mask=mask)
 
     @property
     def measured(self) -> list[int]:
@@ -82,10 +133,10 @@ def masses_of(angle: Any, torque: Any, axis: int, structure: Any, *, mask: Any =
     TypeError
         If the structure is none.
     """
-    if structure is not None and not isinstance(structure, Chain):
+    if structure is not None and not isinstance(structure, Chain | Mechanism):
         raise TypeError(
-            f"structure must be a tvident.Chain; got {arguments.shown(structure)}; leave it out for full matrices, whose "
-            "entries are given by tvident.Matrix"
+            f"structure must be a tvident.Chain or a tvident.Mechanism; got {arguments.shown(structure)}; leave it out for full "
+            "matrices, whose entries are given by tvident.Matrix"
         )
     angles, torques = arguments.channels(angle=angle, torque=torque)
     if angles.ndim != 2 or axis not in {0, -2}:  # noqa: PLR2004 - masses and time
@@ -95,7 +146,7 @@ def masses_of(angle: Any, torque: Any, axis: int, structure: Any, *, mask: Any =
         )
     count, samples = angles.shape
     each: list[Numbers] = list(angles)
-    if structure is not None:
+    if isinstance(structure, Chain):
         if structure.masses != count:
             raise ValueError(
                 f"angle must have a row for each of {structure.masses} masses of the structure; got {count} rows; "
@@ -120,7 +171,7 @@ def masses_of(angle: Any, torque: Any, axis: int, structure: Any, *, mask: Any =
 
 def identify_masses(masses: Masses, asked: Asked, term_values: TermValues) -> MergedIdentification:
     """Identify the elements of several masses."""
-    elements = masses.elements(asked)
+    masses, elements = masses.with_elements(asked, term_values)
     if all(element.is_known for element in elements):
         raise ValueError("at least one element must be unknown; all are given; use 'windowed' or 'constant' for one")
     unknowable = unknowable_of(masses, elements)
@@ -134,25 +185,27 @@ def identify_masses(masses: Masses, asked: Asked, term_values: TermValues) -> Me
         if all(one.is_known for one in inside):
             continue
         names = dict(_terms_of(inside, elements))
-        terms = np.stack([_term(masses, name, term_values) for name in names.values()]) if names else None
+        terms = np.stack([_term(masses, *one, term_values) for one in names.items()]) if names else None
         order = {place: new for new, place in enumerate(names)}
         inside = [_renumbered(one, order) for one in inside]
         torques = np.stack([np.asarray(masses.torques[mass], np.float64) for mass in equations])
         # The angle of every equation comes first, in their order.
-        channels = [*equations, *(one for one in range(len(masses.angles)) if one not in equations)]
+        channels = [*equations, *(one for one in range(len(masses.channels)) if one not in equations)]
         inside = [_rewired(one, {channel: place for place, channel in enumerate(channels)}) for one in inside]
-        angles = np.stack([np.asarray(masses.angles[channel], np.float64) for channel in channels])
-        parts.append(asked.part([(angles, torques, terms, masses.mask, None)], inside, samples))
+        angles = np.stack([np.asarray(masses.channels[channel], np.float64) for channel in channels])
+        recorded = Equations(inside, equations, [(angles, torques, terms, masses.mask, None)])
+        parts.append(asked.part(recorded, samples, masses.noise(channels, equations, asked.sampling.passed)))
     merging = Merging(
         elements,
         parts,
-        period=asked.period,
+        sampling=asked.sampling,
         step=asked.step,
         samples=samples,
         trials=1,
         masses=masses.count,
         units=asked.units_of(elements),
         unknowable=unknowable,
+        inertia=masses.inertia,
     )
     return MergedIdentification(merging)
 
@@ -228,8 +281,10 @@ def _terms_of(inside: Sequence[Element], elements: Sequence[Element]) -> list[tu
     return [(entry[2], one.name) for one in elements if one.name in names for entry in one.entries if entry[1] is None]
 
 
-def _term(masses: Masses, name: str, term_values: TermValues) -> npt.NDArray[np.float64]:
+def _term(masses: Masses, place: int, name: str, term_values: TermValues) -> npt.NDArray[np.float64]:
     """Return a term of one mass at every sample."""
+    if place < len(masses.forces):
+        return masses.forces[place]
     term, mass = name.rsplit("_", 1)
     return term_values(term, masses.angles[int(mass)])
 

@@ -2,77 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tvident import _core
 from tvident._equation import COEFFICIENTS
 from tvident._merged import modal
-from tvident._merged.elements import Element, matrix_of
+from tvident._merged.elements import matrix_of
 from tvident._merged.heterogeneity import differences_of, excess
+from tvident._merged.merging import Identifiable, Merging, Part
+from tvident._merged.predicted import predicted
 from tvident._merged.words import summary_of, words_of
-from tvident._results import Words
+from tvident._results import Scan, Words, every_sample, scan_of
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
 from tvident._tables import Table, Tabular
 
 Array = npt.NDArray[np.float64]
 
 UNEXPLAINED_SPREAD = Status.KIND_CONTRADICTED
-
-
-@dataclass(frozen=True)
-class Identifiable:
-    """Whether something can be known, and why not. It counts as True where it can."""
-
-    identifiable: bool
-    reason: str
-
-    def __bool__(self) -> bool:
-        return self.identifiable
-
-
-@dataclass(frozen=True)
-class Part:
-    """What one call of the core found: its numbers, and the names of the elements that it was given, in order."""
-
-    found: _core.MergedIdentification
-    names: Sequence[str]
-
-
-@dataclass(frozen=True)
-class Merging:
-    """What a result is made of.
-
-    Parameters
-    ----------
-    elements : sequence of Element
-    parts : sequence of Part
-        What was found of elements that share no equation with others.
-    period : float
-        Seconds from one sample to the next.
-    step, samples, trials, masses : int
-        No masses: one equation of motion, and arrays of shape (n,).
-    units : mapping of str to str
-    phase : ndarray, shape (samples,), optional
-    unknowable : mapping of str to str
-        Why some elements cannot be known.
-    """
-
-    elements: Sequence[Element]
-    parts: Sequence[Part]
-    period: float
-    step: int
-    samples: int
-    trials: int
-    masses: int
-    units: Mapping[str, str]
-    phase: Array | None = None
-    unknowable: Mapping[str, str] = field(default_factory=dict)
 
 
 class MergedIdentification(Tabular):
@@ -136,7 +86,7 @@ class MergedIdentification(Tabular):
     def __init__(self, merging: Merging) -> None:
         self._merging = merging
         wanted = slice(None, None, merging.step)
-        self.time: Array = (np.arange(merging.samples, dtype=np.float64) * merging.period)[wanted]
+        self.time: Array = merging.sampling.times(merging.samples)[wanted]
         self.phase = None if merging.phase is None else merging.phase[wanted]
         size = self.time.size
         self.elements: dict[str, Array] = {}
@@ -153,7 +103,7 @@ class MergedIdentification(Tabular):
             self.stderr[element.name] = np.full(size, np.nan if np.isnan(value) else 0.0)
             self.kinds[element.name] = "known" if element.is_known else "constant"
         self.status = np.zeros(size, np.uint16)
-        flags = 0
+        flags = int(Status.CHANNEL_SUSPECTED) if merging.sampling.doubt else 0
         residuals = []
         for part in merging.parts:
             self._take(part, size)
@@ -162,7 +112,15 @@ class MergedIdentification(Tabular):
             residuals.append(part.found.residual)
         squares = [np.square(one) for one in residuals] or [np.full(size, np.nan)]
         self.residual_std: Array = np.sqrt(np.mean(squares, axis=0)).astype(np.float64)
-        self.jumps = tuple(sorted({one * merging.period for part in merging.parts for one in part.found.jumps}))
+        self.jumps = tuple(
+            sorted(
+                {
+                    merging.sampling.start + one * merging.sampling.period
+                    for part in merging.parts
+                    for one in part.found.jumps
+                }
+            )
+        )
         if any(factor > 1 for factor in self._scatter.values()):
             flags |= int(UNEXPLAINED_SPREAD)
         self.identifiable = self._identifiable()
@@ -242,7 +200,13 @@ class MergedIdentification(Tabular):
         return known
 
     def _patterns(self, coefficient: int) -> dict[str, Array]:
-        return matrix_of(self._merging.elements, coefficient, max(self._merging.masses, 1))
+        """Return by how much elements enter a matrix, shape (masses, masses, 1), or (masses, masses, n) where masses move that."""
+        merging = self._merging
+        fixed = matrix_of(merging.elements, coefficient, max(merging.masses, 1))
+        moving = merging.inertia if coefficient == 0 else {}
+        return {name: pattern[:, :, np.newaxis] for name, pattern in fixed.items()} | {
+            name: pattern[:, :, :: merging.step] for name, pattern in moving.items()
+        }
 
     def _coefficient(self, coefficient: int) -> Array:
         """Return inertia, damping or stiffness: an array, or matrices made of the elements."""
@@ -251,8 +215,8 @@ class MergedIdentification(Tabular):
         masses = self._merging.masses
         total = np.zeros((masses, masses, self.time.size))
         for name, pattern in self._patterns(coefficient).items():
-            rows, columns = np.nonzero(pattern)
-            total[rows, columns] += pattern[rows, columns, np.newaxis] * self.elements[name]
+            rows, columns = np.nonzero(pattern.any(axis=2))
+            total[rows, columns] += pattern[rows, columns] * self.elements[name]
         return total
 
     def _error(self, coefficient: int) -> Array:
@@ -264,8 +228,8 @@ class MergedIdentification(Tabular):
         for (one, other), values in covariances.items():
             if one in patterns and other in patterns:
                 both = patterns[one] * patterns[other] * (1.0 if one == other else 2.0)
-                rows, columns = np.nonzero(both)
-                variance[rows, columns] += both[rows, columns, np.newaxis] * values
+                rows, columns = np.nonzero(both.any(axis=2))
+                variance[rows, columns] += both[rows, columns] * values
         return np.sqrt(np.maximum(variance, 0))
 
     @property
@@ -281,8 +245,19 @@ class MergedIdentification(Tabular):
 
     @cached_property
     def modes(self) -> modal.Modes:
-        """Natural frequencies, damping ratios and shapes over time, each mode followed by its pole and shape."""
+        """Natural frequencies, damping ratios and shapes over time, each mode followed by its pole and shape.
+
+        Raises
+        ------
+        ValueError
+            If the equations of a mechanism are not linear in its motion.
+        """
         merging = self._merging
+        if merging.inertia:
+            raise ValueError(
+                "modes are those of linear equations; got a Mechanism, whose inertia moves with it; describe its motion around a "
+                "position by a Chain or by matrices"
+            )
         masses = max(merging.masses, 1)
         patterns = [matrix_of(merging.elements, coefficient, masses) for coefficient in range(3)]
         names = [one.name for one in merging.elements if any(one.name in pattern for pattern in patterns)]
@@ -294,6 +269,37 @@ class MergedIdentification(Tabular):
         times = modal.times_of(self.time.size)
         covariances = {pair: values[times] for pair, values in self._covariances.items()}
         return modal.modes_of(elements, modal.shared(names, covariances, times.size), times, self.time.size)
+
+    def scan(self, part: int = 0) -> Scan:
+        """Return estimates by the width of the test function, which tell whether equations of every scale agree.
+
+        Parameters
+        ----------
+        part : int, optional
+            Which of the groups of equations that share no unknown with others; mostly there is one.
+
+        Returns
+        -------
+        Scan
+            Estimates, errors and the band in Hz of every width; ``summary()`` and ``plot()`` show them.
+
+        Raises
+        ------
+        ValueError
+            If widths were not compared: something may change with time, or the width was given.
+        IndexError
+            If there is no such part.
+        """
+        parts = self._merging.parts
+        if not -len(parts) <= part < len(parts):
+            raise IndexError(f"part must be below {len(parts)}, the number of groups of equations; got {part}")
+        found = parts[part].found.scan
+        if not found.tried:
+            raise ValueError(
+                "widths of the test function are compared where all unknowns are 'constant' and the width is not given; got kinds that "
+                "may change with time, or a window_length; ask for constants and leave it out"
+            )
+        return replace(scan_of(found, parts[part].names), units=self.units)
 
     @property
     def natural_frequency(self) -> Array:
@@ -307,9 +313,47 @@ class MergedIdentification(Tabular):
         found = self.modes.damping_ratio
         return found if self._merging.masses else found[0]
 
+    def predicted_torque(self, trial: int = 0) -> tuple[Array, Array, Array]:
+        """Return the recorded torques, and those that the identified equations predict from the recorded motion.
+
+        Both are averages over the test function, in which the noise of derivatives is small. Costs about 0.1 µs a sample and channel.
+
+        Parameters
+        ----------
+        trial : int, optional
+            Which of the trials.
+
+        Returns
+        -------
+        time : ndarray, shape (m,)
+            Seconds, for every sample of the trial.
+        recorded, predicted : ndarray, shape (m,) for trials, (masses, m) for masses
+            N m. NaN near the ends, near what is missing, and for masses of which nothing can be known.
+
+        Raises
+        ------
+        IndexError
+            If there is no such trial.
+        """
+        merging = self._merging
+        if not -merging.trials <= trial < merging.trials:
+            raise IndexError(f"trial must be below {merging.trials}, the number of trials; got {trial}")
+        values = {name: every_sample(one, merging.samples, merging.step) for name, one in self.elements.items()}
+        both: Array | None = None
+        for part in merging.parts:
+            form = (part.found.window_length, part.found.exponent)
+            found = predicted(part.equations, trial, values, form, merging.sampling.period)
+            if both is None:
+                both = np.full((2, max(merging.masses, 1), found[0].shape[1]), np.nan)
+            both[:, list(part.equations.numbers)] = found
+        if both is None:
+            both = np.full((2, max(merging.masses, 1), merging.samples), np.nan)
+        recorded, expected = both if merging.masses else both[:, 0]
+        return merging.sampling.times(both.shape[2]), recorded, expected
+
     @cached_property
     def _words(self) -> Words:
-        return words_of(self, [part.found for part in self._merging.parts], self._scatter)
+        return words_of(self, self._merging.sampling, [part.found for part in self._merging.parts], self._scatter)
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -347,7 +391,7 @@ class MergedIdentification(Tabular):
         of = [part.found for part in merging.parts]
         return {
             "form": "weak",
-            "sample_rate": 1 / merging.period,
+            "sample_rate": 1 / merging.sampling.period,
             "trials": merging.trials,
             "masses": merging.masses or 1,
             "kinds": dict(self.kinds),
@@ -357,6 +401,7 @@ class MergedIdentification(Tabular):
             "noise": [list(map(list, one.noise)) for one in of],
             "prediction_error": [one.prediction_error for one in of],
             "step": merging.step,
+            **merging.sampling.settings,
         }
 
     def __repr__(self) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident._merged.sampling import Sampling
 from tvident._units import scaled
 
 Numbers = npt.NDArray[np.number]
@@ -47,6 +48,22 @@ class Trials:
             [scaled(one, by) for one in each] for each, by in ((self.angles, angle), (self.torques, torque))
         )
         return replace(self, angles=angles, torques=torques)
+
+    def on_grid(self, sampling: Sampling) -> Trials:
+        """Return the trials with their channels on a uniform grid.
+
+        Raises
+        ------
+        ValueError
+            If times are not those of every trial.
+        """
+        if self.positions is not None or len({one.size for one in self.angles}) > 1:
+            raise ValueError(
+                "t must be uniform beside phase=, and beside trials of different lengths; got steps that scatter; resample each trial"
+            )
+        angles, torques = ([sampling.channel(one) for one in each] for each in (self.angles, self.torques))
+        masks = None if self.masks is None else [sampling.mask(one) for one in self.masks]
+        return replace(self, angles=angles, torques=torques, masks=masks, samples=angles[0].size)
 
 
 def trials_of(angle: Any, torque: Any, axis: int, *, phase: Any = None, mask: Any = None) -> Trials:

@@ -10,38 +10,35 @@ import numpy as np
 from tvident import _core
 from tvident._arguments import own_digits, to_digits_of
 from tvident._files import aligned
+from tvident._merged.sampling import Sampling
 from tvident._results import Words
 from tvident._status import Status, describe
 
 _MOST = 20
 """Sentences of a kind that a summary shows."""
 
+_DOUBTS = {
+    Status.SCALES_DISAGREE: "test functions of different widths disagree: the equations do not hold at all frequencies, so do not trust "
+    "the numbers; look at scan(), for a term that is missing, a lag or noise that one channel gets from the other",
+    Status.NOISE_MODEL: "the equations leave more than the noise of the channels explains: a term may be missing, a channel may be late "
+    "or coupled in another way",
+    Status.KIND_CONTRADICTED: "an element that is taken as constant differs between parts of the record: give it the kind 'windowed'",
+}
 
-def words_of(  # noqa: C901 - one branch a sentence
-    result: Any, found: Sequence[_core.MergedIdentification], scatter: Mapping[str, float]
+
+def words_of(
+    result: Any, sampling: Sampling, found: Sequence[_core.MergedIdentification], scatter: Mapping[str, float]
 ) -> Words:
     """Return reasons and advice."""
-    reasons, advice = [], []
+    reasons, advice = ([one] if one else [] for one in (sampling.words, sampling.doubt))
     for one in found:
-        reasons.append(
-            f"the test function has {one.window_length} samples and exponent {one.exponent}; rows are predicted with "
-            f"{one.prediction_error:.2f} times the variance of the channels' noise"
-        )
-        if one.lengths:
-            best = min(one.lengths, key=lambda length: length[1])
-            reasons.append(f"windows of {best[0]} samples predict best, of {len(one.lengths)} lengths that were tried")
-        if one.record_status & Status.NOISE_MODEL:
-            advice.append(
-                "the equations leave more than the noise of the channels explains: a term may be missing, a channel may be late or coupled "
-                "in another way"
-            )
-        if one.record_status & Status.KIND_CONTRADICTED:
-            advice.append(
-                "an element that is taken as constant differs between parts of the record: give it the kind 'windowed'"
-            )
+        reasons += _reasons_of(one)
+        advice += [words for flag, words in _DOUBTS.items() if one.record_status & flag]
     for name, probability in result.tests.items():
         kind = result.kinds[name]
-        if kind == "constant":
+        if kind == "constant" and probability < _core.NO_CHANCE:
+            reasons.append(f"{name} is taken as constant, though parts of the record differ (p = {probability:.2g})")
+        elif kind == "constant":
             reasons.append(f"{name} is constant: parts of the record differ as chance allows (p = {probability:.2g})")
         elif kind == "windowed":
             reasons.append(f"{name} is followed in windows, since parts of the record differ (p = {probability:.2g})")
@@ -57,6 +54,23 @@ def words_of(  # noqa: C901 - one branch a sentence
         if not verdict:
             advice.append(f"{name} cannot be known: {verdict.reason}")
     return Words(tuple(dict.fromkeys(reasons)), tuple(dict.fromkeys(advice)))
+
+
+def _reasons_of(one: _core.MergedIdentification) -> list[str]:
+    """Return what was chosen for equations that share unknowns."""
+    function = f"the test function has {one.window_length} samples and exponent {one.exponent}"
+    reasons = [
+        f"{function}; rows are predicted with {one.prediction_error:.2f} times the variance of the channels' noise"
+    ]
+    if one.scan.plateau is not None:
+        first, last = (one.scan.window_length[place] for place in one.scan.plateau)
+        reasons.append(
+            f"test functions of {first} to {last} samples agree, of {one.scan.tried} widths that were compared"
+        )
+    if one.lengths:
+        best = min(one.lengths, key=lambda length: length[1])
+        reasons.append(f"windows of {best[0]} samples predict best, of {len(one.lengths)} lengths that were tried")
+    return reasons
 
 
 @np.errstate(all="ignore")

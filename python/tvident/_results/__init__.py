@@ -7,9 +7,11 @@ from tvident._results.loaded import load
 from tvident._results.parts import chosen, of_records, settings_of
 from tvident._results.recorded import Recorded
 from tvident._results.records import IdentifiedRecords, Shared, covariance_between, with_shared
+from tvident._results.response import accounted_for, every_sample
 from tvident._results.result import Identification
-from tvident._results.scan import Scan
+from tvident._results.scan import Scan, scan_of
 from tvident._results.simulated import predicted_at_samples
+from tvident._results.torque import correlated_with, kernels_of, touched_by
 from tvident._results.words import Words, of_batch
 
 __all__ = [
@@ -21,14 +23,20 @@ __all__ = [
     "Scan",
     "Shared",
     "Words",
+    "accounted_for",
     "chosen",
+    "correlated_with",
     "covariance_between",
+    "every_sample",
     "explained_steps",
+    "kernels_of",
     "load",
     "of_batch",
     "of_powers",
     "of_records",
     "predicted_at_samples",
+    "scan_of",
     "settings_of",
+    "touched_by",
     "with_shared",
 ]

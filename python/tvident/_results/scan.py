@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from tvident import _core
+
 Array = npt.NDArray[np.float64]
 
 
@@ -117,3 +119,21 @@ class Scan:
         from tvident import _figures  # noqa: PLC0415 - matplotlib is optional
 
         return _figures.plot_scan(self, ax)
+
+
+def scan_of(found: _core.Scan, names: Sequence[str]) -> Scan:
+    """Return estimates by the width of the test function, by name."""
+    shape = (len(found.window_length), len(found.unknowns))
+    values, errors = np.array(found.values).reshape(shape), np.array(found.stderr).reshape(shape)
+    called = [names[place] for place in found.unknowns]
+    length = np.array(found.window_length, dtype=np.int64)
+    plateau = None if found.plateau is None else (int(length[found.plateau[0]]), int(length[found.plateau[1]]))
+    return Scan(
+        window_length=length,
+        band=np.array(found.band),
+        estimates={name: values[:, place] for place, name in enumerate(called)},
+        stderr={name: errors[:, place] for place, name in enumerate(called)},
+        plateau=plateau,
+        corrected=found.corrected,
+        moved=found.moved,
+    )

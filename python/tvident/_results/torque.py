@@ -55,16 +55,13 @@ def compared(
         missing = ~np.isfinite(angle)
         return on_time, np.where(missing, np.nan, _sum(model, (smooth, velocity, acceleration), lambda values: values))
     half = settings["window_length"] // 2
-    kernels = _kernels(half, settings["exponent"], model.period)
+    kernels = kernels_of(half, settings["exponent"], model.period)
     missing = ~(np.isfinite(angle) & np.isfinite(on_time))
-    touched = np.ones(angle.size, bool)
-    if angle.size > 2 * half:
-        count = np.concatenate([[0], np.cumsum(missing)])
-        touched[half : angle.size - half] = count[2 * half + 1 :] - count[: -2 * half - 1] > 0
+    touched = touched_by(missing, half)
     filled = np.where(missing, 0.0, angle)
-    acceleration, velocity, smooth = _correlated(filled, kernels)
-    predicted = _sum(model, (smooth, velocity, acceleration), lambda values: _correlated(values, kernels[2:])[0])
-    (measured,) = _correlated(np.where(missing, 0.0, on_time), kernels[2:])
+    acceleration, velocity, smooth = correlated_with(filled, kernels)
+    predicted = _sum(model, (smooth, velocity, acceleration), lambda values: correlated_with(values, kernels[2:])[0])
+    (measured,) = correlated_with(np.where(missing, 0.0, on_time), kernels[2:])
     return np.where(touched, np.nan, measured), np.where(touched, np.nan, predicted)
 
 
@@ -98,7 +95,16 @@ def _where_known(values: npt.NDArray[np.number], averaged: Callable[[Array], Arr
     return np.where(np.abs(averaged(missing.astype(np.float64))) > _TOUCHED, np.nan, found)
 
 
-def _kernels(half: int, exponent: float, period: float) -> Array:
+def touched_by(missing: npt.NDArray[np.bool_], half: int) -> npt.NDArray[np.bool_]:
+    """Return around which samples a test function does not fit, or touches a sample that is missing."""
+    touched = np.ones(missing.size, bool)
+    if missing.size > 2 * half:
+        count = np.concatenate([[0], np.cumsum(missing)])
+        touched[half : missing.size - half] = count[2 * half + 1 :] - count[: -2 * half - 1] > 0
+    return touched
+
+
+def kernels_of(half: int, exponent: float, period: float) -> Array:
     """Return φ″, -φ′ and φ at the samples, of which φ sums to one, and only φ leaves a constant."""
     u = np.arange(-half, half + 1) / half
     phi = Polynomial([1, 0, -1]) ** int(exponent)
@@ -107,7 +113,7 @@ def _kernels(half: int, exponent: float, period: float) -> Array:
     return np.asarray(rows + np.outer(np.array([0.0, 0.0, 1.0]) - rows.sum(axis=1), rows[2]))
 
 
-def _correlated(values: Array, kernels: Array) -> Array:
+def correlated_with(values: Array, kernels: Array) -> Array:
     """Return the sums of samples around each one, weighted by each kernel; zero where they do not fit. By overlap-save."""
     width = kernels.shape[1]
     result = np.zeros((len(kernels), values.size))

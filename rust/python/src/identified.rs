@@ -53,7 +53,7 @@ pub(crate) struct Scan {
 }
 
 impl Scan {
-    fn new(py: Python<'_>, found: &FoundScan) -> PyResult<Py<Self>> {
+    pub(crate) fn new(py: Python<'_>, found: &FoundScan) -> PyResult<Py<Self>> {
         let scales = || found.scales.iter();
         Py::new(
             py,

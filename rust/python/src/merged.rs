@@ -14,7 +14,7 @@ use tvident::identify::{
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
-use crate::identified::{kind, name};
+use crate::identified::{Scan, kind, name};
 use crate::records::{StridedSamples, flags, records};
 use crate::watch::watched;
 
@@ -48,6 +48,7 @@ pub(crate) struct MergedIdentification {
     status: Py<PyArray1<u16>>,
     record_status: u16,
     jumps: Vec<usize>,
+    scan: Py<Scan>,
 }
 
 /// One trial: angles, torques and terms, one of each a row, a mask, and positions in the result.
@@ -199,5 +200,6 @@ pub(crate) fn identify_merged<'py>(
         status: PyArray1::from_vec(py, found.status).unbind(),
         record_status: found.record_status.bits(),
         jumps: found.jumps,
+        scan: Scan::new(py, &found.scan)?,
     })
 }

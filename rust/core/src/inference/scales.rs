@@ -6,6 +6,7 @@
 //! but only along a range: the widest test functions may be wrong for other reasons).
 
 use crate::regression::block_fit::BlockFit;
+use crate::weak_form::test_function::TestFunction;
 
 /// Estimates agree that differ by no more than so many standard errors, the smaller of the two.
 const AGREE: f64 = 2.0;
@@ -30,8 +31,8 @@ pub struct AtScale {
 }
 
 impl AtScale {
-    pub(crate) fn new(half_width: usize, band: f64, fit: BlockFit) -> Self {
-        Self { half_width, band, values: fit.values, errors: fit.errors }
+    pub(crate) fn new(function: &TestFunction, fit: BlockFit) -> Self {
+        Self { half_width: function.half_width(), band: function.band(), errors: fit.errors(), values: fit.values }
     }
 
     fn window_length(&self) -> f64 {

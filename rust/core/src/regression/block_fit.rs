@@ -28,7 +28,16 @@ const SPREAD_BESIDE_WINDOWED: f64 = 5.0;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct BlockFit {
     pub(crate) values: Vec<f64>,
-    pub(crate) errors: Vec<f64>,
+    /// Their covariance, row by row.
+    pub(crate) covariance: Vec<f64>,
+}
+
+impl BlockFit {
+    /// Standard errors.
+    pub(crate) fn errors(&self) -> Vec<f64> {
+        let count = self.values.len();
+        (0..count).map(|i| self.covariance[i * (count + 1)].sqrt()).collect()
+    }
 }
 
 /// The rows of one block, as products of their columns: windowed unknowns and their growth in turns, constants, the right-hand side.
@@ -212,10 +221,14 @@ pub(crate) fn fit_in_blocks(
         let spread = if first == 0 { SPREAD } else { SPREAD_BESIDE_WINDOWED };
         let few = used < (ROWS_OF_AN_UNKNOWN * unknowns) as f64;
         let fit = if few || !is_spread(&parts, constants, spread) { None } else { solve(&parts, constants, lags) };
-        let unscaled = |(i, value): (usize, f64)| value * scale[count - 1] / scale[first + i];
-        fit.map(|(values, errors)| BlockFit {
-            values: values.into_iter().enumerate().map(unscaled).collect(),
-            errors: errors.into_iter().enumerate().map(unscaled).collect(),
+        let unscaled = |i: usize| scale[count - 1] / scale[first + i];
+        fit.map(|(values, covariance)| BlockFit {
+            values: values.into_iter().enumerate().map(|(i, value)| value * unscaled(i)).collect(),
+            covariance: covariance
+                .into_iter()
+                .enumerate()
+                .map(|(place, value)| value * unscaled(place / constants) * unscaled(place % constants))
+                .collect(),
         })
     };
     noises.iter().map(fit).collect()
@@ -273,7 +286,7 @@ fn is_spread(parts: &[Vec<f64>], constants: usize, least: f64) -> bool {
     })
 }
 
-/// Solves the products that are left of all blocks for the constants, and gives their standard errors.
+/// Solves the products that are left of all blocks for the constants, and gives their covariance.
 fn solve(parts: &[Vec<f64>], constants: usize, lags: usize) -> Option<(Vec<f64>, Vec<f64>)> {
     let size = constants + 1;
     let told = parts.iter().filter(|part| part.iter().any(|&value| value != 0.0)).count();
@@ -294,13 +307,19 @@ fn solve(parts: &[Vec<f64>], constants: usize, lags: usize) -> Option<(Vec<f64>,
     };
     let pulls: Vec<Vec<f64>> = parts.iter().map(pull).collect();
     let few = told as f64 / (told - 1) as f64;
-    let variance = |i: usize| {
-        let of = |lag: usize| pulls.iter().zip(&pulls[lag..]).map(|(a, b)| a[i] * b[i]).sum::<f64>();
-        let weight = |lag: usize| 2.0 * (1.0 - lag as f64 / (lags + 1) as f64);
-        few * (of(0) + (1..=lags).map(|lag| weight(lag) * of(lag)).sum::<f64>()).max(of(0))
+    let weighted = |i: usize, j: usize| {
+        let of = |lag: usize| pulls.iter().zip(&pulls[lag..]).map(|(a, b)| a[i] * b[j] + b[i] * a[j]).sum::<f64>();
+        let weight = |lag: usize| 1.0 - lag as f64 / (lags + 1) as f64;
+        [0.5 * of(0), (1..=lags).map(|lag| weight(lag) * of(lag)).sum::<f64>()]
     };
-    let errors = (0..constants).map(|i| variance(i).sqrt()).collect();
-    Some((solution, errors))
+    // Neighbours may make an error larger, not smaller: what they seem to share is then chance.
+    let larger: Vec<bool> = (0..constants).map(|i| weighted(i, i)[1] > 0.0).collect();
+    let entry = |i: usize, j: usize| {
+        let [alone, shared] = weighted(i, j);
+        few * if larger[i] && larger[j] { alone + shared } else { alone }
+    };
+    let covariance = (0..constants * constants).map(|place| entry(place / constants, place % constants)).collect();
+    Some((solution, covariance))
 }
 
 #[cfg(test)]
@@ -318,7 +337,7 @@ mod tests {
     fn constants_beside_what_grows_linearly_in_every_block_are_exact() {
         let rows = rows(WHOLE, |time| [1.0 + 0.1 * time, 0.1], 0.0);
         let fit = fit_in_blocks(&rows, &model(), &[0.0], &blocks(20), 1).remove(0).unwrap();
-        for (place, (value, error)) in fit.values.iter().zip(&fit.errors).enumerate() {
+        for (place, (value, error)) in fit.values.iter().zip(&fit.errors()).enumerate() {
             assert_near(*value, CONSTANTS[place], 1e-8);
             assert!(*error < 1e-8);
         }
@@ -328,7 +347,7 @@ mod tests {
     fn errors_are_as_large_as_the_noise_makes_them() {
         let rows = rows(WHOLE, |time| [1.0 + 0.1 * time, 0.1], 0.3);
         let fit = fit_in_blocks(&rows, &model(), &[0.0], &blocks(20), 1).remove(0).unwrap();
-        for (place, (value, error)) in fit.values.iter().zip(&fit.errors).enumerate() {
+        for (place, (value, error)) in fit.values.iter().zip(&fit.errors()).enumerate() {
             assert!((value - CONSTANTS[place]).abs() < 4.0 * error && *error > 0.0);
         }
     }

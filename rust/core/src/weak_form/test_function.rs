@@ -82,6 +82,13 @@ impl TestFunction {
         2 * self.half_width + 1
     }
 
+    /// Where half the power passes, in hertz: the function is nearly a bell, `(1 - x²)^p ≈ exp(-p x²)`.
+    #[must_use]
+    pub fn band(&self) -> f64 {
+        let seconds = self.half_width as f64 * self.delta;
+        (2.0 * self.exponent as f64 * std::f64::consts::LN_2).sqrt() / (2.0 * std::f64::consts::PI * seconds)
+    }
+
     /// Samples from one row to the next that carry all the information of every row: from half their rate on the
     /// spectrum of `φ″` is below a hundredth of its largest value, for exponents from 5 to 12.
     #[must_use]

@@ -12,8 +12,6 @@ use crate::weak_form::test_function_choice::{Candidates, Evidence, half_widths, 
 
 /// Rounds of choosing the test function and estimating what the choice depends on.
 const ROUNDS: usize = 6;
-/// Exponent of the test function before one is chosen.
-const EXPONENT: usize = 9;
 
 /// Variances of the noise of every angle and of every torque: means over the trials.
 pub(crate) fn noise_of(session: &mut MergedSession<'_, '_, '_>) -> Result<[Vec<f64>; 2], Error> {
@@ -40,10 +38,22 @@ pub(crate) fn noise_of(session: &mut MergedSession<'_, '_, '_>) -> Result<[Vec<f
 impl MergedSession<'_, '_, '_> {
     /// Chooses half-width and exponent where they are not given, and builds the rows.
     pub(crate) fn choose(&mut self) -> Result<(), Error> {
+        if self.options.window_length.is_some() || !self.asks_for_constants() {
+            return self.choose_by_spectra();
+        }
+        if !self.spectra_tell() {
+            return self.onto_plateau(None);
+        }
+        self.choose_by_spectra()?;
+        self.onto_plateau(Some(self.all.function))
+    }
+
+    /// Chooses them by the spectra of the angles.
+    fn choose_by_spectra(&mut self) -> Result<(), Error> {
         let delta = self.options.delta;
         let width = self.options.window_length.map(|length| length / 2);
         let longest = self.merged.trials.iter().map(|trial| trial.angles[0].len()).max().unwrap_or(0);
-        let widest = longest.min(self.merged.samples) / 16;
+        let widest = self.longest() / 16;
         let length = spectrum_length(longest, 200);
         let periods = (0..self.merged.equations()).map(|one| Ok(self.evidence(one, length)?.period()));
         let periods = periods.collect::<Result<Vec<f64>, Error>>()?;
@@ -66,7 +76,7 @@ impl MergedSession<'_, '_, '_> {
             }
         }
         let start = width.unwrap_or_else(|| typical.min(widest));
-        let mut current = TestFunction::new(start, self.options.exponent.unwrap_or(EXPONENT), delta)?;
+        let mut current = TestFunction::new(start, self.exponent(), delta)?;
         let mut seen = Vec::new();
         loop {
             self.build(current)?;

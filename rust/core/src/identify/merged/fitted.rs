@@ -11,6 +11,7 @@ use crate::inference::cross_validation::{Validated, best, validate};
 use crate::inference::jumps::jump::Jump;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
+use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
 use crate::regression::problem::Correlated;
 use crate::regression::residuals::residuals;
@@ -206,6 +207,10 @@ impl MergedSession<'_, '_, '_> {
 
     /// Whether each constant is the same in all parts of the record.
     fn tests(&mut self, fitted: &MergedFit) -> Result<Vec<Option<Test>>, Error> {
+        if self.asks_for_constants() && fitted.error > NOISE_MODEL_FAILS {
+            // By how much constants may differ is not known where the noise that is left is not.
+            return Ok(vec![None; fitted.model.constant.len()]);
+        }
         let rows = &self.all.rows;
         let problem = fitted.model.problem(rows, &rows.rhs, 1.0, Some(&fitted.correlated));
         let noise = TestNoise {

@@ -8,14 +8,13 @@ use crate::exec::stages::Stages;
 use crate::identify::merged::choice::noise_of;
 use crate::identify::merged::found::MergedFound;
 use crate::identify::merged::interleaved::{Interleaved, Weights};
-use crate::identify::merged::session::MergedSession;
+use crate::identify::merged::session::{EXPONENT, MergedSession};
 use crate::identify::merged::system::{Merged, MergedOptions};
+use crate::identify::weak::scanned::Scan;
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 
 /// Stages of a call, about: only for showing progress.
 const STAGES: usize = 60;
-/// Exponent of the test function that rows are made for before one is chosen.
-const EXPONENT: usize = 9;
 
 /// Identifies what trials and masses share, in weak form.
 ///
@@ -40,6 +39,7 @@ pub fn identify_merged(
         all,
         trials,
         at_end: false,
+        scan: Scan::default(),
         jumps: Vec::new(),
         whole: None,
         stages,

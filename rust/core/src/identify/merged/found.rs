@@ -1,7 +1,8 @@
 //! What is found of merged rows.
 
 use crate::identify::kinds::Kind;
-use crate::identify::results::SampleResults;
+use crate::identify::results::{Constant, SampleResults};
+use crate::identify::weak::scanned::Scan;
 use crate::inference::constancy::Test;
 use crate::status::Status;
 
@@ -59,9 +60,19 @@ pub struct MergedFound {
     pub record_status: Status,
     /// Samples before which windowed elements jump.
     pub jumps: Vec<usize>,
+    /// Estimates by the width of the test function; empty where something is windowed or the width was given.
+    pub scan: Scan,
 }
 
 impl MergedFound {
+    /// Elements that are constants.
+    pub(crate) fn constants_found(&self) -> Vec<Constant> {
+        let constants = self.elements.iter().filter(|one| one.kind == Kind::Constant);
+        constants
+            .map(|one| Constant { unknown: one.element, value: one.values[0], error: one.stderr[0], test: None })
+            .collect()
+    }
+
     /// Takes the numbers at the samples.
     pub(crate) fn take(&mut self, windowed: &[usize], mut results: SampleResults) {
         for (place, &element) in windowed.iter().enumerate() {

@@ -7,6 +7,7 @@ pub(crate) mod found;
 pub(crate) mod interleaved;
 pub(crate) mod jumps;
 pub(crate) mod report;
+pub(crate) mod scan;
 pub(crate) mod session;
 pub(crate) mod spread;
 pub(crate) mod system;

@@ -6,6 +6,7 @@ use crate::identify::merged::fitted::MergedFit;
 use crate::identify::merged::found::{FoundElement, MergedFound};
 use crate::identify::merged::session::MergedSession;
 use crate::identify::results::{RowResults, SampleResults};
+use crate::identify::weak::scanned::Scan;
 use crate::inference::identifiability::is_mostly_noise;
 use crate::inference::window_averaging::{Averages, average};
 use crate::regression::constants::weakest;
@@ -36,6 +37,11 @@ impl MergedSession<'_, '_, '_> {
         let mut covariance = fit.covariance(&problem, &fitted.covariance, &mut self.stages)?;
         for entry in &mut covariance {
             *entry *= inflation;
+        }
+        // What the noise of the channels does not explain may be correlated in any way.
+        if model.windowed.is_empty() && fitted.error > NOISE_MODEL_FAILS {
+            let of_blocks = self.in_blocks(model, &[1.0]).pop().flatten();
+            covariance = of_blocks.map_or(covariance, |fit| fit.covariance);
         }
         let weakest = weakest(&fit.full, &fit.pooled.weights);
         let mostly_noise = is_mostly_noise(&problem, rows, model, fit, &weakest, 1.0, &mut self.stages)?;
@@ -69,6 +75,8 @@ impl MergedSession<'_, '_, '_> {
         ] {
             found.record_status |= if holds { flag } else { Status::GOOD };
         }
+        found.scan = std::mem::take(&mut self.scan);
+        found.record_status |= found.scan.status(&found.constants_found());
         let deviation = self.deviation(fitted)?;
         let ([first, stride], period) = (self.all.samples(), self.all.rows.period);
         let results = RowResults {
@@ -237,6 +245,7 @@ impl MergedSession<'_, '_, '_> {
             status: Vec::new(),
             record_status: Status::GOOD,
             jumps: Vec::new(),
+            scan: Scan::default(),
         }
     }
 

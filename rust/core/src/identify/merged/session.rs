@@ -6,6 +6,7 @@ use crate::exec::stages::Stages;
 use crate::identify::kinds::Kind;
 use crate::identify::merged::interleaved::{Channels, Interleaved, Weights};
 use crate::identify::merged::system::{Entry, Merged, MergedOptions, Multiplied};
+use crate::identify::weak::scanned::Scan;
 use crate::inference::jumps::jump::Jump;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
@@ -14,6 +15,8 @@ use crate::regression::row_covariance::RowCovariance;
 use crate::regression::window_length::Scale;
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 
+/// Exponent of the test function before one is chosen.
+pub(crate) const EXPONENT: usize = 9;
 /// Half-widths of the test function that windows span while it is chosen.
 const PILOT_WINDOW: usize = 4;
 /// Fits with the weights that the last one gives.
@@ -34,6 +37,8 @@ pub(crate) struct MergedSession<'a, 'b, 'c> {
     pub(crate) trials: Vec<Channels>,
     /// Whether the narrowest or widest test function was chosen of all that were tried.
     pub(crate) at_end: bool,
+    /// Estimates by the width of the test function; empty where something is windowed or the width was given.
+    pub(crate) scan: Scan,
     /// Where windowed elements jump, and all rows where some are left out for that.
     pub(crate) jumps: Vec<Jump>,
     pub(crate) whole: Option<Rows>,
@@ -193,9 +198,19 @@ impl MergedSession<'_, '_, '_> {
         (known, expected)
     }
 
+    /// Samples of the longest trial.
+    pub(crate) fn longest(&self) -> usize {
+        let longest = self.merged.trials.iter().map(|trial| trial.angles[0].len()).max().unwrap_or(0);
+        longest.min(self.merged.samples)
+    }
+
+    /// The exponent that is asked for, or that rows are made with before one is chosen.
+    pub(crate) fn exponent(&self) -> usize {
+        self.options.exponent.unwrap_or(EXPONENT)
+    }
+
     pub(crate) fn too_short(&self) -> Error {
-        let samples = self.merged.trials.iter().map(|trial| trial.angles[0].len()).max().unwrap_or(0);
-        let samples = samples.min(self.merged.samples);
+        let samples = self.longest();
         Error::RecordTooShortForWindows { samples, least: (16 * LEAST_HALF_WIDTH).max(samples + 1) }
     }
 }

@@ -5,9 +5,9 @@ use std::ops::Range;
 use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::identify::weak::choice::Chosen;
-use crate::identify::weak::scanned::Scan;
+use crate::identify::weak::scanned::{BLOCKS, LONGER, Scan, Scans, wider};
 use crate::identify::weak::session::Session;
-use crate::inference::scales::{AtScale, plateau};
+use crate::inference::scales::AtScale;
 use crate::regression::block_fit::fit_in_blocks;
 use crate::regression::model::Model;
 use crate::regression::subsample::stretches_of_blocks;
@@ -15,55 +15,14 @@ use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 use crate::weak_form::test_function_choice::spectrum_length;
 use crate::weak_form::weak_rows::WeakRows;
 
-/// From one half-width to the next.
-const STEP: f64 = 1.25;
 /// The exponent where none is given.
 const EXPONENT: usize = 9;
-/// Blocks of a record, or of a stretch, without windowed unknowns.
-const BLOCKS: usize = 40;
 /// Typical cycles of the motion that blocks last in which windowed unknowns grow linearly, and the fewest blocks.
 const CYCLES: [f64; 3] = [3.0, 6.0, 12.0];
 const FEWEST_BLOCKS: usize = 8;
-/// A plateau counts as longer than another from this factor on.
-const LONGER: f64 = 1.05;
 /// Samples of a long record that are scanned, in so many stretches.
 const MOST_SAMPLES: usize = 1 << 17;
 const STRETCHES: usize = 8;
-/// The estimate of the test function that was chosen contradicts the plateau beyond so many standard errors, the smaller of the two.
-const CONTRADICTS: f64 = 3.0;
-/// Fewer widths than this show no plateau.
-const FEWEST_WIDTHS: usize = 4;
-
-/// What a scan found with the correction for noise and without.
-pub(crate) struct Scans {
-    pub(crate) best: Scan,
-    /// With the correction that the chosen test function is used with.
-    pub(crate) corrected: Scan,
-}
-
-impl Scans {
-    /// The half-width to believe where another one lies off the plateau: a little wider than its narrowest, which is the first that its
-    /// errors cannot tell from the others. A wider one that agrees may stay.
-    fn believed(&self, half_width: usize) -> Option<usize> {
-        let plateau = self.best.believable()?;
-        let (place, _) = self.corrected.nearest(half_width)?;
-        let on_its_own = self.corrected.believable().is_some_and(|own| own.holds(place));
-        if on_its_own || place > plateau.last && !self.contradict(half_width) {
-            return None;
-        }
-        self.best.inside()
-    }
-
-    /// Whether a half-width, corrected for noise, contradicts the plateau.
-    fn contradict(&self, half_width: usize) -> bool {
-        let (Some(believed), Some((place, chosen))) = (self.best.narrowest(), self.corrected.nearest(half_width))
-        else {
-            return false;
-        };
-        let on_its_own = self.corrected.believable().is_some_and(|own| own.holds(place));
-        !on_its_own && !believed.agrees(chosen, CONTRADICTS)
-    }
-}
 
 impl Session<'_, '_, '_> {
     /// Scans the widths unless that was done, moves to the plateau where the test function that the spectra suggest is off it, and on to wider ones where
@@ -157,15 +116,13 @@ impl Session<'_, '_, '_> {
                     scan.tried += 1;
                 }
                 for (scan, fit) in scans.iter_mut().zip(fits) {
-                    scan.scales.extend(fit.map(|fit| AtScale::new(half, band(&function), fit)));
+                    scan.scales.extend(fit.map(|fit| AtScale::new(&function, fit)));
                 }
             }
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the record's length")]
-            let next = (half as f64 * STEP).round() as usize;
-            half = next.max(half + 1);
+            half = wider(half);
         }
         for scan in scans.iter_mut().flatten() {
-            scan.plateau = plateau(&scan.scales).filter(|_| scan.scales.len() >= FEWEST_WIDTHS);
+            scan.find_plateau();
         }
         let mut best: Option<Scan> = None;
         let mut corrected: Option<Scan> = None;
@@ -233,10 +190,4 @@ fn blocks(weak: &WeakRows, stretches: &[Range<usize>], length: Option<f64>) -> V
         (0..count).map(|index| at(index)..at(index + 1)).collect()
     };
     stretches.iter().flat_map(part).collect()
-}
-
-/// Where half the power passes a test function, which is nearly a bell: `(1 - x²)^p ≈ exp(-p x²)`.
-fn band(function: &TestFunction) -> f64 {
-    let seconds = function.half_width() as f64 * function.delta();
-    (2.0 * function.exponent() as f64 * std::f64::consts::LN_2).sqrt() / (2.0 * std::f64::consts::PI * seconds)
 }

@@ -1,9 +1,19 @@
 //! What a scan of the test function's width found, and what it says of a result.
 
 use crate::identify::results::Constant;
-use crate::inference::scales::{AtScale, LEAST_PLATEAU, Plateau};
+use crate::inference::scales::{AtScale, LEAST_PLATEAU, Plateau, plateau};
 use crate::status::Status;
 
+/// From one half-width to the next.
+const STEP: f64 = 1.25;
+/// Blocks of a record, or of a stretch, without windowed unknowns.
+pub(crate) const BLOCKS: usize = 40;
+/// The estimate of the test function that was chosen contradicts the plateau beyond so many standard errors, the smaller of the two.
+const CONTRADICTS: f64 = 3.0;
+/// Fewer widths than this show no plateau.
+const FEWEST_WIDTHS: usize = 4;
+/// A plateau counts as longer than another from this factor on.
+pub(crate) const LONGER: f64 = 1.05;
 /// How much wider than its narrowest a test function on the plateau is, at most.
 const MARGIN: f64 = 1.5;
 /// A constant is another one than the plateau's beyond so many standard errors of both.
@@ -30,7 +40,19 @@ pub struct Scan {
     pub moved: bool,
 }
 
+/// The half-width that is tried after one.
+pub(crate) fn wider(half: usize) -> usize {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the record's length")]
+    let next = (half as f64 * STEP).round() as usize;
+    next.max(half + 1)
+}
+
 impl Scan {
+    /// Looks for widths that agree, among enough of them.
+    pub(crate) fn find_plateau(&mut self) {
+        self.plateau = plateau(&self.scales).filter(|_| self.scales.len() >= FEWEST_WIDTHS);
+    }
+
     /// By what factor widths that agree differ.
     pub(crate) fn factor(&self) -> f64 {
         self.plateau.map_or(1.0, |plateau| plateau.factor(&self.scales))
@@ -79,5 +101,42 @@ impl Scan {
 
     pub(crate) fn nearest(&self, half_width: usize) -> Option<(usize, &AtScale)> {
         self.scales.iter().enumerate().min_by_key(|(_, one)| one.half_width.abs_diff(half_width))
+    }
+}
+
+/// What a scan found with the correction for noise and without.
+pub(crate) struct Scans {
+    pub(crate) best: Scan,
+    /// With the correction that the chosen test function is used with.
+    pub(crate) corrected: Scan,
+}
+
+impl Scans {
+    /// Of scans with the correction for noise and without, the longer plateau; that with the correction where they are as long.
+    pub(crate) fn of([corrected, plain]: [Scan; 2]) -> Self {
+        let best = if plain.factor() > LONGER * corrected.factor() { plain } else { corrected.clone() };
+        Self { best, corrected }
+    }
+
+    /// The half-width to believe where another one lies off the plateau: a little wider than its narrowest, which is the first that its
+    /// errors cannot tell from the others. A wider one that agrees may stay.
+    pub(crate) fn believed(&self, half_width: usize) -> Option<usize> {
+        let plateau = self.best.believable()?;
+        let (place, _) = self.corrected.nearest(half_width)?;
+        let on_its_own = self.corrected.believable().is_some_and(|own| own.holds(place));
+        if on_its_own || place > plateau.last && !self.contradict(half_width) {
+            return None;
+        }
+        self.best.inside()
+    }
+
+    /// Whether a half-width, corrected for noise, contradicts the plateau.
+    pub(crate) fn contradict(&self, half_width: usize) -> bool {
+        let (Some(believed), Some((place, chosen))) = (self.best.narrowest(), self.corrected.nearest(half_width))
+        else {
+            return false;
+        };
+        let on_its_own = self.corrected.believable().is_some_and(|own| own.holds(place));
+        !on_its_own && !believed.agrees(chosen, CONTRADICTS)
     }
 }

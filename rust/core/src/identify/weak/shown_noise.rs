@@ -8,7 +8,7 @@
 use crate::error::Error;
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
-use crate::identify::weak::scan::Scans;
+use crate::identify::weak::scanned::Scans;
 use crate::identify::weak::session::Session;
 use crate::inference::cross_validation::left_of_rows;
 use crate::regression::constants::Expected;

@@ -1,0 +1,74 @@
+"""What a result of trials or masses is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _core
+from tvident._merged.elements import Element
+from tvident._merged.predicted import Equations
+from tvident._merged.sampling import Sampling
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Identifiable:
+    """Whether something can be known, and why not. It counts as True where it can."""
+
+    identifiable: bool
+    reason: str
+
+    def __bool__(self) -> bool:
+        return self.identifiable
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one call of the core found, and what it was given."""
+
+    found: _core.MergedIdentification
+    equations: Equations
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Names of the elements, in order."""
+        return [element.name for element in self.equations.elements]
+
+
+@dataclass(frozen=True)
+class Merging:
+    """What a result is made of.
+
+    Parameters
+    ----------
+    elements : sequence of Element
+    parts : sequence of Part
+        What was found of elements that share no equation with others.
+    sampling : Sampling
+        When samples were taken.
+    step, samples, trials, masses : int
+        No masses: one equation of motion, and arrays of shape (n,).
+    units : mapping of str to str
+    phase : ndarray, shape (samples,), optional
+    unknowable : mapping of str to str
+        Why some elements cannot be known.
+    inertia : mapping of str to ndarray, shape (masses, masses, samples)
+        By how much factors of a mechanism enter the matrix of inertia along the motion.
+    """
+
+    elements: Sequence[Element]
+    parts: Sequence[Part]
+    sampling: Sampling
+    step: int
+    samples: int
+    trials: int
+    masses: int
+    units: Mapping[str, str]
+    phase: Array | None = None
+    unknowable: Mapping[str, str] = field(default_factory=dict)
+    inertia: Mapping[str, Array] = field(default_factory=dict)

@@ -1,0 +1,86 @@
+"""When samples were taken: at a uniform rate, or at times that had to be brought onto a uniform grid."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _core
+from tvident._clocks import Clock, Grid, clock_of
+
+Numbers = npt.NDArray[np.number]
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """When the samples of channels were taken.
+
+    Parameters
+    ----------
+    period : float
+        Seconds from one sample to the next.
+    start : float
+        Time of the first sample in seconds.
+    clock : Clock, optional
+        How channels are brought onto a grid; None where they are not.
+    passed : PassedNoise, optional
+        What that makes of white noise.
+    workers : int, optional
+    """
+
+    period: float
+    start: float = 0.0
+    clock: Clock | None = None
+    passed: _core.PassedNoise | None = None
+    workers: int | None = None
+
+    @classmethod
+    def of_grid(
+        cls, grid: Grid, angles: Sequence[Numbers], torques: Sequence[Numbers], workers: int | None
+    ) -> Sampling:
+        """Return how channels whose times are not uniform are brought onto a grid."""
+        channels = {"angle": np.stack(angles), "torque": np.stack(torques)}
+        clock = clock_of(grid, channels, None, workers)
+        passed = clock.evened(channels, propagate=False, workers=workers).passed
+        return cls(clock.period, grid.start, clock, passed, workers)
+
+    @property
+    def doubt(self) -> str:
+        """What is wrong with the times; empty where nothing is."""
+        return "" if self.clock is None else self.clock.doubt
+
+    @property
+    def words(self) -> str:
+        """What was done; empty where nothing was."""
+        return "" if self.clock is None else self.clock.words
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What settings keep."""
+        return {} if self.clock is None else self.clock.settings
+
+    def times(self, samples: int) -> npt.NDArray[np.float64]:
+        """Return the times of samples in seconds."""
+        return self.start + self.period * np.arange(samples, dtype=np.float64)
+
+    def channel(self, values: Numbers) -> Numbers:
+        """Return a channel on the grid."""
+        if self.clock is None:
+            return values
+        return self.clock.evened({"": values}, propagate=False, workers=self.workers).channels[""]
+
+    def mask(self, mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+        """Return where on the grid the samples on both sides may be used."""
+        if self.clock is None:
+            return mask
+        found = self.clock.evened({}, propagate=False, workers=self.workers).mask(mask)
+        return mask if found is None else found
+
+
+def variances(channels: Sequence[Numbers], passed: _core.PassedNoise | None) -> list[float]:
+    """Return the variance of the noise of every channel."""
+    return [one.sigma**2 for channel in channels for one in _core.noise(np.asarray(channel), None, passed)]
