@@ -47,8 +47,7 @@ def assert_same_bits(found: tvident.dask.DaskIdentification, whole: tvident.Iden
     (columns,) = da.compute(dict(found.columns))
     for name, values in columns.items():
         assert values.tobytes() == np.ascontiguousarray(expected[name]).tobytes(), name
-    # How much windows of the whole record scatter is not among the settings of blocks.
-    assert found.settings == {name: one for name, one in whole.settings.items() if name != "stderr_factors"}
+    assert found.settings == whole.settings
     assert np.array_equal(found.time.compute(), whole.time)
 
 
@@ -134,6 +133,7 @@ def test_the_weak_form_finds_what_one_call_finds(rig: tvident.Recording, client:
     whole = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
     angle, torque = (chunked(one, 20_000) for one in (rig.angle, rig.torque))
     found = tvident.dask.identify(angle, torque, sample_rate=1000, settings=whole.settings)
+    assert found.settings == whole.settings
     for name, (value, error) in whole.constants.items():
         # Neighbours of blocks count twice, and noise is known of each block by itself: two good estimates of one value.
         assert abs(found.constants[name][0] - value) < MOST_DIFFERENCE * error, name

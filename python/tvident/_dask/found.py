@@ -27,7 +27,7 @@ class DaskIdentification:
     record_status : int, or ndarray of uint16 in the shape of the batch
         Flags of whole records. Asking computes them.
     settings : dict
-        What was given; in weak form what stretches chose is computed with the rest.
+        What was given and chosen, as those of a result: ``settings=`` of another call repeats it. Asking computes what the record says.
     units : dict of str to str
 
     See Also
@@ -49,9 +49,13 @@ class DaskIdentification:
 
     time: Any
     columns: Mapping[str, Any] = field(repr=False)
-    settings: Mapping[str, Any]
+    chosen: Any = field(repr=False)
     units: Mapping[str, str]
     told: Any = field(repr=False)
+
+    @cached_property
+    def settings(self) -> dict[str, Any]:
+        return dict(self.chosen.compute())
 
     @property
     def inertia(self) -> Any:

@@ -125,12 +125,21 @@ def identify(
     time = array.arange(0, samples, every, chunks=max(samples // every, 1), dtype=float) * period
     units = UNITS if axis.system is ROTARY else LINEAR_UNITS
     return DaskIdentification(
-        time, columns, each[0].settings, units, dask.delayed(_of_batch)([one.told for one in each], batch)
+        time,
+        columns,
+        dask.delayed(_of_first, pure=True)(each[0].settings, alone=not batch),
+        units,
+        dask.delayed(_of_batch)([one.told for one in each], batch),
     )
 
 
 def _scaled(samples: Any, factor: float) -> Any:
     return samples if factor == 1 else samples.astype(float) * factor
+
+
+def _of_first(settings: Mapping[str, Any], *, alone: bool) -> dict[str, Any]:
+    """Return the settings of a batch: standard errors of windows have factors of their own in every record."""
+    return {name: one for name, one in settings.items() if alone or name != "stderr_factors"}
 
 
 def _of_batch(each: Sequence[tuple[Mapping[str, tuple[float, float]], int]], batch: tuple[int, ...]) -> Any:

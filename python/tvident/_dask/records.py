@@ -43,13 +43,13 @@ class Identified:
     Parameters
     ----------
     columns : mapping of str to dask.array.Array
-    settings : mapping
+    settings : mapping or Delayed
     told : Delayed
         Constants by name, and the flags of the record.
     """
 
     columns: Mapping[str, Any]
-    settings: Mapping[str, Any]
+    settings: Any
     told: Any
 
 
@@ -126,7 +126,8 @@ def _windowed(record: _Record) -> Identified:
     for block in found:
         span = plain.around(block)
         parts.append(work(*record.held([span]), (span, block), factors, asked, record.quantisation))
-    return Identified(record.columns(parts, found), plain.settings(), dask.delayed(({}, 0)))
+    settings = dask.delayed(_with_factors, pure=True)(factors, asked, record.quantisation)
+    return Identified(record.columns(parts, found), settings, dask.delayed(({}, 0)))
 
 
 def _reach(plain: Long, samples: int) -> int:
@@ -136,6 +137,10 @@ def _reach(plain: Long, samples: int) -> int:
 
 def _factors(angle: Any, torque: Any, spans: Sequence[Span], asked: _Asked, quantisation: float) -> list[float]:
     return asked.long(quantisation).factors(_held(angle, torque, spans), 1)
+
+
+def _with_factors(factors: Sequence[float], asked: _Asked, quantisation: float) -> dict[str, Any]:
+    return asked.long(quantisation).settings(factors)
 
 
 def _held(angle: Any, torque: Any, spans: Sequence[Span]) -> Held:
@@ -232,7 +237,7 @@ def _alone(record: _Record) -> Identified:
     means = dask.delayed(means_of, pure=True)(notes)
     columns = record.columns([finish(part, means) for part in parts], found)
     told = dask.delayed(_told, pure=True)(notes, means, choices)
-    settings = given.settings or {"method": asked.request.name, "step": asked.step, "sample_rate": 1 / given.period}
+    settings = dask.delayed(_settings, pure=True)(notes if choices is None else [], choices)
     return Identified(columns, settings, told)
 
 
@@ -248,7 +253,13 @@ def _block_alone(
     span, block = places
     settings = None if choices is None else choices.settings
     result = given.identified(_held(angle, torque, [span]), chosen=settings, step=step)
-    return part_alone(result, span, block, step)
+    columns, note = part_alone(result, span, block, step)
+    return columns, note if choices is not None else note | {"settings": result.settings}
+
+
+def _settings(notes: Sequence[Mapping[str, Any]], choices: Choices | None) -> dict[str, Any]:
+    """Return what was chosen for all blocks, or else by the only one."""
+    return dict(notes[0]["settings"] if choices is None else choices.settings)
 
 
 def _listed(part: tuple[Columns, dict[str, Any]]) -> list[dict[str, Any]]:

@@ -68,7 +68,7 @@ class _NothingFound:
 @dataclass(frozen=True)
 class _Kind:
     kind: str
-    factor: None = None
+    factor: float | None = None
 
 
 def requested(
@@ -164,12 +164,14 @@ class Long(Task):
             held.angle, step=self._step, part=(wanted, held.spans[0], self._samples), workers=1
         )
 
-    def settings(self) -> dict[str, Any]:
-        """Return inputs and choices of the strong form, as those of a result."""
+    def settings(self, factors: Sequence[float] | None = None) -> dict[str, Any]:
+        """Return inputs and choices of the strong form, as those of a result, with factors of standard errors where they are known."""
         form = self._request.form
         length = self._length("window_length", form.window_length, least=SHORTEST_WINDOW)
         rows = arguments.window_length("regression_window", form.regression_window, self._data.period, odd=False)
-        kinds = [_Kind("constant" if one.kind == "auto" else one.kind) for one in self._unknowns]
+        known = factors if factors is not None else [None] * len(self._unknowns)
+        each = zip(self._unknowns, known, strict=True)
+        kinds = [_Kind("constant" if one.kind == "auto" else one.kind, factor) for one, factor in each]
         found: Any = _NothingFound(length, rows, kinds)
         return plain(self._settings([found], Searched({})))
 

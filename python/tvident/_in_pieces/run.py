@@ -124,7 +124,9 @@ class Run:
                 self._kept.note_fact("factors", long.factors(held, asked.given.workers))
             alone = None if asked.given.nan_policy == "propagate" else asked.in_pieces(None)
             factors = self._kept.facts["factors"]
-            return long.settings(), Windows(asked.recording, long, factors, alone, asked.step, asked.given.workers)
+            return long.settings(factors), Windows(
+                asked.recording, long, factors, alone, asked.step, asked.given.workers
+            )
         if long is not None:
             return long.settings(), asked.in_pieces(None)
         if len(self._pieces) == 1:
