@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tvident import _core
+from tvident._advice.events import lost_samples
 from tvident._advice.lists import listed
 from tvident._equation import BUILT_IN, COEFFICIENTS, UNITS
 from tvident._results import Words
@@ -90,6 +91,7 @@ class Explained:
             self._noise(),
             self._test_function(),
             *self._scales(),
+            *lost_samples(self.found),
             *self._rest(),
             *self._lag(),
             *self._angle_zero(),
@@ -176,6 +178,8 @@ class Explained:
     def _defects(self) -> list[str]:
         words = []
         for channel, defect, amount in self.found.defects:
+            if defect == "broken":
+                continue
             name = ("angle", "torque", "velocity", "acceleration")[channel]
             if defect == "clipped":
                 cure = (

@@ -38,6 +38,8 @@ pub enum Defect {
     Held(usize),
     /// The angle jumps by so much.
     Wrapped(f64),
+    /// The angle jumps between two samples at so many places, where samples were lost.
+    Broken(usize),
 }
 
 impl Defect {
@@ -48,16 +50,23 @@ impl Defect {
             Self::Clipped(_) => "clipped",
             Self::Held(_) => "held",
             Self::Wrapped(_) => "wrapped",
+            Self::Broken(_) => "broken",
         }
     }
 
-    /// How much of it there is: a part of the samples, samples or the angle's unit.
+    /// Whether the channel is doubtful: what is broken is left out of the equations.
     #[must_use]
-    #[allow(clippy::cast_precision_loss, reason = "a few samples")]
+    pub fn is_doubtful(&self) -> bool {
+        !matches!(self, Self::Broken(_))
+    }
+
+    /// How much of it there is: a part of the samples, samples, the angle's unit or places.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss, reason = "a few samples or places")]
     pub fn amount(&self) -> f64 {
         match *self {
             Self::Clipped(amount) | Self::Wrapped(amount) => amount,
-            Self::Held(samples) => samples as f64,
+            Self::Held(count) | Self::Broken(count) => count as f64,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The noise of a channel: its variance, its colour, its quantisation and its spectrum.
 
+pub(crate) mod breaks;
 pub(crate) mod channel;
 pub(crate) mod coherence;
 pub(crate) mod colour;

@@ -2,7 +2,7 @@
 
 use std::num::NonZeroUsize;
 
-use crate::equation::motion::{Motion, Term};
+use crate::equation::motion::{Measured, Motion, Term};
 use crate::equation::terms::{BuiltInTerm, TermFunction};
 use crate::error::Error;
 use crate::exec::pool::{Piece, Watch};
@@ -14,6 +14,7 @@ use crate::identify::weak::options::WeakOptions;
 use crate::identify::weak::scanned::Scan;
 use crate::identify::weak::session::Session;
 use crate::identify::weak::torque_jumps::without_jumps;
+use crate::noise::breaks::search::{Broken, breaks};
 use crate::noise::channel::variance_after;
 use crate::noise::defects::{Defect, defects};
 use crate::noise::passed::PassedNoise;
@@ -38,26 +39,41 @@ pub(crate) fn identify_weak(
     watch: &mut Watch<'_>,
 ) -> Result<WeakIdentified, Error> {
     let lag = options.lag.unwrap_or(0.0);
-    with_record(motion, (mask, lag), (options.delta, options.instructions), (workers, watch), |record, watch| {
-        let jumping: Vec<_> = motion.terms.iter().zip(&record.terms).filter_map(jumping).collect();
-        let calm = without_jumps(record.torque, &jumping);
-        identify(record, (calm.as_deref(), motion.measured.passed), options, workers, watch)
-    })
-    .map(|(found, resting)| {
-        let [angle, rates @ ..] = motion.measured.channels;
-        let mut defects = vec![
-            if rates.iter().all(Option::is_none) {
-                defects(motion.angle)
-            } else {
-                angle.map_or_else(Vec::new, defects)
-            },
-            defects_of_torque(motion.torque),
-        ];
-        defects.extend(rates.map(|rate| rate.map_or_else(Vec::new, defects_of_rate)));
-        let suspected =
-            if defects.iter().any(|defects| !defects.is_empty()) { Status::CHANNEL_SUSPECTED } else { Status::GOOD };
+    let mut defects = defects_of_motion(motion);
+    let places = lost_samples(motion, &defects, watch)?;
+    let (angle, torque) =
+        (Broken { channel: motion.angle, places: &places }, Broken { channel: motion.torque, places: &places });
+    let whole =
+        if places.is_empty() { None } else { Some(Motion { angle: &angle, torque: &torque, ..motion.clone() }) };
+    let motion = whole.as_ref().unwrap_or(motion);
+    let found =
+        with_record(motion, (mask, lag), (options.delta, options.instructions), (workers, watch), |record, watch| {
+            let jumping: Vec<_> = motion.terms.iter().zip(&record.terms).filter_map(jumping).collect();
+            let calm = without_jumps(record.torque, &jumping);
+            identify(record, (calm.as_deref(), motion.measured.passed), options, workers, watch)
+        });
+    found.map(|(found, resting)| {
+        defects[0].extend((!places.is_empty()).then_some(Defect::Broken(places.len())));
+        let doubtful = defects.iter().flatten().any(Defect::is_doubtful);
+        let suspected = if doubtful { Status::CHANNEL_SUSPECTED } else { Status::GOOD };
         WeakIdentified { record_status: found.record_status | suspected, resting, defects, ..found }
     })
+}
+
+/// What was done to every channel: angle and torque, then velocity and acceleration.
+fn defects_of_motion(motion: &Motion<'_>) -> Vec<Vec<Defect>> {
+    let [angle, rates @ ..] = motion.measured.channels;
+    let of_angle =
+        if rates.iter().all(Option::is_none) { defects(motion.angle) } else { angle.map_or_else(Vec::new, defects) };
+    let rates = rates.map(|rate| rate.map_or_else(Vec::new, defects_of_rate));
+    [of_angle, defects_of_torque(motion.torque)].into_iter().chain(rates).collect()
+}
+
+/// The samples before which some were lost: only of an angle that was measured alone and uniformly, and as it was recorded otherwise.
+fn lost_samples(motion: &Motion<'_>, defects: &[Vec<Defect>], watch: &mut Watch<'_>) -> Result<Vec<usize>, Error> {
+    let Measured { channels: [_, rates @ ..], passed, .. } = motion.measured;
+    let alone = rates.iter().all(Option::is_none) && passed[0].is_none();
+    if alone && defects[0].is_empty() { breaks(motion.angle, watch) } else { Ok(Vec::new()) }
 }
 
 /// Does something with the record that a motion is, its terms evaluated at every sample, and says which part of it rests.
