@@ -66,7 +66,10 @@ def _settings() -> Iterator[dict[str, Any]]:
 
 
 def _identify(recording: tvident.Recording, **options: Any) -> tvident.Identification:
-    return tvident.identify(recording.angle, recording.torque, sample_rate=recording.sample_rate, workers=1, **options)
+    found: tvident.Identification = tvident.identify(
+        recording.angle, recording.torque, sample_rate=recording.sample_rate, workers=1, **options
+    )
+    return found
 
 
 def _parameters(found: tvident.Identification) -> dict[str, Any]:

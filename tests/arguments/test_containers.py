@@ -27,7 +27,8 @@ UTC = DATES.tz_convert(None).to_numpy()
 
 
 def identified(angle: Any, torque: Any, **options: Any) -> tvident.Identification:
-    return tvident.identify(angle, torque, **({"sample_rate": 1000} | GIVEN | options))
+    found: tvident.Identification = tvident.identify(angle, torque, **({"sample_rate": 1000} | GIVEN | options))
+    return found
 
 
 def matlab(values: Any) -> Any:

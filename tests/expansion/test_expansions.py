@@ -26,7 +26,8 @@ def short() -> tvident.Recording:
 
 
 def identify(rig: tvident.Recording, **given: Any) -> tvident.Identification:
-    return tvident.identify(rig.angle, rig.torque, sample_rate=1000, **{**CONSTANT, **given})
+    found: tvident.Identification = tvident.identify(rig.angle, rig.torque, sample_rate=1000, **{**CONSTANT, **given})
+    return found
 
 
 def error(result: tvident.Identification, rig: tvident.Recording) -> float:

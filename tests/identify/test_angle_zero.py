@@ -31,7 +31,10 @@ def rig(seed: int, pattern: Pattern = "slider") -> tvident.Recording:
 def identified(seed: int, zero: float, pattern: Pattern = "slider", **more: Any) -> tvident.Identification:
     """Identify a record whose encoder reads so many root mean squares of the angle where the spring is relaxed."""
     record = rig(seed, pattern)
-    return tvident.identify(record.angle + zero * record.angle.std(), record.torque, sample_rate=1000, **more)
+    found: tvident.Identification = tvident.identify(
+        record.angle + zero * record.angle.std(), record.torque, sample_rate=1000, **more
+    )
+    return found
 
 
 def off(result: tvident.Identification, seed: int, zero: float) -> float:

@@ -44,7 +44,8 @@ def identify(angle: Any, torque: Any, form: str, **more: Any) -> tvident.Identif
         assert (~np.isnan(result.stderr[name]) | invalid).all(), name
     if result.inertia.ndim == 1:
         assert result.summary()
-    return result
+    found: tvident.Identification = result
+    return found
 
 
 def error(result: tvident.Identification, rig: tvident.Recording, where: Any = slice(None)) -> float:

@@ -74,4 +74,4 @@ def test_records_that_determine_nothing_and_other_forms_have_a_loss_too() -> Non
     squares = tvident.identify(rig.angle, torque, sample_rate=rig.sample_rate, method="paper")
     assert errors(paper, rig)[1] < errors(squares, rig)[1]
     with pytest.raises(ValueError, match=r"loss must be"):
-        tvident.identify(rig.angle, torque, sample_rate=rig.sample_rate, loss="cauchy")  # type: ignore[arg-type]
+        tvident.identify(rig.angle, torque, sample_rate=rig.sample_rate, loss="cauchy")  # type: ignore[call-overload]

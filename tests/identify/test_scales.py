@@ -26,7 +26,8 @@ def rig(seed: int = 0, seconds: float = 20.0, angle_noise: float = 1e-3) -> tvid
 
 def identified(recorded: tvident.Recording, angle: Array | None = None, **call: Any) -> tvident.Identification:
     angle = recorded.angle if angle is None else angle
-    return tvident.identify(angle, recorded.torque, sample_rate=RATE, **call)
+    found: tvident.Identification = tvident.identify(angle, recorded.torque, sample_rate=RATE, **call)
+    return found
 
 
 def hum(recorded: tvident.Recording, part: float = 0.01) -> Array:
@@ -163,9 +164,10 @@ def test_rest_says_nothing_of_friction(seed: int) -> None:
 
 
 def constants(angle: Array, torque: Array, rate: float, **call: Any) -> tvident.Identification:
-    return tvident.identify(
+    found: tvident.Identification = tvident.identify(
         angle, torque, sample_rate=rate, inertia="constant", damping="constant", stiffness=0, **call
     )
+    return found
 
 
 def recording(folder: Path, name: str) -> dict[str, Array]:

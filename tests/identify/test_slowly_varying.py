@@ -36,7 +36,8 @@ def identified(
     )
     angle = rig.angle + angle_noise * rig.angle.std() * noise[0]
     torque = rig.torque + 0.1 * rig.torque.std() * noise[1]
-    return tvident.identify(angle, torque, sample_rate=1000, step=STEP, **call)
+    found: tvident.Identification = tvident.identify(angle, torque, sample_rate=1000, step=STEP, **call)
+    return found
 
 
 @pytest.mark.parametrize(

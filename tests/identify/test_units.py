@@ -79,7 +79,7 @@ def test_units_that_cannot_be_meant_are_refused(units: dict[str, Any], message: 
     with pytest.raises(ValueError, match=message):
         tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, **units)
     with pytest.raises(TypeError, match="angle_unit must be text"):
-        tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, angle_unit=1)  # type: ignore[arg-type]
+        tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, angle_unit=1)  # type: ignore[call-overload]
 
 
 def advice(angle: Any, torque: Any, **call: Any) -> str:

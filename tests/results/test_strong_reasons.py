@@ -19,7 +19,8 @@ RIG = tvident.simulate_torsional_rig(8.0)
 
 
 def paper(angle: Array, torque: Array, **call: Any) -> tvident.Identification:
-    return tvident.identify(angle, torque, sample_rate=1000, **calls.paper(**call))
+    found: tvident.Identification = tvident.identify(angle, torque, sample_rate=1000, **calls.paper(**call))
+    return found
 
 
 def advice(result: tvident.Identification) -> str:

@@ -35,7 +35,8 @@ def followed(result: tvident.Identification, angle: Any, torque: Any) -> tvident
     call = re.search(r": (?:try|give) (.*?)(?:;|$)", line)
     assert call, line
     options: dict[str, Any] = eval(f"dict({call[1]})")  # noqa: S307 - what a user types
-    return tvident.identify(angle, torque, sample_rate=RATE, **options)
+    found: tvident.Identification = tvident.identify(angle, torque, sample_rate=RATE, **options)
+    return found
 
 
 @pytest.mark.parametrize("seed", [2, 3])

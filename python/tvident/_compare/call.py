@@ -129,7 +129,7 @@ def _richest_of_the_determined(
     """
     first: Identification | None = None
     for call in sorted(calls.values(), key=lambda call: -len(call.get("terms") or ())):
-        found = identify(angle, torque, **{**common, **call, "method": common["method"]})
+        found: Identification = identify(angle, torque, **{**common, **call, "method": common["method"]})
         if not Status(int(found.record_status)) & (Status.RANK_DEFICIENT | Status.ILL_CONDITIONED):
             return found
         first = first or found

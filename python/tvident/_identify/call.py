@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, Literal, cast
+from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._clocks import Grid, grid_of
-from tvident._equation import LINEAR_UNITS, UNITS, GivenTerm, Parameter
+from tvident._equation import LINEAR_UNITS, UNITS, GivenTerm
 from tvident._identify.aligned import Align
 from tvident._identify.channels import motion_channels
 from tvident._identify.data import Data
@@ -25,11 +25,41 @@ from tvident._identify.settings import Request, resolve
 from tvident._identify.signals import Signals, with_own_step
 from tvident._identify.task import Task
 from tvident._identify.together import Options, identify_together, sampled
-from tvident._merged import Chain, Mechanism
-from tvident._results import Identification
+from tvident._identify.typed import Entries, OfMasses, OfOne
+from tvident._merged import Chain, Mechanism, MergedIdentification
+from tvident._results import Identification, IdentifiedRecords
 from tvident._units import ROTARY, Axis, axis_of, factor_between, scaled, unit_said
 
 
+@overload
+def identify(
+    angle: npt.ArrayLike,
+    torque: npt.ArrayLike,
+    *,
+    dof_axis: int,
+    structure: Chain | Mechanism | None = None,
+    **options: Unpack[OfMasses],
+) -> MergedIdentification: ...
+@overload
+def identify(
+    angle: npt.ArrayLike,
+    torque: npt.ArrayLike,
+    *,
+    ensemble_axis: int,
+    phase: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None,
+    **options: Unpack[OfOne],
+) -> MergedIdentification: ...
+@overload
+def identify(
+    angle: npt.ArrayLike,
+    torque: npt.ArrayLike,
+    *,
+    share: str | Sequence[str],
+    **options: Unpack[OfOne],
+) -> IdentifiedRecords: ...
+# Lists of records are IdentifiedRecords where lengths differ, which types do not say.
+@overload
+def identify(angle: npt.ArrayLike | None, torque: npt.ArrayLike, **options: Unpack[OfOne]) -> Identification: ...
 # All but the data are options, as users call it.
 def identify(
     angle: npt.ArrayLike | None,
@@ -42,9 +72,9 @@ def identify(
     torque_unit: str | None = None,
     time_unit: str | None = None,
     method: Method = "auto",
-    inertia: Parameter | None = None,
-    damping: Parameter | None = None,
-    stiffness: Parameter | None = None,
+    inertia: Entries = None,
+    damping: Entries = None,
+    stiffness: Entries = None,
     terms: Sequence[GivenTerm] | None = None,
     velocity: npt.ArrayLike | None = None,
     acceleration: npt.ArrayLike | None = None,
@@ -65,7 +95,7 @@ def identify(
     settings: Mapping[str, Any] | None = None,
     workers: int | None = None,
     progress: arguments.Progress = None,
-) -> Identification:
+) -> Identification | IdentifiedRecords | MergedIdentification:
     r"""Identify I(t), C(t) and K(t) in I θ̈ + C θ̇ + K θ = T from a recorded angle and torque.
 
     The torque is that which acts *on* the system, positive in the direction of a positive angle: a spring that pulls back has K > 0. The
@@ -259,12 +289,11 @@ def identify(
     """
     call = {name: value for name, value in locals().items() if name != "share"}
     together = Options.of({**call, "share": share})
-    # A type for each would ask everyone who identifies one record which it is.
     if together.is_asked:
-        return cast("Identification", identify_together(angle, torque, together))
+        return identify_together(angle, torque, together)
     records = calls_of_records(call, names := names_shared(share))
     if records is not None:
-        return cast("Identification", identify_records(identify, records, names, progress))
+        return identify_records(identify, records, names, progress)
     motion = {"angle": angle, "velocity": velocity, "acceleration": acceleration}
     measured = _measured(motion)
     first = next(iter(measured.values()))

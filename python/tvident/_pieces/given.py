@@ -54,7 +54,7 @@ class Given:
             equation = {} if settings is None else equation
             method, settings = "auto" if isinstance(method, WeakForm) else method, chosen
         units: dict[str, Any] = {} if self.axis.system is ROTARY else {"angle_unit": "m", "torque_unit": "N"}
-        return identify(
+        found: Identification = identify(
             held.angle,
             held.torque,
             delta=self.period,
@@ -67,3 +67,4 @@ class Given:
             **units,
             **equation,
         )
+        return found
