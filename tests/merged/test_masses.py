@@ -97,6 +97,9 @@ def test_one_spring_of_a_chain_is_followed(masses: int, most: float) -> None:
     inside = np.abs(found.elements["stiffness_base_0"] - simulated.stiffness[0]) < 2 * found.stderr["stiffness_base_0"]
     assert inside.mean() > 0.8
     assert all(found.identifiable.values())
+    # The torques' noise, averaged over the test function, is the rest.
+    assert found.held_back().predicted.shape == (masses,)
+    assert (found.held_back().predicted > 99).all()
 
 
 def test_modes_are_those_of_the_matrices_and_keep_their_names() -> None:
@@ -133,6 +136,7 @@ def test_what_cannot_be_known_is_said_and_no_number() -> None:
     assert "independent forces" in full.identifiable["stiffness_0_0"].reason
     assert np.isnan(full.stiffness).all()
     assert not full.trusted.any()
+    assert "is not known" in full.summary().splitlines()[0]
     driven = chain([constant(12.0), constant(18.0)], 6000, seed=7)
     torque = driven.torque.copy()
     torque[1] = np.nan

@@ -59,6 +59,8 @@ def test_a_double_pendulum_has_the_factors_that_it_was_made_with(seed: int) -> N
     assert scan.plateau[0] <= found.settings["window_length"][0] <= scan.plateau[1] > 2 * scan.plateau[0]
     assert not found.record_status & tvident.Status.SCALES_DISAGREE
     assert (explained(found) > 0.99).all()
+    assert (found.held_back().predicted > 99).all()
+    assert found.summary().startswith("explains 99")
     A, I2, h = (simulated.factors[name] for name in ("A", "I2", "h"))
     bent = np.cos(np.interp(found.time, simulated.time, simulated.angle[1]))
     moving = [[A + I2 + 2 * h * bent, I2 + h * bent], [I2 + h * bent, np.full(bent.size, I2)]]

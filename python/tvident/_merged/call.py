@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -82,7 +82,9 @@ class Asked:
             workers=self.workers,
             progress=self.report,
         )
-        return Part(found, equations)
+        form = {name: getattr(found, name) for name in self.form}
+        again = replace(self, form=form, report=None)
+        return Part(found, equations, lambda others: again.part(others, samples, noise or found.noise))
 
     def units_of(self, elements: Sequence[Element]) -> dict[str, str]:
         """Return the units of everything by name."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,10 +29,11 @@ class Identifiable:
 
 @dataclass(frozen=True)
 class Part:
-    """What one call of the core found, and what it was given."""
+    """What one call of the core found, what it was given, and how it is done once more, with what was chosen, for other samples."""
 
     found: _core.MergedIdentification
     equations: Equations
+    again: Callable[[Equations], Part]
 
     @property
     def names(self) -> Sequence[str]:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from tvident._equation import COEFFICIENTS
 from tvident._merged import modal
 from tvident._merged.elements import matrix_of
+from tvident._merged.held_back import HeldBackTorque, held_back
 from tvident._merged.heterogeneity import differences_of, excess
 from tvident._merged.merging import Identifiable, Merging, Part
 from tvident._merged.predicted import predicted
@@ -350,6 +351,23 @@ class MergedIdentification(Tabular):
             both = np.full((2, max(merging.masses, 1), merging.samples), np.nan)
         recorded, expected = both if merging.masses else both[:, 0]
         return merging.sampling.times(both.shape[2]), recorded, expected
+
+    @cached_property
+    def _held_back(self) -> HeldBackTorque:
+        return held_back(self._merging)
+
+    def held_back(self) -> HeldBackTorque:
+        """Return how much of the torques the equations explain in parts that they are not fitted to: the last tenth of every tenth.
+
+        They are identified once more without these samples, with the settings of this result, when it is asked for first, by
+        :meth:`summary` too. Elements that change are interpolated between the other parts.
+
+        Returns
+        -------
+        HeldBackTorque
+            ``predicted``: percent of the variance of every torque, as averages over the test function; ``words()`` says it.
+        """
+        return self._held_back
 
     @cached_property
     def _words(self) -> Words:

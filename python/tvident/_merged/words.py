@@ -89,6 +89,8 @@ def summary_of(result: Any) -> str:
     s = result.settings
     seconds = float(result.time[-1]) if result.time.size else 0.0
     lines = [
+        result.held_back().words(),
+        "",
         f"{s['trials']} trials of {s['masses']} masses, {result.time.size} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz",
         "",
     ]

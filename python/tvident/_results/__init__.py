@@ -3,11 +3,12 @@
 from tvident._results.curve import ExpandedParameter, of_powers
 from tvident._results.estimates import Estimates
 from tvident._results.explained import explained_steps
+from tvident._results.held_back import parts_of, percent, where_held_back
 from tvident._results.loaded import load
 from tvident._results.parts import chosen, of_records, settings_of
 from tvident._results.recorded import Recorded
 from tvident._results.records import IdentifiedRecords, Shared, covariance_between, with_shared
-from tvident._results.response import accounted_for, every_sample
+from tvident._results.response import accounted_for, every_sample, without_gaps
 from tvident._results.result import Identification
 from tvident._results.scan import Scan, scan_of
 from tvident._results.simulated import predicted_at_samples
@@ -34,9 +35,13 @@ __all__ = [
     "of_batch",
     "of_powers",
     "of_records",
+    "parts_of",
+    "percent",
     "predicted_at_samples",
     "scan_of",
     "settings_of",
     "touched_by",
+    "where_held_back",
     "with_shared",
+    "without_gaps",
 ]

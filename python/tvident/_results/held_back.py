@@ -48,18 +48,22 @@ class HeldBack:
         if self.why_not:
             return f"how much of a held-back part the model explains is not known: {self.why_not}"
         several = np.ndim(self.simulated) > 0
-        simulated, predicted = (_percent(float(np.nanmedian(value))) for value in (self.simulated, self.predicted))
-        where = {PARTS: "the last tenth of every tenth", 1: "the last tenth"}.get(
-            self.parts, f"the last tenth of each of {self.parts} parts"
-        )
+        simulated, predicted = (percent(float(np.nanmedian(value))) for value in (self.simulated, self.predicted))
         whose = " (median of all records)" if several else ""
         return (
-            f"explains {simulated} of the angle simulated and {predicted} predicted one test function ahead in {where}, "
+            f"explains {simulated} of the angle simulated and {predicted} predicted one test function ahead in "
+            f"{where_held_back(self.parts)}, "
             f"held back from the fit{whose}"
         )
 
 
-def _percent(value: float) -> str:
+def where_held_back(parts: int) -> str:
+    """Return what was held back of so many parts."""
+    few = {PARTS: "the last tenth of every tenth", 1: "the last tenth"}
+    return few.get(parts, f"the last tenth of each of {parts} parts")
+
+
+def percent(value: float) -> str:
     """Return a share with two digits of what it leaves: 99.9964 is far from 100."""
     left = abs(100 - value)
     digits = min(6, max(0, 1 - math.floor(math.log10(left)))) if 0 < left < np.inf else 0
