@@ -8,13 +8,18 @@ use std::ptr;
 use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering};
 use std::thread;
 
-/// Bytes of the reserve. They are never touched, so they are addresses only, and no memory.
-const BYTES: usize = 1 << 26;
+/// Bytes of a part of the reserve. They are never touched, so they are addresses only, and no memory. More than the core asks for at
+/// least (`exec/memory.rs`), and less than the 64 MiB that glibc takes as a heap of its own for a thread that allocates for the first
+/// time: where it found room in place of a part, there would be none for others.
+const BYTES: usize = 40 << 20;
 
-/// How often memory is tried again, since another thread may just be giving up the reserve.
+/// Parts of the reserve, given up one after the other.
+const PARTS: usize = 3;
+
+/// How often memory is tried again, since another thread may just be giving up a part.
 const TRIES: usize = 100;
 
-static RESERVE: AtomicPtr<u8> = AtomicPtr::new(ptr::null_mut());
+static RESERVE: [AtomicPtr<u8>; PARTS] = [const { AtomicPtr::new(ptr::null_mut()) }; PARTS];
 
 /// What could not be had since the reserve was last filled, in bytes.
 static MISSED: AtomicUsize = AtomicUsize::new(0);
@@ -24,19 +29,23 @@ static ALLOCATOR: WithReserve = WithReserve;
 
 /// Fills the reserve where it was given up. Returns the bytes that there are not, if so.
 pub(crate) fn fill() -> Result<(), usize> {
-    if !RESERVE.load(Ordering::Acquire).is_null() {
-        return Ok(());
+    let empty = RESERVE.iter().filter(|part| part.load(Ordering::Acquire).is_null());
+    let mut was_full = true;
+    for part in empty {
+        was_full = false;
+        // SAFETY: the layout has a size.
+        let fresh = unsafe { System.alloc(layout()) };
+        if fresh.is_null() {
+            return Err(BYTES);
+        }
+        if part.compare_exchange(ptr::null_mut(), fresh, Ordering::AcqRel, Ordering::Relaxed).is_err() {
+            // SAFETY: another thread was faster, and nobody else knows of this memory.
+            unsafe { System.dealloc(fresh, layout()) };
+        }
     }
-    // SAFETY: the layout has a size.
-    let fresh = unsafe { System.alloc(layout()) };
-    if fresh.is_null() {
-        return Err(BYTES);
+    if !was_full {
+        MISSED.store(0, Ordering::Release);
     }
-    if RESERVE.compare_exchange(ptr::null_mut(), fresh, Ordering::AcqRel, Ordering::Relaxed).is_err() {
-        // SAFETY: another thread was faster, and nobody else knows of this memory.
-        unsafe { System.dealloc(fresh, layout()) };
-    }
-    MISSED.store(0, Ordering::Release);
     Ok(())
 }
 
@@ -87,12 +96,12 @@ fn again(bytes: usize, ask: &dyn Fn() -> *mut u8) -> *mut u8 {
         // The reserve is no help.
         return ptr::null_mut();
     }
-    for _ in 0..TRIES {
-        let reserve = RESERVE.swap(ptr::null_mut(), Ordering::AcqRel);
-        if !reserve.is_null() {
+    for turn in 0..TRIES {
+        let part = RESERVE[turn % PARTS].swap(ptr::null_mut(), Ordering::AcqRel);
+        if !part.is_null() {
             MISSED.fetch_max(bytes, Ordering::AcqRel);
-            // SAFETY: whoever takes the reserve out of its place is the only one to have it.
-            unsafe { System.dealloc(reserve, layout()) };
+            // SAFETY: whoever takes a part out of its place is the only one to have it.
+            unsafe { System.dealloc(part, layout()) };
         }
         let place = ask();
         if !place.is_null() {
