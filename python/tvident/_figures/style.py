@@ -33,6 +33,9 @@ TIME_MAP = "cividis"
 _MOST_POINTS = 8000
 """Of a line: more than a printed page has columns."""
 
+_LONGEST_NAME = 60
+"""Characters of a channel's name in a picture."""
+
 _STYLE: Any = {
     "figure.dpi": 110,
     "figure.constrained_layout.h_pad": 0.08,
@@ -187,5 +190,6 @@ def legend(ax: Axes, place: Place = None) -> None:
 
 
 def plain(name: str) -> str:
-    """Return a name that is no formula."""
-    return name.replace("$", r"\$")
+    """Return a name that is no formula, and no longer than a title may be beside the axes that it stands over."""
+    short = name if len(name) <= _LONGEST_NAME else f"{name[: _LONGEST_NAME - 3]}..."
+    return short.replace("$", r"\$")
