@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tvident
+from commands import run
 from tvident import recordings
-
-TVIDENT = str(Path(sys.executable).with_name("tvident"))
-
-
-def run(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([TVIDENT, *map(str, arguments)], cwd=cwd, capture_output=True, text=True, check=False)
 
 
 @pytest.mark.parametrize(("degrees", "period"), [(1.0, "2pi"), (180 / math.pi, "360")])

@@ -9,7 +9,6 @@ import select
 import signal
 import struct
 import subprocess
-import sys
 import termios
 import time
 from pathlib import Path
@@ -20,14 +19,8 @@ import pytest
 
 import calls
 import tvident
+from commands import TVIDENT, run, run_program
 from tvident import recordings
-
-TVIDENT = str(Path(sys.executable).with_name("tvident"))
-
-
-def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    command = [TVIDENT, *map(str, arguments)]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +33,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_demo_prints_a_table_and_writes_pictures(tmp_path: Path) -> None:
-    done = run("demo", cwd=tmp_path)
+    done = run_program("demo", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "stiffness  N m/rad" in done.stdout
     written = {path.name for path in (tmp_path / "tvident-demo").iterdir()}

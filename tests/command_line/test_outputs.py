@@ -15,25 +15,19 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 import tvident
+from commands import TVIDENT, run, run_program
 from tvident import recordings
 from tvident._command_line import main
 from tvident._commands.own_files import check_own, note_own
 from tvident._files import check_apart, printable, replaced, write_csv, write_table
 
-TVIDENT = str(Path(sys.executable).with_name("tvident"))
 IDENTIFY = ("identify", "rig.csv", "--angle", "angle", "--torque", "torque", "--time", "time", "--no-progress")
-
-
-def run(folder: Path, *arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
-    command = [TVIDENT, *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=60, **options)
 
 
 @pytest.fixture
@@ -85,7 +79,7 @@ def test_derivatives_replace_no_recording_either(folder: Path) -> None:
     (folder / "link.csv").symlink_to("rig.csv")
     (folder / "picture.svg").symlink_to("rig.csv")
     for output in (("-o", "link.csv"), ("--plot", "picture.svg")):
-        done = run(folder, "derivatives", "rig.csv", "--channel", "angle", "--sample-rate", 1000, *output)
+        done = run("derivatives", "rig.csv", "--channel", "angle", "--sample-rate", 1000, *output, cwd=folder)
         assert done.returncode == 2
         assert "must not replace the recording" in done.stderr
 
@@ -101,7 +95,7 @@ def test_files_that_do_not_exist_yet_are_compared_where_links_end(tmp_path: Path
 
 def test_the_demo_replaces_its_own_files_and_no_others(tmp_path: Path) -> None:
     (tmp_path / "recording.csv").write_text("mine")
-    refused = run(tmp_path, "demo", "--folder", ".")
+    refused = run("demo", "--folder", ".", cwd=tmp_path)
     assert refused.returncode == 2
     assert "holds recording.csv of somebody else; give another --folder" in " ".join(refused.stderr.split())
     assert [path.name for path in tmp_path.iterdir()] == ["recording.csv"]
@@ -137,7 +131,7 @@ def test_a_replaced_file_keeps_its_mode(folder: Path, mode: int) -> None:
     place = folder / "result.csv"
     place.write_text("old")
     place.chmod(mode)
-    assert run(folder, *IDENTIFY, "-o", "result.csv").returncode == 0
+    assert run(*IDENTIFY, "-o", "result.csv", cwd=folder).returncode == 0
     assert stat.S_IMODE(place.stat().st_mode) == mode
     assert place.read_text().startswith("time [s]")
 
@@ -158,27 +152,27 @@ def test_a_link_stays_a_link_and_its_target_is_written(folder: Path) -> None:
     target.write_text("old")
     for name, leads_to in (("link.csv", "far/target.csv"), ("second.csv", "link.csv"), ("new.csv", "far/new.csv")):
         (folder / name).symlink_to(leads_to)
-        assert run(folder, *IDENTIFY, "-o", name).returncode == 0
+        assert run(*IDENTIFY, "-o", name, cwd=folder).returncode == 0
         assert (folder / name).is_symlink()
         assert (folder / name).read_text().startswith("time [s]")
     assert target.read_text().startswith("time [s]")
     assert {path.name for path in (folder / "far").iterdir()} == {"target.csv", "new.csv"}
     (folder / "loop.csv").symlink_to("loop.csv")
-    refused = run(folder, *IDENTIFY, "-o", "loop.csv")
+    refused = run(*IDENTIFY, "-o", "loop.csv", cwd=folder)
     assert refused.returncode == 1
     assert "these links lead in a circle" in refused.stderr
 
 
 def test_a_pipe_is_written_to_and_stays_a_pipe(folder: Path) -> None:
     os.mkfifo(folder / "pipe.csv")
-    refused = run(folder, *IDENTIFY, "-o", "pipe.csv")
+    refused = run(*IDENTIFY, "-o", "pipe.csv", cwd=folder)
     assert refused.returncode == 1
     assert "nobody reads this pipe" in refused.stderr
     read: list[str] = []
     reader = threading.Thread(target=lambda: read.append((folder / "pipe.csv").read_text()))
     reader.start()
     time.sleep(0.2)
-    assert run(folder, *IDENTIFY, "-o", "pipe.csv").returncode == 0
+    assert run(*IDENTIFY, "-o", "pipe.csv", cwd=folder).returncode == 0
     reader.join()
     assert len(read[0].splitlines()) == 2001
     assert stat.S_ISFIFO((folder / "pipe.csv").stat().st_mode)
@@ -188,12 +182,12 @@ def test_a_pipe_is_written_to_and_stays_a_pipe(folder: Path) -> None:
 def test_devices_and_streams_of_the_process_are_written_to(folder: Path) -> None:
     parent, child = pty.openpty()
     device = os.ttyname(child)
-    assert run(folder, *IDENTIFY, "--settings-output", device).returncode == 0
+    assert run(*IDENTIFY, "--settings-output", device, cwd=folder).returncode == 0
     assert stat.S_ISCHR(Path(device).stat().st_mode)
     assert os.read(parent, 100).startswith(b"{")
     os.close(parent)
     os.close(child)
-    shown = run(folder, *IDENTIFY, "--settings-output", "/proc/self/fd/1")
+    shown = run_program(*IDENTIFY, "--settings-output", "/proc/self/fd/1", cwd=folder)
     assert shown.returncode == 0
     assert shown.stdout.startswith("{\n")
     assert "stiffness" in shown.stdout.partition("\n}\n")[2]
@@ -235,7 +229,7 @@ def test_a_full_disk_leaves_the_old_file(folder: Path, name: str) -> None:
 
     (folder / name).write_text("old")
     option = {".png": "--plot", ".json": "--settings-output"}.get(Path(name).suffix, "-o")
-    done = run(folder, *IDENTIFY, option, name, preexec_fn=fill)
+    done = run_program(*IDENTIFY, option, name, preexec_fn=fill, cwd=folder)
     assert done.returncode == 1
     assert f"{name}: File too large" in done.stderr
     assert (folder / name).read_text() == "old"
@@ -243,7 +237,7 @@ def test_a_full_disk_leaves_the_old_file(folder: Path, name: str) -> None:
 
 def test_long_names_are_written(folder: Path) -> None:
     for name in ("x" * 251 + ".csv", "é" * 125 + ".csv"):
-        assert run(folder, *IDENTIFY, "-o", name).returncode == 0
+        assert run(*IDENTIFY, "-o", name, cwd=folder).returncode == 0
         assert (folder / name).is_file()
 
 
@@ -339,11 +333,11 @@ def test_names_of_channels_are_no_names_of_files_and_no_formulas(folder: Path) -
     names = ("a$b_{$" + "x" * 300, "t" * 300)
     write_table(folder / "x.npz", dict(zip(names, list(channels.values())[1:3], strict=True)), {})
     period = ("--sample-rate", 1000, "--no-progress")
-    done = run(folder, "derivatives", "x.npz", "--channel", names[0], *period, "--plot", "x.png")
+    done = run("derivatives", "x.npz", "--channel", names[0], *period, "--plot", "x.png", cwd=folder)
     assert done.returncode == 0, done.stderr
-    done = run(folder, "identify", "x.npz", "--angle", names[0], "--torque", names[1], *period, "-o", "y.csv")
+    done = run("identify", "x.npz", "--angle", names[0], "--torque", names[1], *period, "-o", "y.csv", cwd=folder)
     assert done.returncode == 0, done.stderr
-    done = run(folder, "identify", "x.npz", "--angle", names[0], "--torque", "z" * 300, *period)
+    done = run("identify", "x.npz", "--angle", names[0], "--torque", "z" * 300, *period, cwd=folder)
     assert done.returncode == 2
     assert "has no channel" in done.stderr
 
@@ -374,20 +368,20 @@ def test_settings_that_are_none(folder: Path, content: str | None, message: str)
         os.mkfifo(folder / "s.json")
     else:
         (folder / "s.json").write_text(content)
-    done = run(folder, *IDENTIFY, "--settings", "s.json")
+    done = run(*IDENTIFY, "--settings", "s.json", cwd=folder)
     assert done.returncode in {1, 2}
     assert message in " ".join(done.stderr.split())
     assert "Traceback" not in done.stderr
 
 
 def test_any_encoding_of_the_terminal_will_do(folder: Path) -> None:
-    done = run(folder, *IDENTIFY, env=os.environ | {"PYTHONIOENCODING": "iso8859-5"})
+    done = run_program(*IDENTIFY, env=os.environ | {"PYTHONIOENCODING": "iso8859-5"}, cwd=folder)
     assert done.returncode == 0, done.stderr
     assert " \\xb1 " in done.stdout
 
 
 def test_explain_walks_through_what_was_found(folder: Path) -> None:
-    done = run(folder, *IDENTIFY, "--explain")
+    done = run(*IDENTIFY, "--explain", cwd=folder)
     steps = [line[:2] for line in done.stdout.splitlines() if line[1:3] == ". "]
     assert steps == ["1.", "2.", "3.", "4.", "5.", "6."], done
     assert "I θ̈ + C θ̇ + K θ + offset = T" in done.stdout
