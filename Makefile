@@ -23,9 +23,10 @@ demo: $(BUILT)  ## identify a simulated recording, print what was found against 
 	$(BIN)/tvident demo
 
 .PHONY: test
-test: test-rust  ## every test and every lint; the last line says which tests had no recordings
-	$(MAKE) $(BUILT)
-	$(MAKE) --no-print-directory lint test-python
+test:  ## every test but the longest, and every lint; the last line says which tests had no recordings
+	# Packages are fetched and types are checked while Rust compiles.
+	$(MAKE) --no-print-directory --jobs=2 test-rust lint-python
+	$(MAKE) --no-print-directory lint-rust lint-core test-python
 
 .PHONY: test-rust
 test-rust:  ## tests of the core
@@ -38,14 +39,31 @@ test-python: $(BUILT)  ## tests of the Python package
 	# Two processes on neighbouring tests: what tests of one file share is made once. Whoever is done first takes over from the other.
 	$(BIN)/python -m pytest --quiet --numprocesses=2 --dist=worksteal --ignore=tests/house/test_parallel.py
 
+.PHONY: test-long
+test-long: $(BUILT)  ## the longest tests: more seeds and cases of what `make test` tests by some
+	TVIDENT_TESTS=long $(BIN)/python -m pytest --quiet --numprocesses=2 --dist=worksteal
+
+.PHONY: test-all
+test-all: test  ## every test there is but soaks and attacks
+	$(MAKE) --no-print-directory test-long
+
 .PHONY: lint
-lint: $(BUILT)  ## formatters, linters, type checkers
+lint: lint-rust lint-python lint-core  ## formatters, linters, type checkers
+
+.PHONY: lint-rust
+lint-rust:  ## of Rust's sources
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets --profile checked -- --deny warnings
 	RUSTDOCFLAGS="--deny warnings" cargo doc --workspace --no-deps --profile checked --quiet
+
+.PHONY: lint-python
+lint-python: $(READY)  ## of Python's sources
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
 	$(BIN)/mypy
+
+.PHONY: lint-core
+lint-core: $(BUILT)  ## of what Python is told of the core against what the core has
 	$(BIN)/stubtest tvident._core
 
 .PHONY: soak

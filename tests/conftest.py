@@ -19,6 +19,15 @@ NO_RECORDINGS, A_MISSING_RECORDING = "no recordings at", "the recording "
 """How tests that need one say why they are skipped."""
 
 
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what takes long, or with `TVIDENT_TESTS=long` everything else: each test is run by one of the two."""
+    long = os.environ.get("TVIDENT_TESTS") == "long"
+    others = [one for one in items if (one.get_closest_marker("long") is not None) != long]
+    if others:
+        config.hook.pytest_deselected(items=others)
+        items[:] = [one for one in items if (one.get_closest_marker("long") is not None) == long]
+
+
 @pytest.fixture(scope="session", autouse=True)
 def let_interrupts_in() -> Iterator[None]:
     """Let Ctrl-C in, here and in the programs that tests start: a shell's background jobs are born ignoring it."""

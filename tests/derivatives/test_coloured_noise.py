@@ -66,8 +66,8 @@ def best_filter(y: Array, truth: Array, derivative: int) -> float:
     return min(errors)
 
 
-@pytest.mark.parametrize("colour", ["0.5", "0.8", "0.9", "1/f"])
-@pytest.mark.parametrize("kind", ["sine", "several sines", "constant", "line"])
+@pytest.mark.parametrize("colour", ["0.5", "0.8", pytest.param("0.9", marks=pytest.mark.long), "1/f"])
+@pytest.mark.parametrize("kind", ["sine", pytest.param("several sines", marks=pytest.mark.long), "constant", "line"])
 def test_no_worse_than_the_best_filter(kind: str, colour: str) -> None:
     """Taken for white, noise of correlation 0.8 made the second derivative 450 times worse: the shortest windows seemed best."""
     truth = motion(kind)

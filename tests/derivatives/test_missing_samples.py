@@ -72,7 +72,7 @@ def test_every_window_is_the_least_squares_of_what_it_holds(
     found = tvident.fit_local_polynomials(
         holed, length, nan_policy="omit", weights=weights if weighted else None, **options
     )
-    for sample in range(n):
+    for sample in {0, n - 1, *generator.integers(n, size=30).tolist()}:
         first = min(max(sample - length // 2, 0), n - length)
         rows = np.arange(first, first + length)
         held = rows[~missing[rows]]

@@ -38,7 +38,7 @@ def grown(value: float, by: float) -> Array:
 
 
 @pytest.mark.parametrize("kinds", [{}, {"stiffness": "constant"}])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 2))])
 @pytest.mark.parametrize(
     ("name", "by", "wrong"), [("inertia", 0.05, 0.01), ("inertia", 0.5, 0.01), ("damping", 0.5, 0.03)]
 )

@@ -56,8 +56,9 @@ def test_without_an_instrument_feedback_is_said(records: tuple[Array, Array, Arr
     assert result.vaf() > 90
 
 
-def test_open_loop_is_not_taken_for_feedback() -> None:
-    for seed in range(40):
+@pytest.mark.parametrize("seeds", [range(8), pytest.param(range(8, 40), marks=pytest.mark.long)], ids=str)
+def test_open_loop_is_not_taken_for_feedback(seeds: range) -> None:
+    for seed in seeds:
         rig = tvident.simulate_torsional_rig(duration=10.0, seed=seed, angle_noise=10.0 ** -(2 + seed % 4))
         result = tvident.identify(rig.angle, rig.torque, sample_rate=1000, **CONSTANT)
         assert not any("holds the angle's noise" in line for line in result.advice), seed

@@ -96,7 +96,7 @@ def test_every_record_of_a_batch_has_its_own() -> None:
 
 
 @pytest.mark.parametrize("pattern", ["constant", "slider"])
-@pytest.mark.parametrize("part", [0.05, 0.2, -0.3, 0.5])
+@pytest.mark.parametrize("part", [0.05, *(pytest.param(part, marks=pytest.mark.long) for part in (0.2, -0.3)), 0.5])
 def test_a_jump_of_the_inertia_is_one_of_the_inertia(pattern: Any, part: float) -> None:
     for seed in (0, 3):
         at = 6.3 + 1.7 * seed

@@ -75,7 +75,10 @@ def test_coloured_noise_of_the_torque_is_no_change_of_the_parameters(kind: str) 
     assert np.mean([one[INTERIOR] for one in within]) > 0.8
 
 
-@pytest.mark.parametrize(("kind", "seed"), [("0.95", 0), ("0.95", 8), ("0.95", 16), ("pink", 16)])
+@pytest.mark.parametrize(
+    ("kind", "seed"),
+    [("0.95", 0), *(pytest.param("0.95", seed, marks=pytest.mark.long) for seed in (8, 16)), ("pink", 16)],
+)
 def test_noise_that_lasts_longer_than_a_test_function_is_no_change_either(kind: str, seed: int) -> None:
     rig = tvident.simulate_torsional_rig(20.0, seed=seed, torque_snr_db=40.0)
     torque = rig.torque + 0.01 * rig.torque.std() * coloured(kind, rig.torque.size, seed)

@@ -176,6 +176,7 @@ def test_the_stiffness_of_the_oscillator_follows_its_amplitude(folder_of_recordi
     assert np.var((result.stiffness - secant)[valid]) <= 0.10 * np.var(secant[valid])
 
 
+@pytest.mark.long
 def test_the_ankle_obeys_the_model_only_before_the_reflex(folder_of_recordings: Path) -> None:
     channels = recordings.read(recording(folder_of_recordings, "ankle_stationary.mat"))
     angle, torque = channels["angle"], -channels["torque"]

@@ -43,10 +43,10 @@ def identified(
 @pytest.mark.parametrize(
     ("pattern", "name", "depth", "angle_noise", "call"),
     [
-        ("slider", "inertia", 0.2, 1e-3, {}),
+        pytest.param("slider", "inertia", 0.2, 1e-3, {}, marks=pytest.mark.long),
         ("ramp", "inertia", 0.2, 1e-2, {}),
         ("slider", "damping", 0.5, 1e-3, {}),
-        ("slider", "damping", 0.5, 1e-3, {"damping": "varying"}),
+        pytest.param("slider", "damping", 0.5, 1e-3, {"damping": "varying"}, marks=pytest.mark.long),
     ],
     ids=str,
 )
