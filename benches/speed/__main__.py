@@ -8,6 +8,7 @@ from pathlib import Path
 
 from speed import environment, memory, table
 from speed.corners import CORNERS
+from speed.long import LONG
 from speed.rows import ROWS, Row
 from speed.streams import STREAMS
 from speed.timing import Effort, alternate
@@ -17,7 +18,7 @@ _README = Path(__file__).parents[1] / "README.md"
 _FULL = Effort(seconds=8.0, least=7)
 _QUICK = Effort(seconds=1.0, least=3)
 _QUICK_SHARE = 0.2
-_ALL = [*ROWS, *CORNERS, *STREAMS]
+_ALL = [*ROWS, *CORNERS, *STREAMS, *LONG]
 
 
 def main() -> int:
@@ -65,8 +66,11 @@ def _line(row: Row, *, quick: bool) -> str:
     _core.force_instructions(row.instructions)
     try:
         duel = row.prepare(_QUICK_SHARE if quick else 1.0)
-        duel.check()
-        timings = alternate(duel.works, _QUICK if quick else _FULL, duel.calls)
+        try:
+            duel.check()
+            timings = alternate(duel.works, _QUICK if quick else _FULL, duel.calls)
+        finally:
+            duel.close()
     finally:
         _core.force_instructions(None)
     return table.Measured(row, timings, duel.samples).line()

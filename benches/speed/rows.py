@@ -27,6 +27,8 @@ class Duel:
     """Samples that one call works on."""
     calls: int = 1
     """Calls that are timed together, where one is too short for the clock."""
+    close: Callable[[], None] = lambda: None
+    """Gives back what the works needed."""
 
 
 @dataclass(frozen=True)

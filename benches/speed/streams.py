@@ -45,21 +45,21 @@ STREAMS = [
         "`IdentificationStream`, paper's method, pieces of 20 000 samples",
         "`identify`, one thread",
         _stream(1_000_000, 20_000),
-        most=1.5,
+        most=1.3,
     ),
     Row(
         "stream-200",
         "the same, pieces of 200 samples",
         "`identify`, one thread",
         _stream(200_000, 200),
-        most=15,
+        most=3,
     ),
     Row(
         "stream-1",
         "the same, one sample at a time from Python",
         "`identify`, one thread",
         _stream(20_000, 1),
-        most=400,
+        most=60,
     ),
 ]
 """One sample at a time fills one of eight lanes and pays for a call from Python: what counts is that it ends before the next one comes."""

@@ -26,8 +26,11 @@ from tvident._pieces import Given
 from tvident._units import Channel as Said
 from tvident._units import named_unit, times_in_seconds
 
-PIECE = 1 << 18
-"""Samples of a piece, about: what is computed of it fits into 100 MiB."""
+PIECE, LONG_PIECE = 1 << 18, 3 << 18
+"""Samples of a piece, about, and of one in weak form in which one unknown changes: what is computed of it fits into 150 MiB.
+
+Every piece in weak form decides for itself what is constant, and at which lengths windows are averaged: 0.6 s, however long it is.
+"""
 
 
 # All but the files are options, as users call it.
@@ -161,7 +164,8 @@ def identify_file(
         try:
             recording = _recording(source, (angle, torque, t), (angle_unit, torque_unit), (delta, sample_rate))
             call = Given(method, given, settings, nan_policy, recording.period, recording.axis, threads)
-            return Run(Asked(recording, call, every), kept, PIECE, place, report).all()
+            asked = Asked(recording, call, every)
+            return Run(asked, kept, LONG_PIECE if asked.is_narrow else PIECE, place, report).all()
         except BaseException:
             if kept.is_empty:
                 kept.remove()

@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._files import printable
+from tvident._in_pieces.rows import write_rows
 
-_FORMAT = 1
+_FORMAT = 2
 """Folders of another number hold other things."""
 
 Columns = Mapping[str, npt.NDArray[Any]]
@@ -65,18 +66,14 @@ class Kept:
 
     def add(self, columns: Columns, note: Any) -> None:
         """Keep the rows of one more piece, and a note of it."""
-        names = list(columns)
-        row = np.dtype([(name, columns[name].dtype) for name in names])
-        rows = np.empty(columns[names[0]].size, row)
-        for name in names:
-            rows[name] = columns[name]
+        row = np.dtype([(name, values.dtype) for name, values in columns.items()])
         with self._rows.open("r+b" if self._rows.exists() else "w+b") as file:
             # What an interrupted call wrote beyond the rows that it noted is written again.
             file.seek(self._found["rows"] * row.itemsize)
-            file.write(rows.view(np.uint8).data if rows.size else b"")
+            count = write_rows(file, row, columns)
             file.truncate()
-        self._found["row"] = [[name, columns[name].dtype.str] for name in names]
-        self._found["rows"] += rows.size
+        self._found["row"] = [[name, values.dtype.str] for name, values in columns.items()]
+        self._found["rows"] += count
         self._found["notes"].append(note)
         self._write()
 

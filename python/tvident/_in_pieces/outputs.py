@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._files import check_folder, printable, replaced, write_csv
+from tvident._in_pieces.rows import write_rows
 
 Columns = Mapping[str, npt.NDArray[Any]]
 
@@ -61,13 +62,7 @@ def _npy(file: IO[bytes], table: Table) -> Iterator[Put]:
         file, {"descr": np.lib.format.dtype_to_descr(row), "fortran_order": False, "shape": (table.rows,)}
     )
 
-    def put(columns: Columns) -> None:
-        rows = np.empty(next(iter(columns.values())).size, row)
-        for name, values in columns.items():
-            rows[name] = values
-        file.write(rows.view(np.uint8).data if rows.size else b"")
-
-    yield put
+    yield lambda columns: write_rows(file, row, columns)
 
 
 @contextmanager

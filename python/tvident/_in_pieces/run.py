@@ -34,6 +34,13 @@ class Asked:
     given : Given
     step : int
         Every how many samples a row is wanted.
+
+    Attributes
+    ----------
+    long : Long, optional
+        The record, in strong form.
+    is_narrow : bool
+        Whether equations are of the weak form, with one unknown at most that changes: rows of others hold several times as many numbers.
     """
 
     def __init__(self, recording: Recording, given: Given, step: int) -> None:
@@ -41,6 +48,9 @@ class Asked:
         rate = 1 / recording.period
         request = requested(given.method, given.equation, given.settings, rate)
         self.long: Long | None = None
+        changing = {"windowed", "varying"}
+        kinds = [*request.parameters.values(), *(term[1] for term in request.terms if isinstance(term, tuple | list))]
+        self.is_narrow = isinstance(request.form, WeakForm) and sum(str(kind) in changing for kind in kinds) <= 1
         if isinstance(request.form, WeakForm):
             return
         if request.quantisation is None:
@@ -101,8 +111,8 @@ class Run:
         """Do all that is not done yet."""
         settings, work = self._prepared()
         for piece in self._pieces[len(self._kept.notes) :]:
-            columns, note = work.piece(piece, self._progress(piece))
-            self._kept.add(columns, note)
+            # Nothing of a piece stays while the next one is worked on.
+            self._kept.add(*work.piece(piece, self._progress(piece)))
             if self._report is not None:
                 self._report(piece[1], self._samples)
         return self._written(settings, work)
