@@ -11,10 +11,10 @@ if TYPE_CHECKING:
     from tvident._files import FileRecording, read_recording
     from tvident._identify import StrongForm, WeakForm, identify
     from tvident._in_pieces import FileIdentification, identify_file
-    from tvident._merged import Chain, Matrix, Mechanism, MergedIdentification
+    from tvident._merged import Chain, Matrix, Mechanism, MergedIdentification, load
     from tvident._plan import ExperimentPlan, plan_experiment
     from tvident._regression import RollingRegression, rolling_least_squares
-    from tvident._results import ExpandedParameter, Identification, IdentifiedRecords, Scan, load
+    from tvident._results import ExpandedParameter, Identification, IdentifiedRecords, Scan
     from tvident._simulate import Recording, simulate_torsional_rig
     from tvident._status import Status
     from tvident._stream import IdentificationStream, LocalPolynomialStream, RollingStream
@@ -66,11 +66,11 @@ _ROOMS = {
     "_equation": ("Term",),
     "_files": ("FileRecording", "read_recording"),
     "_identify": ("StrongForm", "WeakForm", "identify"),
-    "_merged": ("Chain", "Matrix", "Mechanism", "MergedIdentification"),
+    "_merged": ("Chain", "Matrix", "Mechanism", "MergedIdentification", "load"),
     "_plan": ("ExperimentPlan", "plan_experiment"),
     "_in_pieces": ("FileIdentification", "identify_file"),
     "_regression": ("RollingRegression", "rolling_least_squares"),
-    "_results": ("ExpandedParameter", "Identification", "IdentifiedRecords", "Scan", "load"),
+    "_results": ("ExpandedParameter", "Identification", "IdentifiedRecords", "Scan"),
     "_simulate": ("Recording", "simulate_torsional_rig"),
     "_status": ("Status",),
     "_stream": ("IdentificationStream", "LocalPolynomialStream", "RollingStream"),

@@ -24,7 +24,8 @@ def read_settings(path: str) -> dict[str, Any]:
     cure = "give a result, a file that --settings-output wrote, or options as TOML"
     ending = Path(path).suffix.lower()
     if ending in RESULT_ENDINGS:
-        return tvident.load(path).settings
+        found: dict[str, Any] = tvident.load(path).settings
+        return found
     kind = Path(path).stat()
     if ending in TABLE_ENDINGS and not _begins_as_json(path):
         return settings_beside(Path(path))

@@ -1,6 +1,7 @@
 """Identifies what repeated trials or coupled masses share, from rows that are merged."""
 
 from tvident._merged.call import Asked, identify_trials
+from tvident._merged.loaded import load
 from tvident._merged.masses import Masses, identify_masses, masses_of
 from tvident._merged.mechanism import Mechanism
 from tvident._merged.merging import Identifiable
@@ -21,6 +22,7 @@ __all__ = [
     "Trials",
     "identify_masses",
     "identify_trials",
+    "load",
     "masses_of",
     "trials_of",
 ]

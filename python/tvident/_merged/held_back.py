@@ -49,6 +49,8 @@ class HeldBackTorque:
 
 def held_back(merging: Merging) -> HeldBackTorque:
     """Return what the equations explain where they are fitted once more without the last tenth of every part."""
+    if not merging.parts:
+        return HeldBackTorque(why_not="the record was not kept with the result, or nothing of it can be known")
     count = max(merging.masses, 1)
     left, spread, samples, parts = np.zeros(count), np.zeros(count), np.zeros(count), 1
     for part in merging.parts:

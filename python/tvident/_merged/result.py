@@ -2,31 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident._equation import COEFFICIENTS
+from tvident._files import RESULT_ENDINGS, write_settings, write_table
 from tvident._merged import modal
 from tvident._merged.elements import matrix_of
-from tvident._merged.held_back import HeldBackTorque, held_back
 from tvident._merged.heterogeneity import differences_of, excess
 from tvident._merged.merging import Identifiable, Merging, Part
-from tvident._merged.predicted import predicted
-from tvident._merged.words import summary_of, words_of
-from tvident._results import Scan, Words, every_sample, scan_of
+from tvident._merged.reported import Reported
+from tvident._merged.stored import store
+from tvident._results import scan_of
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
-from tvident._tables import Table, Tabular
 
-Array = npt.NDArray[np.float64]
+Array: TypeAlias = npt.NDArray[np.float64]
 
 UNEXPLAINED_SPREAD = Status.KIND_CONTRADICTED
 
 
-class MergedIdentification(Tabular):
+class MergedIdentification(Reported):
     r"""What :func:`tvident.identify` found of what repeated trials or coupled masses share. ``n`` is the number of samples.
 
     Attributes
@@ -61,6 +62,8 @@ class MergedIdentification(Tabular):
         Standard deviation of what is left of the equations, over that of their noise.
     settings : dict
         What was chosen, as plain JSON.
+    scans : tuple of Scan
+        Estimates by the width of the test function; see :meth:`scan`.
     units : dict of str to str
 
     See Also
@@ -132,12 +135,34 @@ class MergedIdentification(Tabular):
                 self.constants.pop(name, None)
                 flags |= int(Status.RANK_DEFICIENT) if merging.unknowable.get(name) is None else 0
         self.record_status = Status(flags)
-        self.terms = {one.name: self.elements[one.name] for one in merging.elements if one.of not in COEFFICIENTS}
+        self.settings = self._settings()
+        self.scans = tuple(scan_of(part.found.scan, part.names) for part in merging.parts if part.found.scan.tried)
+        self.derive()
+
+    @classmethod
+    def of_file(cls, merging: Merging, known: Mapping[str, Any]) -> MergedIdentification:
+        """Return the result that a file held: what it is made of, without its recording, and attributes."""
+        found = cls.__new__(cls)
+        found.__dict__.update({"_merging": merging, **known})
+        found.derive()
+        return found
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A record may be long, and functions cannot be stored; what was found of it stays.
+        sampling = replace(self._merging.sampling, clock=None, passed=None)
+        known = {"_covariances": self._covariances, "_words": self._words}
+        return {**self.__dict__, **known, "_merging": replace(self._merging, parts=(), sampling=sampling)}
+
+    def derive(self) -> None:
+        """Find what follows from the elements; called once."""
+        merging = self._merging
+        self.terms: dict[str, Array] = {
+            one.name: self.elements[one.name] for one in merging.elements if one.of not in COEFFICIENTS
+        }
         self.inertia, self.damping, self.stiffness = (self._coefficient(of) for of in range(3))
         for coefficient, name in enumerate(COEFFICIENTS):
             self.stderr[name] = self._error(coefficient)
         self.units = dict(merging.units)
-        self.settings = self._settings()
 
     def _take(self, part: Part, size: int) -> None:
         """Take what the core found of some elements."""
@@ -181,7 +206,7 @@ class MergedIdentification(Tabular):
                 return "the equations hardly determine it: the motion tells regressors apart by little more than noise"
         return "the equations determine it"
 
-    @property
+    @cached_property
     def _covariances(self) -> dict[tuple[str, str], Array]:
         """Covariances of all pairs of elements that one call of the core found, themselves included."""
         known: dict[tuple[str, str], Array] = {}
@@ -191,11 +216,14 @@ class MergedIdentification(Tabular):
             both = np.array(found.covariance).reshape(len(names), len(names))
             for i, one in enumerate(names):
                 for j, other in enumerate(names[: i + 1]):
-                    known[one, other] = np.full(self.time.size, both[i, j])
+                    known[one, other] = np.asarray(both[i, j])
             for (one_place, other_place), values in found.covariances.items():
                 known[part.names[one_place], part.names[other_place]] = np.asarray(values)
         larger = {name: factor**0.5 for name, factor in self._scatter.items()}
-        known = {pair: values * (larger.get(pair[0], 1.0) * larger.get(pair[1], 1.0)) for pair, values in known.items()}
+        known = {
+            pair: np.broadcast_to(values * (larger.get(pair[0], 1.0) * larger.get(pair[1], 1.0)), self.time.shape)
+            for pair, values in known.items()
+        }
         for name in self.elements:
             known[name, name] = self.stderr[name] ** 2
         return known
@@ -206,7 +234,9 @@ class MergedIdentification(Tabular):
         fixed = matrix_of(merging.elements, coefficient, max(merging.masses, 1))
         moving = merging.inertia if coefficient == 0 else {}
         return {name: pattern[:, :, np.newaxis] for name, pattern in fixed.items()} | {
-            name: pattern[:, :, :: merging.step] for name, pattern in moving.items()
+            # What comes from a file has only the samples that were wanted.
+            name: pattern if pattern.shape[2] == self.time.size else pattern[:, :, :: merging.step]
+            for name, pattern in moving.items()
         }
 
     def _coefficient(self, coefficient: int) -> Array:
@@ -271,37 +301,6 @@ class MergedIdentification(Tabular):
         covariances = {pair: values[times] for pair, values in self._covariances.items()}
         return modal.modes_of(elements, modal.shared(names, covariances, times.size), times, self.time.size)
 
-    def scan(self, part: int = 0) -> Scan:
-        """Return estimates by the width of the test function, which tell whether equations of every scale agree.
-
-        Parameters
-        ----------
-        part : int, optional
-            Which of the groups of equations that share no unknown with others; mostly there is one.
-
-        Returns
-        -------
-        Scan
-            Estimates, errors and the band in Hz of every width; ``summary()`` and ``plot()`` show them.
-
-        Raises
-        ------
-        ValueError
-            If widths were not compared: something may change with time, or the width was given.
-        IndexError
-            If there is no such part.
-        """
-        parts = self._merging.parts
-        if not -len(parts) <= part < len(parts):
-            raise IndexError(f"part must be below {len(parts)}, the number of groups of equations; got {part}")
-        found = parts[part].found.scan
-        if not found.tried:
-            raise ValueError(
-                "widths of the test function are compared where all unknowns are 'constant' and the width is not given; got kinds that "
-                "may change with time, or a window_length; ask for constants and leave it out"
-            )
-        return replace(scan_of(found, parts[part].names), units=self.units)
-
     @property
     def natural_frequency(self) -> Array:
         """Natural frequencies in Hz, shape (n,) for trials, (modes, n) for masses."""
@@ -314,94 +313,27 @@ class MergedIdentification(Tabular):
         found = self.modes.damping_ratio
         return found if self._merging.masses else found[0]
 
-    def predicted_torque(self, trial: int = 0) -> tuple[Array, Array, Array]:
-        """Return the recorded torques, and those that the identified equations predict from the recorded motion.
-
-        Both are averages over the test function, in which the noise of derivatives is small. Costs about 0.1 µs a sample and channel.
+    def save(self, path: str | Path) -> None:
+        """Write every column to a file, with units in the header; all that :func:`tvident.load` needs too, if the file can hold it.
 
         Parameters
         ----------
-        trial : int, optional
-            Which of the trials.
-
-        Returns
-        -------
-        time : ndarray, shape (m,)
-            Seconds, for every sample of the trial.
-        recorded, predicted : ndarray, shape (m,) for trials, (masses, m) for masses
-            N m. NaN near the ends, near what is missing, and for masses of which nothing can be known.
+        path : str or Path
+            A name that ends in ``.npz`` or ``.parquet``, from which the result comes back as it is, without the recording; or in ``.csv``
+            and others, for columns alone, with the settings beside. The file appears whole or not at all.
 
         Raises
         ------
-        IndexError
-            If there is no such trial.
+        ValueError
+            If the ending is another one.
+        OSError
+            If there is no such folder, or the file cannot be written.
         """
-        merging = self._merging
-        if not -merging.trials <= trial < merging.trials:
-            raise IndexError(f"trial must be below {merging.trials}, the number of trials; got {trial}")
-        values = {name: every_sample(one, merging.samples, merging.step) for name, one in self.elements.items()}
-        both: Array | None = None
-        for part in merging.parts:
-            form = (part.found.window_length, part.found.exponent)
-            found = predicted(part.equations, trial, values, form, merging.sampling.period)
-            if both is None:
-                both = np.full((2, max(merging.masses, 1), found[0].shape[1]), np.nan)
-            both[:, list(part.equations.numbers)] = found
-        if both is None:
-            both = np.full((2, max(merging.masses, 1), merging.samples), np.nan)
-        recorded, expected = both if merging.masses else both[:, 0]
-        return merging.sampling.times(both.shape[2]), recorded, expected
-
-    @cached_property
-    def _held_back(self) -> HeldBackTorque:
-        return held_back(self._merging)
-
-    def held_back(self) -> HeldBackTorque:
-        """Return how much of the torques the equations explain in parts that they are not fitted to: the last tenth of every tenth.
-
-        They are identified once more without these samples, with the settings of this result, when it is asked for first, by
-        :meth:`summary` too. Elements that change are interpolated between the other parts.
-
-        Returns
-        -------
-        HeldBackTorque
-            ``predicted``: percent of the variance of every torque, as averages over the test function; ``words()`` says it.
-        """
-        return self._held_back
-
-    @cached_property
-    def _words(self) -> Words:
-        return words_of(self, self._merging.sampling, [part.found for part in self._merging.parts], self._scatter)
-
-    @property
-    def reasons(self) -> tuple[str, ...]:
-        """What was chosen, and why."""
-        return self._words.reasons
-
-    @property
-    def advice(self) -> tuple[str, ...]:
-        """What to do about what looks wrong."""
-        return self._words.advice
-
-    def summary(self) -> str:
-        """Return a table of the elements, and in words what was chosen and what to do."""
-        return summary_of(self)
-
-    def columns(self) -> dict[str, npt.NDArray[Any]]:
-        """Return everything that has one value a sample, by name: elements, their standard errors, residuals and flags."""
-        found: dict[str, npt.NDArray[Any]] = {"time": self.time}
-        if self.phase is not None:
-            found["phase"] = self.phase
-        for name, values in self.elements.items():
-            found[name], found[f"{name}_stderr"] = values, self.stderr[name]
-        found["residual_std"], found["status"] = self.residual_std, self.status
-        found["record_status"] = np.full(self.status.shape, int(self.record_status), np.uint16)
-        found["trusted"] = self.trusted.astype(np.uint8)
-        return found
-
-    def _table(self) -> Table:
-        columns = self.columns()
-        return Table(columns.pop("time"), columns, self.units, self.settings)
+        if Path(path).suffix in RESULT_ENDINGS:
+            store(Path(path), self)
+        else:
+            write_table(path, self.columns(), self.units)
+            write_settings(Path(path), self.settings)
 
     def _settings(self) -> dict[str, Any]:
         """Return what was chosen, as plain JSON."""

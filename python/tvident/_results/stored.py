@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from tvident._arguments import Labels, labels_in, labels_out
 from tvident._equation import COEFFICIENTS
-from tvident._files import FileError, printable, read_result, write_result
+from tvident._files import FileError, write_result
 from tvident._results.estimates import Estimates
 from tvident._results.scan import Scan
 from tvident._results.words import Words
@@ -56,7 +56,7 @@ def store(path: Path, table: Table, found: Estimates, rest: Mapping[str, Any]) -
         "constants": {name: [np.asarray(one).tolist() for one in pair] for name, pair in found.constants.items()},
         "kinds": {name: np.asarray(kind).tolist() for name, kind in found.kinds.items()},
         "record_status": flags.tolist(),
-        "scans": [_plain_scan(scan) for scan in found.scans],
+        "scans": [plain_scan(scan) for scan in found.scans],
         "labels": labels,
         "units": dict(found.units),
         **rest,
@@ -64,19 +64,11 @@ def store(path: Path, table: Table, found: Estimates, rest: Mapping[str, Any]) -
     write_result(path, {**arrays, **more}, found.units, json.dumps(facts))
 
 
-def restored(path: str | Path) -> tuple[Estimates, dict[str, Any], npt.NDArray[np.float64]]:
-    """Return what `store` wrote: the estimates, the facts and the time."""
-    place = printable(path)
-    arrays, text = read_result(Path(path))
-    try:
-        facts = json.loads(text)
-        if facts["format"] != _FORMAT:
-            raise FileError(f"{place}: holds a result of another version; identify again with the version at hand")
-        return _estimates(arrays, facts), facts, arrays["time"]
-    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise FileError(
-            f"{place}: must hold a result as result.save writes it; it lacks {printable(error, 60)}; save it again"
-        ) from None
+def restored(place: str, arrays: Arrays, facts: Mapping[str, Any]) -> Estimates:
+    """Return the estimates that `store` wrote to a file that is called `place`."""
+    if facts["format"] != _FORMAT:
+        raise FileError(f"{place}: holds a result of another version; identify again with the version at hand")
+    return _estimates(arrays, facts)
 
 
 def _estimates(arrays: Arrays, facts: Mapping[str, Any]) -> Estimates:
@@ -105,7 +97,7 @@ def _estimates(arrays: Arrays, facts: Mapping[str, Any]) -> Estimates:
         order=arrays["order"],
         status=arrays["status"],
         record_status=np.asarray(flags, np.uint16) if batch else Status(flags),
-        scans=tuple(_scan(scan) for scan in facts["scans"]),
+        scans=tuple(scan_from(scan) for scan in facts["scans"]),
         labels=_labels(arrays, facts),
         kinds={name: np.asarray(kind) for name, kind in facts["kinds"].items()},
         units=facts["units"],
@@ -116,7 +108,8 @@ def _labels(arrays: Arrays, facts: Mapping[str, Any]) -> Labels | None:
     return None if facts["labels"] is None else labels_in(arrays, facts["labels"])
 
 
-def _plain_scan(scan: Scan) -> dict[str, Any]:
+def plain_scan(scan: Scan) -> dict[str, Any]:
+    """Return a scan as JSON has it."""
     return {
         "window_length": scan.window_length.tolist(),
         "band": scan.band.tolist(),
@@ -128,7 +121,8 @@ def _plain_scan(scan: Scan) -> dict[str, Any]:
     }
 
 
-def _scan(plain: Mapping[str, Any]) -> Scan:
+def scan_from(plain: Mapping[str, Any]) -> Scan:
+    """Return a scan from JSON."""
     estimates, stderr = (
         {name: np.asarray(values, np.float64) for name, values in plain[of].items()} for of in ("estimates", "stderr")
     )
@@ -148,6 +142,6 @@ def plain_words(words: Words) -> dict[str, Any]:
     return {"reasons": words.reasons, "advice": words.advice, "each": [plain_words(one) for one in words.each]}
 
 
-def words_of(plain: Mapping[str, Any]) -> Words:
+def words_from(plain: Mapping[str, Any]) -> Words:
     """Return reasons and advice from JSON."""
-    return Words(tuple(plain["reasons"]), tuple(plain["advice"]), tuple(words_of(one) for one in plain["each"]))
+    return Words(tuple(plain["reasons"]), tuple(plain["advice"]), tuple(words_from(one) for one in plain["each"]))

@@ -1,0 +1,217 @@
+"""What a result of trials or masses shows of itself: words, tables, files, figures, and the torques that it explains."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident._merged.drawn import drawn
+from tvident._merged.held_back import HeldBackTorque, held_back
+from tvident._merged.merging import Merging
+from tvident._merged.predicted import predicted
+from tvident._merged.words import summary_of, words_of
+from tvident._results import Scan, Words, every_sample
+from tvident._status import Status
+from tvident._tables import Table, Tabular
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array: TypeAlias = npt.NDArray[np.float64]
+
+Picture: TypeAlias = Literal["parameters", "torque", "scan"]
+
+
+class Reported(Tabular):
+    """The part of a result that is shown.
+
+    Attributes
+    ----------
+    time, phase, elements, stderr, residual_std, status, record_status, scans, settings, units :
+        Those of the result.
+    """
+
+    time: Array
+    phase: Array | None
+    elements: dict[str, Array]
+    stderr: dict[str, Array]
+    residual_std: Array
+    status: npt.NDArray[np.uint16]
+    record_status: Status
+    scans: tuple[Scan, ...]
+    settings: dict[str, Any]
+    units: Mapping[str, str]
+    _merging: Merging
+    _scatter: dict[str, float]
+
+    @property
+    def trusted(self) -> npt.NDArray[np.bool_]:
+        """Where values can be trusted."""
+        raise NotImplementedError
+
+    def scan(self, part: int = 0) -> Scan:
+        """Return estimates by the width of the test function, which tell whether equations of every scale agree.
+
+        Parameters
+        ----------
+        part : int, optional
+            Which of the groups of equations that share no unknown with others; mostly there is one.
+
+        Returns
+        -------
+        Scan
+            Estimates, errors and the band in Hz of every width; ``summary()`` and ``plot()`` show them.
+
+        Raises
+        ------
+        ValueError
+            If widths were not compared: something may change with time, or the width was given.
+        IndexError
+            If there is no such part.
+        """
+        if not self.scans:
+            raise ValueError(
+                "widths of the test function are compared where all unknowns are 'constant' and the width is not given; got kinds that "
+                "may change with time, or a window_length; ask for constants and leave it out"
+            )
+        if not -len(self.scans) <= part < len(self.scans):
+            raise IndexError(f"part must be below {len(self.scans)}, the number of groups of equations; got {part}")
+        return replace(self.scans[part], units=self.units)
+
+    def predicted_torque(self, trial: int = 0) -> tuple[Array, Array, Array]:
+        """Return the recorded torques, and those that the identified equations predict from the recorded motion.
+
+        Both are averages over the test function, in which the noise of derivatives is small. Costs about 0.1 µs a sample and channel.
+
+        Parameters
+        ----------
+        trial : int, optional
+            Which of the trials.
+
+        Returns
+        -------
+        time : ndarray, shape (m,)
+            Seconds, for every sample of the trial.
+        recorded, predicted : ndarray, shape (m,) for trials, (masses, m) for masses
+            N m. NaN near the ends, near what is missing, and for masses of which nothing can be known.
+
+        Raises
+        ------
+        ValueError
+            If the result was loaded from a file, or nothing of it can be known.
+        IndexError
+            If there is no such trial.
+        """
+        merging = self._merging
+        if not merging.parts:
+            raise ValueError(
+                "the record must be there; got a result without one, or of which nothing can be known; identify again"
+            )
+        if not -merging.trials <= trial < merging.trials:
+            raise IndexError(f"trial must be below {merging.trials}, the number of trials; got {trial}")
+        values = {name: every_sample(one, merging.samples, merging.step) for name, one in self.elements.items()}
+        both: Array = np.zeros((2, 0, 0))
+        for part in merging.parts:
+            form = (part.found.window_length, part.found.exponent)
+            found = predicted(part.equations, trial, values, form, merging.sampling.period)
+            if not both.size:
+                both = np.full((2, max(merging.masses, 1), found[0].shape[1]), np.nan)
+            both[:, list(part.equations.numbers)] = found
+        recorded, expected = both if merging.masses else both[:, 0]
+        return merging.sampling.times(both.shape[2]), recorded, expected
+
+    @cached_property
+    def _held_back(self) -> HeldBackTorque:
+        return held_back(self._merging)
+
+    def held_back(self) -> HeldBackTorque:
+        """Return how much of the torques the equations explain in parts that they are not fitted to: the last tenth of every tenth.
+
+        They are identified once more without these samples, with the settings of this result, when it is asked for first, by
+        :meth:`summary` too. Elements that change are interpolated between the other parts.
+
+        Returns
+        -------
+        HeldBackTorque
+            ``predicted``: percent of the variance of every torque, as averages over the test function; ``words()`` says it.
+        """
+        return self._held_back
+
+    @cached_property
+    def _words(self) -> Words:
+        return words_of(self, self._merging.sampling, [part.found for part in self._merging.parts], self._scatter)
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """What was chosen, and why."""
+        return self._words.reasons
+
+    @property
+    def advice(self) -> tuple[str, ...]:
+        """What to do about what looks wrong."""
+        return self._words.advice
+
+    def summary(self) -> str:
+        """Return a table of the elements, and in words what was chosen and what to do."""
+        return summary_of(self)
+
+    def plot(
+        self, what: Picture = "parameters", *, mass: int = 0, trial: int = 0, ax: Axes | Sequence[Axes] | None = None
+    ) -> Figure:
+        """Draw the result, on axes of your own or in a new figure.
+
+        Parameters
+        ----------
+        what : {"parameters", "torque", "scan"}, optional
+            ``"parameters"``: the elements that change, with bands of two standard errors, and in a line what is constant. ``"torque"``: the
+            recorded torque of a mass in a trial, the predicted one and what is left. ``"scan"``: estimates by the width of the test
+            function.
+        mass, trial : int, optional
+            Of which the torque is drawn.
+        ax : Axes or sequence of Axes, optional
+            Where to draw; one Axes is divided where a picture has several panels.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is missing: install ``tvident[plot]``.
+        ValueError
+            If there is no such picture, or the record is not there.
+        """
+        from tvident import _figures  # noqa: PLC0415 - matplotlib is optional
+
+        arguments.one_of("what", what, get_args(Picture))
+        if what == "scan":
+            return self.scan().plot(ax=ax)
+        if what == "parameters":
+            return _figures.plot_identification(drawn(self), ax=ax)
+        time, *both = self.predicted_torque(trial)
+        recorded, expected = (np.atleast_2d(one)[mass] for one in both)
+        return _figures.plot_torque(drawn(self, (time, recorded, expected)), ax=ax)
+
+    def columns(self) -> dict[str, npt.NDArray[Any]]:
+        """Return everything that has one value a sample, by name: elements, their standard errors, residuals and flags."""
+        found: dict[str, npt.NDArray[Any]] = {"time": self.time}
+        if self.phase is not None:
+            found["phase"] = self.phase
+        for name, values in self.elements.items():
+            found[name], found[f"{name}_stderr"] = values, self.stderr[name]
+        found["residual_std"], found["status"] = self.residual_std, self.status
+        found["record_status"] = np.full(self.status.shape, int(self.record_status), np.uint16)
+        found["trusted"] = self.trusted.astype(np.uint8)
+        return found
+
+    def _table(self) -> Table:
+        columns = self.columns()
+        return Table(columns.pop("time"), columns, self.units, self.settings)

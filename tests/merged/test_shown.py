@@ -1,0 +1,86 @@
+"""Results of masses and trials in files and pictures."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import tvident
+from merged.simulated import chain, double_pendulum, simulated
+from merged.test_masses import OPTIONS, changing, constant, springs
+from merged.test_mechanisms import FRICTION, pendulum
+
+mpl.use("agg")
+
+identify: Any = tvident.identify
+"""Its type is that of a single record."""
+
+STRUCTURE = tvident.Chain(2, springs(2))
+
+
+def masses() -> Any:
+    one = chain([changing, constant(18.0)], 5000, seed=3)
+    return identify(one.angle, one.torque, structure=STRUCTURE, stiffness=["windowed", "auto"], step=2, **OPTIONS)
+
+
+def trials() -> Any:
+    several = simulated(3, 1500, changing, seed=1)
+    return identify(several.angle, several.torque, sample_rate=1000, ensemble_axis=0)
+
+
+def mechanism() -> Any:
+    one = double_pendulum(2000, seed=1)
+    return identify(one.angle, one.torque, t=one.time, structure=pendulum(), **FRICTION)
+
+
+@pytest.mark.parametrize("made", [masses, trials, mechanism])
+def test_what_was_saved_comes_back(made: Any, tmp_path: Path) -> None:
+    result = made()
+    for ending in ("npz", "parquet"):
+        result.save(tmp_path / f"result.{ending}")
+        loaded = tvident.load(tmp_path / f"result.{ending}")
+        assert isinstance(loaded, tvident.MergedIdentification)
+        for name in ("inertia", "damping", "stiffness", "status", "residual_std", "time", "trusted"):
+            np.testing.assert_array_equal(getattr(loaded, name), getattr(result, name), err_msg=name)
+        for name, values in result.stderr.items():
+            np.testing.assert_array_equal(loaded.stderr[name], values, err_msg=name)
+        assert loaded.constants == result.constants
+        assert loaded.identifiable == result.identifiable
+        assert loaded.settings == result.settings
+        assert loaded.record_status == result.record_status
+        assert loaded.summary().splitlines()[1:] == result.summary().splitlines()[1:]
+        assert "was not kept" in loaded.summary().splitlines()[0]
+        if made is masses:
+            found, again = (one.modes.natural_frequency_stderr for one in (result, loaded))
+            np.testing.assert_array_equal(again, found)
+        if made is mechanism:
+            assert loaded.scan().summary() == result.scan().summary()
+        with pytest.raises(ValueError, match="record must be there"):
+            loaded.predicted_torque()
+    copied = pickle.loads(pickle.dumps(result))  # noqa: S301 - our own
+    assert copied.summary().splitlines()[1:] == result.summary().splitlines()[1:]
+    np.testing.assert_array_equal(
+        copied.natural_frequency if made is trials else copied.inertia,
+        getattr(result, "natural_frequency" if made is trials else "inertia"),
+    )
+    result.save(tmp_path / "result.csv")
+    assert tvident.read_recording(tmp_path / "result.csv")["residual_std"].size == result.time.size
+
+
+def test_results_are_drawn() -> None:
+    result = masses()
+    shown = result.plot()
+    assert [text.get_text() for text in shown.axes[0].texts] == ["Stiffness base 0"]
+    assert "Inertia 1" in shown.axes[0].get_title(loc="left")
+    assert len(result.plot("torque", mass=1).axes) == 2
+    assert len(mechanism().plot("scan").axes) == 11
+    assert trials().plot("torque", trial=2).axes
+    with pytest.raises(ValueError, match="what must be"):
+        result.plot("poles")
+    plt.close("all")
