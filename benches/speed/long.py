@@ -51,7 +51,8 @@ def _from_file(samples: int, **options: Any) -> Callable[[float], Duel]:
             return tvident.identify_file(source, target, angle="0", torque="1", **more)
 
         def in_memory() -> tvident.Identification:
-            return tvident.identify(angle, torque, **more)
+            found: tvident.Identification = tvident.identify(angle, torque, **more)
+            return found
 
         def check() -> None:
             from_file()
@@ -79,7 +80,8 @@ def _in_two_processes(samples: int, **options: Any) -> Callable[[float], Duel]:
             return tvident.dask.identify(*parts, **more).stiffness.compute()
 
         def in_one() -> tvident.Identification:
-            return tvident.identify(angle, torque, workers=1, **more)
+            found: tvident.Identification = tvident.identify(angle, torque, workers=1, **more)
+            return found
 
         def check() -> None:
             _check(in_processes(), in_one(), same="method" in options)
