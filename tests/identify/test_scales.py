@@ -17,6 +17,8 @@ from tvident import Status, recordings
 mpl.use("agg")
 Array = npt.NDArray[np.float64]
 RATE = 1000.0
+CLIPPED = 0.01
+"""What the inertia of an angle that was clipped may be wrong by."""
 DOUBT = Status.NOISE_MODEL | Status.COLOURED | Status.SCALES_DISAGREE | Status.WINDOW_LIMIT
 
 
@@ -129,6 +131,11 @@ def test_what_a_recorder_did_is_named_with_its_cure(spoil: Any, words: str) -> N
     result = identified(recorded, angle)
     assert result.record_status & Status.CHANNEL_SUSPECTED
     assert any(words in advice for advice in result.advice)
+    if words.endswith("clipped"):
+        # What is left is as good as if these samples were missing.
+        assert abs(result.inertia[0] / recorded.inertia[0] - 1) < CLIPPED
+        assert np.mean(result.status & Status.GAP != 0) > np.mean(np.diff(angle) == 0)
+        assert not result.record_status & Status.SCALES_DISAGREE
     assert not identified(recorded).record_status & Status.CHANNEL_SUSPECTED
 
 

@@ -186,6 +186,11 @@ class Explained:
                     f"is clipped: {amount:.1%} of its samples lie at its largest or smallest value: make these NaN, or record with a "
                     "larger range"
                 )
+            elif defect == "left out":
+                cure = (
+                    f"is clipped: {amount:.1%} of its samples lie at its largest or smallest value: they count as missing; record with a "
+                    "larger range"
+                )
             elif defect == "held" and name in {"velocity", "acceleration"}:
                 cure = f"holds every value for {amount:.0f} samples: keep every {amount:.0f}th sample of all channels"
             elif defect == "held":

@@ -32,8 +32,15 @@ const FEWEST_JUMPS: usize = 2;
 /// What was done to a channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Defect {
-    /// This part of the samples lies at the largest or smallest value.
-    Clipped(f64),
+    /// Samples lie at the smallest or largest value.
+    Clipped {
+        /// The part of the samples that does.
+        part: f64,
+        /// These values, infinite where no run of samples lies at one.
+        limits: [f64; 2],
+    },
+    /// This part of the samples lies at the smallest or largest value, and equations with them are left out.
+    LeftOut(f64),
     /// Every value stands for so many samples.
     Held(usize),
     /// The angle jumps by so much.
@@ -47,10 +54,18 @@ impl Defect {
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
-            Self::Clipped(_) => "clipped",
+            Self::Clipped { .. } => "clipped",
+            Self::LeftOut(_) => "left out",
             Self::Held(_) => "held",
             Self::Wrapped(_) => "wrapped",
             Self::Broken(_) => "broken",
+        }
+    }
+
+    /// Says that clipped samples are left out.
+    pub(crate) fn leave_out(&mut self) {
+        if let Self::Clipped { part, .. } = *self {
+            *self = Self::LeftOut(part);
         }
     }
 
@@ -65,8 +80,28 @@ impl Defect {
     #[allow(clippy::cast_precision_loss, reason = "a few samples or places")]
     pub fn amount(&self) -> f64 {
         match *self {
-            Self::Clipped(amount) | Self::Wrapped(amount) => amount,
+            Self::Clipped { part: amount, .. } | Self::LeftOut(amount) | Self::Wrapped(amount) => amount,
             Self::Held(count) | Self::Broken(count) => count as f64,
+        }
+    }
+}
+
+/// A channel whose samples at its limits are missing.
+pub(crate) struct Within<'a> {
+    pub(crate) channel: &'a dyn Samples,
+    pub(crate) limits: [f64; 2],
+}
+
+impl Samples for Within<'_> {
+    fn len(&self) -> usize {
+        self.channel.len()
+    }
+
+    fn read(&self, first: usize, into: &mut [f64]) {
+        self.channel.read(first, into);
+        let [least, most] = self.limits;
+        for value in into.iter_mut().filter(|value| **value <= least || **value >= most) {
+            *value = f64::NAN;
         }
     }
 }
@@ -106,13 +141,15 @@ fn clipped(parts: &[&[f64]], extremes: [f64; 2]) -> Option<Defect> {
         return None;
     }
     let (mut count, mut arrivals) = (0, Vec::new());
+    let mut limits = [f64::NEG_INFINITY, f64::INFINITY];
     for part in parts {
-        for extreme in extremes {
+        for (extreme, limit) in extremes.into_iter().zip(&mut limits) {
             let mut place = 0;
             while let Some(first) = part[place..].iter().position(|&value| value == extreme).map(|next| place + next) {
                 let end =
                     part[first..].iter().position(|&value| value != extreme).map_or(part.len(), |run| first + run);
                 if end - first >= RUN {
+                    *limit = extreme;
                     count += end - first;
                     if first >= 2 {
                         arrivals.push((part[first - 1] - part[first - 2]).abs());
@@ -126,7 +163,7 @@ fn clipped(parts: &[&[f64]], extremes: [f64; 2]) -> Option<Defect> {
     let arrival = arrivals.get(arrivals.len() / 2).copied().unwrap_or(0.0);
     let samples = parts.iter().fold(0, |samples, part| samples + part.len());
     let is_clipped = arrivals.len() >= FEWEST_RUNS && count >= FEWEST_CLIPPED && arrival > ARRIVES * typical;
-    is_clipped.then(|| Defect::Clipped(count as f64 / samples as f64))
+    is_clipped.then(|| Defect::Clipped { part: count as f64 / samples as f64, limits })
 }
 
 fn held(parts: &[&[f64]]) -> Option<Defect> {
@@ -186,7 +223,14 @@ mod tests {
     #[test]
     fn what_was_done_to_a_channel_is_recognised() {
         let found = of(|sample| wave(sample).clamp(-1.0, 1.0));
-        assert!(matches!(found[..], [Defect::Clipped(part)] if part > 0.05 && part < 0.5), "{found:?}");
+        let [Defect::Clipped { part, limits }] = found[..] else { panic!("{found:?}") };
+        assert!(part > 0.05 && part < 0.5 && limits == [-1.0, 1.0], "{found:?}");
+        let found = of(|sample| wave(sample).min(1.0));
+        let [Defect::Clipped { limits, .. }] = found[..] else { panic!("{found:?}") };
+        assert_eq!(limits, [f64::NEG_INFINITY, 1.0]);
+        let (values, mut read) = ([0.5, 1.0, -2.0, 1.5], [0.0; 3]);
+        Within { channel: &values.as_slice(), limits }.read(1, &mut read);
+        assert!(read[0].is_nan() && read[1] == -2.0 && read[2].is_nan(), "{read:?}");
         assert_eq!(of(|sample| wave(sample / 5 * 5)), [Defect::Held(5)]);
         let found = of(|sample| (sample as f64 * 0.01).rem_euclid(1.0));
         assert!(matches!(found[..], [Defect::Wrapped(jump)] if (jump - 0.99).abs() < 0.01), "{found:?}");

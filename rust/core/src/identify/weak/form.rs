@@ -16,7 +16,7 @@ use crate::identify::weak::session::Session;
 use crate::identify::weak::torque_jumps::without_jumps;
 use crate::noise::breaks::search::{Broken, breaks};
 use crate::noise::channel::variance_after;
-use crate::noise::defects::{Defect, defects};
+use crate::noise::defects::{Defect, Within, defects};
 use crate::noise::passed::PassedNoise;
 use crate::noise::quantisation::quantisation_step;
 use crate::record::samples::Samples;
@@ -41,10 +41,12 @@ pub(crate) fn identify_weak(
     let lag = options.lag.unwrap_or(0.0);
     let mut defects = defects_of_motion(motion);
     let places = lost_samples(motion, &defects, watch)?;
-    let (angle, torque) =
-        (Broken { channel: motion.angle, places: &places }, Broken { channel: motion.torque, places: &places });
-    let whole =
-        if places.is_empty() { None } else { Some(Motion { angle: &angle, torque: &torque, ..motion.clone() }) };
+    let limits = clipped_at(motion, &defects);
+    let within = Within { channel: motion.angle, limits: limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]) };
+    let angle = Broken { channel: &within, places: &places };
+    let torque = Broken { channel: motion.torque, places: &places };
+    let is_whole = limits.is_none() && places.is_empty();
+    let whole = if is_whole { None } else { Some(Motion { angle: &angle, torque: &torque, ..motion.clone() }) };
     let motion = whole.as_ref().unwrap_or(motion);
     let found =
         with_record(motion, (mask, lag), (options.delta, options.instructions), (workers, watch), |record, watch| {
@@ -53,6 +55,9 @@ pub(crate) fn identify_weak(
             identify(record, (calm.as_deref(), motion.measured.passed), options, workers, watch)
         });
     found.map(|(found, resting)| {
+        if limits.is_some() {
+            defects[0].iter_mut().for_each(Defect::leave_out);
+        }
         defects[0].extend((!places.is_empty()).then_some(Defect::Broken(places.len())));
         let doubtful = defects.iter().flatten().any(Defect::is_doubtful);
         let suspected = if doubtful { Status::CHANNEL_SUSPECTED } else { Status::GOOD };
@@ -64,16 +69,30 @@ pub(crate) fn identify_weak(
 fn defects_of_motion(motion: &Motion<'_>) -> Vec<Vec<Defect>> {
     let [angle, rates @ ..] = motion.measured.channels;
     let of_angle =
-        if rates.iter().all(Option::is_none) { defects(motion.angle) } else { angle.map_or_else(Vec::new, defects) };
+        if is_alone(&motion.measured) { defects(motion.angle) } else { angle.map_or_else(Vec::new, defects) };
     let rates = rates.map(|rate| rate.map_or_else(Vec::new, defects_of_rate));
     [of_angle, defects_of_torque(motion.torque)].into_iter().chain(rates).collect()
 }
 
 /// The samples before which some were lost: only of an angle that was measured alone and uniformly, and as it was recorded otherwise.
 fn lost_samples(motion: &Motion<'_>, defects: &[Vec<Defect>], watch: &mut Watch<'_>) -> Result<Vec<usize>, Error> {
-    let Measured { channels: [_, rates @ ..], passed, .. } = motion.measured;
-    let alone = rates.iter().all(Option::is_none) && passed[0].is_none();
+    let alone = is_alone(&motion.measured) && motion.measured.passed[0].is_none();
     if alone && defects[0].is_empty() { breaks(motion.angle, watch) } else { Ok(Vec::new()) }
+}
+
+/// The limits at which an angle that was measured alone is clipped.
+fn clipped_at(motion: &Motion<'_>, defects: &[Vec<Defect>]) -> Option<[f64; 2]> {
+    let limits = |defect: &Defect| match defect {
+        Defect::Clipped { limits, .. } => Some(*limits),
+        _ => None,
+    };
+    defects[0].iter().find_map(limits).filter(|_| is_alone(&motion.measured))
+}
+
+/// Whether the angle is what was measured, and nothing else was.
+fn is_alone(measured: &Measured<'_>) -> bool {
+    let [_, rates @ ..] = measured.channels;
+    rates.iter().all(Option::is_none)
 }
 
 /// Does something with the record that a motion is, its terms evaluated at every sample, and says which part of it rests.
