@@ -102,6 +102,33 @@ def test_one_spring_of_a_chain_is_followed(masses: int, most: float) -> None:
     assert (found.held_back().predicted > 99).all()
 
 
+@pytest.mark.parametrize("changes", [True, False])
+def test_masses_respond_as_they_were_simulated(changes: bool) -> None:
+    spring = changing if changes else constant(12.0)
+    simulated, other = (chain([spring, constant(18.0)], 5000, seed=seed, angle_noise=1e-4) for seed in (11, 12))
+    found = identify(simulated.angle, simulated.torque, structure=tvident.Chain(2, springs(2)), **OPTIONS)
+    assert (found.kinds["stiffness_base_0"] == "windowed") == changes
+    # Torques of another record, of which a tenth is noise, drive the angles to within some thousandths of their variance.
+    assert (found.vaf(other.angle, other.torque) > 99).all()
+    state = np.array([other.angle[:, 0], [0.0, 0.0]])
+    np.testing.assert_allclose(found.simulate(other.torque, state)[:, 0], other.angle[:, 0])
+    if not changes:
+        fallen = identify(
+            simulated.angle,
+            simulated.torque,
+            **OPTIONS,
+            inertia=tvident.Matrix("diagonal", 0.0, entries={(0, 0): "constant"}),
+        )
+        with pytest.raises(ValueError, match="must have an inertia"):
+            fallen.vaf(other.angle, other.torque)
+        assert found.simulate(other.torque[:, :700], state).shape == (2, 700)
+        return
+    with pytest.raises(ValueError, match="shape \\(2, 5000\\)"):
+        found.simulate(other.torque[:, :700], state)
+    with pytest.raises(ValueError, match="terms that are not linear"):
+        identify(simulated.angle, simulated.torque, terms=["coulomb"], **OPTIONS).vaf(other.angle, other.torque)
+
+
 def test_modes_are_those_of_the_matrices_and_keep_their_names() -> None:
     simulated = chain([changing, constant(18.0)], 12000, seed=4)
     found = identify(simulated.angle, simulated.torque, structure=tvident.Chain(2, springs(2)), **OPTIONS)
