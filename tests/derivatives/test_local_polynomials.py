@@ -168,7 +168,7 @@ def test_scores_are_equation_8() -> None:
         assert fit.order[i] == expected.argmin()
 
 
-@pytest.mark.parametrize("step", [2, 7, 1000])
+@pytest.mark.parametrize("step", [2, 4, 7, 1000])
 def test_a_step_gives_every_so_manieth_estimate(step: int) -> None:
     y = signal(3, 777, 0.01)
     full = tvident.fit_local_polynomials(y, 51)

@@ -150,8 +150,8 @@ impl<'a> Near<'a> {
         let centres = samples.start.max(all.start)..samples.end.min(all.end);
         let mut compare = vec![f64::NAN; samples.len()];
         if !centres.is_empty() {
-            let mut scratch = bank.scratch();
-            let estimates = bank.estimates(record, centres.clone(), 1, &mut scratch);
+            let (mut scratch, mut projected) = (bank.scratch(), Projected::default());
+            let estimates = bank.estimates(record, centres.clone(), 1, &mut scratch, &mut projected);
             compare[centres.start - samples.start..centres.end - samples.start].copy_from_slice(&estimates[*candidate]);
         }
         Self { survey, end, samples, compare, kernel: bank.kernel(*candidate), gain: bank.gains[*candidate] }

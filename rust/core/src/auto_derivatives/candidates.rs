@@ -10,8 +10,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::auto_derivatives::tables::{TablesWanted, WindowTables, tables};
-use crate::local_polynomials::coefficients::{self, Projected};
+use crate::local_polynomials::coefficients::{CoefficientScratch, Projected};
+use crate::local_polynomials::tables::{TablesWanted, WindowTables, tables};
 use crate::noise::correlated::CorrelatedNoise;
 use crate::record::samples::Samples;
 use crate::simd::instructions::Instructions;
@@ -69,19 +69,14 @@ pub(crate) struct Bank {
     constant: f64,
 }
 
-/// Memory of one thread for one bank.
-#[derive(Debug)]
-pub(crate) struct CandidateScratch {
-    coefficients: coefficients::CoefficientScratch,
-    projected: Projected,
-}
-
 impl Bank {
     /// Prepares the tables, or returns `None` if windows of this length have no candidate.
     pub(crate) fn new(half: usize, target: &Target<'_>) -> Option<Self> {
         let orders = target.orders(half);
         let (derivative, highest) = (target.derivative, *orders.last()?);
-        let wanted = TablesWanted { half, highest, first: derivative, step: 2, instructions: target.instructions };
+        // One basis serves all derivatives.
+        let (all, instructions) = (target.highest(half), target.instructions);
+        let wanted = TablesWanted { half, highest: all, first: derivative, step: 2, instructions };
         let tables = tables(wanted);
         let basis = &tables.basis;
         let degrees: Vec<usize> = (derivative..=highest).step_by(2).collect();
@@ -104,8 +99,13 @@ impl Bank {
         Some(bank)
     }
 
-    pub(crate) fn scratch(&self) -> CandidateScratch {
-        CandidateScratch { coefficients: self.tables.coefficients.scratch(), projected: Projected::default() }
+    pub(crate) fn scratch(&self) -> CoefficientScratch {
+        self.tables.coefficients().scratch()
+    }
+
+    /// Centres that are worked on together.
+    pub(crate) fn run(&self) -> usize {
+        self.tables.coefficients().run()
     }
 
     /// The samples of a record that can be centres of windows.
@@ -119,11 +119,11 @@ impl Bank {
         record: &dyn Samples,
         centres: Range<usize>,
         step: usize,
-        scratch: &'a mut CandidateScratch,
-    ) -> &'a [Vec<f64>] {
-        let CandidateScratch { coefficients, projected } = scratch;
+        scratch: &mut CoefficientScratch,
+        projected: &'a mut Projected,
+    ) -> &'a mut [Vec<f64>] {
         let windows = centres.start - self.half..centres.end - self.half;
-        self.tables.coefficients.project(record, windows, step, projected, coefficients);
+        self.tables.coefficients().project(record, windows, step, projected, scratch);
         let Projected { level: sums, coefficients: rows, .. } = projected;
         for sum in sums.iter_mut() {
             // NaN stays NaN.
@@ -135,7 +135,7 @@ impl Bank {
                 *value = *sum;
             }
         }
-        &rows[self.first..]
+        &mut rows[self.first..]
     }
 
     /// The same from the coefficients of all degrees.
@@ -173,10 +173,13 @@ impl Bank {
 
     /// The weights of a window's samples in a candidate.
     pub(crate) fn kernel(&self, candidate: usize) -> Vec<f64> {
-        let degree = |l: usize| self.tables.basis.degrees() - 1 - 2 * (self.weights.len() - 1 - l);
         let weights = &self.weights[..=self.first + candidate];
         let weight = |index| {
-            weights.iter().enumerate().map(|(l, weight)| weight * self.tables.basis.value(degree(l), index)).sum()
+            weights
+                .iter()
+                .enumerate()
+                .map(|(l, weight)| weight * self.tables.basis.value(self.derivative + 2 * l, index))
+                .sum()
         };
         (0..self.tables.basis.length()).map(weight).collect()
     }

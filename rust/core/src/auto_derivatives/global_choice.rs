@@ -28,9 +28,10 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use crate::auto_derivatives::candidates::{Bank, Target, correlated};
-use crate::auto_derivatives::tables::{TablesWanted, WindowTables, tables};
+use crate::auto_derivatives::symmetric_grid::within;
 use crate::error::Error;
 use crate::local_polynomials::coefficients::Projected;
+use crate::local_polynomials::tables::{TablesWanted, WindowTables, tables};
 use crate::noise::correlated::CorrelatedNoise;
 use crate::record::samples::Samples;
 use crate::simd::instructions::Instructions;
@@ -80,9 +81,33 @@ pub(crate) struct Survey<'a> {
 struct Surveyed {
     bank: Bank,
     rows: Vec<Vec<f64>>,
+    /// The places where windows fit, if they fit at all of these: no sample is missing.
+    whole: Option<Range<usize>>,
 }
 
-/// A candidate of a window, and its risk where that is known.
+/// What candidates are compared with: the weights of its samples are the same for all of them.
+struct ReferenceCandidate<'a> {
+    looked: &'a Surveyed,
+    candidate: usize,
+    kernel: Vec<f64>,
+}
+
+impl Surveyed {
+    fn new(bank: Bank, rows: Vec<Vec<f64>>) -> Self {
+        let row = &rows[0];
+        let first = row.iter().position(|value| !value.is_nan());
+        let last = row.iter().rposition(|value| !value.is_nan());
+        let fits = first.zip(last).map(|(first, last)| first..last + 1);
+        let whole = fits.filter(|places| !row[places.clone()].iter().any(|value| value.is_nan()));
+        Self { bank, rows, whole }
+    }
+
+    fn compared(&self, candidate: usize) -> ReferenceCandidate<'_> {
+        ReferenceCandidate { looked: self, candidate, kernel: self.bank.kernel(candidate) }
+    }
+}
+
+/// A candidate of a window, and its risk.
 #[derive(Clone, Copy)]
 struct JudgedWindow<'a> {
     looked: &'a Surveyed,
@@ -136,8 +161,7 @@ impl<'a> Survey<'a> {
         let Some((pair, (window, candidate))) = best_of(&ladder, target.noise) else { return Ok(None) };
         let looked = ladder.swap_remove(window);
         drop(ladder);
-        let reference = JudgedWindow { looked: &looked, candidate, risk: f64::NAN };
-        self.refine(target, pair, reference, check_cancelled).map(Some)
+        self.refine(target, pair, &looked.compared(candidate), check_cancelled).map(Some)
     }
 
     /// Finds the window, and the order, between those of the ladder.
@@ -145,7 +169,7 @@ impl<'a> Survey<'a> {
         &self,
         target: &Target<'_>,
         pair: Pair,
-        reference: JudgedWindow<'_>,
+        reference: &ReferenceCandidate<'_>,
         check_cancelled: &mut CheckCancelled<'_>,
     ) -> Result<Pair, Error> {
         // The best of a window, compared with the best so far.
@@ -177,7 +201,7 @@ impl<'a> Survey<'a> {
 
     fn look(&self, bank: Bank) -> Surveyed {
         let rows = bank.combine(&self.coefficients(bank.half));
-        Surveyed { bank, rows }
+        Surveyed::new(bank, rows)
     }
 
     /// The record that is surveyed.
@@ -207,9 +231,9 @@ impl<'a> Survey<'a> {
             let step = room.div_ceil(most).max(1);
             let first = part.start + if last { room.saturating_sub(1) % step } else { 0 };
             let tables = self.tables(half);
-            let (mut scratch, mut projected) = (tables.coefficients.scratch(), Projected::default());
+            let (mut scratch, mut projected) = (tables.coefficients().scratch(), Projected::default());
             let windows = first..part.start + room;
-            tables.coefficients.project(self.record, windows.clone(), step, &mut projected, &mut scratch);
+            tables.coefficients().project(self.record, windows.clone(), step, &mut projected, &mut scratch);
             return (windows.step_by(step).collect(), projected);
         }
         let known = self.coefficients(half);
@@ -236,7 +260,7 @@ impl<'a> Survey<'a> {
             return Rc::clone(known);
         }
         let tables = self.tables(half);
-        let mut scratch = tables.coefficients.scratch();
+        let mut scratch = tables.coefficients().scratch();
         let (mut all, mut part) = (Projected::default(), Projected::default());
         all.coefficients.resize_with(tables.basis.degrees(), Vec::new);
         for stretch in &self.stretches {
@@ -254,7 +278,7 @@ impl<'a> Survey<'a> {
             }
             let first = stretch.start + wanted.start * self.step;
             let end = centres.end.min(stretch.end);
-            tables.coefficients.project(self.record, first - half..end - half, self.step, &mut part, &mut scratch);
+            tables.coefficients().project(self.record, first - half..end - half, self.step, &mut part, &mut scratch);
             let own = before + wanted.start..before + wanted.end;
             all.level[own.clone()].copy_from_slice(&part.level);
             for (row, found) in all.coefficients.iter_mut().zip(&part.coefficients) {
@@ -275,10 +299,10 @@ fn best_of(ladder: &[Surveyed], noise: &CorrelatedNoise) -> Option<(Pair, (usize
     while !seen.contains(&reference) {
         seen.push(reference);
         let least_gain = ladder.get(reference.0)?.bank.gains[reference.1] / JUDGED;
-        let compared = JudgedWindow { looked: &ladder[reference.0], candidate: reference.1, risk: f64::NAN };
+        let compared = ladder[reference.0].compared(reference.1);
         let (mut shorter_best, mut least): (_, Option<(f64, usize, usize)>) = (None, None);
         for (window, looked) in ladder.iter().enumerate() {
-            let risks = risks(compared, looked, shorter_best, least_gain, noise).into_iter().enumerate();
+            let risks = risks(&compared, looked, shorter_best, least_gain, noise).into_iter().enumerate();
             let judged = risks.filter(|&(_, risk)| risk.is_finite());
             let Some((candidate, risk)) = judged.min_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
             shorter_best = Some(JudgedWindow { looked, candidate, risk });
@@ -297,7 +321,7 @@ fn best_of(ladder: &[Surveyed], noise: &CorrelatedNoise) -> Option<(Pair, (usize
 /// The risk of every candidate of a window of at least some gain, by comparison with a reference; infinite where they cannot be compared. Given another
 /// candidate whose risk is known, it is that risk plus the difference where both windows fit.
 fn risks(
-    reference: JudgedWindow<'_>,
+    reference: &ReferenceCandidate<'_>,
     looked: &Surveyed,
     beside: Option<JudgedWindow<'_>>,
     least_gain: f64,
@@ -309,25 +333,29 @@ fn risks(
     }
     let variance = noise.variance();
     let longest = looked.bank.half.max(beside.map_or(0, |other| other.looked.bank.half));
-    let kernel = correlated(reference.looked.bank.kernel(reference.candidate), longest, noise);
+    let kernel = correlated(reference.kernel.clone(), longest, noise);
     let compare = &reference.looked.rows[reference.candidate];
+    let both = looked.whole.as_ref().zip(reference.looked.whole.as_ref()).map(|(a, b)| within(a, b));
+    let all = match beside {
+        Some(other) => both.zip(other.looked.whole.as_ref()).map(|(both, other)| within(&both, other)),
+        None => both,
+    };
     let fits = |place: usize| {
         let other = beside.map_or(0.0, |other| other.looked.rows[other.candidate][place]);
         !(looked.rows[0][place] + compare[place] + other).is_nan()
     };
-    let places: Vec<usize> = (0..compare.len()).filter(|&place| fits(place)).collect();
-    let (Some(&first), Some(&last)) = (places.first(), places.last()) else { return nothing() };
-    if places.len() < FEWEST_PLACES {
+    let some: Vec<usize> =
+        if all.is_some() { Vec::new() } else { (0..compare.len()).filter(|&place| fits(place)).collect() };
+    let count = all.as_ref().map_or(some.len(), Range::len);
+    if count < FEWEST_PLACES {
         return nothing();
     }
-    let whole = last - first + 1 == places.len();
     let distance = |row: &[f64]| {
-        let sum = if whole {
-            squared_distance(&row[first..=last], &compare[first..=last])
-        } else {
-            places.iter().map(|&place| (row[place] - compare[place]).powi(2)).sum()
+        let sum = match &all {
+            Some(all) => squared_distance(&row[all.clone()], &compare[all.clone()]),
+            None => some.iter().map(|&place| (row[place] - compare[place]).powi(2)).sum(),
         };
-        sum / places.len() as f64
+        sum / count as f64
     };
     let risk = |looked: &Surveyed, candidate: usize, shared: f64| {
         distance(&looked.rows[candidate]) + variance * (2.0 * shared + (OPTIMISM - 1.0) * looked.bank.gains[candidate])
@@ -399,19 +427,20 @@ mod tests {
             let bank = Bank::new(half, &target).expect("a window of enough samples");
             let row: Vec<f64> =
                 (0..100).map(|place| if (30..70).contains(&place) { inside } else { outside }).collect();
-            Surveyed { rows: vec![row; bank.orders.len()], bank }
+            let rows = vec![row; bank.orders.len()];
+            Surveyed::new(bank, rows)
         };
         // The longest fits in the middle only, and what all are compared with is far off wherever it does not.
         let (reference, short, long) = (surveyed(4, 9.0, 0.0), surveyed(8, 0.0, 0.1), surveyed(30, f64::NAN, 0.3));
         let judged = |looked, candidate, risk| JudgedWindow { looked, candidate, risk };
-        let reference = judged(&reference, 0, f64::NAN);
-        let of_short = risks(reference, &short, None, 0.0, &noise)[0];
-        let of_long = risks(reference, &long, Some(judged(&short, 0, of_short)), 0.0, &noise)[0];
+        let reference = reference.compared(0);
+        let of_short = risks(&reference, &short, None, 0.0, &noise)[0];
+        let of_long = risks(&reference, &long, Some(judged(&short, 0, of_short)), 0.0, &noise)[0];
         assert!((of_short - 0.6 * 81.0 - 0.4 * 0.01).abs() < 1e-12);
         assert!((of_long - of_short - (0.09 - 0.01)).abs() < 1e-12);
         // The other way round as well.
-        let alone = risks(reference, &long, None, 0.0, &noise)[0];
-        let beside = risks(reference, &short, Some(judged(&long, 0, alone)), 0.0, &noise)[0];
+        let alone = risks(&reference, &long, None, 0.0, &noise)[0];
+        let beside = risks(&reference, &short, Some(judged(&long, 0, alone)), 0.0, &noise)[0];
         assert!((alone - beside - (0.09 - 0.01)).abs() < 1e-12);
     }
 }

@@ -23,7 +23,8 @@
 use std::num::NonZeroUsize;
 use std::ops::Range;
 
-use crate::auto_derivatives::candidate_weights::{AverageScratch, Refinement, Weighed, within};
+use crate::auto_derivatives::candidate_weights::{AverageScratch, Refinement, Weighed};
+use crate::auto_derivatives::symmetric_grid::within;
 use crate::error::Error;
 use crate::exec::pool::{self, Piece, Watch};
 use crate::lanes::output::split_off;
@@ -31,6 +32,9 @@ use crate::record::samples::Samples;
 
 /// Candidates of less weight are left out.
 const NEGLIGIBLE: f64 = 1e-9;
+
+/// The logarithm of a weight that adds nothing to one, in any number of candidates.
+const NOTHING: f64 = -46.0;
 
 /// Where the estimates of one record go. Slices that are empty are not wanted.
 #[derive(Debug)]
@@ -42,12 +46,16 @@ pub(crate) struct DerivativeOutputs<'a> {
 
 /// Turns logarithms of weights, of which the largest is zero, into weights.
 fn normalise(weights: &mut [f64]) {
-    let total: f64 = weights.iter().map(|weight| weight.exp()).sum();
+    for weight in weights.iter_mut() {
+        *weight = if *weight > NOTHING { weight.exp() } else { 0.0 };
+    }
+    let total: f64 = weights.iter().sum();
     for weight in weights {
-        let share = weight.exp() / total;
+        let share = *weight / total;
         *weight = if share > NEGLIGIBLE { share } else { 0.0 };
     }
 }
+
 impl Refinement {
     /// Estimates wherever a window of any candidate lies in the record; NaN elsewhere.
     pub(crate) fn estimate(
@@ -57,42 +65,57 @@ impl Refinement {
         workers: NonZeroUsize,
         watch: &mut Watch<'_>,
     ) -> Result<(), Error> {
-        let (blocks, candidates) = (self.blocks.count(), self.offsets.len());
-        let mut sums = vec![0.0; blocks * candidates];
-        let mut counts = vec![0.0; blocks * self.banks.len()];
-        let total = 2 * record.len();
-        {
-            let (mut sums, mut counts) = (sums.as_mut_slice(), counts.as_mut_slice());
-            let mut pieces = Vec::new();
-            for part in self.pieces() {
-                let own = split_off(&mut sums, part.len() * candidates);
-                let own_counts = split_off(&mut counts, part.len() * self.banks.len());
-                pieces.push(Piece { size: self.samples(&part).len(), content: (part, own, own_counts) });
-            }
-            let work = |(part, sums, counts): (Range<usize>, &mut [f64], &mut [f64]), scratch: &mut AverageScratch| {
-                self.compare(record, part, sums, counts, scratch);
-            };
-            pool::run(pieces, workers, || self.scratch(), work, &mut |done, _| watch(done, total))?;
-        }
-        let weighed = self.weigh(&sums, &counts);
-        drop((sums, counts));
-        let mut pieces = Vec::new();
+        let (samples, total) = (record.len(), 2 * record.len());
         let DerivativeOutputs { values, errors, order } = outputs;
         let (mut values, mut errors, mut order) = (&mut **values, &mut **errors, &mut **order);
-        for part in self.pieces() {
-            let size = self.samples(&part).len();
-            let own = DerivativeOutputs {
-                values: split_off(&mut values, size),
-                errors: split_off(&mut errors, size),
-                order: split_off(&mut order, size),
+        for chunk in self.chunks() {
+            // What is done of both passes.
+            let (before, size) = (2 * self.samples(&chunk).start, self.samples(&chunk).len());
+            let weighed =
+                self.weigh_around(record, &chunk, workers, &mut |done, _| watch(before + done.min(size), total))?;
+            let mut pieces = Vec::new();
+            for part in self.pieces(&chunk) {
+                let size = self.samples(&part).len();
+                let own = DerivativeOutputs {
+                    values: split_off(&mut values, size),
+                    errors: split_off(&mut errors, size),
+                    order: split_off(&mut order, size),
+                };
+                pieces.push(Piece { size, content: (part, own) });
+            }
+            let work = |(part, mut outputs): (Range<usize>, DerivativeOutputs<'_>), scratch: &mut AverageScratch| {
+                self.average(record, part, &weighed, &mut outputs, scratch);
             };
-            pieces.push(Piece { size, content: (part, own) });
+            pool::run(pieces, workers, || self.scratch(), work, &mut |done, _| watch(before + size + done, total))?;
         }
-        let work = |(part, mut outputs): (Range<usize>, DerivativeOutputs<'_>), scratch: &mut AverageScratch| {
-            self.average(record, part, &weighed, &mut outputs, scratch);
+        if watch(2 * samples, total) { Ok(()) } else { Err(Error::Cancelled) }
+    }
+
+    /// The weights of some blocks and of one more on either side.
+    fn weigh_around(
+        &self,
+        record: &dyn Samples,
+        chunk: &Range<usize>,
+        workers: NonZeroUsize,
+        watch: &mut Watch<'_>,
+    ) -> Result<Weighed, Error> {
+        let candidates = self.offsets.len();
+        let around = self.blocks_around(chunk, 1);
+        let known = self.blocks_around(&around, self.reach());
+        let mut sums = vec![0.0; known.len() * candidates];
+        let mut counts = vec![0.0; known.len() * self.banks.len()];
+        let (mut all, mut all_counts) = (sums.as_mut_slice(), counts.as_mut_slice());
+        let mut pieces = Vec::new();
+        for part in self.pieces(&known) {
+            let own = split_off(&mut all, part.len() * candidates);
+            let own_counts = split_off(&mut all_counts, part.len() * self.banks.len());
+            pieces.push(Piece { size: self.samples(&part).len(), content: (part, own, own_counts) });
+        }
+        let work = |(part, sums, counts): (Range<usize>, &mut [f64], &mut [f64]), scratch: &mut AverageScratch| {
+            self.compare(record, part, sums, counts, scratch);
         };
-        let samples = record.len();
-        pool::run(pieces, workers, || self.scratch(), work, &mut |done, _| watch(samples + done, total))
+        pool::run(pieces, workers, || self.scratch(), work, watch)?;
+        Ok(self.weigh(around, known.start, &sums, &counts))
     }
 
     /// Averages the candidates of some blocks' samples.
@@ -106,8 +129,8 @@ impl Refinement {
     ) {
         let (samples, candidates) = (self.samples(&blocks), self.offsets.len());
         // Weights are linear between the centres of neighbouring blocks.
-        let around = blocks.start.saturating_sub(1)..(blocks.end + 1).min(self.blocks.count());
-        let part = around.start * candidates..around.end * candidates;
+        let around = self.blocks_around(&blocks, 1);
+        let part = (around.start - weighed.first) * candidates..(around.end - weighed.first) * candidates;
         let (logarithms, biases) = (&weighed.logarithms[part.clone()], &weighed.biases[part]);
         let mut weights = logarithms.to_vec();
         weights.chunks_exact_mut(candidates).for_each(normalise);
@@ -116,8 +139,9 @@ impl Refinement {
         self.fill(record, &samples, &used, scratch);
         let mut missing = Vec::new();
         let (mut between, mut active) = ((usize::MAX, usize::MAX), Vec::new());
-        for (place, sample) in samples.clone().enumerate() {
-            let (low, high, distance) = self.blocks.between(sample);
+        let mut first = samples.start;
+        while first < samples.end {
+            let (low, high, distance) = self.blocks.between(first);
             if between != (low, high) {
                 between = (low, high);
                 active.clear();
@@ -126,18 +150,26 @@ impl Refinement {
                     (of(low), of(high) - of(low))
                 };
                 let candidates = (0..candidates).filter(|&one| used[one]);
-                let candidates = candidates.map(|one| (one, of(&weights, one), of(biases, one)));
-                active.extend(candidates.filter(|(_, weight, _)| *weight != (0.0, 0.0)));
+                let candidates =
+                    candidates.map(|one| Share { candidate: one, weight: of(&weights, one), bias: of(biases, one) });
+                active.extend(candidates.filter(|share| share.weight != (0.0, 0.0)));
             }
-            let line = |(start, growth): (f64, f64)| start + distance * growth;
-            let shares = active.iter().map(|&(candidate, weight, bias)| Share {
-                candidate,
-                weight: line(weight),
-                bias: line(bias),
-            });
-            if !self.mix(&shares, place, outputs, scratch) {
-                missing.push((place, self.blocks.of(sample)));
+            // A few samples between the same centres.
+            let mut distances = [distance; TOGETHER];
+            let mut count = 1;
+            while count < TOGETHER.min(samples.end - first) {
+                let (below, above, distance) = self.blocks.between(first + count);
+                if (below, above) != between {
+                    break;
+                }
+                distances[count] = distance;
+                count += 1;
             }
+            let places = first - samples.start..first - samples.start + count;
+            for place in self.mix(&active, &distances, places, outputs, scratch) {
+                missing.push((place, self.blocks.of(samples.start + place)));
+            }
+            first += count;
         }
         if missing.is_empty() {
             return;
@@ -151,14 +183,14 @@ impl Refinement {
             let fits =
                 (0..candidates).filter(|&one| !scratch.rows[one][place].is_nan() && row[one] > f64::NEG_INFINITY);
             let best = fits.max_by(|&a, &b| row[a].total_cmp(&row[b]));
-            let share = best.into_iter().map(|candidate| Share { candidate, weight: 1.0, bias: biases[candidate] });
-            self.mix(&share, place, outputs, scratch);
+            let share = best.map(|candidate| Share { candidate, weight: (1.0, 0.0), bias: (biases[candidate], 0.0) });
+            let _ = self.mix(share.as_slice(), &[0.0; TOGETHER], place..place + 1, outputs, scratch);
         }
     }
 
     /// Fills the rows of the candidates wanted; NaN where a window does not fit.
     fn fill(&self, record: &dyn Samples, samples: &Range<usize>, wanted: &[bool], scratch: &mut AverageScratch) {
-        let AverageScratch { banks, rows, .. } = scratch;
+        let AverageScratch { banks, projected, rows, .. } = scratch;
         let mut first = 0;
         for (bank, scratch) in self.banks.iter().zip(banks) {
             let own = first..first + bank.orders.len();
@@ -167,12 +199,17 @@ impl Refinement {
             if !wanted[own.clone()].contains(&true) {
                 continue;
             }
+            if centres == *samples {
+                let estimates = bank.estimates(record, centres, 1, scratch, projected);
+                rows[own].iter_mut().zip(estimates).for_each(|(row, estimates)| std::mem::swap(row, estimates));
+                continue;
+            }
             for row in &mut rows[own.clone()] {
                 row.clear();
                 row.resize(samples.len(), f64::NAN);
             }
             if !centres.is_empty() {
-                let estimates = bank.estimates(record, centres.clone(), 1, scratch);
+                let estimates = bank.estimates(record, centres.clone(), 1, scratch, projected);
                 for (row, estimates) in rows[own].iter_mut().zip(estimates) {
                     row[centres.start - samples.start..centres.end - samples.start].copy_from_slice(estimates);
                 }
@@ -180,44 +217,83 @@ impl Refinement {
         }
     }
 
-    /// Writes the average of some candidates at one place, or NaN. Returns whether there is one.
+    /// Writes the average of some candidates at a few places, or NaN. Returns the places where there is none.
     fn mix(
         &self,
-        shares: &(impl Iterator<Item = Share> + Clone),
-        place: usize,
+        shares: &[Share],
+        distances: &[f64; TOGETHER],
+        places: Range<usize>,
         outputs: &mut DerivativeOutputs<'_>,
         scratch: &AverageScratch,
-    ) -> bool {
-        let estimate = |candidate: usize| scratch.rows[candidate][place];
-        let known = || shares.clone().filter(|share| share.weight > 0.0 && !estimate(share.candidate).is_nan());
-        let (mut total, mut sum, mut largest, mut best) = (0.0, 0.0, 0.0, None);
-        for Share { candidate, weight, .. } in known() {
-            total += weight;
-            sum += weight * estimate(candidate);
-            if weight > largest {
-                (largest, best) = (weight, Some(candidate));
+    ) -> impl Iterator<Item = usize> + use<> {
+        let count = places.len();
+        // Estimates and weights, zero where there is no estimate.
+        let known = |share: &Share| {
+            let mut estimates = [f64::NAN; TOGETHER];
+            estimates[..count].copy_from_slice(&scratch.rows[share.candidate][places.clone()]);
+            let mut weights = line(share.weight, distances);
+            for (estimate, weight) in estimates.iter_mut().zip(&mut weights) {
+                let usable = *weight > 0.0 && !estimate.is_nan();
+                *weight = if usable { *weight } else { 0.0 };
+                *estimate = if usable { *estimate } else { 0.0 };
+            }
+            (estimates, weights)
+        };
+        let (mut total, mut values, mut largest) = ([0.0; TOGETHER], [0.0; TOGETHER], [0.0; TOGETHER]);
+        let mut best = [None; TOGETHER];
+        for share in shares {
+            let (estimates, weights) = known(share);
+            for i in 0..TOGETHER {
+                total[i] += weights[i];
+                values[i] += weights[i] * estimates[i];
+            }
+            for i in 0..TOGETHER {
+                if weights[i] > largest[i] {
+                    (largest[i], best[i]) = (weights[i], Some(share.candidate));
+                }
             }
         }
-        let value = sum / total;
-        outputs.values[place] = value;
-        if let (Some(slot), Some(best)) = (outputs.order.get_mut(place), best) {
-            *slot = self.orders[best];
+        values.iter_mut().zip(&total).for_each(|(value, total)| *value /= total);
+        outputs.values[places.clone()].copy_from_slice(&values[..count]);
+        if !outputs.order.is_empty() {
+            for (slot, best) in outputs.order[places.clone()].iter_mut().zip(best) {
+                *slot = best.map_or(*slot, |best| self.orders[best]);
+            }
         }
-        if let Some(error) = outputs.errors.get_mut(place) {
-            let square = |Share { candidate, weight, bias }: Share| {
-                weight * (bias + self.variances[candidate] + (estimate(candidate) - value).powi(2))
-            };
-            *error = (known().map(square).sum::<f64>() / total).sqrt();
+        if !outputs.errors.is_empty() {
+            let mut squares = [0.0; TOGETHER];
+            for share in shares {
+                let ((estimates, weights), biases) = (known(share), line(share.bias, distances));
+                let variance = self.variances[share.candidate];
+                for i in 0..TOGETHER {
+                    let away = estimates[i] - values[i];
+                    // Where the weight is zero nothing is added, whatever there is no value of.
+                    let square = weights[i] * (biases[i] + variance + away * away);
+                    squares[i] += if weights[i] > 0.0 { square } else { 0.0 };
+                }
+            }
+            for ((slot, square), total) in outputs.errors[places.clone()].iter_mut().zip(squares).zip(total) {
+                *slot = (square / total).sqrt();
+            }
         }
-        best.is_some()
+        let first = places.start;
+        (0..count).filter(move |&i| best[i].is_none()).map(move |i| first + i)
     }
 }
 
-/// What a candidate contributes to one sample.
+/// Samples that are averaged together.
+const TOGETHER: usize = 8;
+
+/// What a candidate contributes between two centres: numbers at the first, and by how much they grow.
 #[derive(Clone, Copy)]
 struct Share {
     candidate: usize,
-    weight: f64,
+    weight: (f64, f64),
     /// Its squared bias there.
-    bias: f64,
+    bias: (f64, f64),
+}
+
+/// Numbers on a line, at some distances from its start.
+fn line((start, growth): (f64, f64), distances: &[f64; TOGETHER]) -> [f64; TOGETHER] {
+    distances.map(|distance| start + distance * growth)
 }

@@ -8,7 +8,6 @@ pub(crate) mod global_choice;
 pub(crate) mod local_average;
 pub(crate) mod slopes;
 pub(crate) mod symmetric_grid;
-pub(crate) mod tables;
 pub(crate) mod trend;
 
 pub use automatic::{

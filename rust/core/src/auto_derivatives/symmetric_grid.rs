@@ -55,6 +55,12 @@ impl Blocks {
     }
 }
 
+/// The intersection of two ranges.
+pub(crate) fn within(one: &Range<usize>, other: &Range<usize>) -> Range<usize> {
+    let start = one.start.max(other.start);
+    start..one.end.min(other.end).max(start)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

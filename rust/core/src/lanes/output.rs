@@ -27,6 +27,13 @@ impl Elements {
         element(samples.start)..element(samples.end)
     }
 
+    /// The rows that elements belong to, of windows of which row zero has a sample: as a mask and what is left of a row under it. All rows, where
+    /// the step is not a power of two up to `most`.
+    pub(crate) fn rows_from(self, sample: isize, most: usize) -> FinishedRows {
+        let mask = if self.step.is_power_of_two() && self.step <= most { self.step - 1 } else { 0 };
+        FinishedRows { mask, rest: (self.first.cast_signed() - sample).cast_unsigned() & mask }
+    }
+
     /// The same, counted from an element on.
     pub(crate) fn from(self, element: usize) -> Self {
         Self { first: self.sample(element), step: self.step }
@@ -50,6 +57,26 @@ impl Elements {
                 *value = result;
             }
         }
+    }
+}
+
+/// Rows of windows that are finished: those that a power of two divides with the same rest.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct FinishedRows {
+    mask: usize,
+    rest: usize,
+}
+
+impl FinishedRows {
+    /// Whether a row is one of them.
+    #[inline(always)]
+    pub(crate) fn hold(self, row: usize) -> bool {
+        row & self.mask == self.rest
+    }
+
+    /// Rows from one to the next.
+    pub(crate) fn step(self) -> usize {
+        self.mask + 1
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::lanes::output::Outputs;
+use crate::lanes::output::{FinishedRows, Outputs};
 use crate::lanes::tile::{TILE, Tile};
 use crate::simd::vectors::{Kernel, Lanes, MOST_LANES};
 
@@ -34,6 +34,8 @@ impl Kernel for Write<'_, '_> {
         let wanted = self.windows.start.cast_signed() <= first && end <= self.windows.end.cast_signed();
         if wanted && self.rows.len() >= lanes && self.outputs.elements.step == 1 {
             self.write_squares(simd);
+        } else if let (true, Some(rows)) = (wanted, self.same_rows()) {
+            self.write_rows::<S>(rows);
         } else {
             self.write_lanes::<S>();
         }
@@ -76,6 +78,44 @@ impl Write<'_, '_> {
                 }
                 if !outputs.status.is_empty() {
                     outputs.status[elements].copy_from_slice(&statuses[..lanes]);
+                }
+            }
+        }
+    }
+
+    /// The rows that elements belong to, where those are the same in all lanes.
+    fn same_rows(&self) -> Option<FinishedRows> {
+        let elements = self.outputs.elements;
+        let rows = elements.rows_from(self.base + self.ahead, self.block);
+        (rows.step() == elements.step && self.block % elements.step == 0).then_some(rows)
+    }
+
+    /// Writes out every row that elements belong to, one element for each lane.
+    #[inline(always)]
+    fn write_rows<S: Lanes>(&mut self, finished: FinishedRows) {
+        let Self { tile, rows, outputs, .. } = self;
+        let (lanes, step) = (S::F64_LANES, outputs.elements.step);
+        let zero = self.base + self.ahead - outputs.elements.first.cast_signed();
+        let apart = self.block / step;
+        for row in rows.clone().filter(|&row| finished.hold(row)) {
+            let first = (zero + row.cast_signed()).unsigned_abs() / step;
+            let fields = outputs.values.len();
+            for (field, values) in outputs.values.iter_mut().enumerate().filter(|(_, values)| !values.is_empty()) {
+                for (lane, value) in values[first..].iter_mut().step_by(apart).take(lanes).enumerate() {
+                    *value = tile.one(field, row, lane, lanes);
+                }
+            }
+            if outputs.status.is_empty() && outputs.order.is_empty() {
+                continue;
+            }
+            for lane in 0..lanes {
+                let (order, status) =
+                    self.fixed_order.map_or_else(|| parts(tile.one(fields, row, lane, lanes)), |order| (order, 0));
+                if let Some(slot) = outputs.order.get_mut(first + lane * apart) {
+                    *slot = order;
+                }
+                if let Some(slot) = outputs.status.get_mut(first + lane * apart) {
+                    *slot = status;
                 }
             }
         }

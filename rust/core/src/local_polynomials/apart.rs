@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use crate::lanes::interleaved::Strips;
-use crate::lanes::output::Outputs;
+use crate::lanes::output::{FinishedRows, Outputs};
 use crate::lanes::store::write_row;
 use crate::lanes::tile::Tile;
 use crate::local_polynomials::evaluate::Finish;
@@ -111,6 +111,7 @@ impl<const D: usize, const RESIDUAL: bool> Apart<'_, D, RESIDUAL> {
                 start: 0,
                 windows: 0..1,
                 ready: true,
+                finished: FinishedRows::default(),
             };
             sweep.go(instructions);
             write_row(tile, lanes, some.clone(), finish.fixed_order(RESIDUAL), outputs);

@@ -61,6 +61,11 @@ impl Coefficients {
         CoefficientScratch(self.engine.scratch())
     }
 
+    /// Windows that are worked on together.
+    pub(crate) fn run(&self) -> usize {
+        self.engine.stride(1)
+    }
+
     /// Projects windows, known by their first samples: all of them, or every `step`-th from the first on.
     pub(crate) fn project(
         &self,

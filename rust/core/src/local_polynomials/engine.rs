@@ -17,7 +17,7 @@ use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::estimates::Estimates;
 use crate::local_polynomials::evaluate::{Finish, Functional};
 use crate::local_polynomials::kernels::{Direction, Fill, STEPS, Start, Sweep, replace, states};
-use crate::local_polynomials::sliding_projection::Projection;
+use crate::local_polynomials::sliding_projection::{Projection, SHORTEST_BLOCK};
 use crate::record::buffer::Stretch;
 use crate::record::samples::Samples;
 use crate::simd::aligned::Aligned;
@@ -204,6 +204,8 @@ impl<const D: usize, const RESIDUAL: bool> EngineRun<'_, D, RESIDUAL> {
         dispatch(instructions, Fill { samples: stretch.from(self.base, strips.samples()), strips });
         // A short block is written whole, with its spans together; a long one tile by tile.
         let whole = projection.block() <= TILE;
+        let ahead = self.engine.before_centre().cast_signed();
+        let finished = outputs.elements.rows_from(self.base + ahead, SHORTEST_BLOCK);
         for first in (wanted.start - wanted.start % span..wanted.end).step_by(span) {
             let start = first + projection.backward();
             self.take_references(stretch, start, references);
@@ -231,6 +233,7 @@ impl<const D: usize, const RESIDUAL: bool> EngineRun<'_, D, RESIDUAL> {
                         start,
                         windows: done..end,
                         ready,
+                        finished,
                     };
                     let lost;
                     (done, lost) = sweep.go(instructions);

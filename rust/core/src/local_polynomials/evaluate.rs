@@ -29,6 +29,8 @@ pub(crate) struct Finish {
     fixed_order: u8,
     /// Where orders are averaged.
     akaike: Option<Akaike>,
+    /// The degrees whose coefficients are given as they are, instead of functionals.
+    bare: Option<Vec<usize>>,
 }
 
 /// An order and flags as one whole number.
@@ -43,17 +45,6 @@ impl Functional {
         let values = basis.evaluate(0.0, derivative);
         let weights = std::array::from_fn(|j| values.get(j).map_or(0.0, |value| value * scale));
         Self { weights, odd: derivative % 2 == 1, constant: f64::from(u8::from(derivative == 0)) }
-    }
-
-    /// The reference that was subtracted from the window's samples before they were projected.
-    fn level() -> Self {
-        Self { weights: [0.0; MOST_DEGREES], odd: false, constant: 1.0 }
-    }
-
-    /// The coefficient of one degree.
-    fn coefficient(degree: usize) -> Self {
-        let weights = std::array::from_fn(|j| f64::from(u8::from(j == degree)));
-        Self { weights, odd: degree % 2 == 1, constant: 0.0 }
     }
 
     /// Its value's standard deviation over that of the noise, for every order.
@@ -102,7 +93,7 @@ impl Finish {
         tables.exact = code(0, Status::EXACT);
         tables.floor = options.quantisation_floor();
         let functionals = options.derivatives.iter().map(functional).collect();
-        Self { functionals, tables, fixed_order, akaike: Akaike::of(options, degrees) }
+        Self { functionals, tables, fixed_order, akaike: Akaike::of(options, degrees), bare: None }
     }
 
     /// Whether orders are averaged.
@@ -112,9 +103,14 @@ impl Finish {
 
     /// Gives, instead of derivatives, the reference of the window's samples and then the coefficients of some degrees.
     pub(crate) fn bare(mut self, degrees: &[usize]) -> Self {
-        self.functionals = vec![Functional::level()];
-        self.functionals.extend(degrees.iter().copied().map(Functional::coefficient));
+        self.functionals.clear();
+        self.bare = Some(degrees.to_vec());
         self
+    }
+
+    /// Whether it gives coefficients as they are.
+    pub(crate) fn is_bare(&self) -> bool {
+        self.bare.is_some()
     }
 
     pub(crate) fn functionals(&self) -> &[Functional] {
@@ -128,7 +124,12 @@ impl Finish {
 
     /// Numbers known of every window: its functionals and, where the residual is followed, noise, order and flags.
     pub(crate) fn fields(&self, residual: bool) -> usize {
-        self.functionals.len() + if residual { 2 } else { 0 }
+        self.numbers() + if residual { 2 } else { 0 }
+    }
+
+    /// The same without noise, order and flags.
+    fn numbers(&self) -> usize {
+        self.bare.as_ref().map_or(self.functionals.len(), |degrees| degrees.len() + 1)
     }
 
     /// Finishes one window of each lane by the average over orders.
@@ -160,6 +161,43 @@ impl Finish {
         }
     }
 
+    /// Gives the reference and the coefficients that are wanted of one window of each lane, the `index`-th of some stored states. Loading all of
+    /// them, to sum them with weights of one and zero, would cost more than the steps between the windows.
+    #[inline(always)]
+    pub(crate) fn give<S: Lanes, const D: usize, const RESIDUAL: bool>(
+        &self,
+        simd: S,
+        (states, index): (&[f64], usize),
+        reference: S::f64s,
+        backward: bool,
+        tile: &mut Tile,
+        place: usize,
+    ) {
+        if RESIDUAL {
+            self.finish_order(simd, &State::<S, D>::load(simd, states, index), tile, place);
+        }
+        tile.put(simd, 0, place, reference);
+        for (&degree, field) in self.bare.iter().flatten().zip(1..) {
+            let value = State::<S, D>::coefficient(simd, states, index, degree);
+            tile.put(simd, field, place, if backward && degree % 2 == 1 { simd.neg_f64s(value) } else { value });
+        }
+    }
+
+    /// Chooses the order of one window of each lane, and finishes its noise, order and flags.
+    #[inline(always)]
+    fn finish_order<S: Lanes, const D: usize>(
+        &self,
+        simd: S,
+        state: &State<S, D>,
+        tile: &mut Tile,
+        place: usize,
+    ) -> S::f64s {
+        let choice = choose(simd, &self.tables, state);
+        tile.put(simd, self.numbers(), place, simd.sqrt_f64s(choice.variance));
+        tile.put(simd, self.numbers() + 1, place, choice.code);
+        choice.order
+    }
+
     /// Finishes one window of each lane.
     #[inline(always)]
     pub(crate) fn finish<S: Lanes, const D: usize, const RESIDUAL: bool>(
@@ -171,14 +209,7 @@ impl Finish {
         tile: &mut Tile,
         place: usize,
     ) {
-        let fields = self.functionals.len();
-        let mut order = None;
-        if RESIDUAL {
-            let choice = choose(simd, &self.tables, state);
-            tile.put(simd, fields, place, simd.sqrt_f64s(choice.variance));
-            tile.put(simd, fields + 1, place, choice.code);
-            order = Some(choice.order);
-        }
+        let order = if RESIDUAL { Some(self.finish_order(simd, state, tile, place)) } else { None };
         let turn = |odd: bool, value: S::f64s| if odd && backward { simd.neg_f64s(value) } else { value };
         let mut left = self.functionals.as_slice();
         let mut field = 0;

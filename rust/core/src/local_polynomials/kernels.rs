@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::lanes::interleaved::Strips;
+use crate::lanes::output::FinishedRows;
 use crate::lanes::tile::{TILE, Tile};
 use crate::local_polynomials::evaluate::Finish;
 use crate::local_polynomials::sliding_projection::{Projection, State};
@@ -123,6 +124,8 @@ pub(crate) struct Sweep<'a, const D: usize, const RESIDUAL: bool> {
     pub(crate) windows: Range<usize>,
     /// Whether the state is that of the first window already.
     pub(crate) ready: bool,
+    /// The rows whose windows are finished.
+    pub(crate) finished: FinishedRows,
 }
 
 impl<const D: usize, const RESIDUAL: bool> Kernel for Sweep<'_, D, RESIDUAL> {
@@ -161,14 +164,22 @@ impl<const D: usize, const RESIDUAL: bool> Sweep<'_, D, RESIDUAL> {
     #[inline(always)]
     fn through<S: Lanes, const AVERAGE: bool>(mut self, simd: S) -> (usize, u32) {
         let reference = simd.load(self.references, 0);
-        let backward = self.direction == Direction::Backward;
+        let (backward, bare) = (self.direction == Direction::Backward, self.finish.is_bare());
         let mut first = self.windows.start;
         while first < self.windows.end {
             let end = self.windows.end.min(first + STEPS);
             let (come_to, lost) = self.step(simd, reference, first..end);
             for index in first..come_to {
-                let state = State::<S, D>::load(simd, self.states, index - first);
                 let row = self.direction.row(self.start, index);
+                if !self.finished.hold(row) {
+                    continue;
+                }
+                if !AVERAGE && bare {
+                    let stored = (&*self.states, index - first);
+                    self.finish.give::<S, D, RESIDUAL>(simd, stored, reference, backward, self.tile, row);
+                    continue;
+                }
+                let state = State::<S, D>::load(simd, self.states, index - first);
                 if AVERAGE {
                     self.finish.finish_average::<S, D>(simd, &state, reference, backward, self.tile, row);
                 } else {

@@ -21,6 +21,7 @@ pub(crate) mod plan;
 pub(crate) mod single_window;
 pub(crate) mod sliding_projection;
 pub(crate) mod span;
+pub(crate) mod tables;
 
 pub use basis::Basis;
 pub use boundary::End;

@@ -79,6 +79,12 @@ impl<S: Lanes, const D: usize> State<S, D> {
         Self { coefficients, residual, energy: simd.load(from, (D + 1) * S::F64_LANES) }
     }
 
+    /// The coefficient of one degree of what [`State::store`] wrote.
+    #[inline(always)]
+    pub(crate) fn coefficient(simd: S, from: &[f64], index: usize, degree: usize) -> S::f64s {
+        simd.load(from, (index * (D + 2) + degree) * S::F64_LANES)
+    }
+
     /// Writes coefficients, residual and energy, one vector each, as the `index`-th of several states.
     #[inline(always)]
     pub(crate) fn store(&self, simd: S, to: &mut [f64], index: usize) {

@@ -15,8 +15,9 @@
 //! zero.
 
 use crate::error::Error;
-use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
-use crate::local_polynomials::coefficients::{Coefficients, Projected};
+use crate::local_polynomials::basis::MOST_DEGREES;
+use crate::local_polynomials::coefficients::Projected;
+use crate::local_polynomials::tables::{TablesWanted, tables};
 use crate::noise::passed::{CHANCE, PassedNoise, Shown};
 use crate::noise::quantisation::{STRETCHES, quantisation_step};
 use crate::noise::spectrum::power_of_whole_segments;
@@ -131,9 +132,9 @@ fn bands(record: &dyn Samples) -> (Vec<f64>, f64) {
 /// The mean of the squared highest coefficients of windows of one half-width.
 fn variance(record: &dyn Samples, half: usize, instructions: Instructions) -> f64 {
     let length = 2 * half + 1;
-    let basis = Basis::new(length, MOST_DEGREES);
-    let degrees: Vec<usize> = (LOWEST_DEGREE..MOST_DEGREES).collect();
-    let plan = Coefficients::new(&basis, &degrees, false, instructions);
+    let wanted = TablesWanted { half, highest: MOST_DEGREES - 1, first: LOWEST_DEGREE, step: 1, instructions };
+    let tables = tables(wanted);
+    let plan = tables.coefficients();
     let (mut scratch, mut projected) = (plan.scratch(), Projected::default());
     let (mut sum, mut count) = (0.0, 0);
     for windows in stretches(record.len() + 1 - length, MOST_WINDOWS, STRETCHES) {

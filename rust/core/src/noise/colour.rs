@@ -17,9 +17,11 @@
 
 use std::f64::consts::{LN_2, PI};
 use std::ops::Range;
+use std::sync::Arc;
 
 use crate::local_polynomials::basis::Basis;
-use crate::local_polynomials::coefficients::{Coefficients, Projected};
+use crate::local_polynomials::coefficients::Projected;
+use crate::local_polynomials::tables::{Kept, TablesWanted, tables};
 use crate::noise::correlated::CorrelatedNoise;
 use crate::record::samples::Samples;
 use crate::record::subsample::stretches;
@@ -68,6 +70,9 @@ const FALL: Range<f64> = 2.0..6.5;
 const ROUNDS: usize = 1000;
 const CHANGE: f64 = 1e-6;
 
+/// The powers of all noises, by half-width and lowest degree.
+static POWERS: Kept<(usize, usize), Arc<[f64]>> = Kept::new();
+
 /// What some degrees of windows of one length see.
 struct Seen {
     /// Angular frequency per sample, about.
@@ -77,7 +82,7 @@ struct Seen {
     deviation: f64,
     kurtosis: f64,
     /// The power of every noise of variance one: white, then by octave.
-    of_noises: Vec<f64>,
+    of_noises: Arc<[f64]>,
 }
 
 /// The noise of a channel, whose variance is given for the case that it is white or that its colour cannot be told.
@@ -175,11 +180,11 @@ fn corners() -> impl Iterator<Item = f64> {
 /// Looks at the noise of a record through some degrees of windows of one length.
 fn look(record: &dyn Samples, half: usize, groups: &[Range<usize>], instructions: Instructions) -> Vec<Seen> {
     let length = 2 * half + 1;
-    let basis = Basis::new(length, HIGH.end);
-    let degrees: Vec<usize> = groups.iter().cloned().flatten().collect();
-    let plan = Coefficients::new(&basis, &degrees, false, instructions);
+    let first = groups.iter().map(|group| group.start).min().unwrap_or(0);
+    let tables = tables(TablesWanted { half, highest: HIGH.end - 1, first, step: 1, instructions });
+    let plan = tables.coefficients();
     let (mut scratch, mut projected) = (plan.scratch(), Projected::default());
-    let (mut squares, mut fourths) = (vec![0.0; degrees.len()], vec![0.0; degrees.len()]);
+    let (mut squares, mut fourths) = (vec![0.0; HIGH.end - first], vec![0.0; HIGH.end - first]);
     let (mut windows, mut used) = (0_usize, 0);
     for places in stretches(record.len() + 1 - length, MOST_WINDOWS, STRETCHES) {
         used += places.len() + length;
@@ -196,10 +201,8 @@ fn look(record: &dyn Samples, half: usize, groups: &[Range<usize>], instructions
         return Vec::new();
     }
     let mean = |sums: &[f64]| sums.iter().sum::<f64>() / (sums.len() * windows) as f64;
-    let mut first = 0;
     let group = |group: &Range<usize>| {
-        let own = first..first + group.len();
-        first = own.end;
+        let own = group.start - first..group.end - first;
         let power = mean(&squares[own.clone()]);
         let independent = (group.len() * used.min(record.len())) as f64 / length as f64;
         Seen {
@@ -207,14 +210,14 @@ fn look(record: &dyn Samples, half: usize, groups: &[Range<usize>], instructions
             power,
             deviation: (2.0 / independent + MISFIT * MISFIT).sqrt(),
             kurtosis: mean(&fourths[own]) / (power * power),
-            of_noises: powers(&basis, group),
+            of_noises: POWERS.get((half, group.start), half, || powers(&tables.basis, group)),
         }
     };
     groups.iter().map(group).collect()
 }
 
 /// The mean square of some degrees' coefficients for every noise of variance one.
-fn powers(basis: &Basis, degrees: &Range<usize>) -> Vec<f64> {
+fn powers(basis: &Basis, degrees: &Range<usize>) -> Arc<[f64]> {
     let rows: Vec<Vec<f64>> =
         degrees.clone().map(|degree| (0..basis.length()).map(|index| basis.value(degree, index)).collect()).collect();
     let of = |noise: CorrelatedNoise| {
@@ -249,10 +252,18 @@ fn fit(seen: &[Seen], noises: &[usize]) -> (f64, Vec<f64>) {
         (0..count).map(|i| (0..count).map(|j| sum(&|row, _| row[i] * row[j])).collect()).collect();
     let right: Vec<f64> = (0..count).map(|i| sum(&|row, one| row[i] / one.deviation)).collect();
     let mut amounts = vec![0.0; count];
+    // In four sums, for which a processor need not wait one after the other.
+    let dot = |a: &[f64], b: &[f64]| {
+        let mut sums = [0.0; 4];
+        for (a, b) in a.chunks(4).zip(b.chunks(4)) {
+            sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum += a * b);
+        }
+        sums.iter().sum::<f64>()
+    };
     for _ in 0..ROUNDS {
         let mut largest = 0.0_f64;
         for i in 0..count {
-            let product: f64 = normal[i].iter().zip(&amounts).map(|(a, b)| a * b).sum();
+            let product = dot(&normal[i], &amounts);
             let new = (amounts[i] + (right[i] - product) / normal[i][i]).max(0.0);
             // In the unit of what is seen: noises of different memory are of different size.
             largest = largest.max((new - amounts[i]).abs() * normal[i][i].sqrt());
