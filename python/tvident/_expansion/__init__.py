@@ -3,6 +3,7 @@
 from tvident._expansion.basis import Basis, Coordinate
 from tvident._expansion.expansion import Expansion
 from tvident._expansion.fit import Curves, Fitted, Linearised
+from tvident._expansion.rivals import Rival, scatter
 from tvident._expansion.rows import Record, Unknown
 from tvident._expansion.search import DERIVATIVES, SLACK, Part, Search, Tried, along_record, curves_of, errors_along
 
@@ -17,10 +18,12 @@ __all__ = [
     "Linearised",
     "Part",
     "Record",
+    "Rival",
     "Search",
     "Tried",
     "Unknown",
     "along_record",
     "curves_of",
     "errors_along",
+    "scatter",
 ]

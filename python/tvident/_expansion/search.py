@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -13,6 +13,7 @@ import numpy.typing as npt
 from tvident._expansion.basis import Basis, Coordinate
 from tvident._expansion.families import Family
 from tvident._expansion.fit import Curves, Fitted, Linearised
+from tvident._expansion.rivals import Rival, scatter
 from tvident._expansion.rows import Record, Unknown
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -26,6 +27,9 @@ _BEYOND, _BEYOND_BY = 2, 8
 SLACK = 4.0
 """The smallest size is taken whose criterion is at most so much above the lowest: the lowest of some twenty is lower than that of the
 best by about as much by chance."""
+
+_NEGLIGIBLE = 1e-3
+"""Sizes of a smaller weight say nothing of how much a curve depends on its size."""
 
 _ROUNDS = 2
 """Of choosing sizes and linearising around what was found."""
@@ -111,6 +115,8 @@ class Search:
     noise: tuple[float, float]
     known: Curves
     tried: dict[tuple[int, ...], Tried] = field(default_factory=dict)
+    rivals: dict[str, list[Rival]] = field(default_factory=dict)
+    _solutions: dict[tuple[int, ...], tuple[list[Unknown], Fitted]] = field(default_factory=dict)
 
     def run(self, curves: Curves, terms: Array) -> tuple[list[Unknown], Fitted, Linearised]:
         """Return the unknowns with their sizes, their factors, and the rows around them.
@@ -133,11 +139,13 @@ class Search:
         before: list[list[int]] = []
         for _ in range(_ROUNDS):
             self.tried.clear()
+            self._solutions.clear()
             sizes, fitted = self._chosen(around, sizes, fitted, free)
             around = self._around(sizes, fitted)
             if not free or sizes == before:
                 break
             before = [list(one) for one in sizes]
+        self.rivals = self._rivals(sizes)
         for _ in range(_STEPS):
             last, fitted = fitted, self._solved(around, sizes)
             if not abs(fitted.misfit - last.misfit) > _SETTLED * last.misfit:
@@ -207,12 +215,41 @@ class Search:
         expanded = {one.name: tuple(size) for one, size in zip(self.parts, sizes, strict=True) if size}
         count = sum(one.size for one in unknowns)
         residual = fitted.misfit / fitted.observations if fitted.observations else float("nan")
-        self.tried[tuple(size for one in sizes for size in one)] = Tried(expanded, fitted.criterion, residual, count)
+        self._solutions[_key(sizes)] = unknowns, fitted
+        self.tried[_key(sizes)] = Tried(expanded, fitted.criterion, residual, count)
         return fitted
+
+    def _rivals(self, sizes: Sequence[Sequence[int]]) -> dict[str, list[Rival]]:
+        """Return the curves of all sizes that explain the record nearly as well, the one that was taken first, by name."""
+        taken = self._solutions[_key(sizes)]
+        least = min(fitted.criterion for _, fitted in self._solutions.values())
+        if not np.isfinite(least):
+            return {}
+        weights = {key: math.exp((least - fitted.criterion) / 2) for key, (_, fitted) in self._solutions.items()}
+        whole = sum(weights.values())
+        others = [
+            (weights[key] / whole, *solution)
+            for key, solution in self._solutions.items()
+            if key != _key(sizes) and weights[key] > _NEGLIGIBLE * whole
+        ]
+        found: dict[str, list[Rival]] = {}
+        for weight, unknowns, fitted in [(1.0, *taken), *others]:
+            first = 0
+            for one in unknowns:
+                place = slice(first, first + one.size)
+                first += one.size
+                if one.basis is not None:
+                    rival = Rival(weight, one.basis, fitted.values[place], fitted.covariance[place, place])
+                    found.setdefault(one.name, []).append(rival)
+        return found
 
     def _around(self, sizes: Sequence[Sequence[int]], fitted: Fitted) -> Linearised:
         curves, terms = curves_of(self._unknowns(sizes), fitted.values, self.record.angle.size)
         return Linearised(self.record, [*curves, *self.known], terms, self.noise, self.known)
+
+
+def _key(sizes: Sequence[Sequence[int]]) -> tuple[int, ...]:
+    return tuple(size for one in sizes for size in one)
 
 
 def curves_of(unknowns: Sequence[Unknown], values: Array, samples: int) -> tuple[Curves, Array]:
@@ -244,12 +281,17 @@ def along_record(basis: Basis, factors: Array, rate: int = 0) -> Array:
     return found
 
 
-def errors_along(basis: Basis, covariance: Array) -> Array:
-    """Return the standard errors of a curve at every sample of a record."""
+def errors_along(basis: Basis, covariance: Array, rivals: Sequence[Rival] = ()) -> Array:
+    """Return the standard errors of a curve at every sample of a record, with what the choice of its size adds."""
     samples = basis.coordinates[0].places.size
     found = np.empty(samples)
     for first in range(0, samples, _SAMPLES):
         some = slice(first, min(samples, first + _SAMPLES))
         functions = basis.along(some, 0)
-        found[some] = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", functions, covariance, functions), 0))
+        variance = np.einsum("ij,jk,ik->i", functions, covariance, functions)
+        found[some] = np.sqrt(np.maximum(variance, 0) + scatter(rivals, _functions_at(some)))
     return found
+
+
+def _functions_at(samples: slice) -> Callable[[Basis], Array]:
+    return lambda basis: basis.along(samples, 0)

@@ -60,7 +60,8 @@ class ExpandedTask:
         search = Search(given.record, given.parts, given.noise, given.known)
         unknowns, fitted, around = search.run(given.start, given.start_of_terms)
         tried = sorted(search.tried.values(), key=lambda one: one.parameters)
-        return self._result(ExpandedOutcome(given, unknowns, fitted, around, tried).with_errors_of_residuals())
+        outcome = ExpandedOutcome(given, unknowns, fitted, around, tried, search.rivals)
+        return self._result(outcome.with_errors_of_residuals())
 
     def _result(self, outcome: ExpandedOutcome) -> Identification:
         data, pilot, curves = self._data, outcome.given.pilot, outcome.curves

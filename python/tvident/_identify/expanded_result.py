@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -16,6 +16,7 @@ from tvident._equation import COEFFICIENTS
 from tvident._expansion import (
     Fitted,
     Linearised,
+    Rival,
     Tried,
     Unknown,
     along_record,
@@ -44,6 +45,8 @@ class ExpandedOutcome:
     around : Linearised
         The rows around what was found.
     tried : sequence of Tried
+    rivals : mapping of str to sequence of Rival
+        Curves of other sizes.
     """
 
     given: ExpandedInputs
@@ -51,6 +54,7 @@ class ExpandedOutcome:
     fitted: Fitted
     around: Linearised
     tried: Sequence[Tried]
+    rivals: Mapping[str, Sequence[Rival]]
 
     @property
     def ratio(self) -> float:
@@ -98,6 +102,7 @@ class ExpandedOutcome:
                 _basis=one.basis,
                 _own=own,
                 _own_covariance=covariance,
+                _rivals=self.rivals.get(one.name, ()),
             )
         return found
 
@@ -115,7 +120,7 @@ class ExpandedOutcome:
                 values[one.name], errors[one.name] = (np.full(count, number) for number in constants[one.name])
             else:
                 values[one.name] = along_record(one.basis, own)[step]
-                errors[one.name] = errors_along(one.basis, covariance)[step]
+                errors[one.name] = errors_along(one.basis, covariance, self.rivals.get(one.name, ()))[step]
         if "angle_zero" in constants:
             moved, error = constants["angle_zero"]
             constants["angle_zero"] = (given.zero + moved, error)

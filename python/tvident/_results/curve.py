@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import legendre
 
-from tvident._expansion import Basis
+from tvident._expansion import Basis, Rival, scatter
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,7 +42,8 @@ class ExpandedParameter:
     position : ndarray, shape (201,), or a pair of them
         Even places within the limits: what the parameter is a function of.
     value, stderr : ndarray, shape (201,) or (201, 201)
-        The curve there, and its standard error: K(position) with its band.
+        The curve there, and its standard error: K(position) with its band. It contains by how much curves of other sizes that explain
+        the record nearly as well differ.
     sizes : dict of str to ndarray
         Every size that was tried: ``"size"``, ``"criterion"`` (corrected Akaike; the smallest size was taken whose criterion is at most 4
         above the lowest), ``"residual"`` (mean square of the equations' residuals over their noise: 1 where noise explains them) and
@@ -86,6 +87,7 @@ class ExpandedParameter:
     _basis: Basis | None = field(default=None, repr=False)
     _own: Array = field(default_factory=lambda: np.zeros(0), repr=False)
     _own_covariance: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
+    _rivals: Sequence[Rival] = field(default=(), repr=False)
 
     @property
     def size(self) -> Any:
@@ -138,6 +140,8 @@ class ExpandedParameter:
         """
         functions, inside, shape = self._at(positions)
         variance = np.einsum("ij,jk,ik->i", functions, self._own_covariance, functions)
+        places = self._places(positions)
+        variance = np.maximum(variance, 0) + scatter(self._rivals, lambda basis: basis.at(places))
         return np.where(inside, np.sqrt(np.maximum(variance, 0)), np.nan).reshape(shape)
 
     def plot(self, *, truth: Any = None, ax: Axes | Sequence[Axes] | None = None) -> Figure:
@@ -186,11 +190,21 @@ class ExpandedParameter:
             raise ValueError(
                 f"{self.name} is a function of {len(ranges)} channels; got {len(positions)}; give one position for each"
             )
-        arrays = np.broadcast_arrays(*(np.asarray(one, dtype=np.float64) for one in positions))
-        places = [(one.ravel() - low) / (high - low) for one, (low, high) in zip(arrays, ranges, strict=True)]
+        shape = np.broadcast_shapes(*(np.shape(one) for one in positions))
+        places = self._unclipped(positions)
         inside = np.all([(place >= 0) & (place <= 1) for place in places], axis=0)
-        functions = self._functions.at([np.where(inside, place, 0.0) for place in places])
-        return functions, inside, arrays[0].shape
+        return self._functions.at(self._places(positions)), inside, shape
+
+    def _unclipped(self, positions: Sequence[npt.ArrayLike]) -> list[Array]:
+        """Return positions as parts of the range of each channel."""
+        arrays = np.broadcast_arrays(*(np.asarray(one, dtype=np.float64) for one in positions))
+        return [(one.ravel() - low) / (high - low) for one, (low, high) in zip(arrays, self._ranges, strict=True)]
+
+    def _places(self, positions: Sequence[npt.ArrayLike]) -> list[Array]:
+        """Return the same where they are within the range, zero elsewhere."""
+        places = self._unclipped(positions)
+        inside = np.all([(place >= 0) & (place <= 1) for place in places], axis=0)
+        return [np.where(inside, place, 0.0) for place in places]
 
 
 def of_powers(coefficients: Array, covariance: Array) -> tuple[Array, Array]:
