@@ -59,6 +59,20 @@ def _against_plain(samples: int, signal: str, *positional: Any, **options: Any) 
     return prepare
 
 
+def _regression(**options: Any) -> Callable[[float], Duel]:
+    """Pit an option of `rolling_least_squares` against the plain call."""
+
+    def prepare(share: float) -> Duel:
+        regressors, sides = signals.regression(max(_LEAST, int(1_000_000 * share)))
+
+        def work(**options: Any) -> Work:
+            return lambda: tvident.rolling_least_squares(regressors, sides, 201, workers=1, **options)
+
+        return Duel([work(**options), work()], _unchecked, sides.size)
+
+    return prepare
+
+
 def _automatic(**kinds: str) -> Callable[[float], Duel]:
     def prepare(share: float) -> Duel:
         angle, torque = signals.recording(max(_LEAST, int(_FEW_MILLIONS * share)))
@@ -169,6 +183,15 @@ CORNERS = [
         '`method="paper"`',
         _automatic(inertia="constant", damping="constant", stiffness="constant"),
         most=4,
+    ),
+    *(
+        Row(f"regression-{name}", f"`rolling_least_squares({words})`, 201 rows", "the plain call", work, most=1.5)
+        for name, words, work in (
+            ("trailing", 'alignment="trailing"', _regression(alignment="trailing")),
+            ("half-life", "half_life=50", _regression(alignment="trailing", half_life=50)),
+            ("partial", "min_observations=50", _regression(min_observations=50)),
+            ("correlated", 'covariance="hac"', _regression(covariance="hac")),
+        )
     ),
     Row("irregular", "`identify(t=)`, steps that scatter by 0.3 of a step", "uniform times", _irregular, most=6),
     Row("events", "`identify`, 4 million samples, a break every 4 s", "a quarter of them", _events, most=5),

@@ -9,12 +9,13 @@ use std::num::NonZeroUsize;
 use std::ops::Range;
 
 use crate::error::Error;
-use crate::exec::memory;
+use crate::exec::huge_pages::zeros;
 use crate::exec::pool::{Piece, Watch};
 use crate::exec::stages::Stages;
 use crate::least_squares::bandwidth::{Bandwidth, Neighbours};
 use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares};
-use crate::record::samples::is_usable;
+use crate::least_squares::sliding_sums::{Side, WIDTH, sliding_sums};
+use crate::record::samples::{Samples, is_usable};
 use crate::record::subsample::stretches;
 use crate::simd::vectors::{Kernel, Lanes, dispatch};
 use crate::status::Status;
@@ -24,9 +25,6 @@ const PIECE: usize = 1 << 14;
 
 /// Windows that are finished together.
 const TILE: usize = 256;
-
-/// Numbers that are added together.
-const WIDTH: usize = 8;
 
 /// Rows of which the correlation of the residuals is learnt: it is known to a few thousandths then.
 const LEARNT_OF: usize = 1 << 17;
@@ -50,8 +48,7 @@ impl RollingLeastSquares {
     ) -> Result<usize, Error> {
         let rows = equations.columns.first().map_or(0, |column| column.len());
         let pairs = self.regressors * (self.regressors + 1) / 2;
-        memory::ask_for_numbers(rows.saturating_mul(pairs))?;
-        let mut normal = vec![vec![0.0; rows]; pairs];
+        let mut normal: Vec<Vec<f64>> = (0..pairs).map(|_| zeros(rows)).collect::<Result<_, _>>()?;
         self.normal = true;
         let mut stages = Stages::new(workers, rows, 2, watch);
         let mut inner = regressions.reborrow();
@@ -93,12 +90,31 @@ struct Fits<'a> {
 }
 
 /// Regressors times residuals of some rows, side by side, zero where there are none.
+#[derive(Default)]
 struct RowProducts {
     first: isize,
     /// Vectors of `WIDTH` numbers a row.
     values: Vec<[f64; WIDTH]>,
     /// Rows that count before each row.
     counts: Vec<u32>,
+}
+
+/// Memory of one thread.
+#[derive(Default)]
+struct Scratch {
+    products: RowProducts,
+    /// Sums of neighbouring rows, the products of each pair of them, and the sums of those.
+    neighbours: Vec<[f64; WIDTH]>,
+    squares: Vec<[f64; WIDTH]>,
+    sums: Vec<[f64; WIDTH]>,
+}
+
+/// So many vectors of each of some rows. What they held before is left there.
+fn side_by_side<const V: usize>(vectors: &mut Vec<[f64; WIDTH]>, rows: usize) -> &mut [Side<V>] {
+    if vectors.len() < rows * V {
+        vectors.resize(rows * V, [0.0; WIDTH]);
+    }
+    vectors[..rows * V].as_chunks_mut::<V>().0
 }
 
 impl Fits<'_> {
@@ -140,50 +156,67 @@ impl Fits<'_> {
     }
 
     /// The products of some rows; those outside of the record are zero.
-    fn products(&self, range: Range<isize>) -> RowProducts {
+    #[inline(always)]
+    fn products(&self, range: Range<isize>, products: &mut RowProducts) {
         let (p, vectors, total) = (self.plan.regressors, self.vectors(), self.rows());
         let clamp = |row: isize| row.clamp(0, total.cast_signed()).unsigned_abs();
         let rows = clamp(range.start)..clamp(range.end);
         let length = (range.end - range.start).max(0).unsigned_abs();
-        let mut values = vec![[0.0; WIDTH]; length * vectors];
-        let mut counts = vec![0; length + 1];
-        let read = |column: usize| {
+        products.first = range.start;
+        products.values.clear();
+        products.values.resize(length * vectors, [0.0; WIDTH]);
+        products.counts.clear();
+        products.counts.resize(length + 1, 0);
+        let read = |samples: &dyn Samples| {
             let mut into = vec![0.0; rows.len()];
-            if !rows.is_empty() {
-                self.equations.columns[column].read(rows.start, &mut into);
-            }
+            samples.read(rows.start, &mut into);
             into
         };
         if !rows.is_empty() {
-            let fits = self.nearest(rows.clone());
-            let columns: Vec<Vec<f64>> = (0..p).map(read).collect();
-            let mut residuals = read(p + self.rhs);
-            for (column, parameters) in columns.iter().zip(&self.parameters) {
+            let columns: Vec<Vec<f64>> = self.equations.columns[..p].iter().map(|column| read(*column)).collect();
+            let mut residuals = read(self.equations.columns[p + self.rhs]);
+            self.take_off_fits(&rows, &columns, &mut residuals);
+            let weights = self.equations.weights.map(read);
+            let skipped = (rows.start.cast_signed() - range.start).unsigned_abs();
+            let (values, counts) = (&mut products.values[skipped * vectors..], &mut products.counts[skipped + 1..]);
+            for (place, residual) in residuals.iter_mut().enumerate() {
+                let weight = weights.as_ref().map_or(1.0, |weights| weights[place]);
+                let counted = is_usable(*residual) && weight > 0.0;
+                counts[place] = u32::from(counted);
+                *residual = if counted { weight * *residual } else { 0.0 };
+            }
+            for (regressor, column) in columns.iter().enumerate() {
+                let of_rows = values[regressor / WIDTH..].iter_mut().step_by(vectors);
+                for ((row, residual), x) in of_rows.zip(&residuals).zip(column) {
+                    // A row that does not count may hold what is no number.
+                    row[regressor % WIDTH] = if *residual == 0.0 { 0.0 } else { residual * x };
+                }
+            }
+        }
+        let mut before = 0;
+        for count in &mut products.counts {
+            before += *count;
+            *count = before;
+        }
+    }
+
+    /// Takes off what fits explain of some rows.
+    #[inline(always)]
+    fn take_off_fits(&self, rows: &Range<usize>, columns: &[Vec<f64>], residuals: &mut [f64]) {
+        let fits = self.nearest(rows.clone());
+        let (first, end) = (fits[0], fits[0] + fits.len());
+        let in_order = end <= self.rows() && fits.iter().zip(first..).all(|(&fit, row)| fit == row);
+        for (column, parameters) in columns.iter().zip(&self.parameters) {
+            if in_order {
+                for ((residual, x), parameter) in residuals.iter_mut().zip(column).zip(&parameters[first..end]) {
+                    *residual -= x * parameter;
+                }
+            } else {
                 for ((residual, x), &fit) in residuals.iter_mut().zip(column).zip(&fits) {
                     *residual -= x * parameters.get(fit).copied().unwrap_or(f64::NAN);
                 }
             }
-            let weights = self.equations.weights.map(|weights| {
-                let mut into = vec![0.0; rows.len()];
-                weights.read(rows.start, &mut into);
-                into
-            });
-            let skipped = (rows.start.cast_signed() - range.start).unsigned_abs();
-            for (place, &residual) in residuals.iter().enumerate() {
-                let weight = weights.as_ref().map_or(1.0, |weights| weights[place]);
-                if is_usable(residual) && weight > 0.0 {
-                    let row = &mut values[(skipped + place) * vectors..][..vectors];
-                    for (regressor, column) in columns.iter().enumerate() {
-                        row[regressor / WIDTH][regressor % WIDTH] = weight * residual * column[place];
-                    }
-                    counts[skipped + place + 1] = 1;
-                }
-            }
         }
-        for row in 0..length {
-            counts[row + 1] += counts[row];
-        }
-        RowProducts { first: range.start, values, counts }
     }
 
     /// Over how many rows residuals are correlated, as stretches of the record show.
@@ -193,7 +226,8 @@ impl Fits<'_> {
             .collect();
         let (p, vectors) = (self.plan.regressors, self.vectors());
         let of_rows = |rows: Range<usize>, (): &mut ()| {
-            let products = self.products(rows.start.cast_signed()..rows.end.cast_signed());
+            let mut products = RowProducts::default();
+            self.products(rows.start.cast_signed()..rows.end.cast_signed(), &mut products);
             let mut sums = vec![Neighbours::default(); p];
             for (regressor, sums) in sums.iter_mut().enumerate() {
                 let at = |row: usize| products.values[row * vectors + regressor / WIDTH][regressor % WIDTH];
@@ -222,10 +256,10 @@ impl Fits<'_> {
                 rest.iter_mut().filter_map(|values| values.split_off_mut(..rows.len())).collect();
             pieces.push(Piece { size: rows.len(), content: (rows, part) });
         }
-        let work = |(rows, part): (Range<usize>, Vec<&mut [f64]>), (): &mut ()| {
-            dispatch(self.plan.instructions, Sandwich { fits: self, bandwidth, rows, errors: part });
+        let work = |(rows, part): (Range<usize>, Vec<&mut [f64]>), scratch: &mut Scratch| {
+            dispatch(self.plan.instructions, Sandwich { fits: self, bandwidth, rows, errors: part, scratch });
         };
-        stages.map(pieces, || (), work)?;
+        stages.map(pieces, Scratch::default, work)?;
         Ok(())
     }
 }
@@ -236,6 +270,7 @@ struct Sandwich<'a, 'b, 'c> {
     bandwidth: &'a Bandwidth,
     rows: Range<usize>,
     errors: Vec<&'c mut [f64]>,
+    scratch: &'c mut Scratch,
 }
 
 impl Kernel for Sandwich<'_, '_, '_> {
@@ -245,75 +280,99 @@ impl Kernel for Sandwich<'_, '_, '_> {
     fn run<S: Lanes>(self, _simd: S) {
         // Vectors that hold the products of a row, and those of pairs of them.
         match self.fits.plan.regressors {
-            0..=3 => self.run_with::<1, 1>(),
-            4..=5 => self.run_with::<1, 2>(),
-            6..=8 => self.run_with::<1, 5>(),
-            _ => self.run_with::<2, 17>(),
+            1 => self.run_with::<1, 1>(1),
+            2 => self.run_with::<1, 1>(2),
+            3 => self.run_with::<1, 1>(3),
+            4 => self.run_with::<1, 2>(4),
+            5 => self.run_with::<1, 2>(5),
+            p @ ..=8 => self.run_with::<1, 5>(p),
+            p => self.run_with::<2, 17>(p),
         }
     }
 }
 
 impl Sandwich<'_, '_, '_> {
     #[inline(always)]
-    fn run_with<const V: usize, const P: usize>(mut self) {
-        let (fits, plan, correlated) = (self.fits, self.fits.plan, self.bandwidth.rows);
-        let (p, length) = (plan.regressors, plan.window - correlated + 1);
-        let pairs = p * (p + 1) / 2;
-        let first = self.rows.start.cast_signed() - plan.before.cast_signed();
-        // Sums of neighbours are wanted from the block of the first window to the end of the block after that of the last one.
-        let span = length.cast_signed();
-        let begin = first.div_euclid(span) * span;
-        let end = ((first + self.rows.len().cast_signed()).div_euclid(span) + 2) * span;
-        let products = fits.products(begin..end + correlated.cast_signed());
-        let mut neighbours = vec![[[0.0; WIDTH]; V]; (end - begin).unsigned_abs()];
-        let of_product = |row: isize| {
-            let mut found = [[0.0; WIDTH]; V];
-            let place = usize::try_from(row - begin).ok();
-            if let Some(values) = place.and_then(|place| products.values.get(place * V..(place + 1) * V)) {
-                found.copy_from_slice(values);
-            }
-            found
-        };
-        sliding_sums(correlated, begin..end, of_product, |place, sum| neighbours[place] = sum);
-        let square = |row: isize| {
-            let of = &neighbours[(row - begin).unsigned_abs()];
-            let (mut found, mut pair) = ([[0.0; WIDTH]; P], 0);
+    fn run_with<const V: usize, const P: usize>(self, p: usize) {
+        let Self { fits, bandwidth, rows, mut errors, scratch } = self;
+        let Scratch { products, neighbours, squares, sums } = scratch;
+        let (correlated, length) = (bandwidth.rows, fits.plan.window - bandwidth.rows + 1);
+        let first = rows.start.cast_signed() - fits.plan.before.cast_signed();
+        // Blocks are tied to the rows of the record: those of windows, and those of neighbours before them.
+        let of_block = |row: isize, length: usize| row.div_euclid(length.cast_signed()) * length.cast_signed();
+        let begin = of_block(first, length);
+        let begin_of_neighbours = of_block(begin, correlated);
+        let end = of_block(first + rows.len().cast_signed(), length) + 2 * length.cast_signed();
+        fits.products(begin_of_neighbours..end + correlated.cast_signed(), products);
+        let neighbours = side_by_side::<V>(neighbours, (end - begin_of_neighbours).unsigned_abs());
+        sliding_sums(correlated, products.values.as_chunks::<V>().0, neighbours);
+        let squares = side_by_side::<P>(squares, (end - begin).unsigned_abs());
+        for (found, of) in squares.iter_mut().zip(&neighbours[(begin - begin_of_neighbours).unsigned_abs()..]) {
+            let mut pair = 0;
             for i in 0..p {
                 for k in i..p {
                     found[pair / WIDTH][pair % WIDTH] = of[i / WIDTH][i % WIDTH] * of[k / WIDTH][k % WIDTH];
                     pair += 1;
                 }
             }
-            found
-        };
-        let mut tile = vec![[0.0; TILE]; pairs];
-        let (last, windows) = (self.rows.len() - 1, first..first + self.rows.len().cast_signed());
-        let finish = |place: usize, sum: [[f64; WIDTH]; P]| {
-            for (tile, sum) in tile.iter_mut().zip(sum.as_flattened()) {
-                tile[place % TILE] = *sum;
+        }
+        let skipped = (first - begin).unsigned_abs();
+        let sums = side_by_side::<P>(sums, skipped + rows.len());
+        sliding_sums(length, squares, sums);
+        let scale = ErrorScale::new(fits, bandwidth);
+        let mut tile = vec![[0.0; TILE]; p * (p + 1) / 2];
+        for (number, some) in sums[skipped..].chunks(TILE).enumerate() {
+            for (pair, tile) in tile.iter_mut().enumerate() {
+                for (into, sum) in tile.iter_mut().zip(some) {
+                    *into = sum[pair / WIDTH][pair % WIDTH];
+                }
             }
-            if place % TILE == TILE - 1 || place == last {
-                self.write(place - place % TILE..place + 1, &tile, &products);
-            }
-        };
-        sliding_sums(length, windows, square, finish);
+            let place = number * TILE;
+            let some_rows = rows.start + place..rows.start + place + some.len();
+            let into = errors.iter_mut().map(|errors| &mut errors[place..place + some.len()]);
+            scale.write(some_rows, &tile, products, into);
+        }
+    }
+}
+
+/// Makes standard errors of the sums over windows.
+struct ErrorScale<'a, 'b> {
+    fits: &'a Fits<'b>,
+    correlated: f64,
+    /// One over the roots of what the sums of neighbours keep of the variance, by regressor.
+    kept: Vec<f64>,
+    /// For a window all of whose rows count.
+    whole: f64,
+}
+
+impl<'a, 'b> ErrorScale<'a, 'b> {
+    #[inline(always)]
+    fn new(fits: &'a Fits<'b>, bandwidth: &Bandwidth) -> Self {
+        let kept = bandwidth.kept.iter().map(|kept| kept.sqrt().recip()).collect();
+        let scale = Self { fits, correlated: bandwidth.rows as f64, kept, whole: 0.0 };
+        let rows = fits.plan.window as f64;
+        Self { whole: scale.of(rows, 0.0, rows), ..scale }
     }
 
-    /// Writes the errors of some windows of the piece from the sums of squares of each.
+    /// Writes the errors of some windows from the sums of squares of each.
     #[inline(always)]
-    fn write(&mut self, places: Range<usize>, sums: &[[f64; TILE]], products: &RowProducts) {
-        let (p, count) = (self.fits.plan.regressors, places.len());
+    fn write<'c>(
+        &self,
+        rows: Range<usize>,
+        sums: &[[f64; TILE]],
+        products: &RowProducts,
+        errors: impl Iterator<Item = &'c mut [f64]>,
+    ) {
+        let (p, kept) = (self.fits.plan.regressors, &self.kept);
         let pair = |i: usize, k: usize| {
             let (i, k) = (i.min(k), i.max(k));
             i * p - i * i.saturating_sub(1) / 2 + k - i
         };
-        let rows = self.rows.start + places.start..self.rows.start + places.end;
         let mut scale = [0.0; TILE];
         for (scale, row) in scale.iter_mut().zip(rows.clone()) {
-            *scale = self.scale(row, products);
+            *scale = self.of_window(row, products);
         }
-        let kept: Vec<f64> = self.bandwidth.kept.iter().map(|kept| kept.sqrt().recip()).collect();
-        for a in 0..p {
+        for (a, into) in errors.enumerate() {
             let mut variance = [0.0; TILE];
             for b in 0..p {
                 let mut inner = [0.0; TILE];
@@ -329,8 +388,7 @@ impl Sandwich<'_, '_, '_> {
                     *variance += of * inner;
                 }
             }
-            let into = &mut self.errors[a][places.clone()];
-            for ((error, variance), scale) in into.iter_mut().zip(&variance[..count]).zip(&scale) {
+            for ((error, variance), scale) in into.iter_mut().zip(&variance).zip(&scale) {
                 // Where there are no parameters there is no error, and it stays NaN.
                 *error = (scale * variance).sqrt() + 0.0 * *error;
             }
@@ -339,79 +397,31 @@ impl Sandwich<'_, '_, '_> {
 
     /// What the sum over the window of a row is to be multiplied by.
     #[inline(always)]
-    fn scale(&self, row: usize, products: &RowProducts) -> f64 {
-        let (plan, correlated) = (self.fits.plan, self.bandwidth.rows as f64);
+    fn of_window(&self, row: usize, products: &RowProducts) -> f64 {
+        let plan = self.fits.plan;
         let first = row.cast_signed() - plan.before.cast_signed();
         let end = first + plan.window.cast_signed();
         let there = first.max(0)..end.min(self.fits.rows().cast_signed());
+        let at = |row: isize| (row - products.first).unsigned_abs();
+        let count = products.counts[at(there.end)] - products.counts[at(there.start)];
+        if count as usize == plan.window {
+            return self.whole;
+        }
         // Sums that reach out of a window are left out, but for those over an end of the record, of which a part is there.
         let over = |rows: isize| {
-            let rows = rows.min(self.bandwidth.rows.cast_signed() - 1) as f64;
-            rows * (1.0 - (rows + 1.0) / (2.0 * correlated))
+            let rows = (rows as f64).min(self.correlated - 1.0);
+            rows * (1.0 - (rows + 1.0) / (2.0 * self.correlated))
         };
-        let spanned = (there.end - there.start) as f64;
-        let complete = spanned - correlated + 1.0 + over(there.start - first) + over(end - there.end);
-        let at = |row: isize| (row - products.first).unsigned_abs();
-        let count = f64::from(products.counts[at(there.end)] - products.counts[at(there.start)]);
+        let outside = over(there.start - first) + over(end - there.end);
+        self.of((there.end - there.start) as f64, outside, f64::from(count))
+    }
+
+    /// The same for a window that spans so many rows, beside sums over the ends that are partly there, of which so many count.
+    #[inline(always)]
+    fn of(&self, spanned: f64, outside: f64, count: f64) -> f64 {
+        let complete = spanned - self.correlated + 1.0 + outside;
         // What fits take of the sums of neighbours: of one row the part p / w, of B rows about (B + p - 1) / w.
-        let left = 1.0 - (correlated + plan.regressors as f64 - 1.0) / count;
-        if left < LEAST_LEFT || complete <= 0.0 { f64::NAN } else { spanned / (complete * correlated * left) }
-    }
-}
-
-/// Sums of `length` rows from each of some rows on, as a suffix of one block and a prefix of the next. `row` gives a row.
-#[inline(always)]
-fn sliding_sums<const V: usize>(
-    length: usize,
-    wanted: Range<isize>,
-    row: impl Fn(isize) -> [[f64; WIDTH]; V],
-    mut give: impl FnMut(usize, [[f64; WIDTH]; V]),
-) {
-    let add = |one: &[[f64; WIDTH]; V], other: &[[f64; WIDTH]; V]| {
-        let mut sum = *one;
-        for (sum, other) in sum.as_flattened_mut().iter_mut().zip(other.as_flattened()) {
-            *sum += other;
-        }
-        sum
-    };
-    let span = length.cast_signed();
-    let mut suffixes = vec![[[0.0; WIDTH]; V]; length];
-    let mut block = wanted.start.div_euclid(span) * span;
-    while block < wanted.end {
-        let mut suffix = [[0.0; WIDTH]; V];
-        for (offset, kept) in suffixes.iter_mut().enumerate().rev() {
-            suffix = add(&suffix, &row(block + offset.cast_signed()));
-            *kept = suffix;
-        }
-        let mut prefix = [[0.0; WIDTH]; V];
-        for (offset, suffix) in suffixes.iter().enumerate() {
-            let place = block + offset.cast_signed();
-            if place >= wanted.end {
-                break;
-            }
-            if place >= wanted.start {
-                give((place - wanted.start).unsigned_abs(), add(suffix, &prefix));
-            }
-            prefix = add(&prefix, &row(place + span));
-        }
-        block += span;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sums_slide_over_blocks_from_any_row_on() {
-        for (length, wanted) in [(1, -3..4_isize), (4, -7..9), (5, 0..1), (3, 2..20)] {
-            let mut found = Vec::new();
-            let row = |row: isize| [[row as f64; WIDTH]];
-            sliding_sums(length, wanted.clone(), row, |place, sum| found.push((place, sum[0][3])));
-            let expected = |(place, first): (usize, isize)| {
-                (place, (first..first + length.cast_signed()).map(|row| row as f64).sum::<f64>())
-            };
-            assert_eq!(found, wanted.enumerate().map(expected).collect::<Vec<_>>());
-        }
+        let left = 1.0 - (self.correlated + self.fits.plan.regressors as f64 - 1.0) / count;
+        if left < LEAST_LEFT || complete <= 0.0 { f64::NAN } else { spanned / (complete * self.correlated * left) }
     }
 }
