@@ -166,7 +166,7 @@ class RollingStream(Stream[StreamedRegression]):
             else _core.RollingStream(self._window, *self._shape, step=self._step, state=state)
         )
 
-    def _given(self, answer: tuple[int, _core.StreamedRegressions]) -> StreamedRegression:
+    def _given(self, answer: tuple[int, _core.RollingRegressions]) -> StreamedRegression:
         first, found = answer
         row = np.arange(first, first + found.status.size * self._step, self._step, dtype=np.int64)
         if self._one_side:

@@ -61,7 +61,7 @@ mod _core {
     #[pymodule_export]
     use crate::streamed_parameters::{ParameterStream, StreamedParameters};
     #[pymodule_export]
-    use crate::streams::{PolynomialStream, RollingStream, StreamedRegressions};
+    use crate::streams::{PolynomialStream, RollingStream};
     #[pymodule_export]
     use crate::window_fit::WindowFit;
 

@@ -14,6 +14,7 @@ use tvident::simd::Instructions;
 
 use crate::arrays::zeros;
 use crate::records::records;
+use crate::streams::rows;
 use crate::watch::{exception, watched};
 
 /// What windows are like.
@@ -59,6 +60,50 @@ pub(crate) struct RollingRegressions {
     lags: usize,
 }
 
+impl RollingRegressions {
+    /// Makes the arrays for some windows and has them filled; `fill` returns over how many rows residuals are taken to be correlated. Residuals
+    /// and the part that is explained have no rows unless they are wanted `with_fit`.
+    pub(crate) fn filled(
+        py: Python<'_>,
+        (p, q): (usize, usize),
+        (elements, count): (Elements, usize),
+        with_fit: bool,
+        fill: impl FnOnce(Regressions<'_>) -> PyResult<usize>,
+    ) -> PyResult<Self> {
+        let fits = if with_fit { q } else { 0 };
+        let (params, stderr) = (zeros::<f64>(py, &[p, q, count])?, zeros::<f64>(py, &[p, q, count])?);
+        let (rss, condition) = (zeros::<f64>(py, &[q, count])?, zeros::<f64>(py, &[count])?);
+        let (residuals, rsquared) = (zeros::<f64>(py, &[fits, count])?, zeros::<f64>(py, &[fits, count])?);
+        let status = zeros::<u16>(py, &[count])?;
+        let lags = {
+            let (mut params, mut stderr, mut rss) = (params.readwrite(), stderr.readwrite(), rss.readwrite());
+            let (mut residuals, mut rsquared) = (residuals.readwrite(), rsquared.readwrite());
+            let (mut condition, mut status) = (condition.readwrite(), status.readwrite());
+            fill(Regressions {
+                elements,
+                parameters: rows(params.as_slice_mut()?, p * q, count),
+                errors: rows(stderr.as_slice_mut()?, p * q, count),
+                residuals: rows(rss.as_slice_mut()?, q, count),
+                own_residuals: rows(residuals.as_slice_mut()?, fits, count),
+                rsquared: rows(rsquared.as_slice_mut()?, fits, count),
+                condition: condition.as_slice_mut()?,
+                status: status.as_slice_mut()?,
+                ..Regressions::default()
+            })?
+        };
+        Ok(Self {
+            params: params.unbind(),
+            stderr: stderr.unbind(),
+            rss: rss.unbind(),
+            residuals: residuals.unbind(),
+            rsquared: rsquared.unbind(),
+            condition: condition.unbind(),
+            status: status.unbind(),
+            lags,
+        })
+    }
+}
+
 /// Least squares in every window of rows; regressors, right-hand sides and weights have the rows along their last axis. `constant` is the
 /// regressor that is a constant. With `correlated`, which needs a step of 1, standard errors know of residuals that are correlated over so
 /// many `lags`, or over as many as they ask for.
@@ -82,43 +127,20 @@ pub(crate) fn rolling_least_squares<'py>(
     let weights = weights.map(records).transpose()?;
     let (p, q) = (regressors.len(), rhs.len());
     let mut columns: Vec<&dyn Samples> = regressors.iter().chain(&rhs).map(|record| record as &dyn Samples).collect();
-    let rows = columns.first().map_or(0, |column| column.len());
+    let total = columns.first().map_or(0, |column| column.len());
     let plan = windows.plan(p, q)?.with_fit(constant.is_some());
     // What comes first is taken off everything that follows.
     let constant = constant.unwrap_or(0);
     columns.swap(0, constant);
-    let count = rows.div_ceil(step);
-
-    let parameters = zeros::<f64>(py, &[p, q, count])?;
-    let errors = zeros::<f64>(py, &[p, q, count])?;
-    let [residuals, own, rsquared] =
-        [zeros::<f64>(py, &[q, count])?, zeros::<f64>(py, &[q, count])?, zeros::<f64>(py, &[q, count])?];
-    let condition = zeros::<f64>(py, &[count])?;
-    let status = zeros::<u16>(py, &[count])?;
-    let mut over = 0;
-    {
-        let (mut parameters, mut errors) = (parameters.readwrite(), errors.readwrite());
-        let (mut residuals, mut condition, mut status) =
-            (residuals.readwrite(), condition.readwrite(), status.readwrite());
-        let (mut own, mut rsquared) = (own.readwrite(), rsquared.readwrite());
-        let mut regressions = Regressions {
-            elements: Elements { first: 0, step },
-            parameters: parameters.as_slice_mut()?.chunks_exact_mut(count).collect(),
-            errors: errors.as_slice_mut()?.chunks_exact_mut(count).collect(),
-            residuals: residuals.as_slice_mut()?.chunks_exact_mut(count).collect(),
-            own_residuals: own.as_slice_mut()?.chunks_exact_mut(count).collect(),
-            rsquared: rsquared.as_slice_mut()?.chunks_exact_mut(count).collect(),
-            condition: condition.as_slice_mut()?,
-            status: status.as_slice_mut()?,
-            ..Regressions::default()
-        };
+    let weights = weights.as_ref().and_then(|records| records.first()).map(|record| record as &dyn Samples);
+    let equations = Equations { columns, weights, rows: 0..total };
+    let (elements, workers) = (Elements { first: 0, step }, threads(workers));
+    RollingRegressions::filled(py, (p, q), (elements, total.div_ceil(step)), true, |mut regressions| {
         for side in 0..q {
             regressions.parameters.swap(side, constant * q + side);
             regressions.errors.swap(side, constant * q + side);
         }
-        let weights = weights.as_ref().and_then(|records| records.first()).map(|record| record as &dyn Samples);
-        let equations = Equations { columns, weights, rows: 0..rows };
-        let workers = threads(workers);
+        let mut over = 0;
         watched(py, progress, |watch| {
             if correlated {
                 over = plan.run_correlated(&equations, regressions, lags, workers, watch)?;
@@ -127,15 +149,6 @@ pub(crate) fn rolling_least_squares<'py>(
                 plan.run(&equations, regressions, workers, watch)
             }
         })?;
-    }
-    Ok(RollingRegressions {
-        params: parameters.unbind(),
-        stderr: errors.unbind(),
-        rss: residuals.unbind(),
-        residuals: own.unbind(),
-        rsquared: rsquared.unbind(),
-        condition: condition.unbind(),
-        status: status.unbind(),
-        lags: over,
+        Ok(over)
     })
 }

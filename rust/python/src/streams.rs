@@ -16,6 +16,7 @@ use tvident::stream::{PolynomialState, PolynomialStream as Polynomials, RollingS
 use crate::arrays::zeros;
 use crate::local_polynomials::{LocalEstimates, LocalPolynomials};
 use crate::records::{StridedSamples, records};
+use crate::rolling::RollingRegressions;
 use crate::watch::exception;
 
 /// Samples between two looks for Ctrl-C; shorter pieces keep the interpreter's lock, which costs less than giving it back.
@@ -243,7 +244,7 @@ impl RollingStream {
         &mut self,
         regressors: &Bound<'py, PyUntypedArray>,
         rhs: &Bound<'py, PyUntypedArray>,
-    ) -> PyResult<(usize, StreamedRegressions)> {
+    ) -> PyResult<Windows> {
         let py = regressors.py();
         let (regressors, rhs) = (records(regressors)?, records(rhs)?);
         if (regressors.len(), rhs.len()) != (self.regressors, self.rhs_count) {
@@ -270,7 +271,7 @@ impl RollingStream {
     }
 
     /// Ends the stream and returns the rest, as `push` does.
-    fn finish(&mut self, py: Python<'_>) -> PyResult<(usize, StreamedRegressions)> {
+    fn finish(&mut self, py: Python<'_>) -> PyResult<Windows> {
         let given = self.stream.at_end();
         let stream = &mut self.stream;
         windows(py, (self.regressors, self.rhs_count), given, self.step, |regressions| {
@@ -280,53 +281,21 @@ impl RollingStream {
     }
 }
 
-/// Windows of rows that came: what [`crate::rolling`] gives of a batch, but for what needs all of it.
-#[pyclass(frozen, get_all, module = "tvident._core")]
-pub(crate) struct StreamedRegressions {
-    /// By regressor, right-hand side and window.
-    params: Py<PyArrayDyn<f64>>,
-    stderr: Py<PyArrayDyn<f64>>,
-    /// Residual sums of squares by right-hand side and window.
-    rss: Py<PyArrayDyn<f64>>,
-    condition: Py<PyArrayDyn<f64>>,
-    status: Py<PyArrayDyn<u16>>,
-}
+/// The number of the first row that is given, and the windows from there on; these have no residuals of their own, nor the part explained.
+type Windows = (usize, RollingRegressions);
 
 /// Makes the arrays and has them filled.
 fn windows(
     py: Python<'_>,
-    (p, q): (usize, usize),
+    shape: (usize, usize),
     given: Range<usize>,
     step: usize,
     fill: impl FnOnce(&mut Regressions<'_>) -> PyResult<()>,
-) -> PyResult<(usize, StreamedRegressions)> {
+) -> PyResult<Windows> {
     let (elements, count) = elements(&given, step);
-    let parameters = zeros::<f64>(py, &[p, q, count])?;
-    let errors = zeros::<f64>(py, &[p, q, count])?;
-    let residuals = zeros::<f64>(py, &[q, count])?;
-    let condition = zeros::<f64>(py, &[count])?;
-    let status = zeros::<u16>(py, &[count])?;
-    {
-        let (mut parameters, mut errors) = (parameters.readwrite(), errors.readwrite());
-        let (mut residuals, mut condition, mut status) =
-            (residuals.readwrite(), condition.readwrite(), status.readwrite());
-        let mut regressions = Regressions {
-            elements,
-            parameters: rows(parameters.as_slice_mut()?, p * q, count),
-            errors: rows(errors.as_slice_mut()?, p * q, count),
-            residuals: rows(residuals.as_slice_mut()?, q, count),
-            condition: condition.as_slice_mut()?,
-            status: status.as_slice_mut()?,
-            ..Regressions::default()
-        };
+    let found = RollingRegressions::filled(py, shape, (elements, count), false, |mut regressions| {
         fill(&mut regressions)?;
-    }
-    let found = StreamedRegressions {
-        params: parameters.unbind(),
-        stderr: errors.unbind(),
-        rss: residuals.unbind(),
-        condition: condition.unbind(),
-        status: status.unbind(),
-    };
+        Ok(0)
+    })?;
     Ok((elements.first, found))
 }
