@@ -35,6 +35,9 @@ TESTS = (
 )
 """A part of the tests that takes little beside NumPy and touches every room of the core."""
 
+MADE = ("__pycache__", ".git", ".venv*", ".*_cache", ".hypothesis", ".benchmarks", "target", "dist", "*.so")
+"""What stands beside the sources but is made from them."""
+
 MOST_BYTES = 20_000_000
 """Of a wheel: its library is stripped."""
 
@@ -151,11 +154,11 @@ def try_out(wheel: Path, tests: Sequence[str], interpreter: str = sys.executable
         python = place / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
         run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel)
         print(run(python, "-c", "import tvident; print(tvident.__version__, sorted(tvident.__all__))"))
-        run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *_locked(TESTED_WITH))
+        needed = _locked(TESTED_WITH) if tests == TESTS else ["--requirement", "requirements-development.txt"]
+        run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *needed)
         copied = Path(folder) / "project"
-        shutil.copytree(ROOT / "tests", copied / "tests", ignore=shutil.ignore_patterns("__pycache__"))
-        (copied / "benches").mkdir()
-        shutil.copy(ROOT / "pyproject.toml", copied)
+        # Some tests read the sources. The package that they import is the wheel's: that of the sources is not on the path.
+        shutil.copytree(ROOT, copied, ignore=shutil.ignore_patterns(*MADE))
         print(run(python, "-m", "pytest", "--quiet", "-p", "no:cacheprovider", *tests, folder=copied).splitlines()[-1])
 
 
@@ -166,7 +169,12 @@ def main() -> None:
     parser.add_argument(
         "--targets", nargs="*", help="Rust's names of systems; by default both of Linux, or this machine"
     )
-    parser.add_argument("--tests", nargs="*", default=TESTS, help="tests that the wheel of this machine must pass")
+    parser.add_argument(
+        "--tests",
+        nargs="*",
+        default=TESTS,
+        help="tests that the wheel of this machine must pass; `tests` is all of them",
+    )
     given = parser.parse_args()
     is_linux = platform.system() == "Linux"
     targets = given.targets or (list(LINUX) if is_linux else [None])
