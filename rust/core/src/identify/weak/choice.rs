@@ -35,6 +35,14 @@ pub(crate) struct Chosen {
     pub(crate) fitted: Option<Decided>,
 }
 
+impl Chosen {
+    /// Samples of the windows that predict best, once that is known.
+    pub(crate) fn best_windows(&self) -> Option<usize> {
+        let best = self.fitted.as_ref().and_then(|fitted| fitted.first);
+        best.map(|scale| scale.span() * self.weak.stride)
+    }
+}
+
 impl Session<'_, '_, '_> {
     /// A first estimate, in windows of a few test functions.
     pub(crate) fn pilot(&mut self, weak: &WeakRows, model: &Model) -> Result<[f64; 3], Error> {

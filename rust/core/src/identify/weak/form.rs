@@ -172,6 +172,7 @@ fn identify(
         channel_noise: [levels[0], levels[1]],
         scan: Scan::default(),
         free_offset: FreeOffset::default(),
+        best_before: None,
         stages,
     };
     let model = session.model();

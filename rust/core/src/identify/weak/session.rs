@@ -32,6 +32,8 @@ pub(crate) struct Session<'a, 'b, 'c> {
     pub(crate) scan: Scan,
     /// How much better an offset would predict that is free in every window, where the record contradicts a constant one.
     pub(crate) free_offset: FreeOffset,
+    /// Samples of the windows that were best a step before, where little changed since: the best ones are near.
+    pub(crate) best_before: Option<usize>,
     pub(crate) stages: Stages<'b, 'c>,
 }
 

@@ -48,7 +48,9 @@ impl Session<'_, '_, '_> {
         }
         for _ in 0..ROUNDS {
             let before = (self.noise, self.scan.clone());
+            self.best_before = chosen.best_windows();
             let mut again = self.choose_once(model, &mut scans)?;
+            self.best_before = None;
             if again.weak.function == chosen.weak.function {
                 break;
             }
@@ -88,7 +90,7 @@ impl Session<'_, '_, '_> {
             }
             let shown = self.noise[1] + (left - 1.0) * expected / gain.variance();
             self.noise[1] = shown.max(self.channel_noise[1]);
-            chosen.fitted = None;
+            self.fit_near(chosen, model)?;
         }
         Ok(true)
     }

@@ -15,6 +15,9 @@ use crate::weak_form::weak_rows::WeakRows;
 /// So many of the longest windows that stretches of a long record hold are tried again on all of it, where one of them is best.
 const OVERLAP: usize = 2;
 
+/// So many lengths on either side of the one that was best a step before are tried first.
+const NEAR: usize = 2;
+
 impl Session<'_, '_, '_> {
     /// Fits everything that is not windowed as constant, in windows of the length that predicts best. What the noise makes of rows depends on
     /// the parameters, so a first fit gives those that the last one is made with.
@@ -54,7 +57,10 @@ impl Session<'_, '_, '_> {
         if tried.is_empty() {
             return Err(self.too_short());
         }
-        let validated = self.validate(rows, decided, &tried)?;
+        let validated = match self.near_best_before(weak, decided, &tried)? {
+            Some(validated) => validated,
+            None => self.validate(rows, decided, &tried)?,
+        };
         let span = |one: &Validated| one.fit.scale.map_or(0, |scale| scale.span() * stride);
         decided.lengths = validated.iter().map(|one| (span(one), one.error)).collect();
         // Where no row can be predicted any length is as good, and the longest tells most.
@@ -69,6 +75,25 @@ impl Session<'_, '_, '_> {
         decided.correlated = Some(correlated);
         decided.fit = Fit::new(&problem, scale, decided.expected, instructions, &mut self.stages)?;
         Ok(())
+    }
+
+    /// How well windows near the length that was best a step before predict, or `None` if none is known or a length farther away may be better.
+    fn near_best_before(
+        &mut self,
+        weak: &WeakRows,
+        decided: &Decided,
+        scales: &[Scale],
+    ) -> Result<Option<Vec<Validated>>, Error> {
+        let before = self.best_before.and_then(|samples| Scale::nearest(scales, rows_of(samples, weak.stride)));
+        let Some(before) = before else { return Ok(None) };
+        let near = before.saturating_sub(NEAR)..(before + NEAR + 1).min(scales.len());
+        let validated = self.validate(&weak.rows, decided, &scales[near.clone()])?;
+        let best = best(&validated).and_then(|best| best.fit.scale);
+        let place = best.and_then(|best| scales.iter().position(|scale| *scale == best));
+        let is_inside = |place: usize| {
+            (place > near.start || near.start == 0) && (place + 1 < near.end || near.end == scales.len())
+        };
+        Ok(place.is_some_and(is_inside).then_some(validated))
     }
 
     /// How well windows of some lengths predict what they have not seen: on stretches of a long record as far as they hold windows so

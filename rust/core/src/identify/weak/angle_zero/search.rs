@@ -21,6 +21,8 @@ use crate::weak_form::weak_rows::TermSamples;
 const CHOICES: usize = 3;
 /// Steps towards it with one choice.
 const STEPS: usize = 8;
+/// A step that is larger than this part of the last one leads nowhere: the equations do not hold.
+const SLOWEST: f64 = 0.7;
 /// A step so small, in standard errors, is the last with one choice, and a choice that moves the angle by no more is the last.
 const SETTLED: f64 = 0.02;
 const CHOSEN: f64 = 0.3;
@@ -28,6 +30,8 @@ const CHOSEN: f64 = 0.3;
 const CONSPICUOUS: f64 = 5.0;
 /// The part of what an offset that is free in every window explains that the angle must explain.
 const LEAST_SHARE: f64 = 0.9;
+/// The same of rows that were chosen without it.
+const LEAST_SHARE_BEFORE: f64 = 0.5;
 
 impl Session<'_, '_, '_> {
     /// Chooses and decides, and where the record contradicts a constant offset, tries an angle other than zero at which the spring is relaxed.
@@ -49,23 +53,36 @@ impl Session<'_, '_, '_> {
         };
         // Before anything else follows what the offset may not: looking for what changes and jumps takes longest where nothing fits.
         let missed = self.offset_is_missed(&mut chosen, model, offset)?;
-        if missed && let Some(settled) = self.with_angle_zero(model, offset)? {
+        if missed && let Some(settled) = self.with_angle_zero(model, offset, Some(&mut chosen))? {
             return Ok(settled);
         }
         let first = self.decide_and_choose_again(chosen, model)?;
         if !missed
             && self.offset_is_contradicted(&first.0.weak, &first.1, offset)?
-            && let Some(settled) = self.with_angle_zero(model, offset)?
+            && let Some(settled) = self.with_angle_zero(model, offset, None)?
         {
             return Ok(settled);
         }
         Ok(first)
     }
 
-    /// Chooses and decides with an angle at which the spring is relaxed; `None`, with everything as it was, if it does not predict better.
-    fn with_angle_zero(&mut self, model: &Model, offset: usize) -> Result<Option<Settled>, Error> {
+    /// Chooses and decides with an angle at which the spring is relaxed; `None`, with everything as it was, if it does not predict better. Where
+    /// rows are predicted badly without it, those at hand must be predicted much better with it before others are chosen.
+    fn with_angle_zero(
+        &mut self,
+        model: &Model,
+        offset: usize,
+        missed: Option<&mut Chosen>,
+    ) -> Result<Option<Settled>, Error> {
         let before = (self.scan.clone(), self.record.lag, self.noise);
-        if let Some(guess) = self.guess_angle_zero(model, offset)? {
+        let guess = match (self.guess_angle_zero(model, offset)?, missed) {
+            (Some(guess), Some(chosen)) => {
+                (self.scan, self.noise) = (before.0.clone(), before.2);
+                self.improved(guess, chosen, model)?
+            }
+            (guess, _) => guess,
+        };
+        if let Some(guess) = guess {
             self.record.angle_zero = guess;
             if let Some(mut settled) = self.settle_around(model, Some(offset))?
                 && self.add_spring(&mut settled)?
@@ -76,6 +93,19 @@ impl Session<'_, '_, '_> {
         self.record.angle_zero = 0.0;
         (self.scan, self.record.lag, self.noise) = before;
         Ok(None)
+    }
+
+    /// A better guess with which rows at hand are predicted better, if not by as much as a free offset does.
+    fn improved(&mut self, guess: f64, chosen: &mut Chosen, model: &Model) -> Result<Option<f64>, Error> {
+        let FreeOffset { error, free } = self.free_offset;
+        let (fitted, rows) = (chosen.fitted.take(), chosen.weak.rows.clone());
+        self.move_zero(chosen, guess);
+        let rests = self.approach(chosen, model)?;
+        let with = chosen.fitted.as_ref().map_or(f64::INFINITY, |fitted| fitted.error);
+        let zero = std::mem::take(&mut self.record.angle_zero);
+        // Moving them back would leave rounding.
+        (chosen.weak.rows, chosen.fitted) = (rows, fitted);
+        Ok((rests && error - with >= LEAST_SHARE_BEFORE * (error - free)).then_some(zero))
     }
 
     /// The regressor of a constant offset beside a windowed stiffness, where such an angle may be looked for.
@@ -127,14 +157,21 @@ impl Session<'_, '_, '_> {
 
     /// Moves the angle until next to nothing remains while everything that is not windowed is constant; whether it comes to rest.
     fn approach(&mut self, chosen: &mut Chosen, model: &Model) -> Result<bool, Error> {
+        let mut before = f64::INFINITY;
         for _ in 0..STEPS {
             let fitted = self.take_fitted(chosen, model)?;
-            let Some((left, error)) = self.left_of_zero(chosen, &fitted)? else { return Ok(false) };
+            let left = self.left_of_zero(chosen, &fitted)?;
+            chosen.fitted = Some(fitted);
+            let Some((left, error)) = left else { return Ok(false) };
             if left.abs() <= CHOSEN * error {
-                chosen.fitted = Some(fitted);
                 return Ok(true);
             }
+            if left.abs() > SLOWEST * before {
+                return Ok(false);
+            }
+            before = left.abs();
             self.move_zero(chosen, left);
+            self.fit_near(chosen, model)?;
         }
         Ok(false)
     }
