@@ -1,6 +1,8 @@
-"""What happens in a record at some times only: samples that a recorder lost without leaving a gap."""
+"""What happens in a record at some times only: samples that a recorder lost without leaving a gap, and short pulses of the stiffness."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +18,15 @@ INSIDE = slice(500, -500)
 LOST, LOSSES = 3, 40
 ERROR = 0.6e-2
 """Of inertia and stiffness beside losses: six times what it is without, a sixth of what it is where losses are not seen."""
+
+LENGTH = 0.45
+"""Free length of the bar in m, whose stiffness is its torsional rigidity over that."""
+WITHIN = {0.1: 0.05, 0.05: 0.15}
+"""What the median of the stiffness in a pulse may be wrong by, by its length in s."""
+SEEN = 50.0
+"""Standard deviations of its noise by which a pulse must move the torque, as its energy tells, to be found with certainty."""
+COVERAGE = 0.88
+"""Of nominal 95 % intervals over the record."""
 
 
 def lost_places(samples: int, seed: int) -> npt.NDArray[np.bool_]:
@@ -43,9 +54,36 @@ def test_equations_over_lost_samples_are_left_out_and_said(gap: str) -> None:
     assert 0.02 < np.mean(result.status & Status.GAP != 0) < 0.5
 
 
-def test_records_of_which_nothing_is_lost_are_not_said_to_lose_samples() -> None:
-    for pattern in ("slider", "square"):
-        rig = tvident.simulate_torsional_rig(10.0, seed=4, pattern=pattern, angle_noise=1e-3)
-        for angle in (rig.angle, np.round(rig.angle / 1e-4) * 1e-4):
-            result = tvident.identify(angle, rig.torque, sample_rate=RATE)
-            assert not any("lost" in reason for reason in result.reasons)
+@pytest.mark.parametrize(("length", "seed"), [(0.1, 1), (0.05, 2)])
+def test_short_pulses_of_the_stiffness_are_found(length: float, seed: int) -> None:
+    def free_length(t: Array) -> Array:
+        return np.where(t % 2 < length, LENGTH / 2, LENGTH)
+
+    rig = tvident.simulate_torsional_rig(20.0, seed=seed, pattern=free_length, damping=0.041, angle_noise=1e-3)
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=RATE)
+    rest = np.median(rig.stiffness)
+    noise = rig.torque.std() / np.sqrt(101.0)  # 20 dB of the torque
+    seen = 0
+    for first in range(int(2 * RATE), rig.angle.size, int(2 * RATE)):
+        pulse = slice(first, first + round(length * RATE))
+        if rest * np.sqrt(np.sum(rig.angle[pulse] ** 2)) / noise < SEEN:
+            continue
+        seen += 1
+        assert abs(np.median(result.stiffness[pulse]) / (2 * rest) - 1) < WITHIN[length]
+        for end in (pulse.start, pulse.stop):
+            assert min(abs(jump - end / RATE) for jump in result.jumps) < 0.01
+    assert seen >= 7
+    assert len(result.jumps) <= 20
+    covered = np.abs(result.stiffness - rig.stiffness) < 1.96 * result.stderr["stiffness"]
+    assert covered[INSIDE].mean() > COVERAGE
+    assert abs(result.inertia[0] / rig.inertia[0] - 1) < ERROR
+    assert any("for a short while" in reason for reason in result.reasons)
+
+
+@pytest.mark.parametrize(("pattern", "seed"), [("slider", 4), ("square", 0), ("ramp", 2)])
+def test_records_without_events_have_none(pattern: Any, seed: int) -> None:
+    # Jumps and bends of the stiffness leave something, too, and so do the steps of an encoder.
+    rig = tvident.simulate_torsional_rig(20.0, seed=seed, pattern=pattern, angle_noise=1e-3)
+    for angle in (rig.angle, np.round(rig.angle / 1e-4) * 1e-4):
+        result = tvident.identify(angle, rig.torque, sample_rate=RATE)
+        assert not any("lost" in reason or "short while" in reason for reason in result.reasons)

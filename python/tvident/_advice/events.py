@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from tvident import _core
 
+_SHOWN = 6
+"""Pulses that are listed at most."""
+
 
 def lost_samples(found: _core.Identification) -> list[str]:
     """Return at how many places samples seem to be lost."""
@@ -13,3 +16,20 @@ def lost_samples(found: _core.Identification) -> list[str]:
         for _, defect, amount in found.defects
         if defect == "broken"
     ]
+
+
+def pulses(found: _core.Identification, period: float) -> list[str]:
+    """Return when the stiffness is another one for a short while."""
+    if not found.pulses:
+        return []
+    shown = ", ".join(f"{first * period:.6g} to {end * period:.6g}" for first, end in found.pulses[:_SHOWN])
+    shown += " …" if len(found.pulses) > _SHOWN else ""
+    many = "once" if len(found.pulses) == 1 else f"{len(found.pulses)} times"
+    words = f"the stiffness is another one for a short while {many}, from {shown} s"
+    return [f"{words}: everything else is identified without these pulses, which are added to it"]
+
+
+def jumps_beside_pulses(found: _core.Identification) -> list[int]:
+    """Return the samples before which parameters jump, without the ends of pulses."""
+    ends = {end for pulse in found.pulses for end in pulse}
+    return [jump for jump in found.jumps if jump not in ends]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tvident import _core
-from tvident._advice.events import lost_samples
+from tvident._advice.events import jumps_beside_pulses, lost_samples, pulses
 from tvident._advice.lists import listed
 from tvident._equation import BUILT_IN, COEFFICIENTS, UNITS
 from tvident._results import Words
@@ -98,6 +98,7 @@ class Explained:
             *self._windows(),
             *self._weights(),
             *self._kinds(),
+            *pulses(self.found, self.period),
             *self._jumps(),
         )
         advice = (
@@ -237,7 +238,7 @@ class Explained:
         return [words]
 
     def _jumps(self) -> list[str]:
-        jumps = self.found.jumps
+        jumps = jumps_beside_pulses(self.found)
         if not jumps:
             return []
         shown = ", ".join(f"{jump * self.period:.6g}" for jump in jumps[:_SHOWN]) + (

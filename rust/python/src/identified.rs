@@ -103,6 +103,7 @@ pub(crate) struct Identification {
     suspects: Vec<Py<Suspect>>,
     defects: Vec<(usize, &'static str, f64)>,
     resting: f64,
+    pulses: Vec<(usize, usize)>,
     scan: Option<Py<Scan>>,
     outside_mask: Option<Py<OutsideMask>>,
     /// With an instrument: the probability of the test of exogeneity, and the smallest F statistic of the first stage.
@@ -171,6 +172,7 @@ impl Identification {
             suspects: weak.map_or(Ok(Vec::new()), |weak| weak.suspects.iter().map(suspect).collect::<PyResult<_>>())?,
             defects: weak.map(defects).unwrap_or_default(),
             resting: weak.map_or(0.0, |weak| weak.resting),
+            pulses: weak.map_or_else(Vec::new, |weak| weak.pulses.iter().map(|one| (one.start, one.end)).collect()),
             scan: weak.map(|weak| Scan::new(py, &weak.scan)).transpose()?,
             outside_mask: found
                 .weak

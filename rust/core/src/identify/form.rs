@@ -121,6 +121,7 @@ pub(crate) fn weak(
         suspects: found.suspects,
         defects: found.defects,
         resting: found.resting,
+        pulses: found.pulses,
         scan: Scan { unknowns: found.scan.unknowns.iter().map(|&one| place(one)).collect(), ..found.scan },
         outside_mask,
     };

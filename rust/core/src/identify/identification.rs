@@ -1,5 +1,7 @@
 //! The result of one record, whatever its route.
 
+use std::ops::Range;
+
 use crate::identify::kinds::Kind;
 use crate::identify::weak::angle_zero::outcome::AngleZero;
 use crate::identify::weak::angle_zero::outcome::FreeOffset;
@@ -100,6 +102,8 @@ pub struct WeakDetails {
     pub defects: Vec<Vec<Defect>>,
     /// The part of the record that rests, where a term of friction asks for it: equations there say nothing of friction and are left out.
     pub resting: f64,
+    /// Samples of pulses of the stiffness: the first, and the first after it. Both are among the jumps.
+    pub pulses: Vec<Range<usize>>,
     /// Estimates by the width of the test function.
     pub scan: Scan,
     /// What the rows say that the mask keeps out; `None` without a mask.

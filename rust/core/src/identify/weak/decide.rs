@@ -138,7 +138,7 @@ impl Session<'_, '_, '_> {
     }
 
     /// Tests every constant. Returns the one that differs most between the parts of the record, if it may be set free.
-    fn test(&mut self, rows: &Rows, decided: &mut Decided) -> Result<Option<usize>, Error> {
+    pub(crate) fn test(&mut self, rows: &Rows, decided: &mut Decided) -> Result<Option<usize>, Error> {
         let Some(fit) = &decided.fit else { return Ok(None) };
         let problem = decided.problem(decided.rows(rows), self.noise[0]);
         let is_raised = self.noise != self.channel_noise;

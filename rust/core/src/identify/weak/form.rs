@@ -8,9 +8,12 @@ use crate::error::Error;
 use crate::exec::pool::{Piece, Watch};
 use crate::exec::stages::Stages;
 use crate::identify::weak::angle_zero::outcome::FreeOffset;
+use crate::identify::weak::angle_zero::spring::STIFFNESS;
+use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::found::WeakIdentified;
 use crate::identify::weak::friction::FrictionDirection;
 use crate::identify::weak::options::WeakOptions;
+use crate::identify::weak::pulses::{add_pulses, are_the_same, without_pulses};
 use crate::identify::weak::scanned::Scan;
 use crate::identify::weak::session::Session;
 use crate::identify::weak::torque_jumps::without_jumps;
@@ -20,12 +23,16 @@ use crate::noise::defects::{Defect, Within, defects};
 use crate::noise::passed::PassedNoise;
 use crate::noise::quantisation::quantisation_step;
 use crate::record::samples::Samples;
+use crate::regression::model::Model;
 use crate::simd::instructions::Instructions;
 use crate::status::Status;
 use crate::weak_form::weak_rows::{Record, TermSamples};
 
 /// Stages of a call, about: only for showing progress.
 const STAGES: usize = 50;
+
+/// Times that pulses are looked for, with those of the last time taken off the torque.
+const PULSE_ROUNDS: usize = 2;
 
 /// Identifies one record in weak form.
 ///
@@ -52,7 +59,7 @@ pub(crate) fn identify_weak(
         with_record(motion, (mask, lag), (options.delta, options.instructions), (workers, watch), |record, watch| {
             let jumping: Vec<_> = motion.terms.iter().zip(&record.terms).filter_map(jumping).collect();
             let calm = without_jumps(record.torque, &jumping);
-            identify(record, (calm.as_deref(), motion.measured.passed), options, workers, watch)
+            identify(&record, (calm.as_deref(), motion.measured.passed, is_whole), options, workers, watch)
         });
     found.map(|(found, resting)| {
         if limits.is_some() {
@@ -145,8 +152,8 @@ fn jumping<'a>((term, samples): (&Term<'a>, &TermSamples<'a>)) -> Option<&'a dyn
 /// Identifies one record. The noise of the torque is that of a `calm` one, without jumps, where there is one; what was resampled is compared with noise
 /// that `passed` the same way.
 fn identify(
-    record: Record<'_>,
-    (calm, passed): (Option<&[f64]>, [Option<&PassedNoise>; 2]),
+    record: &Record<'_>,
+    (calm, passed, whole): (Option<&[f64]>, [Option<&PassedNoise>; 2], bool),
     options: &WeakOptions,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
@@ -165,32 +172,70 @@ fn identify(
         given.unwrap_or_else(|| variance_after(passed, channel, step, options.instructions))
     };
     let levels = stages.map(pieces.into(), || (), level)?;
-    let mut session = Session {
-        record,
-        options,
-        noise: [0.0; 2],
-        channel_noise: [levels[0], levels[1]],
-        scan: Scan::default(),
-        free_offset: FreeOffset::default(),
-        best_before: None,
-        stages,
-    };
-    let model = session.model();
-    let (chosen, decided, lag) = session.settle(&model)?;
-    let (mut found, at_rows) = session.report(chosen, &decided)?;
-    found.scan = std::mem::take(&mut session.scan);
-    found.free_offset = session.free_offset;
-    found.angle_zero = session.take_angle_zero(&mut found, &decided);
-    let status = found.scan.status(&found.constants);
-    found.record_status |= status;
-    // Rows and windows take as much memory as the results.
-    drop(decided);
-    if let Some(at_rows) = at_rows {
-        found.results = at_rows.at_samples(samples, options.step, &mut session.stages)?;
+    settled(record, (options, whole), [levels[0], levels[1]], stages)
+}
+
+/// Identifies a record whose channels have some noise, again where pulses of the stiffness were found that hide what else there is.
+fn settled(
+    record: &Record<'_>,
+    (options, whole): (&WeakOptions, bool),
+    channel_noise: [f64; 2],
+    mut stages: Stages<'_, '_>,
+) -> Result<WeakIdentified, Error> {
+    // What looks like a pulse where samples are missing may be a loss that was not seen.
+    let (mut pulses, mut calm, mut round) = (Vec::new(), Vec::new(), if whole { 0 } else { PULSE_ROUNDS });
+    loop {
+        let calm_torque = calm.as_slice();
+        let mut session = Session {
+            record: Record { torque: if pulses.is_empty() { record.torque } else { &calm_torque }, ..record.clone() },
+            options,
+            noise: [0.0; 2],
+            channel_noise,
+            scan: Scan::default(),
+            free_offset: FreeOffset::default(),
+            best_before: None,
+            stages,
+        };
+        let model = session.model();
+        let mut chosen = session.choose(&model)?;
+        if round < PULSE_ROUNDS {
+            let again = session.pulses(&mut chosen, &model, &pulses, record.torque)?;
+            if !are_the_same(&again, &pulses) {
+                stages = session.stages;
+                calm = without_pulses(record.torque, record.angle, &again);
+                // Pulses that are none stay out.
+                (round, pulses) = (if again.is_empty() { PULSE_ROUNDS } else { round + 1 }, again);
+                continue;
+            }
+        }
+        let mut found = session.finished(chosen, &model)?;
+        if let Some(place) = found.changing.iter().position(|&unknown| unknown == STIFFNESS) {
+            add_pulses(&mut found, place, options.step, &pulses);
+        }
+        session.stages.finish()?;
+        return Ok(found);
     }
-    session.stages.finish()?;
-    found.lag = lag;
-    Ok(found)
+}
+
+impl Session<'_, '_, '_> {
+    /// Decides with a test function that was chosen, and reports.
+    fn finished(&mut self, chosen: Chosen, model: &Model) -> Result<WeakIdentified, Error> {
+        let samples = self.record.angle.len();
+        let (chosen, decided, lag) = self.settle(model, chosen)?;
+        let (mut found, at_rows) = self.report(chosen, &decided)?;
+        found.scan = std::mem::take(&mut self.scan);
+        found.free_offset = self.free_offset;
+        found.angle_zero = self.take_angle_zero(&mut found, &decided);
+        let status = found.scan.status(&found.constants);
+        found.record_status |= status;
+        // Rows and windows take as much memory as the results.
+        drop(decided);
+        if let Some(at_rows) = at_rows {
+            found.results = at_rows.at_samples(samples, self.options.step, &mut self.stages)?;
+        }
+        found.lag = lag;
+        Ok(found)
+    }
 }
 
 /// What was done to a velocity or an acceleration; wrapping is for angles.

@@ -1,5 +1,7 @@
 //! The result of one record in weak form.
 
+use std::ops::Range;
+
 use crate::identify::results::{Constant, SampleResults};
 use crate::identify::weak::angle_zero::outcome::AngleZero;
 use crate::identify::weak::angle_zero::outcome::FreeOffset;
@@ -60,6 +62,8 @@ pub(crate) struct WeakIdentified {
     pub(crate) pairs: Vec<(usize, usize)>,
     /// Samples before which what changes jumps.
     pub(crate) jumps: Vec<usize>,
+    /// Samples of pulses of the stiffness, whose ends are among the jumps.
+    pub(crate) pulses: Vec<Range<usize>>,
     /// Estimates by the width of the test function.
     pub(crate) scan: Scan,
     /// What was done to angle, torque and other channels.

@@ -12,6 +12,7 @@ pub(crate) mod jumps_of_constants;
 pub(crate) mod lag;
 pub(crate) mod options;
 pub(crate) mod outside_mask;
+pub(crate) mod pulses;
 pub(crate) mod report;
 pub(crate) mod scan;
 pub(crate) mod scanned;

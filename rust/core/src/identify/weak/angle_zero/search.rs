@@ -34,9 +34,9 @@ const LEAST_SHARE: f64 = 0.9;
 const LEAST_SHARE_BEFORE: f64 = 0.5;
 
 impl Session<'_, '_, '_> {
-    /// Chooses and decides, and where the record contradicts a constant offset, tries an angle other than zero at which the spring is relaxed.
-    /// It stays if it predicts better.
-    pub(crate) fn settle(&mut self, model: &Model) -> Result<Settled, Error> {
+    /// Decides with the test function that was chosen, and where the record contradicts a constant offset, tries an angle other than zero at which
+    /// the spring is relaxed. It stays if it predicts better.
+    pub(crate) fn settle(&mut self, model: &Model, mut chosen: Chosen) -> Result<Settled, Error> {
         let offset = self.offset_beside_changing_stiffness(model);
         if let (Some(_), Some(given)) = (offset, self.options.angle_zero.filter(|given| *given != 0.0)) {
             self.record.angle_zero = given;
@@ -46,8 +46,8 @@ impl Session<'_, '_, '_> {
                 return Ok(settled);
             }
             self.record.angle_zero = 0.0;
+            chosen = self.choose(model)?;
         }
-        let mut chosen = self.choose(model)?;
         let Some(offset) = offset.filter(|_| self.options.angle_zero.is_none()) else {
             return self.decide_and_choose_again(chosen, model);
         };

@@ -151,6 +151,7 @@ impl Session<'_, '_, '_> {
             constant_pairs: Vec::new(),
             pairs: Vec::new(),
             jumps: decided.jumps.iter().map(|jump| jump.sample).collect(),
+            pulses: Vec::new(),
             scan: Scan::default(),
             resting: 0.0,
             defects: Vec::new(),

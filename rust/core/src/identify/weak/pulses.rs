@@ -1,0 +1,213 @@
+//! Pulses of the windowed stiffness, which are taken off the torque so that everything else is identified as if there were none.
+//!
+//! Windows that hold rows over a pulse follow it in part, so these rows are found and left out in turns before the pulses are placed. Then
+//! the record is identified with the torque that it would have without them, and they are placed again from what that leaves.
+
+use std::ops::Range;
+
+use crate::error::Error;
+use crate::identify::results::SampleResults;
+use crate::identify::weak::angle_zero::spring::{STIFFNESS, SpringColumn};
+use crate::identify::weak::choice::Chosen;
+use crate::identify::weak::decided::Decided;
+use crate::identify::weak::found::WeakIdentified;
+use crate::identify::weak::session::Session;
+use crate::inference::constancy::NO_CHANCE;
+use crate::inference::jumps::pulses::{Pulse, PulseSearch};
+use crate::record::samples::Samples;
+use crate::regression::constants::Expected;
+use crate::regression::fit::Fit;
+use crate::regression::limits::NOISE_MODEL_FAILS;
+use crate::regression::model::Model;
+use crate::regression::residuals::{residuals, usual_variance};
+use crate::weak_form::weak_rows::{Record, WeakRows};
+
+/// Times that rows over pulses are left out and what is left of all is looked at again.
+const TURNS: usize = 3;
+/// The largest part of the rows that may be over pulses: what happens more often is no event.
+const MOST: f64 = 0.3;
+
+/// The least change of the stiffness that is a pulse, as a part of it: the bend of a ramp looks like a smaller one. And the largest part of a
+/// pulse by which the stiffness may differ before and after it: what does not come back is a jump.
+const LEAST: f64 = 0.1;
+const COMES_BACK: f64 = 0.25;
+/// The least part of what stands out that must be pulses.
+const EXPLAINED: f64 = 0.6;
+/// By how much less the squared errors of independent rows must be with pulses than without, or with a touch or a spike of the torque in their
+/// places, over the noise's variance.
+const BETTER: f64 = 20.0;
+
+/// What windows leave of every row, whether they say anything of it, and their stiffness there.
+struct Left {
+    rows: Vec<f64>,
+    usable: Vec<bool>,
+    stiffness: Vec<f64>,
+    /// Rows of a window.
+    span: usize,
+    /// Whether parts of the record differ by more than chance in what is held constant: that leaves something, too.
+    others_change: bool,
+}
+
+impl Left {
+    /// Whether the stiffness around some rows is such as a pulse in them leaves it.
+    fn comes_back(&self, pulse: &Pulse, rows: &Range<usize>) -> bool {
+        let reach = self.span / 2 + 1;
+        let last = self.stiffness.len() - 1;
+        let [before, after] =
+            [rows.start.saturating_sub(reach), (rows.end + reach).min(last)].map(|row| self.stiffness[row]);
+        let change = pulse.change.iter().fold(0.0_f64, |most, change| most.max(change.abs()));
+        change > LEAST * f64::midpoint(before.abs(), after.abs()) && (after - before).abs() < COMES_BACK * change
+    }
+}
+
+impl Session<'_, '_, '_> {
+    /// The pulses of the stiffness where it is what is windowed. `known` ones are taken off the torque already; `torque` is as it was recorded.
+    pub(crate) fn pulses(
+        &mut self,
+        chosen: &mut Chosen,
+        model: &Model,
+        known: &[Pulse],
+        torque: &dyn Samples,
+    ) -> Result<Vec<Pulse>, Error> {
+        let decides = self.options.averaging && self.options.lag == Some(0.0);
+        if !decides || model.windowed != [STIFFNESS] {
+            return Ok(Vec::new());
+        }
+        let fitted = self.take_fitted(chosen, model)?;
+        let left = self.left_of_all_rows(&chosen.weak, &chosen.weak.rows.usable, &fitted)?;
+        let (error, expected) = (fitted.error, fitted.expected);
+        chosen.fitted = Some(fitted);
+        let Some(mut left) = left.filter(|_| error <= NOISE_MODEL_FAILS) else { return Ok(known.to_vec()) };
+        if !known.is_empty() && !self.are_better(chosen, model, (torque, error), &mut left.rows)? {
+            return Ok(Vec::new());
+        }
+        let mut over = self.search(&chosen.weak, expected, &left).conspicuous();
+        let turns = if known.is_empty() { TURNS } else { 0 };
+        for _ in 0..turns {
+            let rows: usize = over.iter().map(Range::len).sum();
+            if over.is_empty() || rows as f64 > MOST * left.rows.len() as f64 {
+                return Ok(Vec::new());
+            }
+            let Some(again) = self.left_without(chosen, model, &over)? else { return Ok(Vec::new()) };
+            left = again;
+            let before = over;
+            over = self.search(&chosen.weak, expected, &left).conspicuous();
+            if over == before {
+                break;
+            }
+        }
+        if left.others_change {
+            return Ok(Vec::new());
+        }
+        let search = self.search(&chosen.weak, expected, &left);
+        let pulse = |rows: &Range<usize>| search.within(rows).filter(|pulse| left.comes_back(pulse, rows));
+        let pulses: Vec<Pulse> = over.iter().filter_map(pulse).collect();
+        let explain = pulses.len() as f64 >= EXPLAINED * over.len() as f64;
+        let above_torque: f64 = pulses.iter().map(|pulse| pulse.above_torque).sum();
+        Ok(if explain && above_torque > BETTER { pulses } else { Vec::new() })
+    }
+
+    /// Whether rows with pulses taken off, which were predicted with some error, are predicted better than the same rows of the torque as it was
+    /// recorded. What pulses make of the rows is added to what is left of them.
+    fn are_better(
+        &mut self,
+        chosen: &mut Chosen,
+        model: &Model,
+        (torque, error): (&dyn Samples, f64),
+        left: &mut [f64],
+    ) -> Result<bool, Error> {
+        let record = Record { torque, ..self.record.clone() };
+        let (function, delta, workers) = (chosen.weak.function, self.options.delta, self.stages.workers);
+        let whole = self.stages.stage(|watch| WeakRows::build(&record, function, delta, None, workers, watch))?;
+        for ((left, whole), calm) in left.iter_mut().zip(&whole.rows.rhs).zip(&chosen.weak.rows.rhs) {
+            *left += whole - calm;
+        }
+        let calm = std::mem::replace(&mut chosen.weak.rows.rhs, whole.rows.rhs);
+        let without = self.error_of(chosen, model);
+        chosen.weak.rows.rhs = calm;
+        let independent = self.record.angle.len() as f64 / function.half_width() as f64;
+        Ok((without? - error) * independent > BETTER)
+    }
+
+    fn search<'a>(&'a self, weak: &'a WeakRows, expected: Expected, left: &'a Left) -> PulseSearch<'a> {
+        // Windows that follow a pulse leave more than noise of all rows in them: what is usual counts.
+        let usual = usual_variance(&left.rows, &left.usable).unwrap_or(0.0);
+        PulseSearch {
+            left: &left.rows,
+            usable: &left.usable,
+            signal: self.record.angle,
+            function: &weak.kernels.values[2],
+            first: weak.first,
+            stride: weak.stride,
+            variance: expected.variance.max(usual),
+            inflation: expected.variance_inflation,
+        }
+    }
+
+    /// What is left of every row by windows that hold none of some rows, and whether they say anything of it.
+    fn left_without(
+        &mut self,
+        chosen: &mut Chosen,
+        model: &Model,
+        rows: &[Range<usize>],
+    ) -> Result<Option<Left>, Error> {
+        let whole = chosen.weak.rows.clone();
+        chosen.weak.rows.exclude(rows.iter().cloned().flatten());
+        let mut fitted = self.fit_first(chosen, model)?;
+        self.test(&chosen.weak.rows, &mut fitted)?;
+        chosen.weak.rows = whole;
+        let usable = chosen.weak.rows.usable.clone();
+        let left = self.left_of_all_rows(&chosen.weak, &usable, &fitted)?;
+        let others_change = fitted.tests.iter().any(|(_, test)| test.probability < NO_CHANCE);
+        Ok(left.map(|left| Left { others_change, ..left }))
+    }
+
+    fn left_of_all_rows(&mut self, weak: &WeakRows, usable: &[bool], fitted: &Decided) -> Result<Option<Left>, Error> {
+        let Some(fit) = fitted.fit.as_ref().filter(|fit: &&Fit| fit.scale.is_some()) else { return Ok(None) };
+        let spring = SpringColumn::new(&fitted.model, fit, weak.rows.len(), weak.rows.period);
+        let Some(spring) = spring else { return Ok(None) };
+        let mut problem = fitted.problem(&weak.rows, self.noise[0]);
+        problem.usable = usable;
+        let (rows, usable) = residuals(&problem, fit, &mut self.stages)?;
+        Ok(Some(Left { rows, usable, stiffness: spring.stiffness().to_vec(), span: fit.span, others_change: false }))
+    }
+}
+
+/// Whether pulses are those of the last round, to a sample.
+pub(crate) fn are_the_same(pulses: &[Pulse], before: &[Pulse]) -> bool {
+    let near = |(one, other): (&Pulse, &Pulse)| {
+        one.samples.start.abs_diff(other.samples.start) <= 1 && one.samples.end.abs_diff(other.samples.end) <= 1
+    };
+    pulses.len() == before.len() && pulses.iter().zip(before).all(near)
+}
+
+/// The torque without what pulses of the stiffness make of it.
+pub(crate) fn without_pulses(torque: &dyn Samples, angle: &dyn Samples, pulses: &[Pulse]) -> Vec<f64> {
+    let mut left = vec![0.0; torque.len()];
+    torque.read(0, &mut left);
+    for pulse in pulses {
+        let mut angles = vec![0.0; pulse.change.len()];
+        angle.read(pulse.first, &mut angles);
+        for ((left, angle), change) in left[pulse.first..].iter_mut().zip(&angles).zip(&pulse.change) {
+            *left -= change * angle;
+        }
+    }
+    left
+}
+
+/// Adds pulses to the values of the stiffness, which are at some place, one every `step` samples, and to their errors; their ends are jumps.
+pub(crate) fn add_pulses(found: &mut WeakIdentified, place: usize, step: usize, pulses: &[Pulse]) {
+    let SampleResults { values, errors, .. } = &mut found.results;
+    for pulse in pulses {
+        let samples = pulse.first..pulse.first + pulse.change.len();
+        for sample in samples.filter(|sample| sample % step == 0) {
+            let (element, index) = (sample / step, sample - pulse.first);
+            values[place][element] += pulse.change[index];
+            let error = &mut errors[place][element];
+            *error = error.hypot(pulse.variance[index].sqrt());
+        }
+    }
+    found.pulses = pulses.iter().map(|pulse| pulse.samples.clone()).collect();
+    found.jumps.extend(found.pulses.iter().flat_map(|pulse| [pulse.start, pulse.end]));
+    found.jumps.sort_unstable();
+}
