@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -113,6 +114,8 @@ class Run:
         for piece in self._pieces[len(self._kept.notes) :]:
             # Nothing of a piece stays while the next one is worked on.
             self._kept.add(*work.piece(piece, self._progress(piece)))
+            # A result in weak form refers to itself, with 19 MB a piece that would wait for the collector's own time.
+            gc.collect()
             if self._report is not None:
                 self._report(piece[1], self._samples)
         return self._written(settings, work)
