@@ -35,7 +35,7 @@ impl Kernel for Write<'_, '_> {
         if wanted && self.rows.len() >= lanes && self.outputs.elements.step == 1 {
             self.write_squares(simd);
         } else if let (true, Some(rows)) = (wanted, self.same_rows()) {
-            self.write_rows::<S>(rows);
+            self.write_rows(lanes, rows);
         } else {
             self.write_lanes::<S>();
         }
@@ -87,14 +87,14 @@ impl Write<'_, '_> {
     fn same_rows(&self) -> Option<FinishedRows> {
         let elements = self.outputs.elements;
         let rows = elements.rows_from(self.base + self.ahead, self.block);
-        (rows.step() == elements.step && self.block % elements.step == 0).then_some(rows)
+        (elements.step > 1 && rows.step() == elements.step && self.block % elements.step == 0).then_some(rows)
     }
 
-    /// Writes out every row that elements belong to, one element for each lane.
-    #[inline(always)]
-    fn write_rows<S: Lanes>(&mut self, finished: FinishedRows) {
+    /// Writes out every row that elements belong to, one element for each lane. Not in the kernel, where it would take registers from the squares.
+    #[inline(never)]
+    fn write_rows(&mut self, lanes: usize, finished: FinishedRows) {
         let Self { tile, rows, outputs, .. } = self;
-        let (lanes, step) = (S::F64_LANES, outputs.elements.step);
+        let step = outputs.elements.step;
         let zero = self.base + self.ahead - outputs.elements.first.cast_signed();
         let apart = self.block / step;
         for row in rows.clone().filter(|&row| finished.hold(row)) {
