@@ -30,7 +30,8 @@ test:  ## every test but the longest, and every lint; the last line says which t
 
 .PHONY: test-rust
 test-rust:  ## tests of the core
-	cargo test --workspace --profile checked --quiet
+	# Cargo has a job server of its own.
+	MAKEFLAGS= cargo test --workspace --profile checked --quiet
 
 .PHONY: test-python
 test-python: $(BUILT)  ## tests of the Python package

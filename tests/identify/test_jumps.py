@@ -58,6 +58,7 @@ def test_none_is_invented(pattern: str, angle_noise: float) -> None:
         assert identify(recorded(pattern, angle_noise=angle_noise, seed=seed)).jumps == ()
 
 
+@pytest.mark.long
 def test_none_is_invented_where_inertia_and_damping_change() -> None:
     recording = tvident.simulate_torsional_rig(
         40.0,

@@ -82,6 +82,7 @@ def test_what_is_constant_is_not_said_to_vary(pattern: str) -> None:
     assert (kinds["inertia"], kinds["damping"]) == ("constant", "constant")
 
 
+@pytest.mark.long
 def test_what_is_constant_and_said_to_vary_stays_where_it_is() -> None:
     rig = clean("slider", None, 0.0)
     result = identified(rig, 1e-3, inertia="varying")

@@ -179,7 +179,7 @@ class StopError(Exception):
     """What a caller raises to interrupt the work."""
 
 
-@pytest.mark.parametrize("method", ["paper", "auto"])
+@pytest.mark.parametrize("method", ["paper", pytest.param("auto", marks=pytest.mark.long)])
 def test_interrupted_work_leaves_no_result_and_goes_on(rig: tvident.Recording, method: str) -> None:
     source = write("in.npy", rig.angle, rig.torque)
     options: dict[str, Any] = {"angle": "angle", "torque": "torque", "sample_rate": 1000, "method": method}
