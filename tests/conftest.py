@@ -21,11 +21,13 @@ NO_RECORDINGS, A_MISSING_RECORDING = "no recordings at", "the recording "
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out what takes long, or with `TVIDENT_TESTS=long` everything else: each test is run by one of the two."""
-    long = os.environ.get("TVIDENT_TESTS") == "long"
-    others = [one for one in items if (one.get_closest_marker("long") is not None) != long]
-    if others:
-        config.hook.pytest_deselected(items=others)
-        items[:] = [one for one in items if (one.get_closest_marker("long") is not None) == long]
+    wanted = os.environ.get("TVIDENT_TESTS") == "long"
+    parted: dict[bool, list[pytest.Item]] = {True: [], False: []}
+    for one in items:
+        is_long = one.get_closest_marker("long") is not None
+        parted[is_long == wanted].append(one)
+    items[:] = parted[True]
+    config.hook.pytest_deselected(items=parted[False])
 
 
 @pytest.fixture(scope="session", autouse=True)

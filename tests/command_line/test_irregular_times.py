@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from scipy.interpolate import make_interp_spline
 
+import commands
 import tvident
-from tvident._command_line import main
 
 RIG = tvident.simulate_torsional_rig(duration=4.0, pattern="constant", seed=6)
 
@@ -27,15 +26,15 @@ def jittered(tmp_path: Path) -> Path:
     return path
 
 
-def run(*call: str) -> str:
-    done = CliRunner().invoke(main, list(call))
-    assert done.exit_code == 0, done.output
-    return str(done.output)
+def run(*call: object) -> str:
+    done = commands.run(*call)
+    assert done.returncode == 0, done.stderr
+    return done.stdout + done.stderr
 
 
 def test_times_that_jitter_are_taken_and_what_was_done_is_said(jittered: Path) -> None:
     output = run(
-        "identify", str(jittered), "--angle", "angle", "--torque", "torque", "--time", "time", "--stiffness", "constant"
+        "identify", jittered, "--angle", "angle", "--torque", "torque", "--time", "time", "--stiffness", "constant"
     )
     assert "Times: steps of time scatter by 0.3 of a step: the channels were brought onto a uniform grid of" in output
     expected, error = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, stiffness="constant").constants[
@@ -43,14 +42,14 @@ def test_times_that_jitter_are_taken_and_what_was_done_is_said(jittered: Path) -
     ]
     found = float(output.rsplit("\nstiffness = ", 1)[1].split(maxsplit=1)[0])
     assert abs(found - expected) <= 3 * error
-    assert "steps scatter by 0.3 of a step" in run("info", str(jittered))
+    assert "steps scatter by 0.3 of a step" in run("info", jittered)
 
 
 def test_derivatives_are_at_the_samples_own_times(jittered: Path, tmp_path: Path) -> None:
     output = tmp_path / "derivatives.csv"
     run(
         "derivatives",
-        str(jittered),
+        jittered,
         "--channel",
         "angle",
         "--time",
@@ -58,7 +57,7 @@ def test_derivatives_are_at_the_samples_own_times(jittered: Path, tmp_path: Path
         "--window-length",
         "0.1 s",
         "-o",
-        str(output),
+        output,
     )
     columns = tvident.read_recording(output)
     np.testing.assert_allclose(columns["time"], tvident.read_recording(jittered)["time"], rtol=1e-12)
