@@ -163,7 +163,7 @@ def test_what_cannot_be_known_is_said_and_no_number() -> None:
     assert "independent forces" in full.identifiable["stiffness_0_0"].reason
     assert np.isnan(full.stiffness).all()
     assert not full.trusted.any()
-    assert "is not known" in full.summary().splitlines()[0]
+    assert full.summary().startswith("do not trust: nothing can be known of what was asked; see what to do\n")
     driven = chain([constant(12.0), constant(18.0)], 6000, seed=7)
     torque = driven.torque.copy()
     torque[1] = np.nan
@@ -171,6 +171,7 @@ def test_what_cannot_be_known_is_said_and_no_number() -> None:
     assert "was not measured" in found.identifiable["inertia_1"].reason
     assert np.isnan(found.elements["inertia_1"]).all()
     assert abs(found.constants["stiffness_0_1"][0] / 18 - 1) < 0.05
+    assert "inertia_1 cannot be known, model explains 99" in found.summary().splitlines()[0]
 
 
 def test_full_matrices_of_masses_with_independent_forces() -> None:

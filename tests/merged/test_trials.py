@@ -111,7 +111,7 @@ def test_trials_that_differ_are_said_to() -> None:
     assert found.record_status & tvident.Status.KIND_CONTRADICTED
     assert any("trials do not share stiffness" in line for line in found.advice)
     assert "trials do not share stiffness" in found.summary()
-    assert "of the torque, averaged over the test function" in found.summary().splitlines()[0]
+    assert "of the torque, averaged over the test function" in found.summary().splitlines()[1]
 
 
 def test_trials_of_several_lengths_are_aligned_on_their_phase() -> None:

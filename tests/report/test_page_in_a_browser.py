@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 import tvident
+from merged.simulated import chain
+from merged.test_masses import changing, constant
 
 MILLION = 1e6
 
@@ -207,6 +209,20 @@ def test_dragging_shows_the_same_time_in_all_plots_and_a_double_click_the_whole(
     shown = opened.ask("tvidentReport.shown")
     assert shown["from"] < 3.0
     assert shown["to"] > 3.4
+    opened.close()
+
+
+def test_a_page_of_masses_opens_like_any_other(browser: Any, tmp_path: Path) -> None:
+    one = chain([changing, constant(18.0)], 1500, seed=3)
+    structure = tvident.Chain(2, [("base", 0), (0, 1)])
+    kinds: Any = {"stiffness": ["windowed", "constant"], "inertia": "constant", "damping": "constant"}
+    found = tvident.identify(one.angle, one.torque, sample_rate=1000, dof_axis=0, structure=structure, **kinds)
+    found.report(tmp_path / "masses.html")
+    opened = Opened(browser, tmp_path / "masses.html")
+    assert opened.page.inner_text(".verdict p") == found.summary().splitlines()[0]
+    assert opened.drawn("Stiffness base 0")["traces"] == 2
+    assert opened.drawn("Torque 1, averaged over the test function")["traces"] == 2
+    assert "All settings" not in opened.page.inner_text("body")
     opened.close()
 
 

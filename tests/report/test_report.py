@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import gzip
+import json
 import re
 import sys
 from pathlib import Path
@@ -18,6 +19,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import tvident
+from merged.simulated import chain, simulated
+from merged.test_masses import constant
 from tvident._command_line import main
 from tvident._report.packed import Packed, Series, packed
 
@@ -111,6 +114,64 @@ def test_a_page_is_never_greener_than_its_verdict(tmp_path: Path) -> None:
         found.report(tmp_path / "page.html")
         assert found.summary().startswith("do not trust") == (tone == "bad")
         assert f'"tone": "{tone}"' in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+def content_of(page: Path) -> Any:
+    """Give what a page says."""
+    text = page.read_text(encoding="utf-8")
+    return json.loads(text.split('<script type="application/json" id="content">')[1].split("</script>")[0])
+
+
+def titles(content: Any, group: str) -> list[str]:
+    return [one["title"] for one in content["charts"] if one["group"] == group]
+
+
+def test_masses_have_a_page_with_every_element_and_torque(tmp_path: Path) -> None:
+    one = chain([constant(12.0), lambda t: 18 + 2 * np.sin(3 * t)], 2500, seed=1, base=True)
+    structure = tvident.Chain(2, [("base", 0), (0, 1)], base=one.base)
+    kinds: Any = {"structure": structure, "stiffness": ["constant", "windowed"], "sample_rate": 1000, "dof_axis": 0}
+    for sign, tone in ((1, "good"), (-1, "bad")):
+        found = tvident.identify(one.angle, sign * one.torque, **kinds)
+        found.report(tmp_path / "page.html", channels={"lamp [V]": np.ones(2500)})
+        content = content_of(tmp_path / "page.html")
+        assert content["verdict"] == found.summary().splitlines()[0]
+        assert content["verdict"].startswith("do not trust: the inertia of mass 0 is negative") == (tone == "bad")
+        assert content["tone"] == tone
+        assert titles(content, "Recorded") == [
+            "Angle 0",
+            "Torque 0",
+            "Angle 1",
+            "Torque 1",
+            "Angle of the base",
+            "lamp",
+        ]
+        assert titles(content, "Found")[0] == "Stiffness 0 1"
+        assert "Torque 1, averaged over the test function" in titles(content, "How well")
+        named = {line["name"]: line for line in content["numbers"]}
+        assert named["Stiffness base 0"]["value"].startswith(f"{found.constants['stiffness_base_0'][0]:.2f}")
+        # The settings of masses are not taken by another call.
+        assert not content["repeat"]
+    with pytest.raises(ValueError, match=r"its name must end in \.html"):
+        found.report(tmp_path / "page.pdf")
+    found.save(tmp_path / "found.npz")
+    tvident.load(tmp_path / "found.npz").report(tmp_path / "loaded.html")
+    assert not titles(content_of(tmp_path / "loaded.html"), "Recorded")
+
+
+def test_trials_have_a_page_along_their_phase(tmp_path: Path) -> None:
+    several = simulated(3, 900, constant(15.0), seed=2)
+    lengths = (900, 800, 700)
+    angles, torques = (
+        [row[:n] for row, n in zip(rows, lengths, strict=True)] for rows in (several.angle, several.torque)
+    )
+    phases = [np.arange(n) / n for n in lengths]
+    found: Any = tvident.identify(angles, torques, sample_rate=1000, ensemble_axis=0, phase=phases)
+    found.report(tmp_path / "page.html")
+    content = content_of(tmp_path / "page.html")
+    assert len(titles(content, "Recorded")) == 6
+    spans = {(one["count"], one["period"]) for one in content["series"]}
+    assert spans == {(found.time.size, 1e-3)}
+    assert all("from trial to trial" in line["more"] for line in content["numbers"])
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from tvident._equation import COEFFICIENTS
 from tvident._merged.elements import Element, kind_or_number
 from tvident._merged.merging import Merging, Part
 from tvident._merged.predicted import Equations
+from tvident._merged.recorded import Recorded
 from tvident._merged.result import MergedIdentification
 from tvident._merged.sampling import Sampling, variances
 from tvident._merged.trials import Trials
@@ -123,5 +124,8 @@ def identify_trials(trials: Trials, asked: Asked, term_values: TermValues) -> Me
         masses=0,
         units=asked.units_of(elements),
         phase=trials.phase,
+        recorded=Recorded(
+            [[one] for one in trials.angles], [[one] for one in trials.torques], [None] * len(given), trials.positions
+        ),
     )
     return MergedIdentification(merging)

@@ -124,7 +124,7 @@ def _restored(arrays: Mapping[str, Any], facts: Mapping[str, Any]) -> MergedIden
             "identifiable": {name: Identifiable(**one) for name, one in facts["identifiable"].items()},
             "settings": facts["settings"],
             "scans": tuple(scan_from(scan) for scan in facts["scans"]),
-            "_words": words_from(facts["words"]),
+            "_told": words_from(facts["words"]),
             "_covariances": covariances,
         },
     )

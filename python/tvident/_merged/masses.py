@@ -17,6 +17,7 @@ from tvident._merged.elements import Element, kind_or_number
 from tvident._merged.mechanism import Mechanism
 from tvident._merged.merging import Merging
 from tvident._merged.predicted import Equations
+from tvident._merged.recorded import Recorded
 from tvident._merged.result import MergedIdentification
 from tvident._merged.sampling import Sampling, variances
 from tvident._merged.structure import Chain, matrices
@@ -206,6 +207,12 @@ def identify_masses(masses: Masses, asked: Asked, term_values: TermValues) -> Me
         units=asked.units_of(elements),
         unknowable=unknowable,
         inertia=masses.inertia,
+        recorded=Recorded(
+            [masses.angles[: masses.count]],
+            [masses.torques],
+            [masses.angles[masses.count] if len(masses.angles) > masses.count else None],
+            structure=masses.structure,
+        ),
     )
     return MergedIdentification(merging)
 

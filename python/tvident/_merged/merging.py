@@ -11,6 +11,7 @@ import numpy.typing as npt
 from tvident import _core
 from tvident._merged.elements import Element
 from tvident._merged.predicted import Equations
+from tvident._merged.recorded import Recorded
 from tvident._merged.sampling import Sampling
 
 Array = npt.NDArray[np.float64]
@@ -60,6 +61,8 @@ class Merging:
         Why some elements cannot be known.
     inertia : mapping of str to ndarray, shape (masses, masses, samples)
         By how much factors of a mechanism enter the matrix of inertia along the motion.
+    recorded : Recorded, optional
+        Not kept with what is stored.
     """
 
     elements: Sequence[Element]
@@ -73,3 +76,4 @@ class Merging:
     phase: Array | None = None
     unknowable: Mapping[str, str] = field(default_factory=dict)
     inertia: Mapping[str, Array] = field(default_factory=dict)
+    recorded: Recorded | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
 
 import numpy as np
@@ -17,8 +18,9 @@ from tvident._merged.held_back import HeldBackTorque, held_back
 from tvident._merged.merging import Identifiable, Merging
 from tvident._merged.predicted import predicted
 from tvident._merged.response import LinearMasses
+from tvident._merged.verdict import verdict_of
 from tvident._merged.words import summary_of, words_of
-from tvident._results import Scan, Words, accounted_for, every_sample, without_gaps
+from tvident._results import Scan, Telling, Words, accounted_for, every_sample, without_gaps
 from tvident._status import Status
 from tvident._tables import Table, Tabular
 
@@ -31,7 +33,7 @@ Array: TypeAlias = npt.NDArray[np.float64]
 Picture: TypeAlias = Literal["parameters", "torque", "scan"]
 
 
-class Reported(Tabular):
+class Reported(Telling, Tabular):
     """The part of a result that is shown.
 
     Attributes
@@ -252,22 +254,12 @@ class Reported(Tabular):
         return self._held_back
 
     @cached_property
-    def _words(self) -> Words:
+    def _told(self) -> Words:
         return words_of(self, self._merging.sampling, [part.found for part in self._merging.parts], self._scatter)
 
-    @property
-    def reasons(self) -> tuple[str, ...]:
-        """What was chosen, and why."""
-        return self._words.reasons
-
-    @property
-    def advice(self) -> tuple[str, ...]:
-        """What to do about what looks wrong."""
-        return self._words.advice
-
     def summary(self) -> str:
-        """Return a table of the elements, and in words what was chosen and what to do."""
-        return summary_of(self)
+        """Return the verdict, a table of the elements, and in words what was chosen and what to do."""
+        return summary_of(self, verdict_of(self, self._merging))
 
     def plot(
         self, what: Picture = "parameters", *, mass: int = 0, trial: int = 0, ax: Axes | Sequence[Axes] | None = None
@@ -306,6 +298,36 @@ class Reported(Tabular):
         time, *both = self.predicted_torque(trial)
         recorded, expected = (np.atleast_2d(one)[mass] for one in both)
         return _figures.plot_torque(drawn(self, (time, recorded, expected)), ax=ax)
+
+    def report(
+        self, path: str | Path, *, channels: Mapping[str, npt.ArrayLike] | None = None, title: str | None = None
+    ) -> None:
+        """Write a report: one page that opens in a browser without a network, as :meth:`Identification.report` does.
+
+        Every element has its number or its plot; channels and torques are those of the first four trials. Where trials were aligned on
+        a phase, channels are drawn along the phase of the median trial.
+
+        Parameters
+        ----------
+        path : str or Path
+            A name that ends in ``.html``. The file appears whole or not at all.
+        channels : mapping of str to array_like, shape (n,), optional
+            Other channels; a unit may follow the name in brackets.
+        title : str, optional
+            By default the name of the file.
+
+        Raises
+        ------
+        ImportError
+            If plotly is missing: install ``tvident[report]``.
+        ValueError
+            If the ending is another one, or a channel does not have a value for every sample.
+        OSError
+            If there is no such folder, or the file cannot be written.
+        """
+        from tvident._merged.paged import report  # noqa: PLC0415 - pages are rarely asked for, and take long to load
+
+        report(self, self._merging, path, channels=channels, title=title)
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """Return everything that has one value a sample, by name: elements, their standard errors, residuals and flags."""

@@ -150,8 +150,12 @@ class MergedIdentification(Reported):
     def __getstate__(self) -> dict[str, Any]:
         # A record may be long, and functions cannot be stored; what was found of it stays.
         sampling = replace(self._merging.sampling, clock=None, passed=None)
-        known = {"_covariances": self._covariances, "_words": self._words}
-        return {**self.__dict__, **known, "_merging": replace(self._merging, parts=(), sampling=sampling)}
+        known = {"_covariances": self._covariances, "_told": self._told}
+        return {
+            **self.__dict__,
+            **known,
+            "_merging": replace(self._merging, parts=(), sampling=sampling, recorded=None),
+        }
 
     def derive(self) -> None:
         """Find what follows from the elements; called once."""
@@ -197,10 +201,10 @@ class MergedIdentification(Reported):
                     reason="the equations do not determine it: its regressors are a combination of others",
                 )
             else:
-                found[name] = Identifiable(identifiable=True, reason=self._told(name))
+                found[name] = Identifiable(identifiable=True, reason=self._why(name))
         return found
 
-    def _told(self, name: str) -> str:
+    def _why(self, name: str) -> str:
         for part in self._merging.parts:
             if name in part.names and part.found.record_status & Status.ILL_CONDITIONED:
                 return "the equations hardly determine it: the motion tells regressors apart by little more than noise"

@@ -8,14 +8,10 @@ from typing import Any
 import numpy as np
 
 from tvident import _core
-from tvident._arguments import own_digits, to_digits_of
 from tvident._files import aligned
 from tvident._merged.sampling import Sampling
-from tvident._results import Words
+from tvident._results import COLUMNS, Words, row_of, sentences_of
 from tvident._status import Status, describe
-
-_MOST = 20
-"""Sentences of a kind that a summary shows."""
 
 _DOUBTS = {
     Status.SCALES_DISAGREE: "test functions of different widths disagree: the equations do not hold at all frequencies, so do not trust "
@@ -73,32 +69,27 @@ def _reasons_of(one: _core.MergedIdentification) -> list[str]:
     return reasons
 
 
+def whose(trials: int, masses: int) -> str:
+    """Return what is merged, in words."""
+    of_masses = "one mass" if masses == 1 else f"{masses} masses"
+    return of_masses if trials == 1 else f"{trials} trials of {of_masses}"
+
+
 @np.errstate(all="ignore")
-def summary_of(result: Any) -> str:
-    """Return a table of the elements, and what was chosen and what to do."""
-    rows = [("element", "kind", "median", "5 %", "95 %", "std. error", "unit")]
+def summary_of(result: Any, verdict: str) -> str:
+    """Return the verdict, a table of the elements, and what was chosen and what to do."""
+    rows: list[tuple[str, ...]] = [("element", *COLUMNS)]
     for name, values in result.elements.items():
-        finite = values[np.isfinite(values)]
-        numbers = np.percentile(finite, [50, 5, 95]).tolist() if finite.size else [np.nan] * 3
-        error = result.stderr[name][np.isfinite(result.stderr[name])]
-        middle = float(np.median(error)) if error.size else np.nan
-        shown = [to_digits_of(number, middle) for number in numbers]
-        if result.kinds[name] != "windowed":
-            shown[1] = shown[2] = ""
-        rows.append((name, result.kinds[name], *shown, own_digits(middle), result.units.get(name, "")))
+        rows.append(row_of(name, result.kinds[name], values, result.stderr[name], result.units))
     s = result.settings
     seconds = float(result.time[-1]) if result.time.size else 0.0
     lines = [
+        verdict,
         result.held_back().words(),
         "",
-        f"{s['trials']} trials of {s['masses']} masses, {result.time.size} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz",
+        f"{whose(s['trials'], s['masses'])}, {result.time.size} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz",
         "",
+        *aligned(rows),
+        *sentences_of(result),
     ]
-    lines += aligned(rows)
-    for name, title in (("advice", "what to do"), ("reasons", "what was chosen, and why")):
-        sentences = getattr(result, name)
-        if sentences:
-            lines += ["", title, *(f"  {sentence}" for sentence in sentences[:_MOST])]
-        if len(sentences) > _MOST:
-            lines.append(f"  and {len(sentences) - _MOST} more in .{name}")
     return "\n".join([*lines, "", *describe(result.status, result.record_status)])

@@ -1,7 +1,21 @@
 """Writes a report: one page that shows a result and its recording without a network."""
 
-from tvident._report.content import Reported
+from tvident._report.channels import check_page, names_of_channels, samples_shown, series_of, write_page
+from tvident._report.content import Compared, Curve, Shown, title_of, unit_of
 from tvident._report.packed import Series
-from tvident._report.written import check_plotly, write_report
+from tvident._report.written import check_plotly
 
-__all__ = ["Reported", "Series", "check_plotly", "write_report"]
+__all__ = [
+    "Compared",
+    "Curve",
+    "Series",
+    "Shown",
+    "check_page",
+    "check_plotly",
+    "names_of_channels",
+    "samples_shown",
+    "series_of",
+    "title_of",
+    "unit_of",
+    "write_page",
+]

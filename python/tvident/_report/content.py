@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._equation import COEFFICIENTS
 from tvident._report.packed import Series
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
 
@@ -23,19 +23,17 @@ _STRETCHES = 12
 _FEW = 0.0005
 """A share of samples below which their number says more."""
 
+_SYMBOL = 2
+"""Letters of a symbol at most."""
+
 _SYMBOLS = {"inertia": "Inertia I", "damping": "Damping C", "stiffness": "Stiffness K"}
 
 
 class Reported(Protocol):
-    """What a report shows of an identification: see :class:`tvident.Identification`."""
+    """What a report takes from every result."""
 
     time: Array
-    inertia: Array
-    terms: dict[str, Array]
     constants: dict[str, tuple[Any, Any]]
-    condition: Array
-    residual_std: Array
-    order: npt.NDArray[np.uint8]
     status: npt.NDArray[np.uint16]
     record_status: Status | npt.NDArray[np.uint16]
     jumps: tuple[Any, ...]
@@ -62,21 +60,84 @@ class Reported(Protocol):
         """Return the result in words."""
 
 
+@dataclass(frozen=True)
+class Curve:
+    """What follows from parameters, at every sample of a result.
+
+    Parameters
+    ----------
+    title, unit : str
+    values, errors : ndarray, shape (n,)
+    """
+
+    title: str
+    unit: str
+    values: Array
+    errors: Array
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A recorded torque and the one that was predicted.
+
+    Parameters
+    ----------
+    title : str
+        What it is called.
+    recorded, predicted : ndarray, shape (m,)
+    """
+
+    title: str
+    recorded: Array
+    predicted: Array
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What a page shows of a result, where kinds of results differ.
+
+    Parameters
+    ----------
+    result : Reported
+    values : mapping of str to ndarray, shape (n,)
+        Parameters and terms by name.
+    derived : callable
+        Gives what follows from them, where something changes.
+    quality : mapping of str to ndarray, shape (n,)
+        Residuals, condition numbers and orders by name.
+    settings : sequence of (str, str)
+        As an engineer reads them.
+    compared : sequence of Compared
+    remarks : mapping of str to str
+        What is said beside a parameter.
+    repeats : bool
+        Whether the settings repeat the identification.
+    """
+
+    result: Reported
+    values: Mapping[str, Array]
+    derived: Callable[[], Sequence[Curve]]
+    quality: Mapping[str, Array]
+    settings: Sequence[tuple[str, str]]
+    compared: Sequence[Compared] = ()
+    remarks: Mapping[str, str] = field(default_factory=dict)
+    repeats: bool = True
+
+
 def unit_of(name: str, units: Mapping[str, str]) -> str:
     """Return a unit as it is printed."""
     unit = units.get(name, "")
     return "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³").replace(" ", "·")
 
 
-def content_of(
-    result: Reported, recorded: list[Series], compared: Sequence[Array], title: str
-) -> tuple[dict[str, Any], list[Series]]:
+def content_of(shown: Shown, recorded: list[Series], title: str) -> tuple[dict[str, Any], list[Series]]:
     """Return what a page says, plain JSON, and the series of its plots; plots name them by number."""
-    drawn = _Drawn(result, list(recorded))
-    values = _values(result)
+    result = shown.result
+    drawn = _Drawn(shown, list(recorded))
     drawn.recorded()
-    drawn.found(values)
-    drawn.compared(compared)
+    drawn.found()
+    for one in shown.compared:
+        drawn.compared(one)
     drawn.quality()
     marks = _flags_over_time(result)
     drawn.status(marks)
@@ -87,13 +148,13 @@ def content_of(
         "verdict": words.splitlines()[0],
         "tone": _tone(result, words.splitlines()[0]),
         "span": [min([one.start for one in series], default=0.0), end],
-        "numbers": _numbers(result, values),
+        "numbers": _numbers(shown),
         "advice": list(result.advice),
         "warnings": _warnings(result, marks),
         "jumps": [round(float(time), 6) for time in result.jumps],
         "reasons": list(result.reasons),
-        "settings": _settings(result),
-        "repeat": json.dumps(result.settings, indent=1),
+        "settings": [list(row) for row in shown.settings],
+        "repeat": json.dumps(result.settings, indent=1) if shown.repeats else "",
         "summary": words,
         "charts": drawn.charts,
         "version": _version(),
@@ -104,10 +165,11 @@ def content_of(
 class _Drawn:
     """Collects what is drawn: series, and plots that name them by number."""
 
-    def __init__(self, result: Reported, series: list[Series]) -> None:
-        self.result = result
+    def __init__(self, shown: Shown, series: list[Series]) -> None:
+        self.shown, self.result = shown, shown.result
         self.series = series
         self.charts: list[dict[str, Any]] = []
+        result = self.result
         self.rate = float(result.settings["sample_rate"])
         self.start = float(result.time[0]) if result.time.size else 0.0
         flagged = result.status & _worth_a_look(result) != 0
@@ -121,50 +183,46 @@ class _Drawn:
         if self._flagged is not None:
             self.shade = self._add("flagged", "", self._flagged.view(np.uint8))
 
-    def found(self, values: Mapping[str, Array]) -> None:
+    def found(self) -> None:
         """Draw what changes, with bands of two standard errors."""
-        result = self.result
-        changing = [name for name in values if name not in result.constants and _is_unknown(result, name)]
-        if changing:
-            changing += ["natural_frequency", "damping_ratio"]
-        for name in changing:
-            found, error = values[name] if name in values else getattr(result, name), result.stderr[name]
-            if not np.isfinite(found).any():
+        result, values = self.result, self.shown.values
+        curves = [
+            Curve(title_of(name), unit_of(name, result.units), found, result.stderr[name])
+            for name, found in values.items()
+            if name not in result.constants and _is_unknown(result, name)
+        ]
+        for one in [*curves, *self.shown.derived()] if curves else []:
+            if not np.isfinite(one.values).any():
                 continue
-            unit = unit_of(name, result.units)
             with np.errstate(all="ignore"):
-                band = [self._add(name, unit, found + sign * 2 * error) for sign in (-1, 1)]
-            self._draw("Found", title_of(name), unit, line=self._add(name, unit, found), band=band, robust=True)
+                band = [self._add(one.title, one.unit, one.values + sign * 2 * one.errors) for sign in (-1, 1)]
+            line = self._add(one.title, one.unit, one.values)
+            self._draw("Found", one.title, one.unit, line=line, band=band, robust=True)
 
-    def compared(self, torques: Sequence[Array]) -> None:
+    def compared(self, one: Compared) -> None:
         """Draw the recorded torque, the predicted one, and what is left."""
-        if not torques or not np.isfinite(torques[1]).any():
+        if not np.isfinite(one.predicted).any():
             return
         unit = unit_of("torque", self.result.units)
-        names = ("recorded", "predicted", "left")
-        numbers = [
-            self._add(name, unit, one, every_sample=True)
-            for name, one in zip(names, (*torques, torques[0] - torques[1]), strict=True)
-        ]
+        series = {"recorded": one.recorded, "predicted": one.predicted, "left": one.recorded - one.predicted}
+        numbers = [self._add(name, unit, values, every_sample=True) for name, values in series.items()]
         weak = self.result.settings["form"] == "weak"
-        name = "Force" if unit == "N" else "Torque"
-        words = f"{name}, averaged over the test function" if weak else f"{name} and its prediction"
+        words = f"{one.title}, averaged over the test function" if weak else f"{one.title} and its prediction"
         self._draw("How well", words, unit, line=numbers[0], second=numbers[1], robust=True)
-        self._draw("How well", f"{name} less what is predicted", unit, line=numbers[2], robust=True)
+        self._draw("How well", f"{one.title} less what is predicted", unit, line=numbers[2], robust=True)
 
     def quality(self) -> None:
         """Draw residuals, condition and order where they change."""
         words = {
             "residual_std": "Residual, standard deviation",
             "condition": "Condition number of the equations",
+            "order": "Order of the polynomial",
         }
-        if self.result.order.any():
-            words["order"] = "Order of the polynomial"
-        for name, title in words.items():
-            numbers = np.asarray(getattr(self.result, name))
+        for name, values in self.shown.quality.items():
+            numbers = np.asarray(values)
             if np.isfinite(numbers).any() and np.nanmin(numbers) < np.nanmax(numbers):
                 unit = unit_of(name, self.result.units)
-                self._draw("How well", title, unit, line=self._add(name, unit, numbers), robust=name != "order")
+                self._draw("How well", words[name], unit, line=self._add(name, unit, numbers), robust=name != "order")
 
     def status(self, marks: Mapping[Status, npt.NDArray[np.bool_]]) -> None:
         """Draw where each flag is set."""
@@ -186,26 +244,29 @@ class _Drawn:
 
 def title_of(name: str) -> str:
     """Return what a parameter is called over its plot."""
-    return _SYMBOLS.get(name, name.replace("_", " ").capitalize())
-
-
-def _values(result: Reported) -> dict[str, Array]:
-    """Return parameters and terms by name."""
-    return {name: getattr(result, name) for name in COEFFICIENTS} | result.terms
+    plain = name.replace("_", " ")
+    # Symbols are as they were given: a factor is h or I2.
+    return _SYMBOLS.get(name, plain if len(plain.split()[0]) <= _SYMBOL else plain.capitalize())
 
 
 def _is_unknown(result: Reported, name: str) -> bool:
     return str(result.settings["kinds"].get(name)) != "known"
 
 
-def _numbers(result: Reported, values: Mapping[str, Array]) -> list[dict[str, str]]:
+def _numbers(shown: Shown) -> list[dict[str, str]]:
     """Return a line for every parameter: its value and error, or its range."""
+    result, values = shown.result, shown.values
     lines = []
     for name, found in values.items():
         kind = str(result.settings["kinds"].get(name, ""))
         finite, error = found[np.isfinite(found)], result.stderr[name]
         error = error[np.isfinite(error)]
-        line = {"name": title_of(name), "unit": unit_of(name, result.units), "kind": kind, "more": ""}
+        line = {
+            "name": title_of(name),
+            "unit": unit_of(name, result.units),
+            "kind": kind,
+            "more": shown.remarks.get(name, ""),
+        }
         if name in result.constants:
             line["value"] = arguments.with_error(*map(float, result.constants[name]))
             line["kind"] = "constant over the record"
@@ -216,7 +277,7 @@ def _numbers(result: Reported, values: Mapping[str, Array]) -> list[dict[str, st
         else:
             low, middle, high = np.percentile(finite, [5, 50, 95])
             line["value"] = arguments.with_error(float(middle), float(np.median(error)) if error.size else math.nan)
-            line["more"] = f"90 % lie between {low:.4g} and {high:.4g}"
+            line["more"] = "; ".join(filter(None, (f"90 % lie between {low:.4g} and {high:.4g}", line["more"])))
             line["kind"] = "known: as given" if kind == "known" else f"{kind}: the median of its values"
         lines.append(line)
     for name in [one for one in result.constants if one not in values]:
@@ -273,33 +334,6 @@ def _tone(result: Reported, verdict: str) -> str:
     ):
         return "bad"
     return "doubtful" if result.advice or int(result.record_status) else "good"
-
-
-def _settings(result: Reported) -> list[list[str]]:
-    """Return settings as an engineer reads them; all of them are in the JSON below."""
-    s = result.settings
-    rate = float(s["sample_rate"])
-
-    def samples(value: Any) -> str:
-        return f"{value} samples ({value / rate:.3g} s)" if isinstance(value, int | float) else str(value)
-
-    weak = s["form"] == "weak"
-    rows = [
-        ["Method", f"{s['method']}: {s['form']} form"],
-        ["Sample rate", f"{rate:.6g} Hz"],
-        ["Test function" if weak else "Window of the polynomials", samples(s["window_length"])],
-        [
-            "Exponent" if weak else "Orders",
-            str(s["exponent"]) if weak else f"up to {s['max_order']} by {s['criterion']}",
-        ],
-        ["Regression windows", samples(s["regression_window"])],
-        *([title_of(name), str(kind)] for name, kind in s["kinds"].items()),
-        ["Delay of the torque", f"{s['lag']} s" if isinstance(s["lag"], int | float) else str(s["lag"])],
-    ]
-    if s["step"] != 1:
-        rows.append(["A result for every", f"{s['step']} samples"])
-    chosen = [name.replace("_", " ") for name in s["chosen"]]
-    return [*rows, ["Chosen from the recording", ", ".join(chosen) or "nothing"]]
 
 
 def _version() -> str:

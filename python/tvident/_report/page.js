@@ -166,7 +166,8 @@
       if (misses.length) {
         this.drawn = this.drawn.then(() => Promise.all(misses.map((number) => series[number].readLevels()))).then(() => {
           this.isStale = true;
-          return this.draw();
+          // Out of sight meanwhile, draw() would give back the very promise that waits for it.
+          return this.isNear ? this.draw() : undefined;
         });
       }
       return this.drawn;
@@ -285,6 +286,7 @@
       byId("settings").tBodies[0].append(row);
     }
     byId("repeat").textContent = content.repeat;
+    byId("repeat").closest("details").hidden = !content.repeat;
     byId("foot").textContent = `Written by tvident ${content.version}. This page needs no network and loads nothing.`;
     if (isTouch) byId("how").textContent = "Look closer with the buttons, or give the times. All plots show the same time.";
   }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import json
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from importlib.resources import files
@@ -14,8 +13,8 @@ from string import Template
 from typing import Any
 
 from tvident._files import printable, replaced
-from tvident._report.content import Reported, content_of
-from tvident._report.packed import Array, Packed, Series, packed, text_of
+from tvident._report.content import Shown, content_of
+from tvident._report.packed import Packed, Series, packed, text_of
 
 _LONGEST_TITLE = 200
 
@@ -39,18 +38,12 @@ def _plotly(place: Path) -> str:
     return text_of(place.read_bytes(), level=6, strategy=0)
 
 
-def write_report(
-    path: str | Path, result: Reported, recorded: list[Series], compared: Sequence[Array], title: str
-) -> None:
+def write_report(path: str | Path, shown: Shown, recorded: list[Series], title: str) -> None:
     """Write a page that shows a result, its channels, and recorded and predicted torque; it appears whole or not at all."""
-    if result.inertia.ndim != 1:
-        raise ValueError(
-            f"only a single record has a report; this one has shape {result.inertia.shape}; take one record"
-        )
     place = check_plotly()
     with ThreadPoolExecutor(1) as beside:
         plotly = beside.submit(_plotly, place)
-        content, series = content_of(result, recorded, compared, printable(title, _LONGEST_TITLE))
+        content, series = content_of(shown, recorded, printable(title, _LONGEST_TITLE))
         parts = packed(series)
         pieces = _pieces(content, parts, plotly.result())
     with replaced(Path(path)) as file:

@@ -6,17 +6,32 @@ from tvident._results.explained import explained_steps
 from tvident._results.held_back import parts_of, percent, where_held_back
 from tvident._results.loaded import from_file
 from tvident._results.parts import chosen, of_records, settings_of
-from tvident._results.recorded import Recorded
+from tvident._results.recorded import Recorded, mark_of
 from tvident._results.records import IdentifiedRecords, Shared, covariance_between, with_shared
 from tvident._results.response import accounted_for, every_sample, without_gaps
 from tvident._results.result import Identification
 from tvident._results.scan import Scan, scan_of
 from tvident._results.simulated import predicted_at_samples
 from tvident._results.stored import plain_scan, plain_words, scan_from, words_from
+from tvident._results.summary import COLUMNS, row_of, sentences_of
+from tvident._results.told import Telling
 from tvident._results.torque import correlated_with, kernels_of, touched_by
+from tvident._results.verdict import (
+    CHANGING,
+    believed,
+    disbelieved,
+    known_to,
+    negative,
+    relative_error,
+    share_of,
+    two_digits,
+    why_not,
+)
 from tvident._results.words import Words, of_batch
 
 __all__ = [
+    "CHANGING",
+    "COLUMNS",
     "Estimates",
     "ExpandedParameter",
     "Identification",
@@ -24,15 +39,21 @@ __all__ = [
     "Recorded",
     "Scan",
     "Shared",
+    "Telling",
     "Words",
     "accounted_for",
+    "believed",
     "chosen",
     "correlated_with",
     "covariance_between",
+    "disbelieved",
     "every_sample",
     "explained_steps",
     "from_file",
     "kernels_of",
+    "known_to",
+    "mark_of",
+    "negative",
     "of_batch",
     "of_powers",
     "of_records",
@@ -41,11 +62,17 @@ __all__ = [
     "plain_scan",
     "plain_words",
     "predicted_at_samples",
+    "relative_error",
+    "row_of",
     "scan_from",
     "scan_of",
+    "sentences_of",
     "settings_of",
+    "share_of",
     "touched_by",
+    "two_digits",
     "where_held_back",
+    "why_not",
     "with_shared",
     "without_gaps",
     "words_from",

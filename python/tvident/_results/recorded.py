@@ -44,7 +44,7 @@ class Recorded:
     _mark: bytes = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_mark", _mark(self.angles) + _mark(self.torques))
+        object.__setattr__(self, "_mark", mark_of(self.angles) + mark_of(self.torques))
 
     def of(self, place: Any) -> Recorded | None:
         """Return some of several records."""
@@ -53,10 +53,11 @@ class Recorded:
     @property
     def is_unchanged(self) -> bool:
         """Whether nobody has written another record into the arrays meanwhile."""
-        return self._mark == _mark(self.angles) + _mark(self.torques)
+        return self._mark == mark_of(self.angles) + mark_of(self.torques)
 
 
-def _mark(channel: Numbers) -> bytes:
+def mark_of(channel: Numbers) -> bytes:
+    """Return some samples of a channel, by which it is known again."""
     flat = channel.reshape(-1, channel.shape[-1])
     rows, samples = (max(1, size // some) for size, some in ((flat.shape[0], 8), (flat.shape[1], _LOOKED_AT)))
     return np.ascontiguousarray(flat[::rows, ::samples]).tobytes()

@@ -4,66 +4,75 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Protocol, TypeAlias
+from typing import Any, TypeAlias
 
-import numpy as np
 import numpy.typing as npt
 
-from tvident import _arguments as arguments
 from tvident import _report
-from tvident._files import listed
+from tvident._equation import COEFFICIENTS
 from tvident._results.recorded import Recorded
-from tvident._units import named_unit, unit_said
 
-Array: TypeAlias = npt.NDArray[np.float64]
-
-
-class Predicting(_report.Reported, Protocol):
-    """A result that predicts the torque."""
-
-    def predicted_torque(self) -> tuple[Array, Array, Array]:
-        """Return time, the recorded torque and the predicted one."""
+Row: TypeAlias = tuple[str, str]
+"""A setting as a table shows it."""
 
 
 def report(
-    result: Predicting,
+    result: Any,
     path: str | Path,
     *,
     recorded: Recorded | None,
     channels: Mapping[str, npt.ArrayLike] | None,
     title: str | None,
 ) -> None:
-    """Write the report of a result with the channels that are there."""
-    if Path(path).suffix.lower() not in {".html", ".htm"}:
-        raise ValueError(f"a report is a page: its name must end in .html; got {arguments.shown(str(path))}; rename it")
-    rate = float(result.settings["sample_rate"])
-    start = float(result.time[0]) if result.time.size else 0.0
-    shown: list[_report.Series] = []
-    compared: list[Array] = []
-
-    def show(name: str, unit: str, values: npt.ArrayLike) -> None:
-        numbers = arguments.real_array("channels", values)
-        shown.append(_report.Series(name, unit, numbers, start, 1 / rate, is_recorded=True))
-
-    if recorded is not None and recorded.is_unchanged and result.inertia.ndim == 1:
-        show("Position" if result.units["angle"] == "m" else "Angle", result.units["angle"], recorded.angles)
-        show(
-            "Force" if result.units["torque"] == "N" else "Torque",
-            result.units["torque"].replace(" ", "·"),
-            recorded.torques,
+    """Write the report of the result of one record, with the channels that are there."""
+    _report.check_page(path)
+    if result.inertia.ndim != 1:
+        raise ValueError(
+            f"only a single record has a report; this one has shape {result.inertia.shape}; take one record"
         )
-        _, *compared = result.predicted_torque()
-    step = int(result.settings["step"])
-    samples = shown[0].values.size if shown else None
-    for name, values in (channels or {}).items():
-        numbers = arguments.real_array("channels", values)
-        count = (result.time.size - 1) * step + 1
-        fits = numbers.shape == (samples,) if samples is not None else count <= numbers.size < count + step
-        if numbers.ndim != 1 or not fits:
-            raise ValueError(
-                f"channels must have one value for every sample of the recording; got {arguments.shown(name)} with shape "
-                f"{numbers.shape}; leave out {listed([name])}, or cut it"
+    shown: list[_report.Series] = []
+    compared: list[_report.Compared] = []
+    if recorded is not None and recorded.is_unchanged:
+        angle, torque = _report.names_of_channels(result.units)
+        _, *torques = result.predicted_torque()
+        compared = [_report.Compared(torque, *torques)]
+        shown = [
+            _report.series_of(result, name, of, values)
+            for name, of, values in ((angle, "angle", recorded.angles), (torque, "torque", recorded.torques))
+        ]
+    page = _report.Shown(
+        result,
+        values={name: getattr(result, name) for name in COEFFICIENTS} | result.terms,
+        derived=lambda: [
+            _report.Curve(
+                _report.title_of(name), _report.unit_of(name, result.units), getattr(result, name), result.stderr[name]
             )
-        bare, unit = named_unit(name)
-        show(bare, unit or unit_said(values), numbers)
-    _report.write_report(path, result, shown, compared, title or Path(path).stem)
+            for name in ("natural_frequency", "damping_ratio")
+        ],
+        quality={name: getattr(result, name) for name in ("residual_std", "condition", "order")},
+        settings=_settings(result.settings),
+        compared=compared,
+    )
+    _report.write_page(path, page, shown, channels, title)
+
+
+def _settings(s: Mapping[str, Any]) -> list[Row]:
+    """Return settings as an engineer reads them; all of them are in the JSON below."""
+    rate = float(s["sample_rate"])
+    weak = s["form"] == "weak"
+    rows = [
+        ("Method", f"{s['method']}: {s['form']} form"),
+        ("Sample rate", f"{rate:.6g} Hz"),
+        ("Test function" if weak else "Window of the polynomials", _report.samples_shown(s["window_length"], rate)),
+        (
+            "Exponent" if weak else "Orders",
+            str(s["exponent"]) if weak else f"up to {s['max_order']} by {s['criterion']}",
+        ),
+        ("Regression windows", _report.samples_shown(s["regression_window"], rate)),
+        *((_report.title_of(name), str(kind)) for name, kind in s["kinds"].items()),
+        ("Delay of the torque", f"{s['lag']} s" if isinstance(s["lag"], int | float) else str(s["lag"])),
+    ]
+    if s["step"] != 1:
+        rows.append(("A result for every", f"{s['step']} samples"))
+    chosen = [name.replace("_", " ") for name in s["chosen"]]
+    return [*rows, ("Chosen from the recording", ", ".join(chosen) or "nothing")]

@@ -25,6 +25,7 @@ from tvident._results.simulated import Simulated
 from tvident._results.standard_errors import StandardErrors
 from tvident._results.stored import plain_words, store
 from tvident._results.summary import summary_of
+from tvident._results.told import Telling
 from tvident._results.valued import Valued
 from tvident._results.words import Words, of_batch
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD
@@ -45,7 +46,7 @@ def _product(factor: Array, error: Array) -> Array:
     return np.asarray(factor * error)
 
 
-class Identification(Simulated, Valued):
+class Identification(Simulated, Telling, Valued):
     r"""What :func:`tvident.identify` found. ``n`` is the number of samples, or of every ``step``-th of them.
 
     Attributes
@@ -185,16 +186,6 @@ class Identification(Simulated, Valued):
         if recorded is None or recorded.improve is None or not recorded.is_unchanged:
             return words
         return recorded.improve(self, words)
-
-    @property
-    def reasons(self) -> tuple[str, ...]:
-        """What was chosen, and why."""
-        return self._told.reasons
-
-    @property
-    def advice(self) -> tuple[str, ...]:
-        """What to do about what looks wrong."""
-        return self._told.advice
 
     def scan(self, record: int = 0) -> Scan:
         """Return estimates by the width of the test function, which tell whether equations of every scale agree.

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from tvident._arguments import own_digits, to_digits_of
 from tvident._files import aligned
-from tvident._results.verdict import verdict
+from tvident._results.verdict import CHANGING, verdict
 from tvident._status import describe
+
+COLUMNS = ("kind", "median", "5 %", "95 %", "std. error", "unit")
+"""Of the table, beside the name."""
 
 _MOST_SENTENCES = 20
 """A summary of many records shows the advice for some."""
@@ -41,14 +45,9 @@ def summary_of(result: Any) -> str:
         verdict(result),
         result.held_back().words(),
         "",
-        *aligned([("parameter", "kind", "median", "5 %", "95 %", "std. error", "unit"), *_rows(result)]),
+        *aligned([("parameter", *COLUMNS), *_rows(result)]),
     ]
-    for name, title in (("advice", "what to do"), ("reasons", "what was chosen, and why")):
-        sentences = getattr(result, name)
-        if sentences:
-            lines += ["", title, *(f"  {sentence}" for sentence in sentences[:_MOST_SENTENCES])]
-        if len(sentences) > _MOST_SENTENCES:
-            lines.append(f"  and {len(sentences) - _MOST_SENTENCES} more in .{name}")
+    lines += sentences_of(result)
     lines += ["", f"{n} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz, method {s['method']}"]
     lines.append(f"{form}; regression windows of {rows} samples")
     return "\n".join([*lines, "", *describe(result.status, result.record_status)])
@@ -58,15 +57,7 @@ def _rows(result: Any) -> Iterator[tuple[str, ...]]:
     """Return a row of cells for every parameter, with digits that go together."""
     values = {"inertia": result.inertia, "damping": result.damping, "stiffness": result.stiffness, **result.terms}
     for name, value in values.items():
-        kind = result.settings["kinds"][name]
-        finite, error = value[np.isfinite(value)], result.stderr[name]
-        numbers = np.percentile(finite, [50, 5, 95]).tolist() if finite.size else [np.nan] * 3
-        error = error[np.isfinite(error)]
-        middle = float(np.median(error)) if error.size else np.nan
-        shown = [to_digits_of(number, middle) for number in numbers]
-        if kind not in {"windowed", "varying", "expanded"}:
-            shown[1] = shown[2] = ""
-        yield name, kind, *shown, own_digits(middle), result.units.get(name, "")
+        yield row_of(name, result.settings["kinds"][name], value, result.stderr[name], result.units)
     if "angle_zero" in result.constants:
         middle, spread = (float(np.nanmedian(one)) for one in result.constants["angle_zero"])
         unit = result.units["angle_zero"]
@@ -74,3 +65,28 @@ def _rows(result: Any) -> Iterator[tuple[str, ...]]:
     for name in result.settings["inner"]:
         middle, spread = (float(np.nanmedian(one)) for one in result.constants[name])
         yield name, "searched", to_digits_of(middle, spread), "", "", own_digits(spread), result.units.get(name, "")
+
+
+def row_of(
+    name: str, kind: str, value: npt.NDArray[Any], error: npt.NDArray[Any], units: Mapping[str, str]
+) -> tuple[str, ...]:
+    """Return the cells of a parameter: median, range where it changes, and median standard error."""
+    finite, error = value[np.isfinite(value)], error[np.isfinite(error)]
+    numbers = np.percentile(finite, [50, 5, 95]).tolist() if finite.size else [np.nan] * 3
+    middle = float(np.median(error)) if error.size else np.nan
+    shown = [to_digits_of(number, middle) for number in numbers]
+    if kind not in CHANGING:
+        shown[1] = shown[2] = ""
+    return name, kind, *shown, own_digits(middle), units.get(name, "")
+
+
+def sentences_of(result: Any) -> list[str]:
+    """Return what to do, and what was chosen and why, as lines of a summary."""
+    lines: list[str] = []
+    for name, title in (("advice", "what to do"), ("reasons", "what was chosen, and why")):
+        sentences = getattr(result, name)
+        if sentences:
+            lines += ["", title, *(f"  {sentence}" for sentence in sentences[:_MOST_SENTENCES])]
+        if len(sentences) > _MOST_SENTENCES:
+            lines.append(f"  and {len(sentences) - _MOST_SENTENCES} more in .{name}")
+    return lines

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,9 @@ from tvident._status import Status
 
 _SYMBOLS = {"stiffness": "K", "inertia": "I", "damping": "C"}
 """In the order in which they are told."""
+
+CHANGING = frozenset({"windowed", "varying", "expanded"})
+"""Kinds of parameters that have a value for every sample."""
 
 _BEYOND = 2.0
 """Standard errors below zero from which on a sample is negative, not merely uncertain."""
@@ -66,8 +69,17 @@ def verdict(result: Any) -> str:
 def _of_one(result: Any) -> str:
     reason = distrust(result)
     if reason:
-        return f"do not trust: {reason}{'; ' + 'see what to do' if result.advice else ''}"
-    share, known = explained(result), _errors(result)
+        return disbelieved(result, reason)
+    return believed(result, _errors(result), explained(result))
+
+
+def disbelieved(result: Any, reason: str) -> str:
+    """Return the verdict on a result that something says to distrust."""
+    return f"do not trust: {reason}{'; see what to do' if result.advice else ''}"
+
+
+def believed(result: Any, known: str, share: float | None) -> str:
+    """Return the verdict on a result that nothing says to distrust, by how well it is known and by how much of the torque it explains."""
     parts = [known] if known else []
     if share is not None:
         parts.append(f"model explains {percent(share)} of the torque")
@@ -83,6 +95,11 @@ def explained(result: Any) -> float | None:
         _, recorded, predicted = result.predicted_torque()
     except ValueError:
         return None
+    return share_of(recorded, predicted)
+
+
+def share_of(recorded: Any, predicted: Any) -> float | None:
+    """Return the share of a torque's variance that is predicted."""
     there = np.isfinite(recorded) & np.isfinite(predicted)
     spread = float(np.var(recorded[there])) if there.any() else 0.0
     return 1 - float(np.var((recorded - predicted)[there])) / spread if spread > 0 else None
@@ -90,23 +107,40 @@ def explained(result: Any) -> float | None:
 
 def distrust(result: Any) -> str | None:
     """Return why numbers of a record are not to be trusted, in words; None where nothing says so."""
+    return why_not(
+        result,
+        lambda: next(filter(None, (_sign(result, name) for name in ("inertia", "damping", "stiffness"))), None),
+        lambda: explained(result),
+    )
+
+
+def why_not(result: Any, sign: Callable[[], str | None], share: Callable[[], float | None]) -> str | None:
+    """Return why numbers are not to be trusted, by flags, by what is wrong with a sign, and by the share of the torque explained."""
     valid = result.status & Status.INVALID == 0
     if not valid.any():
         return "nothing could be identified"
     for flag, words in _DISTRUST.items():
         if result.record_status & flag:
             return words
-    for name in ("inertia", "damping", "stiffness"):
-        reason = _sign(result, name)
-        if reason:
-            return reason
+    reason = sign()
+    if reason:
+        return reason
     if result.record_status & Status.SCALES_DISAGREE:
         return "slow and fast motion give different parameters"
-    share = explained(result)
-    if share is not None and share < _LITTLE:
-        return f"the model explains {percent(share)} of the torque"
+    explains = share()
+    if explains is not None and explains < _LITTLE:
+        return f"the model explains {percent(explains)} of the torque"
     trusted = float(np.mean(result.trusted))
     return f"{1 - trusted:.0%} of the samples are flagged" if trusted < _LITTLE else None
+
+
+def negative(value: Any, error: Any) -> str | None:
+    """Return how often something is negative that never is, in words; None where that may be chance."""
+    there = np.isfinite(value) & np.isfinite(error)
+    below = float(np.mean(value[there] < -_BEYOND * error[there])) if there.any() else 0.0
+    if below <= _OFTEN:
+        return None
+    return "is negative" + ("" if below > 1 - _OFTEN else f" in {below:.0%} of the record")
 
 
 def _sign(result: Any, name: str) -> str | None:
@@ -114,14 +148,10 @@ def _sign(result: Any, name: str) -> str | None:
     if result.settings["kinds"][name] == "known":
         return None
     value, error = getattr(result, name), result.stderr[name]
-    there = np.isfinite(value) & np.isfinite(error)
-    if not there.any():
-        return None
-    below = float(np.mean(value[there] < -_BEYOND * error[there]))
-    above = float(np.mean(value[there] > _BEYOND * error[there]))
-    if name != "stiffness" and below > _OFTEN:
-        return f"{name} is negative" + ("" if below > 1 - _OFTEN else f" in {below:.0%} of the record")
-    if name == "stiffness" and below > _OFTEN and above > _OFTEN:
+    if name != "stiffness":
+        words = negative(value, error)
+        return f"{name} {words}" if words else None
+    if negative(value, error) and negative(-value, error):
         one = result.value(name)
         ends = " to ".join(to_digits_of(end, one.stderr) for end in (one.least, one.greatest))
         return f"stiffness has both signs ({ends} {one.unit})"
@@ -135,22 +165,27 @@ def _errors(result: Any) -> str:
         kind = result.settings["kinds"][name]
         if kind == "known":
             continue
-        value, error = getattr(result, name), result.stderr[name]
-        there = np.isfinite(value) & np.isfinite(error) & result.trusted
-        if not there.any():
-            continue
-        with np.errstate(all="ignore"), warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # a record of which nothing can be trusted has no median
-            middles = (np.nanmedian(np.where(there, one, np.nan), axis=-1) for one in (error, np.abs(value)))
-            relative = float(np.nanmedian(np.divide(*middles)))
-        changes = "(t)" if kind in {"windowed", "varying", "expanded"} else ""
-        found.append((f"{symbol}{changes}", relative))
-    return _sentence(found)
+        relative = relative_error(getattr(result, name), result.stderr[name], result.trusted)
+        if relative is not None:
+            found.append((f"{symbol}(t)" if kind in CHANGING else symbol, relative))
+    return known_to(found)
 
 
-def _sentence(found: Sequence[tuple[str, float]]) -> str:
+def relative_error(value: Any, error: Any, trusted: Any) -> float | None:
+    """Return the median error of something over its median size, of several records the median of that; None where nothing is trusted."""
+    there = np.isfinite(value) & np.isfinite(error) & trusted
+    if not there.any():
+        return None
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a record of which nothing can be trusted has no median
+        middles = (np.nanmedian(np.where(there, one, np.nan), axis=-1) for one in (error, np.abs(value)))
+        return float(np.nanmedian(np.divide(*middles)))
+
+
+def known_to(found: Sequence[tuple[str, float]]) -> str:
+    """Return how well each of some parameters is known, in words."""
     shown = [
-        f"{symbol} known to ± {_two_digits(100 * relative)} %"
+        f"{symbol} known to ± {two_digits(100 * relative)} %"
         if relative < 1
         else f"{symbol} not known (± {100 * relative:.0f} %)"
         for symbol, relative in found
@@ -159,5 +194,6 @@ def _sentence(found: Sequence[tuple[str, float]]) -> str:
     return ", ".join([*shown[:1], *(one.replace(" known to", "") for one in shown[1:])])
 
 
-def _two_digits(value: float) -> str:
+def two_digits(value: float) -> str:
+    """Return a number with the digits that an error deserves."""
     return f"{value:.2g}" if value < 10 else f"{value:.0f}"  # noqa: PLR2004 - two digits before the point

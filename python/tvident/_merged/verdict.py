@@ -1,0 +1,91 @@
+"""The first line of the summary of trials or masses: how well the elements are known, or why not to trust them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tvident._equation import COEFFICIENTS
+from tvident._merged.merging import Merging
+from tvident._results import (
+    CHANGING,
+    believed,
+    disbelieved,
+    known_to,
+    negative,
+    relative_error,
+    share_of,
+    two_digits,
+    why_not,
+)
+
+_SYMBOLS = {"inertia": "I", "damping": "C", "stiffness": "K"}
+"""Of one mass."""
+
+_MOST = 6
+"""Elements that are told one by one."""
+
+
+def verdict_of(result: Any, merging: Merging) -> str:
+    """Return the verdict on what trials or masses share."""
+    if not result.status.size:
+        return "no verdict: there are no samples"
+    lost = [name for name, verdict in result.identifiable.items() if not verdict]
+    asked = [one.name for one in merging.elements if not one.is_known]
+    if len(lost) == len(asked):
+        return disbelieved(result, "nothing can be known of what was asked")
+    share = _explained(result, merging)
+    reason = why_not(result, lambda: _sign(result, merging), lambda: share)
+    if reason:
+        return disbelieved(result, reason)
+    known = _known(result, merging)
+    if lost:
+        known += (
+            f"{', ' if known else ''}{lost[0]}{f' and {len(lost) - 1} more' if len(lost) > 1 else ''} cannot be known"
+        )
+    return believed(result, known, share)
+
+
+def _known(result: Any, merging: Merging) -> str:
+    """Return how well elements are known; terms beside the equation are left to the table."""
+    of_masses = merging.masses > 0
+    found = []
+    for one in merging.elements:
+        # Factors of a mechanism have names of their own, a term of a mass is called after both.
+        if one.is_known or not (one.of in COEFFICIENTS or (of_masses and one.of == one.name)):
+            continue
+        relative = relative_error(result.elements[one.name], result.stderr[one.name], result.trusted)
+        if relative is not None:
+            name = one.name if of_masses else _SYMBOLS[one.of]
+            found.append((f"{name}(t)" if result.kinds[one.name] in CHANGING else name, relative))
+    if len(found) <= _MOST:
+        return known_to(found)
+    found.sort(key=lambda one: one[1])
+    ends = " to ".join(two_digits(100 * relative) for _, relative in (found[0], found[-1]))
+    return f"{len(found)} elements known to ± {ends} %, worst {found[-1][0]}"
+
+
+def _explained(result: Any, merging: Merging) -> float | None:
+    """Return the least share of a torque's variance that the equations predict; None where the record is not there."""
+    if not merging.parts:
+        return None
+    both = [[np.atleast_2d(one) for one in result.predicted_torque(trial)[1:]] for trial in range(merging.trials)]
+    recorded, predicted = (np.concatenate([one[which] for one in both], axis=1) for which in range(2))
+    shares = [share_of(*rows) for rows in zip(recorded, predicted, strict=True)]
+    return min((share for share in shares if share is not None), default=None)
+
+
+def _sign(result: Any, merging: Merging) -> str | None:
+    """Return what is wrong with a sign: moving a mass takes energy, in whatever direction."""
+    if not merging.masses:
+        for name in ("inertia", "damping"):
+            words = negative(result.elements[name], result.stderr[name]) if result.kinds[name] != "known" else None
+            if words:
+                return f"{name} {words}"
+        return None
+    for mass in range(merging.masses):
+        words = negative(result.inertia[mass, mass], result.stderr["inertia"][mass, mass])
+        if words:
+            return f"the inertia of mass {mass} {words}"
+    return None
