@@ -105,10 +105,42 @@ def test_a_record_that_is_too_short_to_compare_says_so() -> None:
         assert "nothing confirms these numbers" in result.summary()
 
 
-def test_the_strong_form_has_no_scan_and_a_batch_has_one_a_record() -> None:
-    recorded = rig(7, 4.0)
-    with pytest.raises(ValueError, match="only the weak form compares test functions"):
-        identified(recorded, method="paper").scan()
+@pytest.mark.parametrize("window_length", [201, 31])
+def test_the_strong_form_compares_windows_when_it_is_asked(window_length: int, tmp_path: Path) -> None:
+    recorded = rig(7, 12.0, angle_noise=1e-2)
+    result = identified(recorded, method=tvident.StrongForm(window_length))
+    scan = result.scan()
+    assert scan.plateau is not None
+    first, last = scan.plateau
+    on = (first <= scan.window_length) & (scan.window_length <= last)
+    # Noise of the angle takes most of the inertia from short windows.
+    assert first > 31
+    assert last >= 2 * first
+    assert np.all(np.abs(scan.estimates["inertia"][on] - recorded.inertia[0]) < 4 * scan.stderr["inertia"][on].max())
+    assert scan.estimates["inertia"][0] < 0.1 * recorded.inertia[0]
+    assert not scan.moved
+    # Half the power of a polynomial passes below the sample rate's half, and of a long window's below that of a short one's.
+    assert scan.band[0] <= RATE / 2
+    assert scan.band[-1] < scan.band[0]
+    words = "are among them" if window_length > first else "choose a length in between"
+    assert words in scan.summary().splitlines()[-1]
+    result.save(tmp_path / "result.npz")
+    np.testing.assert_array_equal(tvident.load(tmp_path / "result.npz").scan().band, scan.band)
+
+
+def test_parts_of_results_have_the_scans_of_the_whole() -> None:
+    recorded = rig(7, 8.0)
+    paper = identified(recorded, method="paper")
+    with pytest.raises(ValueError, match=r"ask for scan\(\) before the result is saved or cut"):
+        paper.between(1.0, 2.0).scan()
+    mask = np.ones(recorded.angle.size, bool)
+    mask[:1000] = False
+    angles, torques = (np.tile(one, (2, 1)) for one in (recorded.angle, recorded.torque))
+    strong = tvident.identify(angles, torques, sample_rate=RATE, method="paper", lag=1e-3, mask=mask)
+    alone = strong[1].scan()
+    for name, values in strong.scan(1).estimates.items():
+        np.testing.assert_array_equal(alone.estimates[name], values)
+        assert not np.array_equal(paper.scan().estimates[name], values)
     both = tvident.identify(np.tile(recorded.angle, (2, 1)), np.tile(recorded.torque, (2, 1)), sample_rate=RATE)
     np.testing.assert_array_equal(both.scan(0).band, both.scan(1).band)
     with pytest.raises(IndexError, match="record must be below 2"):

@@ -39,9 +39,10 @@ def single_sine() -> tuple[Array, Array]:
 
 def test_a_good_recording_is_told_what_was_chosen_and_what_would_help_most() -> None:
     result = paper(RIG.angle, RIG.torque)
-    orders, errors = result.reasons
+    orders, errors, scales = result.reasons
     assert "of up to 15, in every window by aicc" in orders
     assert "times those of independent equations" in errors
+    assert "was not tested, since windows of 201 samples were given: result.scan()" in scales
     assert "give inertia='constant', or its value" in advice(result)
     followed = paper(RIG.angle, RIG.torque, inertia="constant", damping="constant")
     assert advice(followed) == ""

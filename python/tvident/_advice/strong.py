@@ -78,7 +78,7 @@ class ExplainedStrong:
             return Words()
         if (self.status & Status.INVALID != 0).all():
             return Words((), tuple(self._nothing()))
-        reasons = (*self._orders(), *self._kinds(), *self._errors())
+        reasons = (*self._orders(), *self._kinds(), *self._errors(), self._scales())
         return Words(reasons, (*self._undetermined(), *self._told_apart(), *self._limits()))
 
     def _some(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -133,6 +133,12 @@ class ExplainedStrong:
         return [
             f"standard errors are {listed(large)} times those of independent equations, from the scatter between windows that share none"
         ]
+
+    def _scales(self) -> str:
+        return (
+            f"whether slow and fast motion give the same numbers was not tested, since windows of {self.settings['window_length']} samples "
+            "were given: result.scan() compares windows of other lengths"
+        )
 
     def _nothing(self) -> list[str]:
         if not (self.status & Status.RANK_DEFICIENT != 0).any() or self._is_missing():

@@ -78,7 +78,7 @@ def plot_scan(scan: Scanned, ax: Place = None) -> Figure:
     """
     if not scan.window_length.size:
         raise ValueError(
-            "there is nothing to draw: got a record too short to compare test functions of different widths; record 20 cycles or more"
+            "there is nothing to draw: got a record too short to compare different widths; record 20 cycles or more"
         )
     agree = np.zeros(scan.window_length.size, bool)
     if scan.plateau is not None:

@@ -11,9 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
+from tvident._advice import FoundBySearch
 from tvident._equation import InnerParameter
 from tvident._identify.columns import Range
 from tvident._identify.minimum import lowest
+from tvident._results import Estimates
 
 Array: TypeAlias = npt.NDArray[np.float64]
 Inner: TypeAlias = Mapping[str, Array]
@@ -104,6 +106,47 @@ class Searched:
             "earned": bool(self.earned[one.term][record]),
             "tried": self.tried,
         }
+
+    def told(
+        self,
+        inner: Sequence[InnerParameter],
+        ranges: Mapping[str, Range],
+        batch: Estimates,
+        lasting: Callable[[Array], Array],
+    ) -> list[list[FoundBySearch]]:
+        """Return what was found of the inner parameters of every record.
+
+        Parameters
+        ----------
+        inner : sequence of InnerParameter
+        ranges : mapping of str to Range
+            Where they were searched.
+        batch : Estimates
+        lasting : callable
+            Gives for how many samples the friction of every record fades, by its Stribeck velocity.
+        """
+        records = int(np.size(batch.record_status))
+        factors = {one.term: batch.values[one.term].reshape(records, -1) for one in inner}
+
+        def middle(values: Array) -> float:
+            there = values[np.isfinite(values)]
+            return float(np.median(there)) if there.size else float("nan")
+
+        return [
+            [
+                FoundBySearch(
+                    one,
+                    value=float(self.values[one.full_name][record]),
+                    error=float(np.ravel(batch.constants[one.full_name][1])[record]),
+                    limits=ranges[one.full_name].of(record),
+                    factor=middle(factors[one.term][record]),
+                    lasts=float(lasting(self.values[one.full_name])[record]) if one.limits is None else np.inf,
+                    **self.of(one, record),
+                )
+                for one in inner
+            ]
+            for record in range(records)
+        ]
 
 
 class _Search:

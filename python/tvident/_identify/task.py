@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
-from tvident._advice import FoundBySearch
 from tvident._derivatives import SHORTEST_WINDOW, plan, quantisation_step
 from tvident._equation import COEFFICIENTS, Kind, Unknown, all_terms, parameter
 from tvident._identify.batch import estimates, of_windows, with_inner
@@ -25,7 +24,7 @@ from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm, expone
 from tvident._identify.searched import Searched, factor_of, search
 from tvident._identify.settings import Request, plain, resolve
 from tvident._identify.told import Told
-from tvident._results import Estimates, Identification, Recorded, Words, chosen, of_records, settings_of
+from tvident._results import Estimates, Identification, Recorded, Scan, Words, chosen, of_records, scan_of, settings_of
 
 Numbers = npt.NDArray[np.float64]
 
@@ -195,7 +194,7 @@ class Task:
         constants = {**batch.constants, **constants_of(data.motion, data.batch)}
         batch, settings = replace(batch, constants=constants, units=data.units), self._settings(found, searched)
         told = Told(data, self._request, self._unknowns, found, batch, settings)
-        words = told.words(names, self._found_by_search(searched, batch))
+        words = told.words(names, searched.told(self.inner, self.ranges, batch, self.columns.samples_of_fading))
         if data.doubts:
             batch = told.doubted()
         jumps = tuple(tuple(data.time[one.jumps].tolist()) for one in found)
@@ -248,39 +247,28 @@ class Task:
             return replace(recorded, improve=of_one(some_data, request, int(one.record_status), run) if alone else None)
 
         inner = {name: np.ravel(value) for name, value in settings["inner"].items()}
+        is_strong = isinstance(self._request.form, StrongForm)
         return Recorded(
             data.angles,
             data.torques,
             own={term.name: fixed(term.own, term, inner) for term in self._terms if term.own is not None},
             again=partial(self._again, settings),
+            scans=partial(self._scans, settings) if is_strong and data.instruments is None else None,
             part=part if data.batch else None,
         )
 
-    def _found_by_search(self, searched: Searched, batch: Estimates) -> list[list[FoundBySearch]]:
-        """Return what was found of the inner parameters of every record."""
-        factors = {one.term: batch.values[one.term].reshape(self._data.records, -1) for one in self.inner}
+    def _scans(self, settings: dict[str, Any]) -> tuple[Scan, ...]:
+        """Compare windows of all lengths, with the other choices that were made."""
+        return self._replayed(settings, self._data).scans()
 
-        def middle(values: Numbers) -> float:
-            there = values[np.isfinite(values)]
-            return float(np.median(there)) if there.size else float("nan")
-
-        return [
-            [
-                FoundBySearch(
-                    one,
-                    value=float(searched.values[one.full_name][record]),
-                    error=float(np.ravel(batch.constants[one.full_name][1])[record]),
-                    limits=self.ranges[one.full_name].of(record),
-                    factor=middle(factors[one.term][record]),
-                    lasts=float(self.columns.samples_of_fading(searched.values[one.full_name])[record])
-                    if one.limits is None
-                    else np.inf,
-                    **searched.of(one, record),
-                )
-                for one in self.inner
-            ]
-            for record in range(self._data.records)
-        ]
+    def scans(self) -> tuple[Scan, ...]:
+        """Compare windows of all lengths in strong form."""
+        form, data = self._form(), self._data
+        assert isinstance(form, _core.StrongForm)  # noqa: S101 - weak form compares test functions of all widths while it identifies
+        motions = self._motions(self.columns.samples(self._searched(None).values))
+        kinds, lags = [one.kind for one in self._unknowns], [late or 0.0 for late in self._lags()]
+        found = form.scan(motions, kinds, lag=lags, masks=data.masks, workers=data.workers)
+        return tuple(scan_of(one, self._names) for one in found)
 
     def _again(self, settings: dict[str, Any], angles: npt.NDArray[np.number]) -> Identification:
         """Identify another angle with what was chosen; its missing values are left out."""

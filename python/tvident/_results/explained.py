@@ -34,7 +34,10 @@ def _steps(result: Any) -> Iterator[tuple[str, list[str]]]:
     yield "What was chosen from the record, and why", list(result.reasons) or ["nothing: everything was given"]
     scan = _scan(result)
     if scan:
-        yield "Do slow and fast motion agree? Estimates by the width of the test function (* are believed)", [scan]
+        yield (
+            "Do slow and fast motion agree? Estimates by the width of the test function, or by the length of windows (* agree)",
+            [scan],
+        )
     yield "Does the model hold where it was not fitted?", [result.held_back().words()]
     yield "How much can be trusted", [_flags(result), verdict(result)]
     yield "What to do next, most useful first", list(result.advice) or ["nothing: no test speaks against these numbers"]

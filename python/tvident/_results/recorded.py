@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._equation import FixedTerm
+from tvident._results.scan import Scan
 from tvident._results.words import Words
 
 Numbers: TypeAlias = npt.NDArray[np.number]
@@ -33,6 +34,8 @@ class Recorded:
         Gives what NumPy's indexing takes of several records.
     improve : callable, optional
         Tries what a result advises, and returns words that begin with what leads to the answer.
+    scans : callable, optional
+        Compares windows of other lengths with those that were used, in strong form.
     """
 
     angles: Numbers
@@ -41,6 +44,7 @@ class Recorded:
     again: Callable[[Numbers], Any]
     part: Callable[[Any], Recorded] | None = None
     improve: Callable[[Any, Words], Words] | None = None
+    scans: Callable[[], tuple[Scan, ...]] | None = None
     _mark: bytes = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

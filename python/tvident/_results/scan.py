@@ -1,8 +1,8 @@
-"""Estimates by the width of the test function, which tell whether equations of every scale agree."""
+"""Estimates by the width of the test function or of windows, which tell whether equations of every scale agree."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -20,32 +20,38 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
+_LEAST_PLATEAU = 2
+"""Widths that agree span at least this factor, or they agree by chance."""
+
 
 @dataclass(frozen=True)
 class Scan:
     r"""What :meth:`tvident.Identification.scan` returns: the same unknowns from test functions of ``w`` widths, from narrow to wide.
 
     A wide test function asks the equation of motion to hold for slow motion only, a narrow one for fast motion as well. Where the
-    recording obeys the equation, all widths agree; the range that does is the plateau.
+    recording obeys the equation, all widths agree; the range that does is the plateau. In strong form the windows of the polynomials take
+    the place of test functions.
 
     Parameters
     ----------
     window_length : ndarray of int64, shape (w,)
-        Samples of each test function.
+        Samples of each test function, or of the windows.
     band : ndarray, shape (w,)
-        Where half the power of the motion passes it, in Hz.
+        Where half the power of the motion passes it, in Hz; of windows with the polynomial order that is usual in them.
     estimates : dict of str to ndarray, shape (w,)
         Unknowns that are constant over the record; means of windowed ones where none is.
     stderr : dict of str to ndarray, shape (w,)
         Their standard errors, from how blocks of the record scatter: they assume nothing of the noise.
     plateau : (int, int) or None
-        Samples of the narrowest and of the widest test function that agree; None where too few widths could be compared.
+        Samples of the narrowest and of the widest that agree; None where too few widths could be compared.
     corrected : bool
         Whether estimates are corrected for white noise of the angle.
     moved : bool
         Whether the test function was moved because of the scan.
     units : mapping of str to str, optional
         Units of the unknowns by name.
+    used : int, optional
+        Samples of the windows that a result of the strong form used, which nothing moves.
 
     See Also
     --------
@@ -79,23 +85,38 @@ class Scan:
     corrected: bool
     moved: bool
     units: Mapping[str, str] = field(default_factory=lambda: UNITS)
+    used: int | None = None
 
     def summary(self) -> str:
         """Return a table with a row for every width; a star marks the plateau.
+
+        In strong form a sentence says whether the window that was used lies on it.
 
         Returns
         -------
         str
         """
         if not self.window_length.size:
-            return "the record is too short to compare test functions of different widths"
+            return "the record is too short to compare different widths"
         units = [f"{name} ({self.units[name]})" if self.units.get(name) else name for name in self.estimates]
         cells = [("", "samples", "band (Hz)", *units)]
         for place, length in enumerate(self.window_length):
             inside = self.plateau is not None and self.plateau[0] <= length <= self.plateau[1]
             values = [f"{value[place]:.4g} ± {self.stderr[name][place]:.1g}" for name, value in self.estimates.items()]
             cells.append(("*" if inside else "", str(length), f"{self.band[place]:.3g}", *values))
-        return "\n".join(aligned(cells))
+        return "\n".join([*aligned(cells), *self._of_used()])
+
+    def _of_used(self) -> Iterator[str]:
+        """Say whether the windows that were given are among those that agree."""
+        if self.used is None:
+            return
+        first, last = self.plateau or (0, 0)
+        if last < _LEAST_PLATEAU * first or not first:
+            yield "no windows agree whose lengths differ by a factor of 2: do not trust numbers that slow and fast motion disagree on"
+        elif first <= self.used <= last:
+            yield f"windows of {first} to {last} samples agree, and those of {self.used} samples that were used are among them"
+        else:
+            yield f"windows of {first} to {last} samples agree, but not the {self.used} samples that were used: choose a length in between"
 
     def plot(self, *, ax: Axes | Sequence[Axes] | None = None) -> Figure:
         """Draw every unknown over the band, with bars of two standard errors and the plateau shaded.

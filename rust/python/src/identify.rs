@@ -8,14 +8,14 @@ use pyo3::prelude::*;
 use tvident::exec::workers as threads;
 use tvident::identify::{
     Identification as Found, InstrumentTest, Kind, Method, Options, StrongForm as Strong, Task, WeakForm as Weak,
-    around, constants_of_rows, identify_all, identify_with_instruments, parts_of_scatter, rows_of_part,
+    around, constants_of_rows, identify_all, identify_with_instruments, parts_of_scatter, rows_of_part, scan_windows,
     scatter_of_windows,
 };
 use tvident::least_squares::Summary;
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
-use crate::identified::{Identification, kind};
+use crate::identified::{Identification, Scan, kind};
 use crate::local_polynomials::LocalPolynomials;
 use crate::motions::Motions;
 use crate::records::{flags, records};
@@ -93,6 +93,30 @@ impl StrongForm {
             Ok(())
         })?;
         Ok(factors)
+    }
+
+    /// Estimates of every record by the length of the polynomials' windows.
+    #[pyo3(signature = (motions, kinds, *, lag, masks=None, workers=None))]
+    fn scan(
+        &self,
+        py: Python<'_>,
+        motions: &Motions,
+        kinds: Vec<String>,
+        lag: Vec<f64>,
+        masks: Option<Vec<Bound<'_, PyUntypedArray>>>,
+        workers: Option<NonZeroUsize>,
+    ) -> PyResult<Vec<Py<Scan>>> {
+        let (kinds, masks) = (kinds_of(&kinds)?, masks_of(masks)?);
+        let method = |_| Ok(Method::Strong(self.settings()));
+        let tasks = tasks(motions, lag.into_iter().map(Some), None, masks.as_deref(), method)?;
+        let mut found = Vec::new();
+        watched(py, None, |watch| {
+            let form = self.settings();
+            let each = tasks.iter().map(|task| scan_windows(task, &form, &kinds, threads(workers), watch));
+            found = each.collect::<Result<_, _>>()?;
+            Ok(())
+        })?;
+        found.iter().map(|found| Scan::new(py, found)).collect()
     }
 
     /// The triangular factor of the equations around some samples of one record: its numbers row by row, its columns, and how many rows it stands for.
@@ -214,10 +238,9 @@ pub(crate) fn identify<'py>(
     workers: Option<NonZeroUsize>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Vec<Identification>> {
-    let kind = |name: &String| kind(name).ok_or_else(|| PyValueError::new_err(format!("no kind is called {name:?}")));
     let options = Options {
         delta,
-        kinds: kinds.iter().map(kind).collect::<PyResult<Vec<Kind>>>()?,
+        kinds: kinds_of(&kinds)?,
         quantisation,
         propagate,
         step,
@@ -225,15 +248,8 @@ pub(crate) fn identify<'py>(
         diagnose,
         instructions: Instructions::current(),
     };
-    // A mask may be written by other threads while the interpreter's lock is away.
-    let masks = masks.map(|masks| masks.iter().map(flags).collect::<PyResult<Vec<_>>>()).transpose()?;
-    let mut tasks = Vec::new();
-    for (record, motion) in motions.all()?.into_iter().enumerate() {
-        let lag = *lag.get(record).ok_or_else(|| PyValueError::new_err("every record needs a lag"))?;
-        let mask = masks.as_ref().and_then(|masks| masks.get(record)).map(Vec::as_slice);
-        let angle_zero = angle_zero.as_ref().and_then(|zeros| zeros.get(record).copied().flatten());
-        tasks.push(Task { motion, mask, method: method.of(record)?, lag, angle_zero });
-    }
+    let masks = masks_of(masks)?;
+    let tasks = tasks(motions, lag.into_iter(), angle_zero, masks.as_deref(), |record| method.of(record))?;
     let instruments = instrument.map(records).transpose()?;
     let mut found: Vec<(Found, Option<InstrumentTest>)> = Vec::new();
     watched(py, progress, |watch| {
@@ -249,4 +265,32 @@ pub(crate) fn identify<'py>(
         Ok(())
     })?;
     found.into_iter().map(|(found, test)| Identification::new(py, found, test)).collect()
+}
+
+/// Kinds by their names.
+fn kinds_of(names: &[String]) -> PyResult<Vec<Kind>> {
+    let of = |name: &String| kind(name).ok_or_else(|| PyValueError::new_err(format!("no kind is called {name:?}")));
+    names.iter().map(of).collect()
+}
+
+/// Masks of records. One may be written by other threads while the interpreter's lock is away, so they are copied.
+fn masks_of(masks: Option<Vec<Bound<'_, PyUntypedArray>>>) -> PyResult<Option<Vec<Vec<bool>>>> {
+    masks.map(|masks| masks.iter().map(flags).collect()).transpose()
+}
+
+/// One task a record.
+fn tasks<'a>(
+    motions: &'a Motions,
+    mut lag: impl Iterator<Item = Option<f64>>,
+    angle_zero: Option<Vec<Option<f64>>>,
+    masks: Option<&'a [Vec<bool>]>,
+    method: impl Fn(usize) -> PyResult<Method<'a>>,
+) -> PyResult<Vec<Task<'a>>> {
+    let task = |(record, motion)| {
+        let lag = lag.next().ok_or_else(|| PyValueError::new_err("every record needs a lag"))?;
+        let mask = masks.and_then(|masks| masks.get(record)).map(Vec::as_slice);
+        let angle_zero = angle_zero.as_ref().and_then(|zeros| zeros.get(record).copied().flatten());
+        Ok(Task { motion, mask, method: method(record)?, lag, angle_zero })
+    };
+    motions.all()?.into_iter().enumerate().map(task).collect()
 }

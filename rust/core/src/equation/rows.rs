@@ -45,6 +45,23 @@ impl Rows {
         sum / count.max(1.0)
     }
 
+    /// Puts rows of the same unknowns behind these. Windows do not reach from one part to the next.
+    pub(crate) fn append(&mut self, mut other: Self) {
+        if self.regressors.is_empty() {
+            *self = other;
+            return;
+        }
+        let before = self.len();
+        self.jumps.push(before);
+        self.jumps.extend(other.jumps.iter().map(|jump| before + jump));
+        self.rhs.append(&mut other.rhs);
+        self.usable.append(&mut other.usable);
+        for (one, mut more) in self.regressors.iter_mut().zip(other.regressors) {
+            one.value.append(&mut more.value);
+            one.companion.append(&mut more.companion);
+        }
+    }
+
     /// Makes rows no equations.
     pub(crate) fn exclude(&mut self, rows: impl Iterator<Item = usize>) {
         for row in rows {

@@ -10,11 +10,11 @@ use crate::identify::identification::{Covariance, Identification, Unknown, WeakD
 use crate::identify::kinds::{Kind, in_strong_form, in_weak_form};
 use crate::identify::options::{Options, StrongForm, Task, WeakForm};
 use crate::identify::results::{Constant, SampleResults};
+use crate::identify::scanned::Scan;
 use crate::identify::strong::general::{StrongOptions, identify_strong};
 use crate::identify::weak::form::identify_weak;
 use crate::identify::weak::options::WeakOptions;
 use crate::identify::weak::outside_mask::Outside;
-use crate::identify::weak::scanned::Scan;
 use crate::inference::missing_terms::Missing;
 
 /// What was found of the unknowns of one record, by the numbers of their regressors.

@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use crate::identify::kinds::Kind;
+use crate::identify::scanned::Scan;
 use crate::identify::weak::angle_zero::outcome::AngleZero;
 use crate::identify::weak::angle_zero::outcome::FreeOffset;
 use crate::identify::weak::lag::Lag;
 use crate::identify::weak::outside_mask::Outside;
-use crate::identify::weak::scanned::Scan;
 use crate::inference::constancy::Test;
 use crate::inference::missing_terms::Suspect;
 use crate::noise::defects::Defect;

@@ -6,7 +6,6 @@
 //! but only along a range: the widest test functions may be wrong for other reasons).
 
 use crate::regression::block_fit::BlockFit;
-use crate::weak_form::test_function::TestFunction;
 
 /// Estimates agree that differ by no more than so many standard errors, the smaller of the two.
 const AGREE: f64 = 2.0;
@@ -17,10 +16,10 @@ pub(crate) const LEAST_PLATEAU: f64 = 2.0;
 /// A scale whose error is so many times that of a wider one is drowned in noise: it agrees with anything.
 const DROWNED: f64 = 10.0;
 
-/// Constants by one test function.
+/// Constants by one test function, or by one length of windows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AtScale {
-    /// Samples on either side of the test function's centre.
+    /// Samples on either side of the centre.
     pub half_width: usize,
     /// Where half the power of the motion passes, in hertz: the equation is asked to hold below.
     pub band: f64,
@@ -31,8 +30,8 @@ pub struct AtScale {
 }
 
 impl AtScale {
-    pub(crate) fn new(function: &TestFunction, fit: BlockFit) -> Self {
-        Self { half_width: function.half_width(), band: function.band(), errors: fit.errors(), values: fit.values }
+    pub(crate) fn new((half_width, band): (usize, f64), fit: BlockFit) -> Self {
+        Self { half_width, band, errors: fit.errors(), values: fit.values }
     }
 
     fn window_length(&self) -> f64 {

@@ -1,5 +1,7 @@
 //! Channels computed from other channels while they are read, so that no long record is held twice.
 
+use std::ops::Range;
+
 use crate::record::samples::{Samples, read_around};
 
 /// One at every sample.
@@ -25,6 +27,22 @@ impl Samples for Whole<'_> {
 
     fn read(&self, first: usize, into: &mut [f64]) {
         self.0.read(first, into);
+    }
+}
+
+/// Some samples of a channel, as a record of their own.
+pub(crate) struct Cut<'a> {
+    pub(crate) channel: &'a dyn Samples,
+    pub(crate) samples: Range<usize>,
+}
+
+impl Samples for Cut<'_> {
+    fn len(&self) -> usize {
+        self.samples.len()
+    }
+
+    fn read(&self, first: usize, into: &mut [f64]) {
+        self.channel.read(self.samples.start + first, into);
     }
 }
 

@@ -10,7 +10,7 @@ use crate::identify::merged::found::MergedFound;
 use crate::identify::merged::interleaved::{Interleaved, Weights};
 use crate::identify::merged::session::{EXPONENT, MergedSession};
 use crate::identify::merged::system::{Merged, MergedOptions};
-use crate::identify::weak::scanned::Scan;
+use crate::identify::scanned::Scan;
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 
 /// Stages of a call, about: only for showing progress.

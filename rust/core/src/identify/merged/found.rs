@@ -2,7 +2,7 @@
 
 use crate::identify::kinds::Kind;
 use crate::identify::results::{Constant, SampleResults};
-use crate::identify::weak::scanned::Scan;
+use crate::identify::scanned::Scan;
 use crate::inference::constancy::Test;
 use crate::status::Status;
 

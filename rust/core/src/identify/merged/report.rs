@@ -6,7 +6,7 @@ use crate::identify::merged::fitted::MergedFit;
 use crate::identify::merged::found::{FoundElement, MergedFound};
 use crate::identify::merged::session::MergedSession;
 use crate::identify::results::{RowResults, SampleResults};
-use crate::identify::weak::scanned::Scan;
+use crate::identify::scanned::Scan;
 use crate::inference::identifiability::is_mostly_noise;
 use crate::inference::window_averaging::{Averages, average};
 use crate::regression::constants::weakest;

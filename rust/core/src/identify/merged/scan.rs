@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::identify::kinds::Kind;
 use crate::identify::merged::session::MergedSession;
 use crate::identify::merged::system::Multiplied;
-use crate::identify::weak::scanned::{BLOCKS, Scan, Scans, wider};
+use crate::identify::scanned::{BLOCKS, Scan, Scans, wider};
 use crate::inference::scales::AtScale;
 use crate::regression::block_fit::{BlockFit, fit_in_blocks};
 use crate::regression::model::Model;
@@ -60,7 +60,7 @@ impl MergedSession<'_, '_, '_> {
             self.pilot()?;
             for (scan, fit) in scans.iter_mut().zip(self.in_blocks(&model, &noises)) {
                 scan.tried += 1;
-                scan.scales.extend(fit.map(|fit| AtScale::new(&function, fit)));
+                scan.scales.extend(fit.map(|fit| AtScale::new((half, function.band()), fit)));
             }
             half = wider(half);
         }

@@ -6,7 +6,7 @@ use crate::exec::stages::Stages;
 use crate::identify::kinds::Kind;
 use crate::identify::merged::interleaved::{Channels, Interleaved, Weights};
 use crate::identify::merged::system::{Entry, Merged, MergedOptions, Multiplied};
-use crate::identify::weak::scanned::Scan;
+use crate::identify::scanned::Scan;
 use crate::inference::jumps::jump::Jump;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;

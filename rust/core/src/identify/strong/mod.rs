@@ -4,6 +4,7 @@ pub(crate) mod constant;
 pub(crate) mod general;
 pub(crate) mod parts;
 pub(crate) mod rows;
+pub(crate) mod scan;
 pub(crate) mod scatter;
 pub(crate) mod streaming;
 pub(crate) mod windowed;

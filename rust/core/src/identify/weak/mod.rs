@@ -15,7 +15,6 @@ pub(crate) mod outside_mask;
 pub(crate) mod pulses;
 pub(crate) mod report;
 pub(crate) mod scan;
-pub(crate) mod scanned;
 pub(crate) mod session;
 pub(crate) mod shown_noise;
 pub(crate) mod torque_jumps;

@@ -3,12 +3,10 @@
 use std::ops::Range;
 
 use crate::error::Error;
-use crate::exec::pool::Piece;
+use crate::identify::scanned::{Scans, wider};
 use crate::identify::weak::choice::Chosen;
-use crate::identify::weak::scanned::{BLOCKS, LONGER, Scan, Scans, wider};
 use crate::identify::weak::session::Session;
-use crate::inference::scales::AtScale;
-use crate::regression::block_fit::fit_in_blocks;
+use crate::identify::widths::{MOST_SAMPLES, OfWidth, STRETCHES, Widths};
 use crate::regression::model::Model;
 use crate::regression::subsample::stretches_of_blocks;
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
@@ -17,12 +15,6 @@ use crate::weak_form::weak_rows::WeakRows;
 
 /// The exponent where none is given.
 const EXPONENT: usize = 9;
-/// Typical cycles of the motion that blocks last in which windowed unknowns grow linearly, and the fewest blocks.
-const CYCLES: [f64; 3] = [3.0, 6.0, 12.0];
-const FEWEST_BLOCKS: usize = 8;
-/// Samples of a long record that are scanned, in so many stretches.
-const MOST_SAMPLES: usize = 1 << 17;
-const STRETCHES: usize = 8;
 
 impl Session<'_, '_, '_> {
     /// Scans the widths unless that was done, moves to the plateau where the test function that the spectra suggest is off it, and on to wider ones where
@@ -88,57 +80,24 @@ impl Session<'_, '_, '_> {
 
     /// Estimates what is constant with test functions of all widths, and looks for widths that agree.
     fn scan(&mut self, model: &Model) -> Result<Scans, Error> {
-        let model = &with_constants(model);
         let samples = self.record.angle.len();
-        let widest = samples / if model.windowed.is_empty() { 8 } else { 16 };
-        let cycle =
-            if model.windowed.is_empty() { 0.0 } else { self.evidence(spectrum_length(samples, 200))?.period() };
-        let lengths: Vec<Option<f64>> =
-            if model.windowed.is_empty() { vec![None] } else { CYCLES.map(|cycles| Some(cycles * cycle)).to_vec() };
-        let noises = [self.noise[0], 0.0];
-        let noises = if noises[0] > 0.0 { &noises[..] } else { &noises[1..] };
-        let new = |&noise: &f64| Scan { unknowns: model.constant.clone(), corrected: noise > 0.0, ..Scan::default() };
-        // By the length of blocks, then by the correction for noise.
-        let mut scans: Vec<Vec<Scan>> = lengths.iter().map(|_| noises.iter().map(new).collect()).collect();
+        let noise = self.noise[0];
+        let mut widths = Widths::new(model, noise, || Ok(self.evidence(spectrum_length(samples, 200))?.period()))?;
         let mut half = LEAST_HALF_WIDTH;
-        while 2 * half < widest {
+        while 2 * half < widths.widest(samples) {
             let function = TestFunction::new(half, self.options.exponent.unwrap_or(EXPONENT), self.options.delta)?;
             let (weak, stretches) = self.rows_to_scan(function)?;
-            let fits_of = |length: Option<f64>| {
-                let blocks = blocks(&weak, &stretches, length);
-                let few = length.is_some() && blocks.iter().any(|block| block.len() < 2 * weak.reach());
-                if few { Vec::new() } else { fit_in_blocks(&weak.rows, model, noises, &blocks, weak.reach()) }
+            let one = OfWidth {
+                rows: &weak.rows,
+                stretches: &stretches,
+                stride: weak.stride,
+                reach: weak.reach(),
+                scale: (half, function.band()),
             };
-            let pieces = lengths.iter().map(|&length| Piece { size: weak.rows.len(), content: length }).collect();
-            let fits = self.stages.map(pieces, || (), |length, (): &mut ()| fits_of(length))?;
-            for (scans, fits) in scans.iter_mut().zip(fits) {
-                for scan in scans.iter_mut() {
-                    scan.tried += 1;
-                }
-                for (scan, fit) in scans.iter_mut().zip(fits) {
-                    scan.scales.extend(fit.map(|fit| AtScale::new(&function, fit)));
-                }
-            }
+            widths.add(&one, &mut self.stages)?;
             half = wider(half);
         }
-        for scan in scans.iter_mut().flatten() {
-            scan.find_plateau();
-        }
-        let mut best: Option<Scan> = None;
-        let mut corrected: Option<Scan> = None;
-        // Where plateaus are equally long, the one with the correction stands.
-        for scan in (0..noises.len()).flat_map(|noise| scans.iter().map(move |scans| scans[noise].clone())) {
-            let longer = |than: &Option<Scan>| than.as_ref().is_none_or(|than| scan.factor() > LONGER * than.factor());
-            if scan.corrected == (self.noise[0] > 0.0) && longer(&corrected) {
-                corrected = Some(scan.clone());
-            }
-            if longer(&best)
-                || best.as_ref().is_some_and(|best| best.factor() <= 1.0 && scan.scales.len() > best.scales.len())
-            {
-                best = Some(scan);
-            }
-        }
-        Ok(Scans { best: best.unwrap_or_default(), corrected: corrected.unwrap_or_default() })
+        Ok(widths.plateaus())
     }
 
     /// Rows of all of a record, or of stretches of a long one, and where the stretches begin and end among them.
@@ -162,32 +121,4 @@ impl Session<'_, '_, '_> {
         });
         Ok((weak, ends.collect()))
     }
-}
-
-/// A model with something to compare: unknowns that the record's windows hold are compared as means of the record where nothing is constant.
-fn with_constants(model: &Model) -> Model {
-    if !model.constant.is_empty() || model.windowed.is_empty() {
-        return model.clone();
-    }
-    let (constant, windowed): (Vec<_>, Vec<_>) = model.windowed.iter().partition(|&&index| index < 2);
-    if constant.is_empty() {
-        return Model { constant: windowed, windowed: Vec::new(), linear: model.linear };
-    }
-    Model { constant, windowed, linear: model.linear }
-}
-
-/// Blocks of rows: of a length in samples, or so many of a record.
-fn blocks(weak: &WeakRows, stretches: &[Range<usize>], length: Option<f64>) -> Vec<Range<usize>> {
-    let rows: usize = stretches.iter().map(Range::len).sum();
-    let part = |stretch: &Range<usize>| -> Vec<Range<usize>> {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the rows")]
-        let count = match length {
-            Some(length) => (stretch.len() as f64 * weak.stride as f64 / length).ceil().max(1.0) as usize,
-            None => (BLOCKS * stretch.len()).div_ceil(rows.max(1)),
-        };
-        let count = count.max(FEWEST_BLOCKS.div_ceil(stretches.len())).min(stretch.len().max(1));
-        let at = |index: usize| stretch.start + stretch.len() * index / count;
-        (0..count).map(|index| at(index)..at(index + 1)).collect()
-    };
-    stretches.iter().flat_map(part).collect()
 }

@@ -6,9 +6,9 @@
 //! noise of the torque, and everything is chosen again with it, unless it is so much that the equations are wrong.
 
 use crate::error::Error;
+use crate::identify::scanned::Scans;
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
-use crate::identify::weak::scanned::Scans;
 use crate::identify::weak::session::Session;
 use crate::inference::cross_validation::left_of_rows;
 use crate::regression::constants::Expected;

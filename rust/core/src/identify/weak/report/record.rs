@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::error::Error;
 use crate::identify::results::{Constant, RowResults, SampleResults};
+use crate::identify::scanned::Scan;
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::found::WeakIdentified;
@@ -12,7 +13,6 @@ use crate::identify::weak::outside_mask::Inside;
 use crate::identify::weak::report::at_rows::Fitted;
 use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::report::explained::Explained;
-use crate::identify::weak::scanned::Scan;
 use crate::identify::weak::session::Session;
 use crate::inference::constancy::NO_CHANCE;
 use crate::inference::identifiability::is_mostly_noise;
