@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 import tvident
 import tvident.dask
+from parameters import long
 from tvident import Status
 
 SAMPLES = 60_000
@@ -106,7 +107,7 @@ def test_two_processes_have_the_bits_of_one_call(rig: tvident.Recording, client:
     assert_same_bits(found, tvident.identify(rig.angle, rig.torque, sample_rate=1000, method="paper"))
 
 
-@pytest.mark.parametrize("terms", [pytest.param((), marks=pytest.mark.long), ("offset", "coulomb")])
+@pytest.mark.parametrize("terms", [*long(((),)), ("offset", "coulomb")])
 def test_shared_parameters_are_those_of_one_call(
     rig: tvident.Recording, client: Client, terms: tuple[str, ...]
 ) -> None:

@@ -8,6 +8,7 @@ import pytest
 from scipy.signal import lfilter, savgol_filter
 
 import tvident
+from parameters import long
 from tvident import Status
 
 Array = npt.NDArray[np.float64]
@@ -66,8 +67,8 @@ def best_filter(y: Array, truth: Array, derivative: int) -> float:
     return min(errors)
 
 
-@pytest.mark.parametrize("colour", ["0.5", "0.8", pytest.param("0.9", marks=pytest.mark.long), "1/f"])
-@pytest.mark.parametrize("kind", ["sine", pytest.param("several sines", marks=pytest.mark.long), "constant", "line"])
+@pytest.mark.parametrize("colour", ["0.5", "0.8", *long("0.9"), "1/f"])
+@pytest.mark.parametrize("kind", ["sine", *long("several sines"), "constant", "line"])
 def test_no_worse_than_the_best_filter(kind: str, colour: str) -> None:
     """Taken for white, noise of correlation 0.8 made the second derivative 450 times worse: the shortest windows seemed best."""
     truth = motion(kind)

@@ -18,6 +18,7 @@ def leave_out(reason: str) -> None:
     pytest.skip(reason)
 
 
+@pytest.mark.long  # the core is compiled once more, as it is shipped
 def test_no_window_costs_more_instructions_than_recorded() -> None:
     for program in ("valgrind", "cargo"):
         if shutil.which(program) is None:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 import pytest
 
 import tvident
+from parameters import long
 from tvident import Status
 
 Array = npt.NDArray[np.float64]
@@ -38,7 +39,7 @@ def grown(value: float, by: float) -> Array:
 
 
 @pytest.mark.parametrize("kinds", [{}, {"stiffness": "constant"}])
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 2))])
+@pytest.mark.parametrize("seed", [0, *long(1, 2)])
 @pytest.mark.parametrize(
     ("name", "by", "wrong"), [("inertia", 0.05, 0.01), ("inertia", 0.5, 0.01), ("damping", 0.5, 0.03)]
 )

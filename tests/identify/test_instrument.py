@@ -10,6 +10,7 @@ import pytest
 
 import tvident
 from identify.closed_loop import RATE, TRUTH, closed_loop
+from parameters import long
 from tvident import Status
 
 Array = npt.NDArray[np.float64]
@@ -56,7 +57,7 @@ def test_without_an_instrument_feedback_is_said(records: tuple[Array, Array, Arr
     assert result.vaf() > 90
 
 
-@pytest.mark.parametrize("seeds", [range(8), pytest.param(range(8, 40), marks=pytest.mark.long)], ids=str)
+@pytest.mark.parametrize("seeds", [range(8), *long(range(8, 40))], ids=str)
 def test_open_loop_is_not_taken_for_feedback(seeds: range) -> None:
     for seed in seeds:
         rig = tvident.simulate_torsional_rig(duration=10.0, seed=seed, angle_noise=10.0 ** -(2 + seed % 4))

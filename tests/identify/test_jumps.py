@@ -9,6 +9,7 @@ import numpy.typing as npt
 import pytest
 
 import tvident
+from parameters import long
 from tvident import Status
 
 Array = npt.NDArray[np.float64]
@@ -52,7 +53,7 @@ def test_every_jump_is_found_and_windows_end_there(angle_noise: float) -> None:
 
 
 @pytest.mark.parametrize("pattern", ["slider", "ramp", "constant"])
-@pytest.mark.parametrize("angle_noise", [1e-6, 1e-2, 1e-1])
+@pytest.mark.parametrize("angle_noise", [*long(1e-6), 1e-2, *long(1e-1)])
 def test_none_is_invented(pattern: str, angle_noise: float) -> None:
     for seed in range(3):
         assert identify(recorded(pattern, angle_noise=angle_noise, seed=seed)).jumps == ()
@@ -97,7 +98,7 @@ def test_every_record_of_a_batch_has_its_own() -> None:
 
 
 @pytest.mark.parametrize("pattern", ["constant", "slider"])
-@pytest.mark.parametrize("part", [0.05, *(pytest.param(part, marks=pytest.mark.long) for part in (0.2, -0.3)), 0.5])
+@pytest.mark.parametrize("part", [0.05, *long(0.2, -0.3, 0.5)])
 def test_a_jump_of_the_inertia_is_one_of_the_inertia(pattern: Any, part: float) -> None:
     for seed in (0, 3):
         at = 6.3 + 1.7 * seed

@@ -7,6 +7,7 @@ import numpy.typing as npt
 import pytest
 
 import tvident
+from parameters import long
 from tvident import Status
 
 Array = npt.NDArray[np.float64]
@@ -29,7 +30,7 @@ def error(values: Array, true: Array) -> float:
     return float(np.sqrt(np.mean((values / true - 1)[INTERIOR] ** 2)))
 
 
-@pytest.mark.parametrize("torque_snr_db", [NOISE_FREE, 80.0])
+@pytest.mark.parametrize("torque_snr_db", [*long(NOISE_FREE), 80.0])
 @pytest.mark.parametrize("converter", [False, True])
 def test_less_noise_is_never_worse(converter: bool, torque_snr_db: float) -> None:
     for seed in (1, 2):
@@ -77,7 +78,7 @@ def test_coloured_noise_of_the_torque_is_no_change_of_the_parameters(kind: str) 
 
 @pytest.mark.parametrize(
     ("kind", "seed"),
-    [("0.95", 0), *(pytest.param("0.95", seed, marks=pytest.mark.long) for seed in (8, 16)), ("pink", 16)],
+    [("0.95", 0), *long(("0.95", 8), ("0.95", 16)), ("pink", 16)],
 )
 def test_noise_that_lasts_longer_than_a_test_function_is_no_change_either(kind: str, seed: int) -> None:
     rig = tvident.simulate_torsional_rig(20.0, seed=seed, torque_snr_db=40.0)

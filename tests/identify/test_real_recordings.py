@@ -13,6 +13,7 @@ import pytest
 
 import tvident
 from calls import paper, plain_weak, weak
+from parameters import long
 from tvident import Status, recordings
 
 Form = Callable[..., dict[str, Any]]
@@ -30,7 +31,7 @@ def recording(folder: Path, name: str) -> Path:
 
 
 # What the numbers are in windows of other lengths is tested below, without starting the command each time.
-@pytest.mark.parametrize("window", [21, 201])
+@pytest.mark.parametrize("window", [*long(21), 201])
 def test_the_positioning_system_from_the_command_line(folder_of_recordings: Path, tmp_path: Path, window: int) -> None:
     command = [
         str(Path(sys.executable).with_name("tvident")),
@@ -100,7 +101,7 @@ OFFSET = (-3.1648, 0.01)
 
 
 @pytest.mark.parametrize("form", [weak, paper])
-@pytest.mark.parametrize("window", [None, *range(21, 202, 20)])
+@pytest.mark.parametrize("window", [None, 21, *long(*range(41, 201, 20)), 201])
 def test_the_positioning_system_in_both_forms(folder_of_recordings: Path, form: Form, window: int | None) -> None:
     position, force = carriage(folder_of_recordings)
     call = {} if window is None else {"window_length": window}

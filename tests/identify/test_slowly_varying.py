@@ -10,6 +10,7 @@ import numpy.typing as npt
 import pytest
 
 import tvident
+from parameters import long
 
 Array = npt.NDArray[np.float64]
 
@@ -43,10 +44,12 @@ def identified(
 @pytest.mark.parametrize(
     ("pattern", "name", "depth", "angle_noise", "call"),
     [
-        pytest.param("slider", "inertia", 0.2, 1e-3, {}, marks=pytest.mark.long),
         ("ramp", "inertia", 0.2, 1e-2, {}),
-        ("slider", "damping", 0.5, 1e-3, {}),
-        pytest.param("slider", "damping", 0.5, 1e-3, {"damping": "varying"}, marks=pytest.mark.long),
+        *long(
+            ("slider", "inertia", 0.2, 1e-3, {}),
+            ("slider", "damping", 0.5, 1e-3, {}),
+            ("slider", "damping", 0.5, 1e-3, {"damping": "varying"}),
+        ),
     ],
     ids=str,
 )
@@ -75,7 +78,7 @@ def test_values_are_as_far_from_the_truth_as_their_standard_errors_say(
     assert np.max(np.abs(others)) < 4
 
 
-@pytest.mark.parametrize("pattern", ["slider", "ramp"])
+@pytest.mark.parametrize("pattern", ["slider", *long("ramp")])
 def test_what_is_constant_is_not_said_to_vary(pattern: str) -> None:
     rig = clean(pattern, None, 0.0)
     kinds = identified(rig, 1e-3).settings["kinds"]

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import tvident
 from calls import plain_weak, weak
+from parameters import long
 from reference.weak_form import profile, rows
 from tvident import Status
 
@@ -60,9 +61,9 @@ def test_without_noise_the_parameters_are_exact(half: int, exponent: int) -> Non
     np.testing.assert_allclose(windowed.stiffness[valid], SYSTEM["stiffness"], rtol=1e-7)
 
 
-def test_ten_million_samples_with_a_drift_lose_no_digits() -> None:
+@pytest.mark.parametrize("n", [1_000_000, *long(10_000_000)])
+def test_millions_of_samples_with_a_drift_lose_no_digits(n: int) -> None:
     angle, torque = multisine(8000)
-    n = 10_000_000
     angle, torque = np.tile(angle, n // 8000), np.tile(torque, n // 8000)
     drift = np.linspace(0, 100, n)
     found = tvident.identify(

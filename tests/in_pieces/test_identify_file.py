@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 import tvident
+from parameters import long
 from tvident import Status
 from tvident._command_line import main
 from tvident._in_pieces import call, choices
@@ -179,7 +180,7 @@ class StopError(Exception):
     """What a caller raises to interrupt the work."""
 
 
-@pytest.mark.parametrize("method", ["paper", pytest.param("auto", marks=pytest.mark.long)])
+@pytest.mark.parametrize("method", ["paper", *long("auto")])
 def test_interrupted_work_leaves_no_result_and_goes_on(rig: tvident.Recording, method: str) -> None:
     source = write("in.npy", rig.angle, rig.torque)
     options: dict[str, Any] = {"angle": "angle", "torque": "torque", "sample_rate": 1000, "method": method}
@@ -276,7 +277,7 @@ def peak_of(arguments: list[str]) -> int:
 
 
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="only Linux keeps the most memory held")
-@pytest.mark.parametrize(("method", "most"), [("paper", 120), ("given", 200)])
+@pytest.mark.parametrize(("method", "most"), [("paper", 120), *long(("given", 200))])
 def test_memory_does_not_grow_with_the_recording(method: str, most: int) -> None:
     # What pieces of 262 144 samples need, and of a million in weak form, the longest there are, in MiB.
     rig = tvident.simulate_torsional_rig(duration=500, sample_rate=1000, seed=1)

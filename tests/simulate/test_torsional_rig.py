@@ -7,10 +7,11 @@ import numpy.typing as npt
 import pytest
 
 import tvident
+from parameters import long
 from tvident._simulate import motion
 
 
-@pytest.mark.parametrize("pattern", ["slider", "ramp", "square", "constant"])
+@pytest.mark.parametrize("pattern", ["slider", *long("ramp", "square", "constant")])
 @pytest.mark.parametrize("excitation", ["multisine", "chirp", "random"])
 def test_the_angle_does_not_change_with_finer_steps(
     pattern: Literal["slider", "ramp", "square", "constant"],
