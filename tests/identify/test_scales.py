@@ -162,7 +162,9 @@ def test_what_a_recorder_did_is_named_with_its_cure(spoil: Any, words: str) -> N
         angle = np.mod(recorded.angle + np.linspace(0, 5, recorded.angle.size), 1.0)
     result = identified(recorded, angle)
     assert result.record_status & Status.CHANNEL_SUSPECTED
-    assert any(words in advice for advice in result.advice)
+    assert words in result.advice[0]
+    if words.startswith("the angle jumps"):
+        assert len(result.advice) == 1  # what else looks wrong is a consequence
     if words.endswith("clipped"):
         # What is left is as good as if these samples were missing.
         assert abs(result.inertia[0] / recorded.inertia[0] - 1) < CLIPPED

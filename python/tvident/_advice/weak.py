@@ -101,6 +101,9 @@ class Explained:
             *pulses(self.found, self.period),
             *self._jumps(),
         )
+        if any(defect == "wrapped" for _, defect, _ in self.found.defects):
+            # A jump of a turn leaves nothing of the rest: what else looks wrong is its consequence.
+            return Words(reasons, tuple(self._defects()))
         advice = (
             *self._feedback(),
             *self._disagreement(flags),

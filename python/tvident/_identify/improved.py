@@ -24,10 +24,15 @@ _DOUBTED = (
     Status.TERM_SUSPECTED | Status.LAG_SUSPECTED | Status.NOISE_MODEL | Status.WINDOW_LIMIT | Status.SCALES_DISAGREE
 )
 
+_MENDED_FIRST = {"held", "wrapped"}
+"""Defects of a channel beside which no other equation tells anything: what would be found is the recorder's."""
+
 
 def is_to_be_tried(data: Data, request: Request, found: Sequence[_core.Identification]) -> bool:
     """Return whether something speaks against the model of a single record in weak form, and there is something to change."""
     if not isinstance(request.form, WeakForm) or data.instruments is not None or data.batch:
+        return False
+    if any(defect in _MENDED_FIRST for _, defect, _ in found[0].defects):
         return False
     flags = found[0].record_status
     if flags & Status.RANK_DEFICIENT:
