@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+import gc
+import weakref
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -168,3 +170,19 @@ def test_more_workers_than_windows_change_nothing() -> None:
         one, many = (tvident.fit_local_polynomials(y, window, workers=workers) for workers in (1, 1000))
         np.testing.assert_array_equal(one.derivatives, many.derivatives)
         np.testing.assert_array_equal(one.order, many.order)
+
+
+@pytest.mark.parametrize("method", ["auto", "paper"])
+def test_a_result_that_nobody_holds_is_freed_at_once(method: Literal["auto", "paper"]) -> None:
+    rig = tvident.simulate_torsional_rig(duration=4.0)
+    angle = np.array(rig.angle)
+    held = weakref.ref(angle)
+    gc.disable()
+    try:
+        result = tvident.identify(angle, rig.torque, sample_rate=1000, method=method)
+        assert held() is not None
+        del angle, result
+        # No cycle waits for the collector: pieces of long records would, with all their samples.
+        assert held() is None
+    finally:
+        gc.enable()

@@ -7,7 +7,7 @@ from tvident._files.places import ENDINGS as TABLE_ENDINGS
 from tvident._files.places import check_apart, check_folder, check_place
 from tvident._files.recorded import FileRecording, is_time, read_recording, time_channels
 from tvident._files.recordings import read
-from tvident._files.replacement import replaced
+from tvident._files.replacement import put_in_place, replaced
 from tvident._files.results import ENDINGS as RESULT_ENDINGS
 from tvident._files.results import read_result, write_result
 from tvident._files.table import aligned, write_csv, write_table
@@ -31,6 +31,7 @@ __all__ = [
     "listed",
     "place_beside",
     "printable",
+    "put_in_place",
     "read",
     "read_recording",
     "read_result",

@@ -40,9 +40,7 @@ def _beside(place: Path) -> Iterator[IO[bytes]]:
     # Names may be 255 bytes long.
     beginning = os.fsdecode(os.fsencode(place.name)[:100])
     beside = place.with_name(f".{beginning}.{os.urandom(8).hex()}")
-    old = place.stat() if place.exists() else None
-    if old is not None and not stat.S_ISREG(old.st_mode):
-        raise OSError(errno.EINVAL, "only a file can be replaced; give the name of a file", str(place))
+    old = _file_there(place)
     # Nobody else may read what replaces a private file, not even for a moment.
     mode = 0o666 if old is None else 0o600
     with _gone_when_terminated(beside):
@@ -55,6 +53,28 @@ def _beside(place: Path) -> Iterator[IO[bytes]]:
         except BaseException:
             beside.unlink(missing_ok=True)
             raise
+
+
+def put_in_place(whole: Path, path: Path) -> bool:
+    """Give a file that is whole the place of another, as :func:`replaced` does; return whether that was done without copying it."""
+    check_folder(path)
+    place = end_of_links(path)
+    # A pipe or a device gets bytes, and so does another disk.
+    if writes_through(path) or whole.stat().st_dev != place.parent.stat().st_dev:
+        return False
+    old = _file_there(place)
+    if old is not None:
+        _take_manners(whole, old)
+    whole.replace(place)
+    return True
+
+
+def _file_there(place: Path) -> os.stat_result | None:
+    """Return what is known of a file that is to be replaced; None where there is none."""
+    old = place.stat() if place.exists() else None
+    if old is not None and not stat.S_ISREG(old.st_mode):
+        raise OSError(errno.EINVAL, "only a file can be replaced; give the name of a file", str(place))
+    return old
 
 
 def _opened(beside: Path, mode: int, place: Path) -> IO[bytes]:

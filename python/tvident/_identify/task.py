@@ -12,15 +12,16 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
-from tvident._derivatives import SHORTEST_WINDOW, plan, quantisation_step
+from tvident._derivatives import quantisation_step
 from tvident._equation import COEFFICIENTS, Kind, Unknown, all_terms, parameter
 from tvident._identify.batch import estimates, of_windows, with_inner
 from tvident._identify.channels import constants_of
-from tvident._identify.columns import WINDOW_OF_TERMS, Columns, Range, fixed, secant
+from tvident._identify.columns import Columns, Range, fixed, secant
 from tvident._identify.criterion import criterion_of
 from tvident._identify.data import Data
 from tvident._identify.improved import Improvement, is_to_be_tried, of_one
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm, exponent_of
+from tvident._identify.polynomials import Polynomials, odd_window
 from tvident._identify.searched import Searched, factor_of, search
 from tvident._identify.settings import Request, plain, resolve
 from tvident._identify.told import Told
@@ -42,6 +43,7 @@ class Task:
         self._data = data
         self._request = request
         self._quantisation = quantisation_step(data.angles, request.quantisation)
+        self._polynomials = Polynomials(request.form, data.period, data.time.size, self._quantisation)
         shape = data.angles.shape
         self._parameters = {name: parameter(name, value, shape) for name, value in request.parameters.items()}
         kinds: dict[str, Kind] = {name: value for name, value in self._parameters.items() if isinstance(value, str)}
@@ -292,17 +294,11 @@ class Task:
         data, weak = self._data, not isinstance(self._request.form, StrongForm)
         return Columns(self._terms, data.angles, data.time, data.period, self._polynomials, weak, data.workers)
 
-    def _polynomials(self) -> _core.LocalPolynomials:
-        form, samples = self._request.form, self._data.time.size
-        if isinstance(form, StrongForm):
-            return self._plan(self._length("window_length", form.window_length, least=SHORTEST_WINDOW), form)
-        return self._plan(min(WINDOW_OF_TERMS, (samples - 1) // 2 * 2 + 1), StrongForm())
-
     def _form(self) -> _core.WeakForm | _core.StrongForm:
         """Return the form as the core has it."""
         form = self._request.form
         if isinstance(form, StrongForm):
-            core_plan = self._plan(self._length("window_length", form.window_length, least=SHORTEST_WINDOW), form)
+            core_plan = self._polynomials()
             rows = arguments.window_length("regression_window", form.regression_window, self._data.period, odd=False)
             if any(
                 one.kind in {"windowed", "varying"} or (one.name, one.kind) == ("stiffness", "auto")
@@ -327,9 +323,7 @@ class Task:
 
     def _length(self, name: str, value: int | str, *, least: int) -> int:
         """Return the samples of an odd window."""
-        length = arguments.window_length(name, value, self._data.period, odd=True)
-        arguments.check_window(name, length, self._data.time.size, least=least)
-        return length
+        return odd_window(name, value, self._data.period, self._data.time.size, least=least)
 
     def _rows(self, value: int | str) -> int:
         """Return the samples of a regression window."""
@@ -339,19 +333,6 @@ class Task:
 
     def _check_rows(self, rows: int) -> None:
         arguments.check_window("regression_window", rows, self._data.time.size, least=len(self._unknowns) + 1)
-
-    def _plan(self, length: int, form: StrongForm) -> _core.LocalPolynomials:
-        return plan(
-            length,
-            order=None,
-            max_order=form.max_order,
-            criterion=form.criterion,
-            selection=form.selection,
-            derivatives=(0, 1, 2),
-            delta=self._data.period,
-            noise=True,
-            quantisation=self._quantisation,
-        )
 
     def _lags(self) -> list[float | None]:
         """Return by how many samples the torque of every record is late; None where that is to be found."""

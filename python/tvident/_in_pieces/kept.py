@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._files import printable
-from tvident._in_pieces.rows import write_rows
+from tvident._in_pieces.rows import read_columns, row_of, write_rows
+from tvident._status import Status
 
-_FORMAT = 2
+_FORMAT = 3
 """Folders of another number hold other things."""
 
 Columns = Mapping[str, npt.NDArray[Any]]
@@ -46,7 +47,7 @@ class Kept:
         if self._state is None:
             shutil.rmtree(self.folder, ignore_errors=True)
             self.folder.mkdir()
-            self._state = {"told": self._told, "notes": [], "rows": 0, "facts": {}}
+            self._state = {"told": self._told, "notes": [], "rows": 0, "flags": {}, "facts": {}}
             self._write()
 
     @property
@@ -64,15 +65,18 @@ class Kept:
         self._found["facts"][name] = value
         self._write()
 
-    def add(self, columns: Columns, note: Any) -> None:
-        """Keep the rows of one more piece, and a note of it."""
-        row = np.dtype([(name, values.dtype) for name, values in columns.items()])
-        with self._rows.open("r+b" if self._rows.exists() else "w+b") as file:
+    def add(self, columns: Columns, note: Any, head: bytes = b"") -> None:
+        """Keep the rows of one more piece, and a note of it; `head` is what the file of all rows begins with."""
+        row = row_of(columns)
+        with self.place.open("r+b" if self.place.exists() else "w+b") as file:
+            file.write(head)
             # What an interrupted call wrote beyond the rows that it noted is written again.
-            file.seek(self._found["rows"] * row.itemsize)
+            file.seek(len(head) + self._found["rows"] * row.itemsize)
             count = write_rows(file, row, columns)
             file.truncate()
         self._found["row"] = [[name, values.dtype.str] for name, values in columns.items()]
+        self._found["head"] = len(head)
+        _count(columns["status"], self._found["flags"])
         self._found["rows"] += count
         self._found["notes"].append(note)
         self._write()
@@ -87,17 +91,25 @@ class Kept:
         """Rows that are done."""
         return int(self._found["rows"])
 
-    def rows(self, first: int, end: int) -> npt.NDArray[Any]:
-        """Return some of the rows that are done, shape (end - first,)."""
+    @property
+    def flags(self) -> dict[str, int]:
+        """How many of them have each flag."""
+        return dict(self._found["flags"])
+
+    def columns(self, first: int, end: int) -> dict[str, npt.NDArray[Any]]:
+        """Return some of the rows that are done, column by column."""
         row = np.dtype([(name, kind) for name, kind in self._found["row"]])
-        return np.fromfile(self._rows, row, end - first, offset=first * row.itemsize)
+        with self.place.open("rb", buffering=0) as file:
+            file.seek(self._found["head"] + first * row.itemsize)
+            return read_columns(file, row, end - first)
 
     def remove(self) -> None:
         """Remove the folder."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
     @property
-    def _rows(self) -> Path:
+    def place(self) -> Path:
+        """The file of all rows that are done, after its head."""
         return self.folder / "rows"
 
     @property
@@ -113,7 +125,7 @@ class Kept:
                 return None
             rows = int(state["rows"])
             size = np.dtype([(name, kind) for name, kind in state["row"]]).itemsize if rows else 0
-            if rows and self._rows.stat().st_size < rows * size:
+            if rows and self.place.stat().st_size < state["head"] + rows * size:
                 return None
         except (OSError, ValueError, KeyError, TypeError):
             return None
@@ -126,3 +138,13 @@ class Kept:
 
     def __repr__(self) -> str:
         return f"<Kept in {printable(self.folder)}>"
+
+
+def _count(status: npt.NDArray[np.uint16], counts: dict[str, int]) -> None:
+    """Add how many rows have each flag."""
+    if not np.any(status):
+        return
+    for flag in Status:
+        found = int(np.count_nonzero(status & np.uint16(flag)))
+        if found:
+            counts[str(flag.name)] = counts.get(str(flag.name), 0) + found

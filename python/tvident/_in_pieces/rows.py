@@ -1,4 +1,4 @@
-"""Rows of numbers from columns: how results are kept, and what a file of rows holds."""
+"""Rows of numbers from columns, and columns from rows: how results are kept, and what a file of rows holds."""
 
 from __future__ import annotations
 
@@ -12,6 +12,11 @@ _AT_ONCE = 1 << 12
 """Rows that stay in the processor's cache while one column after the other is written into them."""
 
 
+def row_of(columns: Mapping[str, npt.NDArray[Any]]) -> np.dtype[Any]:
+    """Return what a row of some columns holds."""
+    return np.dtype([(name, values.dtype) for name, values in columns.items()])
+
+
 def write_rows(file: IO[bytes], row: np.dtype[Any], columns: Mapping[str, npt.NDArray[Any]]) -> int:
     """Write columns as rows with these fields, and return how many there are."""
     count = next(iter(columns.values())).size
@@ -22,3 +27,13 @@ def write_rows(file: IO[bytes], row: np.dtype[Any], columns: Mapping[str, npt.ND
             some[name] = values[first : first + some.size]
         file.write(some.view(np.uint8).data)
     return count
+
+
+def read_columns(file: IO[bytes], row: np.dtype[Any], count: int) -> dict[str, npt.NDArray[Any]]:
+    """Return the columns of the next so many rows of a file."""
+    columns = {name: np.empty(count, row[name]) for name in row.names or ()}
+    for first in range(0, count, _AT_ONCE):
+        rows = np.fromfile(file, row, min(_AT_ONCE, count - first))
+        for name, values in columns.items():
+            values[first : first + rows.size] = rows[name]
+    return columns

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -10,16 +9,16 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tvident import _core
 from tvident._equation import LINEAR_UNITS, UNITS
+from tvident._files import put_in_place
 from tvident._identify import Long, Span, WeakForm, requested
 from tvident._in_pieces.choices import chosen, stretches
 from tvident._in_pieces.found import FileIdentification
 from tvident._in_pieces.kept import Kept
-from tvident._in_pieces.outputs import CHUNK, Table, writer
+from tvident._in_pieces.outputs import CHUNK, Table, head_of_rows, holds_rows, writer
 from tvident._in_pieces.recorded import Recording
+from tvident._in_pieces.rows import row_of
 from tvident._in_pieces.work import Alone, Windows, Work
 from tvident._pieces import SHARED, Columns, Given, Mean, means_of, reach_of
 from tvident._status import Status
@@ -113,12 +112,16 @@ class Run:
         settings, work = self._prepared()
         for piece in self._pieces[len(self._kept.notes) :]:
             # Nothing of a piece stays while the next one is worked on.
-            self._kept.add(*work.piece(piece, self._progress(piece)))
-            # A result in weak form refers to itself, with 19 MB a piece that would wait for the collector's own time.
-            gc.collect()
+            self._keep(*work.piece(piece, self._progress(piece)))
             if self._report is not None:
                 self._report(piece[1], self._samples)
         return self._written(settings, work)
+
+    def _keep(self, columns: Columns, note: Any) -> None:
+        """Keep what was found of a piece, in a file that only needs its name where nothing changes any more."""
+        rows = -(-self._samples // self._asked.step)
+        head = head_of_rows(row_of(columns), rows) if holds_rows(self._output) else b""
+        self._kept.add(columns, note, head)
 
     def _progress(self, piece: Span) -> Any:
         """Return what is told of the work within a piece."""
@@ -177,31 +180,35 @@ class Run:
             advice += notes[0]["advice"]
         constants = {name: (mean.value, mean.error) for name, mean in means.items()}
         told = {"settings": settings, "constants": constants, "record_status": int(status), "advice": advice}
-        some = self._finished(work, notes[0], (0, min(1, self._kept.count)), means)
-        kinds = {name: values.dtype for name, values in some.items()}
-        table = Table(kinds, self._kept.count, self._asked.units, told)
-        counts: dict[str, int] = {}
-        with writer(self._output, table) as put:
-            done = 0
-            for note, piece in zip(notes, self._pieces, strict=True):
-                last = done + len(range(piece[0] + -piece[0] % self._asked.step, piece[1], self._asked.step))
-                for begin in range(done, last, CHUNK):
-                    columns = self._finished(work, note, (begin, min(begin + CHUNK, last)), means)
-                    _count(columns["status"], counts)
-                    put(columns)
-                done = last
+        self._put_in_place(work, means, told)
+        flags, rows = self._kept.flags, self._kept.count
         self._kept.remove()
         return FileIdentification(
             self._output,
             self._samples,
-            table.rows,
+            rows,
             constants,
             status,
-            counts,
+            flags,
             settings,
             self._asked.units,
             tuple(advice),
         )
+
+    def _put_in_place(self, work: Work, means: Mapping[str, Mean], told: Mapping[str, Any]) -> None:
+        """Write all columns to where the result is to be."""
+        if work.is_final and holds_rows(self._output) and put_in_place(self._kept.place, self._output):
+            return
+        notes = self._kept.notes
+        some = self._finished(work, notes[0], (0, min(1, self._kept.count)), means)
+        kinds = {name: values.dtype for name, values in some.items()}
+        with writer(self._output, Table(kinds, self._kept.count, self._asked.units, told)) as put:
+            done = 0
+            for note, piece in zip(notes, self._pieces, strict=True):
+                last = done + len(range(piece[0] + -piece[0] % self._asked.step, piece[1], self._asked.step))
+                for begin in range(done, last, CHUNK):
+                    put(self._finished(work, note, (begin, min(begin + CHUNK, last)), means))
+                done = last
 
     def _contradictions(self, means: Mapping[str, Mean]) -> list[str]:
         """Return what is to be said of constants that are none."""
@@ -215,18 +222,7 @@ class Run:
 
     def _finished(self, work: Work, note: Any, span: Span, means: Mapping[str, Mean]) -> Columns:
         """Return some rows as they are written."""
-        rows = self._kept.rows(*span)
-        columns = {name: rows[name] for name in rows.dtype.names or ()}
+        columns = self._kept.columns(*span)
         if note is not None:
             return work.finished(columns, note, means)
         return {name: values for name, values in columns.items() if not name.startswith(SHARED)}
-
-
-def _count(status: Any, counts: dict[str, int]) -> None:
-    """Add how many rows have each flag."""
-    if not np.any(status):
-        return
-    for flag in Status:
-        found = int(np.count_nonzero(status & np.uint16(flag)))
-        if found:
-            counts[str(flag.name)] = counts.get(str(flag.name), 0) + found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from tvident._identify import Held, Long, Span
 from tvident._in_pieces.recorded import Recording
@@ -16,6 +16,9 @@ Report = Callable[[int, int], object] | None
 
 class Work(Protocol):
     """Finds the numbers of a piece."""
+
+    is_final: ClassVar[bool]
+    """Whether columns are written as they are, whatever other pieces say."""
 
     def piece(self, wanted: Span, report: Report) -> tuple[Columns, Any]:
         """Return columns of the samples of a piece, and a note for those of others."""
@@ -39,6 +42,8 @@ class Windows:
     step : int
     workers : int, optional
     """
+
+    is_final: ClassVar[bool] = True
 
     recording: Recording
     long: Long
@@ -74,6 +79,8 @@ class Alone:
         Neighbours on each side.
     step : int
     """
+
+    is_final: ClassVar[bool] = False
 
     recording: Recording
     identified: Callable[[Held, Report], Identification]

@@ -151,9 +151,9 @@ class Moved:
     def of(self, value: Numbers, error: Numbers, shared: Numbers) -> tuple[Numbers, Numbers]:
         """Return a windowed parameter and its error, where `shared` are its covariances with the constants, shape (constants, n)."""
         slopes = self.inverse @ shared
-        variance = error**2 - np.einsum("cn,cn->n", slopes, shared)
+        variance = error**2 - (slopes * shared).sum(axis=0)
         # Rounding may leave less than nothing of a variance that is all of the constants.
-        variance = np.maximum(variance, 0.0) + np.einsum("cn,cd,dn->n", slopes, self.covariance, slopes)
+        variance = np.maximum(variance, 0.0) + (slopes * (self.covariance @ slopes)).sum(axis=0)
         return value + self.shift @ slopes, np.sqrt(variance)
 
 
