@@ -123,10 +123,8 @@ def test_masses_respond_as_they_were_simulated(changes: bool) -> None:
             fallen.vaf(other.angle, other.torque)
         assert found.simulate(other.torque[:, :700], state).shape == (2, 700)
         return
-    with pytest.raises(ValueError, match="shape \\(2, 5000\\)"):
+    with pytest.raises(ValueError, match="the record's 5000 samples where elements change"):
         found.simulate(other.torque[:, :700], state)
-    with pytest.raises(ValueError, match="terms that are not linear"):
-        identify(simulated.angle, simulated.torque, terms=["coulomb"], **OPTIONS).vaf(other.angle, other.torque)
 
 
 def test_modes_are_those_of_the_matrices_and_keep_their_names() -> None:

@@ -148,6 +148,7 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
             sampling=sampling,
             parameters={name: value for name, value in options.parameters.items() if value is not None},
             terms=[(one.name, one.kind) for one in terms],
+            own={one.name: one.own for one in terms if one.own is not None},
             form=_lengths(form, sampling.period, max(map(len, recorded[0]))),
             units=UNITS if axis.system is ROTARY else LINEAR_UNITS,
             step=arguments.whole_number("step", options.step, least=1),

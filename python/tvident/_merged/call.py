@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
-from tvident._equation import COEFFICIENTS
+from tvident._equation import COEFFICIENTS, Term
 from tvident._merged.elements import Element, kind_or_number
 from tvident._merged.merging import Merging, Part
 from tvident._merged.predicted import Equations
@@ -44,6 +44,8 @@ class Asked:
         What was given of inertia, damping and stiffness.
     terms : sequence of (str, str)
         Names and kinds.
+    own : mapping of str to Term
+        Those of the user's own.
     form : mapping of str to int or None
         Window length, exponent and regression window in samples, None where they are chosen.
     units : mapping of str to str
@@ -57,6 +59,7 @@ class Asked:
     sampling: Sampling
     parameters: Mapping[str, Any]
     terms: Sequence[tuple[str, str]]
+    own: Mapping[str, Term]
     form: Mapping[str, int | None]
     units: Mapping[str, str]
     step: int
@@ -125,7 +128,11 @@ def identify_trials(trials: Trials, asked: Asked, term_values: TermValues) -> Me
         units=asked.units_of(elements),
         phase=trials.phase,
         recorded=Recorded(
-            [[one] for one in trials.angles], [[one] for one in trials.torques], [None] * len(given), trials.positions
+            [[one] for one in trials.angles],
+            [[one] for one in trials.torques],
+            [None] * len(given),
+            trials.positions,
+            own=asked.own,
         ),
     )
     return MergedIdentification(merging)

@@ -212,6 +212,7 @@ def identify_masses(masses: Masses, asked: Asked, term_values: TermValues) -> Me
             [masses.torques],
             [masses.angles[masses.count] if len(masses.angles) > masses.count else None],
             structure=masses.structure,
+            own=asked.own,
         ),
     )
     return MergedIdentification(merging)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -139,6 +139,55 @@ class Mechanism:
             elements.append(Element(name, name, tuple(entries), kind_or_number(name, self.kinds.get(name, "constant"))))
         return Regressors(elements, momenta, forces, {name: self._inertia(name, q) for name in self.kinetic})
 
+    def dynamics(self, factors: Mapping[str, float], q: Array, v: Array, step: Array) -> tuple[Array, Array]:
+        """Return the matrix of inertia, shape (n, masses, masses), and all forces but the accelerations' at some states.
+
+        Parameters
+        ----------
+        factors : mapping of str to float
+        q, v : ndarray, shape (masses, n)
+        step : ndarray, shape (masses,)
+            By which coordinates are moved to find slopes.
+        """
+        masses, states = q.shape
+        pairs, speeds, units = _around(masses)
+        moved = units * step
+        places = (q.T[np.newaxis] + moved[:, np.newaxis]).transpose(2, 0, 1)
+        shape = (masses, len(moved), speeds.shape[1], states)
+        both = [
+            np.ascontiguousarray(np.broadcast_to(one, shape)).reshape(masses, -1)
+            for one in (places[:, :, np.newaxis], speeds[:, np.newaxis, :, np.newaxis])
+        ]
+        energy = sum(
+            (factors[name] * _energy(f"kinetic[{name!r}]", one, *both) for name, one in self.kinetic.items()),
+            np.zeros(both[0].shape[1]),
+        ).reshape(shape[1:])
+        inertia = np.empty((len(moved), masses, masses, states))
+        for place, (i, j) in enumerate(pairs):
+            inertia[:, i, j] = inertia[:, j, i] = (energy[:, place] - energy[:, place + len(pairs)]) / 2
+        slope = _slope(inertia, step)
+        rest = np.einsum("kijs,ks,js->is", slope, v, v) - np.einsum("ijks,js,ks->is", slope, v, v) / 2
+        flat = places.reshape(masses, -1)
+        height = sum(
+            (factors[name] * _energy(f"potential[{name!r}]", one, flat) for name, one in self.potential.items()),
+            np.zeros(flat.shape[1]),
+        )
+        rest += _slope(height.reshape(len(moved), states), step)
+        for name in self.forces:
+            rest += factors[name] * self._force(name, q, v)
+        return inertia[0].transpose(2, 0, 1), rest
+
+    def _force(self, name: str, q: Array, v: Array) -> Array:
+        """Return what has no energy."""
+        given = self.forces[name](q.copy(), v.copy())
+        try:
+            return np.stack([np.broadcast_to(np.asarray(one, np.float64), q.shape[1:]) for one in given])
+        except ValueError:
+            raise ValueError(
+                f"forces[{name!r}] must return an array of shape {q.shape}, or one array or number for each mass; got "
+                f"{arguments.shown(given)}; return (first, second, …)"
+            ) from None
+
     def _of(self, name: str, q: Array, v: Array) -> tuple[Array, Array]:
         """Return the momenta and the forces of one factor, each of shape (masses, n)."""
         momentum, force = np.zeros(q.shape), np.zeros(q.shape)
@@ -150,14 +199,7 @@ class Mechanism:
             energy = partial(_energy, f"potential[{name!r}]", self.potential[name])
             force += _slopes(energy, q)
         if name in self.forces:
-            given = self.forces[name](q.copy(), v.copy())
-            try:
-                force += np.stack([np.broadcast_to(np.asarray(one, np.float64), q.shape[1:]) for one in given])
-            except ValueError:
-                raise ValueError(
-                    f"forces[{name!r}] must return an array of shape {q.shape}, or one array or number for each mass; got "
-                    f"{arguments.shown(given)}; return (first, second, …)"
-                ) from None
+            force += self._force(name, q, v)
         return momentum, force
 
     def _momentum(self, name: str, q: Array, v: Array) -> Array:
@@ -209,16 +251,40 @@ def _energy(name: str, function: Callable[..., Any], *motion: Array) -> Array:
         raise ValueError(
             f"{name} must return an array of shape {(samples,)}; got {found.shape}; return one energy for every sample"
         )
-    return np.broadcast_to(found, samples)
+    return found if found.ndim else np.full(samples, found)
+
+
+@cache
+def _around(masses: int) -> tuple[list[tuple[int, int]], Array, Array]:
+    """Return pairs of coordinates, their unit velocities added and subtracted, and where slopes look, in steps.
+
+    What is quadratic in velocities is known from its values at sums and differences of unit vectors.
+    """
+    unit = np.eye(masses)
+    pairs = [(row, column) for row in range(masses) for column in range(row, masses)]
+    speeds = np.stack([unit[i] + sign * unit[j] for sign in (1, -1) for i, j in pairs], axis=1)
+    return pairs, speeds, np.concatenate([np.zeros((1, masses)), *(by * unit for by in (1, -1, 2, -2))])
+
+
+def steps_of(q: Array) -> Array:
+    """Return by how much every coordinate is moved to find slopes."""
+    spreads = [float(np.nanstd(row)) if np.isfinite(row).any() else 0.0 for row in q]
+    return _STEP * np.array([spread or 1.0 for spread in spreads])
+
+
+def _slope(values: Array, step: Array) -> Array:
+    """Return slopes along every coordinate, from values at it, ahead and behind by one step and by two."""
+    masses = step.size
+    near, far = (values[1 + at : 1 + at + masses] - values[1 + at + masses :][:masses] for at in (0, 2 * masses))
+    return np.asarray((8 * near - far) / (12 * step.reshape(-1, *[1] * (values.ndim - 1))))
 
 
 def _slopes(energy: Callable[[Array], Array], q: Array) -> Array:
     """Return the slopes of an energy along every coordinate, by differences of fourth order."""
     found = []
-    for mass, row in enumerate(q):
-        spread = float(np.nanstd(row)) if np.isfinite(row).any() else 0.0
+    for mass, size in enumerate(steps_of(q)):
         step = np.zeros((len(q), 1))
-        step[mass] = _STEP * (spread or 1.0)
+        step[mass] = size
         near = energy(q + step) - energy(q - step)
         far = energy(q + 2 * step) - energy(q - 2 * step)
         found.append((8 * near - far) / (12 * step[mass]))

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
+from tvident._equation import COEFFICIENTS
 from tvident._merged.elements import Element
 from tvident._merged.predicted import Equations
 from tvident._merged.recorded import Recorded
@@ -77,3 +78,15 @@ class Merging:
     unknowable: Mapping[str, str] = field(default_factory=dict)
     inertia: Mapping[str, Array] = field(default_factory=dict)
     recorded: Recorded | None = None
+
+    @property
+    def factors(self) -> frozenset[str]:
+        """Names of a mechanism's factors, which are names of their own; terms of masses are called after both."""
+        each = self.elements if self.masses else ()
+        return frozenset(one.name for one in each if one.of not in COEFFICIENTS and one.of == one.name)
+
+    @property
+    def base_moves(self) -> bool:
+        """Whether masses are moved by a base, whose channel follows theirs."""
+        entries = [entry for one in self.elements if one.of in COEFFICIENTS for entry in one.entries]
+        return self.masses > 0 and any(channel == self.masses for _, _, channel, _ in entries)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from tvident._equation import Term
 from tvident._results import mark_of
 
 Numbers = npt.NDArray[np.number]
@@ -29,6 +30,8 @@ class Recorded:
     positions : sequence of ndarray, optional
         The sample of the result that every sample belongs to, by trial.
     structure : Chain or Mechanism, optional
+    own : mapping of str to Term
+        Terms of the user's own.
     """
 
     angles: Sequence[Sequence[Numbers]]
@@ -36,6 +39,7 @@ class Recorded:
     bases: Sequence[Numbers | None]
     positions: Sequence[npt.NDArray[np.float64]] | None = None
     structure: Any = None
+    own: Mapping[str, Term] = field(default_factory=dict)
     _marks: tuple[bytes, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

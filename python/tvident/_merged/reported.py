@@ -12,15 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._equation import COEFFICIENTS
 from tvident._merged.drawn import drawn
 from tvident._merged.held_back import HeldBackTorque, held_back
 from tvident._merged.merging import Identifiable, Merging
 from tvident._merged.predicted import predicted
-from tvident._merged.response import LinearMasses
+from tvident._merged.simulated import Simulated
 from tvident._merged.verdict import verdict_of
 from tvident._merged.words import summary_of, words_of
-from tvident._results import Scan, Telling, Words, accounted_for, every_sample, without_gaps
+from tvident._results import Scan, Telling, Words, every_sample
 from tvident._status import Status
 from tvident._tables import Table, Tabular
 
@@ -33,7 +32,7 @@ Array: TypeAlias = npt.NDArray[np.float64]
 Picture: TypeAlias = Literal["parameters", "torque", "scan"]
 
 
-class Reported(Telling, Tabular):
+class Reported(Simulated, Telling, Tabular):
     """The part of a result that is shown.
 
     Attributes
@@ -139,106 +138,6 @@ class Reported(Telling, Tabular):
     @cached_property
     def _held_back(self) -> HeldBackTorque:
         return held_back(self._merging)
-
-    def simulate(
-        self, torque: npt.ArrayLike, initial: npt.ArrayLike | None = None, *, angle: npt.ArrayLike | None = None
-    ) -> Array:
-        """Return the angles with which identified masses respond to torques.
-
-        Between two samples elements are the mean of theirs there and torques are linear, for which the response is exact. What cannot be
-        trusted in between is bridged by straight lines. Costs about 10 µs a sample.
-
-        Parameters
-        ----------
-        torque : array_like, shape (masses, m)
-            Torques at the record's sample rate; as long as the record if elements change with time.
-        initial : array_like, shape (2, masses), optional
-            Angles and velocities at the first sample.
-        angle : array_like, shape (masses, m), optional
-            The angles that were recorded with these torques, from which the state at the first sample is estimated by least squares.
-
-        Returns
-        -------
-        ndarray, shape (masses, m)
-
-        Raises
-        ------
-        ValueError
-            If the result is of trials or of a mechanism, has terms that are not linear or a base that moves, something of it cannot be
-            known, shapes do not match, or the response leaves the range of numbers.
-        """
-        model, offsets = self._linear()
-        torques = np.asarray(arguments.channel("torque", torque), np.float64)
-        changes = any(kind == "windowed" for kind in self.kinds.values())
-        known = model.inertia.shape[2]
-        if torques.ndim != 2 or len(torques) != model.masses or (changes and torques.shape[1] != known):  # noqa: PLR2004 - masses and time
-            expected = f"({model.masses}, {known if changes else 'm'})"
-            raise ValueError(f"torque must have shape {expected}; got {torques.shape}; give a row for each mass")
-        if (initial is None) == (angle is None):
-            raise ValueError("the state must come from initial= or from angle=; got both or neither; give one of them")
-        angles = None if angle is None else np.asarray(arguments.channel("angle", angle), np.float64)
-        if angles is not None and angles.shape != torques.shape:
-            raise ValueError(
-                f"angle must have the shape of the torque, {torques.shape}; got {angles.shape}; cut one of them"
-            )
-        if not changes:
-            model = model.lasting(torques.shape[1])
-            offsets = np.repeat(offsets[:, :1], torques.shape[1], axis=1)
-        begin = None if initial is None else np.asarray(arguments.real_array("initial", initial), np.float64)
-        if begin is not None and begin.shape != (2, model.masses):
-            raise ValueError(
-                f"initial must have shape {(2, model.masses)}, angles and velocities; got {begin.shape}; give both of each mass"
-            )
-        return model.respond(torques - offsets, begin, angles)
-
-    def vaf(self, angle: npt.ArrayLike, torque: npt.ArrayLike) -> Array:
-        """Return the variance accounted for: how much of recorded angles the simulated ones explain, in percent.
-
-        Parameters
-        ----------
-        angle, torque : array_like, shape (masses, m)
-            A recording, best one that was not used to identify.
-
-        Returns
-        -------
-        ndarray, shape (masses,)
-
-        Raises
-        ------
-        ValueError
-            As in :meth:`simulate`.
-        """
-        angles = np.asarray(arguments.channel("angle", angle), np.float64)
-        return np.asarray(accounted_for(angles, self.simulate(torque, angle=angles)))
-
-    def _linear(self) -> tuple[LinearMasses, Array]:
-        """Return the equations of masses as they are simulated, and the offsets of their torques."""
-        merging = self._merging
-        terms = {one.of for one in merging.elements if one.of not in COEFFICIENTS} - {"offset"}
-        based = any(
-            entry[1] is not None and entry[2] >= merging.masses for one in merging.elements for entry in one.entries
-        )
-        for wrong, what in (
-            (not merging.masses, "trials"),
-            (bool(merging.inertia), "a mechanism"),
-            (bool(terms), f"terms that are not linear ({', '.join(sorted(terms))})"),
-            (based, "a base that moves"),
-            (not all(self.identifiable.values()), "elements that cannot be known"),
-        ):
-            if wrong:
-                raise ValueError(
-                    f"linear equations of masses can be simulated; got {what}, which is not supported yet; held_back() compares torques"
-                )
-
-        def every(values: Array) -> Array:
-            return every_sample(without_gaps(values), merging.samples, merging.step)
-
-        model = LinearMasses(every(self.inertia), every(self.damping), every(self.stiffness), merging.sampling.period)
-        offsets = np.zeros((merging.masses, merging.samples))
-        for one in merging.elements:
-            if one.of == "offset":
-                offsets[one.entries[0][0]] += every(self.elements[one.name])
-        return model, offsets
 
     def held_back(self) -> HeldBackTorque:
         """Return how much of the torques the equations explain in parts that they are not fitted to: the last tenth of every tenth.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NoReturn, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -49,14 +49,18 @@ class LinearMasses:
         return LinearMasses(inertia, damping, stiffness, self.period)
 
     @np.errstate(all="ignore")
-    def respond(self, forces: Array, initial: Array | None, angles: Array | None) -> Array:
-        """Return the angles with which masses respond to forces, shape (masses, n).
+    def respond(
+        self, forces: Array, initial: Array | None, angles: Array | None, *, held: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Return the angles with which masses respond to forces, shape (masses, n), and the state at the first sample.
 
         Between two samples matrices are the mean of theirs there and forces are linear, for which the response is exact.
 
         Parameters
         ----------
         forces : ndarray, shape (masses, n)
+        held : ndarray, shape (masses, n - 1), optional
+            Forces that are constant between two samples, beside these.
         initial : ndarray, shape (2, masses), optional
             Angles and velocities at the first sample.
         angles : ndarray, shape (masses, n), optional
@@ -67,11 +71,7 @@ class LinearMasses:
         ValueError
             If a mass has no inertia, or the response leaves the range of numbers.
         """
-        if not (np.linalg.cond(np.moveaxis(self.inertia, 2, 0)) < _SINGULAR).all():
-            raise ValueError(
-                "every mass must have an inertia to be simulated; got a matrix of inertia that is singular at some time; give one, "
-                "however small"
-            )
+        check_inertia(np.moveaxis(self.inertia, 2, 0))
         count, samples = 2 * self.masses, forces.shape[1]
         # The response of the rest to the forces, and those to each of the states at the beginning.
         state = np.concatenate([np.zeros((count, 1)), np.eye(count)], axis=1)
@@ -81,23 +81,20 @@ class LinearMasses:
         found[0] = state[: self.masses]
         for first in range(0, samples - 1, _PIECE):
             steps = slice(first, min(samples - 1, first + _PIECE))
-            moved, pushed = self._steps(forces, steps)
+            moved, pushed = self._steps(forces, steps, held)
             for place, (move, push) in enumerate(zip(moved, pushed, strict=True), first + 1):
                 state = move @ state
                 state[:, 0] += push
                 found[place] = state[: self.masses]
         if not np.isfinite(found).all():
-            raise ValueError(
-                "a response must stay within the range of numbers; the identified masses are unstable, or too fast for their samples; "
-                "simulate a shorter stretch, or look at the elements"
-            )
+            lost()
         if initial is not None or angles is None:
-            return np.asarray(found[:, :, 0].T)
+            return np.asarray(found[:, :, 0].T), np.zeros((2, self.masses)) if initial is None else initial
         there = np.isfinite(angles.T)
         begun = np.linalg.lstsq(found[there][:, 1:], (angles.T - found[:, :, 0])[there], rcond=None)[0]
-        return np.asarray((found[:, :, 0] + found[:, :, 1:] @ begun).T)
+        return np.asarray((found[:, :, 0] + found[:, :, 1:] @ begun).T), np.asarray(begun.reshape(2, self.masses))
 
-    def _steps(self, forces: Array, steps: slice) -> tuple[Array, Array]:
+    def _steps(self, forces: Array, steps: slice, held: Array | None) -> tuple[Array, Array]:
         """Return by which matrix each step moves the state, and what forces add."""
         masses, here = self.masses, np.arange(steps.start, steps.stop)
         middle = [
@@ -116,8 +113,27 @@ class LinearMasses:
         rates[:, 2 * masses : 3 * masses, 3 * masses :] = np.eye(masses) / self.period
         moved = _exponential(rates * self.period)[:, : 2 * masses]
         now, growth = forces[:, here], forces[:, here + 1] - forces[:, here]
+        if held is not None:
+            now = now + held[:, here]
         pushed = moved[:, :, 2 * masses :] @ np.concatenate([now, growth]).T[:, :, np.newaxis]
         return moved[:, :, : 2 * masses], pushed[:, :, 0]
+
+
+def check_inertia(inertia: Array) -> None:
+    """Refuse matrices of inertia, shape (n, masses, masses), by which something has no acceleration."""
+    if not (np.linalg.cond(inertia) < _SINGULAR).all():
+        raise ValueError(
+            "every mass must have an inertia to be simulated; got a matrix of inertia that is singular at some time; give one, "
+            "however small"
+        )
+
+
+def lost() -> NoReturn:
+    """Say that a response left the range of numbers."""
+    raise ValueError(
+        "a response must stay within the range of numbers; the identified masses are unstable, or too fast for their samples; "
+        "simulate a shorter stretch, or look at the elements"
+    )
 
 
 def _exponential(matrices: Array) -> Array:

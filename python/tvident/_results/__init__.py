@@ -8,10 +8,10 @@ from tvident._results.loaded import from_file
 from tvident._results.parts import chosen, of_records, settings_of
 from tvident._results.recorded import Recorded, mark_of
 from tvident._results.records import IdentifiedRecords, Shared, covariance_between, with_shared
-from tvident._results.response import accounted_for, every_sample, without_gaps
+from tvident._results.response import Model, accounted_for, every_sample, without_gaps
 from tvident._results.result import Identification
 from tvident._results.scan import Scan, scan_of
-from tvident._results.simulated import predicted_at_samples
+from tvident._results.simulated import in_units_of, predicted_at_samples
 from tvident._results.stored import plain_scan, plain_words, scan_from, words_from
 from tvident._results.summary import COLUMNS, row_of, sentences_of
 from tvident._results.told import Telling
@@ -36,6 +36,7 @@ __all__ = [
     "ExpandedParameter",
     "Identification",
     "IdentifiedRecords",
+    "Model",
     "Recorded",
     "Scan",
     "Shared",
@@ -50,6 +51,7 @@ __all__ = [
     "every_sample",
     "explained_steps",
     "from_file",
+    "in_units_of",
     "kernels_of",
     "known_to",
     "mark_of",

@@ -227,10 +227,7 @@ class Simulated:
         return self._recorded
 
     def _channel(self, name: str, values: npt.ArrayLike) -> npt.NDArray[np.number]:
-        """Return a channel in the unit of the result, by the unit that it says it has."""
-        system = ROTARY if self.units["angle"] == ROTARY.units["angle"] else LINEAR
-        factor = factor_to(system, name, unit_said(values), name=f"the {name}")
-        return scaled(arguments.channel(name, values), factor)
+        return in_units_of(self.units, name, values)
 
     def _model(self, without: npt.NDArray[np.bool_] | None = None) -> Model:
         """Return the equation of motion that was found, with nothing at samples that are left out."""
@@ -302,6 +299,13 @@ def predicted_at_samples(result: Simulated) -> Array:
         return predicted
     places = np.arange(predicted.size, dtype=np.float64)
     return np.asarray(np.interp(places - late, places, predicted, left=np.nan, right=np.nan))
+
+
+def in_units_of(units: Mapping[str, str], name: str, values: npt.ArrayLike) -> npt.NDArray[np.number]:
+    """Return a channel in the unit of a result, by the unit that it says it has."""
+    system = ROTARY if units["angle"] == ROTARY.units["angle"] else LINEAR
+    factor = factor_to(system, name, unit_said(values), name=f"the {name}")
+    return scaled(arguments.channel(name, values), factor)
 
 
 def _like_torque(name: str, array: npt.NDArray[np.number], torque: npt.NDArray[np.number]) -> npt.NDArray[np.number]:

@@ -1,0 +1,315 @@
+"""Does it hold? The simulation of what trials or masses share, in comparison with recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident._merged.merging import Identifiable, Merging
+from tvident._merged.models import Responding, model_of
+from tvident._merged.recorded import Recorded
+from tvident._results import accounted_for, every_sample, in_units_of, without_gaps
+
+Array: TypeAlias = npt.NDArray[np.float64]
+
+_BRIDGED = 3
+"""Samples of a torque that may be missing: a straight line stands for them, as for one mass."""
+
+_ALONE = 1
+"""Dimensions of the torque of one trial of one mass."""
+
+
+class Simulated:
+    """The part of a result of trials or masses that is compared with recordings.
+
+    Attributes
+    ----------
+    elements, kinds, identifiable, units :
+        Those of the result.
+    """
+
+    elements: dict[str, Array]
+    kinds: dict[str, str]
+    identifiable: dict[str, Identifiable]
+    units: Mapping[str, str]
+    _merging: Merging
+
+    def simulate(
+        self,
+        torque: npt.ArrayLike | Sequence[npt.ArrayLike],
+        initial: npt.ArrayLike | None = None,
+        *,
+        angle: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None,
+        phase: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None,
+        base: npt.ArrayLike | None = None,
+    ) -> Any:
+        """Return the angles with which the identified system responds to torques.
+
+        Between two samples elements are the mean of theirs there, torques and a base that moves follow straight lines, for which the
+        response of linear equations is exact. Other equations are integrated in steps that become smaller until halves of them change
+        the response by less than a part of 1e-5; a mass with dry friction sticks and breaks away. What cannot be trusted in between is
+        bridged by straight lines. Costs about 10 µs a sample where equations are linear, 0.2 ms with terms that are not, and 1 ms for a
+        mechanism of two bodies, whose state is estimated from the first 2048 samples in as long as ten simulations of these.
+
+        Parameters
+        ----------
+        torque : array_like, shape (masses, m); of trials (trials, m), (m,), or a list of them
+            Torques at the record's sample rate; as long as the record if elements change with time, of trials at most as long.
+        initial : array_like, shape (2, masses); of trials (2,) or (trials, 2), optional
+            Angles and velocities at the first sample. By default the state in which the record began, estimated from its angles by
+            least squares.
+        angle : array_like or list, as the torque, optional
+            The angles that were recorded with these torques, from which the state at the first sample is estimated instead.
+        phase : array_like or list, as the torque, optional
+            The phase of every sample, where trials were aligned on one; by default that of the trials that were identified.
+        base : array_like, shape (m,), optional
+            Motion of a base that moves; by default that of the record.
+
+        Returns
+        -------
+        ndarray, the torque's shape, or a list of them
+            Angles in rad.
+
+        Raises
+        ------
+        ValueError
+            If something cannot be known, shapes do not match, the record is not there to tell the state, or the response leaves the
+            range of numbers or depends on the steps.
+        """
+        several = self._trials("torque", torque)
+        angles = None if angle is None else self._trials("angle", angle)
+        if angles is not None and [one.shape for one in angles] != [one.shape for one in several]:
+            shapes = ([one.shape for one in of] for of in (angles, several))
+            raise ValueError(
+                "angle and torque must have the same shape; got {} and {}; cut one of them".format(*map(str, shapes))
+            )
+        if initial is not None and angles is not None:
+            raise ValueError("the state must come from initial= or from angle=; got both; drop one")
+        states = None if initial is None else self._states(initial, len(several))
+        positions = self._positions(phase, several)
+        found = []
+        for trial, pushed in enumerate(several):
+            position = None if positions is None else positions[trial]
+            moving = self._base(base, pushed.shape[1])
+            model = self._model(pushed.shape[1], position, moving)
+            state = None if states is None else states[trial]
+            seen = None if angles is None else angles[trial]
+            if state is None and seen is None:
+                state, seen = self._begun(trial, pushed, len(several))
+            found.append(model.respond(_bridged(pushed), state, seen)[0])
+        return self._as_given(torque, found)
+
+    def vaf(
+        self,
+        angle: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None,
+        torque: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None,
+        *,
+        phase: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None,
+        base: npt.ArrayLike | None = None,
+    ) -> Any:
+        """Return the variance accounted for: how much of recorded angles the simulated ones explain, in percent.
+
+        Parameters
+        ----------
+        angle, torque : array_like or list, shapes as in :meth:`simulate`, optional
+            A recording, best one that was not used to identify; by default the one that was.
+        phase, base : array_like, optional
+            Of that recording, as in :meth:`simulate`.
+
+        Returns
+        -------
+        ndarray, shape (masses,), or (trials,); a float for one trial of shape (m,)
+
+        Raises
+        ------
+        ValueError
+            As in :meth:`simulate`, and if only one of the channels is given.
+        """
+        if (angle is None) != (torque is None):
+            raise ValueError("angle and torque must be of the same recording; got only one of them; give both")
+        seen: Any = angle
+        pushed: Any = torque
+        if angle is None:
+            recorded = self._record("angle= and torque=")
+            rows = [
+                (_rows(angles), _rows(torques))
+                for angles, torques in zip(recorded.angles, recorded.torques, strict=True)
+            ]
+            seen, pushed = rows[0] if self._merging.masses else ([one[place][0] for one in rows] for place in range(2))
+        simulated = self._trials("angle", self.simulate(pushed, angle=seen, phase=phase, base=base))
+        shares = [accounted_for(one, found) for one, found in zip(self._trials("angle", seen), simulated, strict=True)]
+        if self._merging.masses:
+            return shares[0]
+        return float(shares[0][0]) if _is_alone(seen) else np.concatenate(shares)
+
+    def _trials(self, name: str, values: Any) -> list[Array]:
+        """Return a channel by trial, each of shape (masses, m)."""
+        if self._merging.masses:
+            found = np.asarray(in_units_of(self.units, name, values), np.float64)
+            if found.ndim != 2 or len(found) != self._merging.masses:  # noqa: PLR2004 - masses and time
+                raise ValueError(
+                    f"{name} must have shape ({self._merging.masses}, m); got {found.shape}; give a row for each mass"
+                )
+            return [found]
+        each = [values] if _is_alone(values) else list(values)
+        several = [np.asarray(in_units_of(self.units, name, one), np.float64) for one in each]
+        if any(one.ndim != _ALONE for one in several):
+            raise ValueError(
+                f"{name} must have shape (trials, m) or (m,), or be a list of such; got {several[0].shape} for a trial; flatten it"
+            )
+        return [one[np.newaxis] for one in several]
+
+    def _as_given(self, torque: Any, found: list[Array]) -> Any:
+        """Return angles in the shape of the torques."""
+        if self._merging.masses:
+            return found[0]
+        rows = [one[0] for one in found]
+        if _is_alone(torque):
+            return rows[0]
+        return np.stack(rows) if len({row.size for row in rows}) == 1 else rows
+
+    def _states(self, initial: npt.ArrayLike, trials: int) -> list[Array]:
+        """Return angles and velocities at the first sample, shape (2, masses), of every trial."""
+        given = np.asarray(arguments.real_array("initial", initial), np.float64)
+        masses = self._merging.masses
+        if masses and given.shape == (2, masses):
+            each = [given]
+        elif not masses and given.shape in {(2,), (trials, 2)}:
+            each = list(np.broadcast_to(given, (trials, 2))[:, :, np.newaxis])
+        else:
+            expected = (2, masses) if masses else (trials, 2)
+            raise ValueError(
+                f"initial must have shape {expected}, angles and velocities; got {given.shape}; give both of each"
+            )
+        if not np.isfinite(given).all():
+            raise ValueError(f"initial must be finite; got {arguments.shown(initial)}; give angles and velocities")
+        return each
+
+    def _positions(self, phase: Any, torques: Sequence[Array]) -> Sequence[Array] | None:
+        """Return the sample of the result that every sample of every trial belongs to; None where it is the sample itself."""
+        merging = self._merging
+        if merging.phase is None:
+            if phase is not None:
+                raise ValueError("phase= must go with trials that were aligned on one; got it for others; leave it out")
+            return None
+        if phase is None:
+            known = self._record("phase=").positions or ()
+            if [one.size for one in known] != [one.shape[1] for one in torques]:
+                raise ValueError(
+                    "the phase of every sample must be known; got torques of other lengths than those that were identified; give phase="
+                )
+            return known
+        each = [phase] if _is_alone(phase) else list(phase)
+        found = [np.asarray(arguments.real_array("phase", one), np.float64) for one in each]
+        if [one.shape for one in found] != [one.shape[1:] for one in torques]:
+            raise ValueError(
+                "phase must have a value for every sample of the torque; got other lengths; cut one of them"
+            )
+        return [one * merging.samples for one in found]
+
+    def _base(self, base: npt.ArrayLike | None, samples: int) -> Array | None:
+        """Return the motion of the base; None where it does not move."""
+        if not self._merging.base_moves:
+            if base is not None:
+                raise ValueError("base= must go with a Chain whose base moves; got it for another; leave it out")
+            return None
+        given: Any = self._record("base=").bases[0] if base is None else in_units_of(self.units, "angle", base)
+        if given is None or np.shape(given) != (samples,):
+            raise ValueError(
+                f"base must have shape ({samples},), as the torque's time has; got {np.shape(given)}; give the base of these torques"
+            )
+        return np.asarray(_bridged(np.asarray(given, np.float64)[np.newaxis])[0])
+
+    def _begun(self, trial: int, pushed: Array, trials: int) -> tuple[Array | None, Array | None]:
+        """Return the state in which a trial that was identified began, or its angles where these are its torques."""
+        recorded = self._record("initial=, or angle= of the same recording")
+        if trials != self._merging.trials:
+            raise ValueError(
+                f"the state at the first sample must be known; got {trials} trials, where {self._merging.trials} were identified; "
+                "give initial=, or angle= of the same recording"
+            )
+        torques, angles = (_rows(of[trial]) for of in (recorded.torques, recorded.angles))
+        if np.array_equal(torques, pushed, equal_nan=True):
+            return None, angles
+        position = None if recorded.positions is None else recorded.positions[trial]
+        base = recorded.bases[trial]
+        model = self._model(angles.shape[1], position, None if base is None else _bridged(_rows([base]))[0])
+        return model.respond(_bridged(torques), None, angles)[1], None
+
+    def _record(self, cure: str) -> Recorded:
+        """Return the record that was identified, if it is still there."""
+        recorded = self._merging.recorded
+        if recorded is None:
+            raise ValueError(f"the record must be there; got a result that was stored without it; give {cure}")
+        if not recorded.is_unchanged:
+            raise ValueError(
+                f"the record must be as it was identified; its arrays hold other samples by now; give {cure}, or pass copies to identify"
+            )
+        return recorded
+
+    def _model(self, samples: int, position: Array | None, base: Array | None) -> Responding:
+        """Return the equations of one trial, along its samples."""
+        merging = self._merging
+        lost = [name for name, verdict in self.identifiable.items() if not verdict]
+        if lost:
+            raise ValueError(
+                f"all elements must be known to be simulated; got {lost[0]}, of which {self.identifiable[lost[0]].reason}; "
+                "held_back() compares torques"
+            )
+        changing = [name for name, kind in self.kinds.items() if kind == "windowed"]
+        fits = samples == merging.samples if merging.masses else samples <= merging.samples
+        if changing and position is None and not fits:
+            raise ValueError(
+                f"torque must have {'the' if merging.masses else 'at most the'} record's {merging.samples} samples where elements change "
+                f"with "
+                f"time; got {samples}; give as many, or identify {' and '.join(changing)} as constant"
+            )
+        values = {}
+        for name, value in self.elements.items():
+            along = every_sample(without_gaps(value), merging.samples, merging.step)
+            if name not in changing:
+                values[name] = np.full(samples, along[0])
+            elif position is None:
+                values[name] = along[:samples]
+            else:
+                values[name] = np.interp(position, np.arange(merging.samples), along)
+        return model_of(merging, values, base)
+
+
+def _is_alone(values: Any) -> bool:
+    """Return whether a channel is of one trial, not of several."""
+    if isinstance(values, list | tuple):
+        return not values or np.ndim(values[0]) == 0
+    return np.ndim(values) == _ALONE
+
+
+def _rows(channels: Sequence[Any]) -> Array:
+    """Return channels of masses as an array; those that were not measured are missing."""
+    samples = max(np.size(one) for one in channels if one is not None)
+    return np.stack([np.full(samples, np.nan) if one is None else np.asarray(one, np.float64) for one in channels])
+
+
+def _bridged(channels: Array) -> Array:
+    """Return channels with straight lines over few missing samples.
+
+    Raises
+    ------
+    ValueError
+        If more are missing in a row.
+    """
+    missing = ~np.isfinite(channels)
+    if not missing.any():
+        return channels
+    for row, lacks in enumerate(missing):
+        edges = np.flatnonzero(np.diff(lacks.view(np.int8), prepend=0, append=0))
+        longest = int(np.max(edges[1::2] - edges[::2], initial=0))
+        if longest > _BRIDGED:
+            raise ValueError(
+                f"what drives a simulation must be there; got {longest} missing samples in a row of channel {row}, where {_BRIDGED} can "
+                "be bridged; cut the recording there, or fill them"
+            )
+    return without_gaps(channels)
