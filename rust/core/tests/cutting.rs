@@ -1,35 +1,18 @@
 //! Any cutting of a record gives the same bits: every kind of plan, on every path of instructions, with samples that are no number and
 //! glitches that make lanes start afresh.
 
+mod columns;
+
 use std::num::NonZeroUsize;
 
+use columns::{Columns, kinds_of_regression, regressions};
 use proptest::prelude::*;
 use tvident::lanes::Elements;
 use tvident::least_squares::HALF_OF_THE_DIGITS;
-use tvident::least_squares::{Equations, Regressions, RollingLeastSquares};
+use tvident::least_squares::{Equations, RollingLeastSquares};
 use tvident::local_polynomials::{Criterion, Estimates, LocalPolynomials, Order, PolynomialOptions, Selection};
 use tvident::record::Samples;
 use tvident::simd::Instructions;
-
-/// Outputs of one kind each, element for element.
-#[derive(Clone, Debug)]
-struct Outputs {
-    numbers: Vec<Vec<f64>>,
-    order: Vec<u8>,
-    status: Vec<u16>,
-}
-
-impl Outputs {
-    fn new(kinds: usize, count: usize) -> Self {
-        Self { numbers: vec![vec![0.0; count]; kinds], order: vec![0; count], status: vec![0; count] }
-    }
-
-    /// Every bit, so that NaN equals itself.
-    fn bits(&self) -> (Vec<Vec<u64>>, &[u8], &[u16]) {
-        let bits = |values: &Vec<f64>| values.iter().map(|value| value.to_bits()).collect();
-        (self.numbers.iter().map(bits).collect(), &self.order, &self.status)
-    }
-}
 
 /// Where a range of so many is cut: at any places, in order.
 fn pieces(cuts: &[usize], count: usize) -> Vec<std::ops::Range<usize>> {
@@ -44,9 +27,9 @@ fn slices(numbers: &mut [Vec<f64>], elements: std::ops::Range<usize>) -> Vec<&mu
     numbers.iter_mut().map(|values| &mut values[elements.clone()]).collect()
 }
 
-fn estimate(options: &PolynomialOptions, record: &[f64], cuts: &[usize], step: usize) -> Outputs {
+fn estimate(options: &PolynomialOptions, record: &[f64], cuts: &[usize], step: usize) -> Columns {
     let plan = LocalPolynomials::new(options.clone()).expect("valid options");
-    let mut all = Outputs::new(options.derivatives.len() + 1, record.len().div_ceil(step));
+    let mut all = Columns::new(options.derivatives.len() + 1, record.len().div_ceil(step));
     let mut scratch = plan.scratch();
     for samples in pieces(cuts, record.len()) {
         let elements = samples.start.div_ceil(step)..samples.end.div_ceil(step);
@@ -66,9 +49,9 @@ fn estimate(options: &PolynomialOptions, record: &[f64], cuts: &[usize], step: u
 }
 
 /// The same by several threads.
-fn estimate_in_parallel(options: &PolynomialOptions, record: &[f64], workers: usize) -> Outputs {
+fn estimate_in_parallel(options: &PolynomialOptions, record: &[f64], workers: usize) -> Columns {
     let plan = LocalPolynomials::new(options.clone()).expect("valid options");
-    let mut all = Outputs::new(options.derivatives.len() + 1, record.len());
+    let mut all = Columns::new(options.derivatives.len() + 1, record.len());
     let mut derivatives = slices(&mut all.numbers, 0..record.len());
     let sigma = derivatives.pop().expect("there is one more than derivatives");
     let estimates = Estimates {
@@ -89,11 +72,11 @@ struct Problem {
     window: usize,
 }
 
-fn solve(problem: &Problem, cuts: &[usize], instructions: Instructions) -> Outputs {
+fn solve(problem: &Problem, cuts: &[usize], instructions: Instructions) -> Columns {
     let (p, n) = (problem.regressors, problem.columns[0].len());
     let q = problem.columns.len() - p;
     let pairs: Vec<(usize, usize)> = (1..p).map(|i| (0, i)).collect();
-    let kinds = [p * q, p * q, pairs.len() * q, q, q, 1];
+    let kinds = kinds_of_regression(p, q);
     let plan = RollingLeastSquares::new(problem.window, p, q, pairs, HALF_OF_THE_DIGITS, instructions).expect("valid");
     let columns: Vec<&[f64]> = problem.columns.iter().map(Vec::as_slice).collect();
     let equations = Equations {
@@ -101,23 +84,12 @@ fn solve(problem: &Problem, cuts: &[usize], instructions: Instructions) -> Outpu
         rows: 0..n,
         ..Equations::default()
     };
-    let mut all = Outputs::new(kinds.iter().sum(), n);
+    let mut all = Columns::new(kinds.iter().sum(), n);
     let mut scratch = plan.scratch();
     for rows in pieces(cuts, n) {
-        let mut numbers = slices(&mut all.numbers, rows.clone()).into_iter();
-        let [parameters, errors, covariances, residuals, deviations, mut condition] =
-            kinds.map(|count| numbers.by_ref().take(count).collect::<Vec<_>>());
-        let mut regressions = Regressions {
-            elements: Elements { first: rows.start, step: 1 },
-            parameters,
-            errors,
-            covariances,
-            residuals,
-            deviations,
-            condition: condition.pop().expect("there is one"),
-            status: &mut all.status[rows.clone()],
-            ..Regressions::default()
-        };
+        let numbers = slices(&mut all.numbers, rows.clone());
+        let elements = Elements { first: rows.start, step: 1 };
+        let mut regressions = regressions(kinds, numbers, &mut all.status[rows.clone()], elements);
         plan.solve(&equations, rows, &mut regressions, &mut scratch);
     }
     all

@@ -1,9 +1,12 @@
 //! A stream gives the bits of the batch, whatever the pieces that it comes in, and goes on from its state.
 
+mod columns;
+
 use std::num::NonZeroUsize;
 use std::ops::Range;
 use std::sync::Arc;
 
+use columns::{Columns, kinds_of_regression};
 use proptest::prelude::*;
 use tvident::lanes::Elements;
 use tvident::least_squares::{Equations, HALF_OF_THE_DIGITS, Regressions, RollingLeastSquares};
@@ -12,30 +15,11 @@ use tvident::record::Samples;
 use tvident::simd::Instructions;
 use tvident::stream::{PolynomialStream, RollingStream};
 
-/// Columns of numbers, orders and flags, element for element.
-#[derive(Clone, Debug, Default)]
-struct Columns {
-    numbers: Vec<Vec<f64>>,
-    order: Vec<u8>,
-    status: Vec<u16>,
-}
-
-impl Columns {
-    fn new(kinds: usize, count: usize) -> Self {
-        Self { numbers: vec![vec![0.0; count]; kinds], order: vec![0; count], status: vec![0; count] }
-    }
-
-    fn append(&mut self, other: Self) {
-        self.numbers.iter_mut().zip(other.numbers).for_each(|(all, some)| all.extend(some));
-        self.order.extend(other.order);
-        self.status.extend(other.status);
-    }
-
-    /// Every bit, so that NaN equals itself.
-    fn bits(&self) -> (Vec<Vec<u64>>, &[u8], &[u16]) {
-        let bits = |values: &Vec<f64>| values.iter().map(|value| value.to_bits()).collect();
-        (self.numbers.iter().map(bits).collect(), &self.order, &self.status)
-    }
+/// Appends what was found in a piece to what was found before.
+fn append(all: &mut Columns, more: Columns) {
+    all.numbers.iter_mut().zip(more.numbers).for_each(|(all, some)| all.extend(some));
+    all.order.extend(more.order);
+    all.status.extend(more.status);
 }
 
 /// The elements of some samples, with a step.
@@ -77,23 +61,10 @@ fn regressions(
     take: impl FnOnce(&mut Regressions<'_>),
 ) -> Columns {
     let (elements, count) = elements(rows, step);
-    let kinds = [p * q, p * q, (p - 1) * q, q, q, 1];
+    let kinds = kinds_of_regression(p, q);
     let mut found = Columns::new(kinds.iter().sum(), count);
-    let mut numbers = found.numbers.iter_mut().map(Vec::as_mut_slice);
-    let [parameters, errors, covariances, residuals, deviations, mut condition] =
-        kinds.map(|count| numbers.by_ref().take(count).collect::<Vec<_>>());
-    let mut regressions = Regressions {
-        elements,
-        parameters,
-        errors,
-        covariances,
-        residuals,
-        deviations,
-        condition: condition.pop().expect("there is one"),
-        status: &mut found.status,
-        ..Regressions::default()
-    };
-    take(&mut regressions);
+    let numbers = found.numbers.iter_mut().map(Vec::as_mut_slice).collect();
+    take(&mut columns::regressions(kinds, numbers, &mut found.status, elements));
     found
 }
 
@@ -174,7 +145,7 @@ proptest! {
             let ready = stream.upcoming(piece.len());
             let due = if piece.end < length { 0 } else { piece.end - stream.delay() };
             prop_assert_eq!(ready.end, ready.start.max(due));
-            found.append(polynomials(3, &ready, step, |estimates, errors| stream.push(&&record[piece.clone()], estimates, errors)));
+            append(&mut found, polynomials(3, &ready, step, |estimates, errors| stream.push(&&record[piece.clone()], estimates, errors)));
             if resume && piece.end % 5 == 0 {
                 let state = stream.state();
                 prop_assert!(state.samples.len() <= 4 * length + 600, "{} samples held", state.samples.len());
@@ -182,7 +153,7 @@ proptest! {
             }
         }
         let rest = stream.at_end();
-        found.append(polynomials(3, &rest, step, |estimates, errors| stream.finish(estimates, errors)));
+        append(&mut found, polynomials(3, &rest, step, |estimates, errors| stream.finish(estimates, errors)));
         prop_assert!(stream.at_end().is_empty());
         prop_assert_eq!(found.bits(), expected.bits());
     }
@@ -212,7 +183,7 @@ proptest! {
             let some: Vec<&[f64]> = slices.iter().map(|column| &column[piece.clone()]).collect();
             let some: Vec<&dyn Samples> = some.iter().map(|column| column as &dyn Samples).collect();
             let ready = stream.upcoming(piece.len());
-            found.append(regressions(p, q, &ready, step, |regressions| stream.push(&some, regressions)));
+            append(&mut found, regressions(p, q, &ready, step, |regressions| stream.push(&some, regressions)));
             if resume && piece.end % 7 == 0 {
                 let state = stream.state();
                 prop_assert!(state.rows.len() <= 2 * window * (p + q));
@@ -220,7 +191,7 @@ proptest! {
             }
         }
         let rest = stream.at_end();
-        found.append(regressions(p, q, &rest, step, |regressions| stream.finish(regressions)));
+        append(&mut found, regressions(p, q, &rest, step, |regressions| stream.finish(regressions)));
         prop_assert_eq!(found.bits(), expected.bits());
     }
 }
