@@ -5,13 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import tvident
+from commands import run
 from tvident import baselines
-from tvident._command_line import main
 
 ROUNDING = 1e-6
 """Some hundred sums, of numbers of one size; a vague beginning costs six digits."""
@@ -110,9 +109,9 @@ def test_methods_are_compared(tmp_path: Path) -> None:
         "time",
         "--methods",
     ]
-    ran = CliRunner().invoke(main, words)
-    assert ran.exit_code == 0, ran.output
-    assert "random walk" in ran.output
+    ran = run(*words)
+    assert ran.returncode == 0, ran.stderr
+    assert "random walk" in ran.stdout
 
 
 @pytest.mark.parametrize(

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from scipy.io import savemat
 
 import tvident
-from tvident._command_line import main
+from commands import run
 
 RIG = tvident.simulate_torsional_rig(duration=3.0, sample_rate=500, seed=4, pattern="constant")
 MILLISECONDS, DEGREES, NEWTON_MILLIMETRES = 1e3 * RIG.time, np.rad2deg(RIG.angle), 1e3 * RIG.torque
@@ -33,44 +31,40 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def invoke(*words: str) -> Any:
-    return CliRunner().invoke(main, words)
-
-
 @pytest.mark.usefixtures("folder")
 def test_times_in_milliseconds_are_shown_in_hertz() -> None:
-    assert "uniform: 0.5 per unit, 500 Hz" in invoke("info", "messung.csv").output
+    assert "uniform: 0.5 per unit, 500 Hz" in run("info", "messung.csv").stdout
 
 
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize("command", ["identify", "compare", "report"])
 def test_the_channel_of_times_is_named_where_none_was_given(command: str) -> None:
-    done = invoke(command, "messung.csv", "--angle", "Winkel", "--torque", "Drehmoment")
-    assert done.exit_code == 2
-    assert "give --sample-rate, --delta or --time; it may be --time Zeit" in done.output
+    done = run(command, "messung.csv", "--angle", "Winkel", "--torque", "Drehmoment")
+    assert done.returncode == 2
+    assert "give --sample-rate, --delta or --time; it may be --time Zeit" in done.stderr
 
 
 @pytest.mark.usefixtures("folder")
 def test_capitals_do_not_matter_where_they_tell_nothing_apart() -> None:
     call = "identify messung.csv --angle winkel --torque DREHMOMENT --time zeit --stiffness constant"
-    done = invoke(*call.split())
-    assert done.exit_code == 0, done.output
+    done = run(*call.split())
+    assert done.returncode == 0, done.stderr
     expected = tvident.identify(RIG.angle, RIG.torque, sample_rate=500, stiffness="constant").constants["inertia"][0]
-    assert float(done.output.rsplit("inertia = ", 1)[1].split()[0]) == pytest.approx(expected, rel=1e-3)
+    assert float(done.stdout.rsplit("inertia = ", 1)[1].split()[0]) == pytest.approx(expected, rel=1e-3)
     np.savez("two.npz", Angle=DEGREES, angle=DEGREES, torque=NEWTON_MILLIMETRES)
-    both = invoke("identify", "two.npz", "--angle", "ANGLE", "--torque", "torque", "--sample-rate", "500")
-    assert both.exit_code == 2
-    assert "must have one channel 'ANGLE'; it has Angle, angle; name one of these" in both.output
+    both = run("identify", "two.npz", "--angle", "ANGLE", "--torque", "torque", "--sample-rate", "500")
+    assert both.returncode == 2
+    assert "must have one channel 'ANGLE'; it has Angle, angle; name one of these" in both.stderr
 
 
 @pytest.mark.usefixtures("folder")
 def test_a_member_of_a_structure_is_found_by_the_name_that_it_is_listed_with() -> None:
     call = "identify run.mat --angle angle_deg --torque torque_Nmm --time t --stiffness constant"
-    done = invoke(*call.split(), "--time-unit", "ms")
-    assert done.exit_code == 0, done.output
-    assert "degrees?" not in done.output
-    wrong = invoke(*call.split())
+    done = run(*call.split(), "--time-unit", "ms")
+    assert done.returncode == 0, done.stderr
+    assert "degrees?" not in done.stdout + done.stderr
+    wrong = run(*call.split())
     assert (
         "is the time in milliseconds? Then give time_unit='ms' with t or delta, --time-unit ms on the command"
-        in wrong.output
+        in wrong.stdout
     )

@@ -6,14 +6,13 @@ import json
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import click
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import tvident
+from commands import run
 from tvident._command_line import main
 from tvident._command_line.group import COMMANDS
 
@@ -26,10 +25,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     tvident.simulate_torsional_rig(duration=2.0).save(tmp_path / "rig.npz")
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-def invoke(*arguments: str) -> Any:
-    return CliRunner().invoke(main, arguments)
 
 
 def test_help_and_version_do_not_wait_for_numpy() -> None:
@@ -59,7 +54,7 @@ def test_every_command_is_listed_with_what_it_says_of_itself() -> None:
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completion_of_names_and_options(shell: str) -> None:
-    script = invoke("completion", shell).stdout
+    script = run("completion", shell).stdout
     assert "_TVIDENT_COMPLETE" in script
     variables = {"COMP_WORDS": "tvident identify --stiff", "COMP_CWORD": "2" if shell != "fish" else "--stiff"}
     done = subprocess.run(
@@ -73,7 +68,7 @@ def test_completion_of_names_and_options(shell: str) -> None:
 
 
 def test_json_says_what_the_summary_says(folder: Path) -> None:
-    said = json.loads(invoke(*IDENTIFY, "--json", "-o", "result.npz").stdout)
+    said = json.loads(run(*IDENTIFY, "--json", "-o", "result.npz").stdout)
     result = tvident.load(folder / "result.npz")
     assert said["settings"] == result.settings
     assert said["parameters"]["inertia"]["value"] == result.constants["inertia"][0]
@@ -83,69 +78,69 @@ def test_json_says_what_the_summary_says(folder: Path) -> None:
 
 def test_a_run_is_repeated_from_its_result_and_from_toml(folder: Path) -> None:
     options = ["--inertia", "0.0123", "--term", "coulomb", "--window-length", "41"]
-    assert invoke(*IDENTIFY, *options, "-o", "first.npz").exit_code == 0
-    assert invoke(*IDENTIFY, "--settings", "first.npz", "-o", "again.npz").exit_code == 0
+    assert run(*IDENTIFY, *options, "-o", "first.npz").returncode == 0
+    assert run(*IDENTIFY, "--settings", "first.npz", "-o", "again.npz").returncode == 0
     (folder / "run.toml").write_text(
         'angle = "angle"\ntorque = "torque"\nsample-rate = 1000\ninertia = 0.0123\nterm = ["coulomb"]\nwindow-length = 41\n'
     )
-    assert invoke("identify", "rig.npz", "--settings", "run.toml", "-o", "toml.npz").exit_code == 0
+    assert run("identify", "rig.npz", "--settings", "run.toml", "-o", "toml.npz").returncode == 0
     first, *others = (tvident.load(f"{name}.npz") for name in ("first", "again", "toml"))
     for other in others:
         np.testing.assert_array_equal(other.stiffness, first.stiffness)
         assert other.settings["window_length"] == 41
-    given = invoke("identify", "rig.npz", "--settings", "run.toml", "--inertia", "0.02", "-o", "given.npz")
-    assert given.exit_code == 0
+    given = run("identify", "rig.npz", "--settings", "run.toml", "--inertia", "0.02", "-o", "given.npz")
+    assert given.returncode == 0
     assert tvident.load("given.npz").inertia[0] == 0.02
     (folder / "run.toml").write_text("stifness = 0\n")
-    wrong = invoke(*IDENTIFY, "--settings", "run.toml")
-    assert wrong.exit_code == 2
-    assert "must hold options of tvident identify, without dashes before them; got 'stifness'; use" in wrong.output
+    wrong = run(*IDENTIFY, "--settings", "run.toml")
+    assert wrong.returncode == 2
+    assert "must hold options of tvident identify, without dashes before them; got 'stifness'; use" in wrong.stderr
 
 
 @pytest.mark.parametrize("ending", [".csv", ".xlsx"])
 def test_a_table_is_repeated_from_the_settings_beside_it(folder: Path, ending: str) -> None:
     options = ["--inertia", "0.0123", "--term", "coulomb"]
-    assert invoke(*IDENTIFY, *options, "-o", f"first{ending}").exit_code == 0
-    again = invoke(*IDENTIFY, "--settings", f"first{ending}", "-o", f"again{ending}")
-    assert again.exit_code == 0, again.output
+    assert run(*IDENTIFY, *options, "-o", f"first{ending}").returncode == 0
+    again = run(*IDENTIFY, "--settings", f"first{ending}", "-o", f"again{ending}")
+    assert again.returncode == 0, again.stderr
     first, second = (tvident.read_recording(folder / f"{name}{ending}") for name in ("first", "again"))
     for name in first:
         np.testing.assert_array_equal(second[name], first[name])
     # Whoever changes the table may still repeat the run, and hears of it; settings themselves do as well.
     (folder / "first.csv").write_text("a,b\n1,2\n")
     if ending == ".csv":
-        changed = invoke(*IDENTIFY, "--settings", "first.csv", "-o", "changed.csv")
-        assert changed.exit_code == 0
+        changed = run(*IDENTIFY, "--settings", "first.csv", "-o", "changed.csv")
+        assert changed.returncode == 0
         assert "first.csv: was changed after its settings were written beside it" in changed.stderr
         assert (folder / "changed.csv").read_bytes() == (folder / "again.csv").read_bytes()
-        direct = invoke(*IDENTIFY, "--settings", "first.csv.settings.json", "-o", "direct.csv")
-        assert direct.exit_code == 0
-        assert "changed after" not in direct.output
+        direct = run(*IDENTIFY, "--settings", "first.csv.settings.json", "-o", "direct.csv")
+        assert direct.returncode == 0
+        assert "changed after" not in direct.stderr
         (folder / "first.csv.settings.json").unlink()
-        none = invoke(*IDENTIFY, "--settings", "first.csv")
-        assert none.exit_code == 1
-        assert "its settings stand in 'first.csv.settings.json' beside it; there is no such file" in none.output
-        own = invoke(*IDENTIFY, "--settings", "again.csv.settings.json", "-o", "again.csv")
-        assert own.exit_code == 2
-        assert "the settings beside results must not replace earlier settings" in own.output
+        none = run(*IDENTIFY, "--settings", "first.csv")
+        assert none.returncode == 1
+        assert "its settings stand in 'first.csv.settings.json' beside it; there is no such file" in none.stderr
+        own = run(*IDENTIFY, "--settings", "again.csv.settings.json", "-o", "again.csv")
+        assert own.returncode == 2
+        assert "the settings beside results must not replace earlier settings" in own.stderr
 
 
 def test_exit_codes(folder: Path) -> None:
-    assert invoke(*IDENTIFY).exit_code == 0
+    assert run(*IDENTIFY).returncode == 0
     np.savez(folder / "rig.npz", angle=np.zeros(500), torque=np.zeros(500))
-    assert invoke(*IDENTIFY, "-o", "nothing.csv").exit_code == 1
+    assert run(*IDENTIFY, "-o", "nothing.csv").returncode == 1
     assert (folder / "nothing.csv").exists()
-    assert invoke("identify", "none.npz", *IDENTIFY[2:]).exit_code == 1
-    assert invoke(*IDENTIFY[:-2]).exit_code == 2
-    assert "Exit status: 0, 1 where there is no usable result" in invoke("--help").output
+    assert run("identify", "none.npz", *IDENTIFY[2:]).returncode == 1
+    assert run(*IDENTIFY[:-2]).returncode == 2
+    assert "Exit status: 0, 1 where there is no usable result" in run("--help").stdout
 
 
 def test_derivatives_behave_as_identify_does(folder: Path) -> None:
     call = ("derivatives", "rig.npz", "--channel", "angle")
-    none = invoke(*call)
-    assert none.exit_code == 2
-    assert "derivatives need the sample period; got none; give --sample-rate, --delta or --time" in none.output
-    assert invoke(*call, "--sample-rate", "1000", "-o", "found.npz").exit_code == 0
+    none = run(*call)
+    assert none.returncode == 2
+    assert "derivatives need the sample period; got none; give --sample-rate, --delta or --time" in none.stderr
+    assert run(*call, "--sample-rate", "1000", "-o", "found.npz").returncode == 0
     angle = np.load(folder / "rig.npz")["angle [rad]"]
     expected = tvident.fit_local_polynomials(angle, "auto", sample_rate=1000).derivatives[2]
     np.testing.assert_array_equal(np.load(folder / "found.npz")["derivative_2"], expected)
@@ -154,7 +149,7 @@ def test_derivatives_behave_as_identify_does(folder: Path) -> None:
 @pytest.mark.usefixtures("folder")
 def test_the_demo_says_at_once_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.modules["tvident._commands.demo"], "find_spec", lambda _: None)
-    done = invoke("demo")
-    assert done.exit_code == 0
+    done = run("demo")
+    assert done.returncode == 0
     assert done.stderr.startswith("Pictures need matplotlib, which is not installed: pip install 'tvident[plot]'")
-    assert done.output.count("result.csv") == 1
+    assert done.stdout.count("result.csv") == 1

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import tvident
-from tvident._command_line import main
+from commands import run
 
 RIG = tvident.simulate_torsional_rig(duration=3.0, pattern="constant", seed=3)
 COLUMNS = np.column_stack([1e3 * RIG.time, np.rad2deg(RIG.angle), 1e3 * RIG.torque])
@@ -26,25 +25,23 @@ COLUMNS = np.column_stack([1e3 * RIG.time, np.rad2deg(RIG.angle), 1e3 * RIG.torq
 def test_the_summary_is_that_of_rad_and_newton_metres(tmp_path: Path, header: str, options: str) -> None:
     np.savetxt(tmp_path / "x.csv", COLUMNS, delimiter=",", header=header, comments="")
     call = f"identify {tmp_path}/x.csv --angle angle --torque torque --time t --stiffness constant {options}"
-    done = CliRunner().invoke(main, call.split())
-    assert done.exit_code == 0, done.output
+    done = run(*call.split())
+    assert done.returncode == 0, done.stderr
     expected = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, stiffness="constant")
-    last = done.output.split("inertia = ")[1].split()
+    last = done.stdout.split("inertia = ")[1].split()
     assert float(last[0]) == pytest.approx(expected.constants["inertia"][0], rel=1e-6)
-    assert "?" not in done.output
+    assert "?" not in done.stdout + done.stderr
 
 
 def test_units_that_cannot_be_converted_are_a_line_and_a_status(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "x.csv", COLUMNS, delimiter=",", header="t [ms],angle [deg],torque [V]", comments="")
     call = f"identify {tmp_path}/x.csv --angle angle --torque torque --time t"
-    done = CliRunner().invoke(main, call.split())
-    assert done.exit_code == 2
-    assert "the torque must be in a unit that can be converted to N m; got 'V'; write one of" in done.output
+    done = run(*call.split())
+    assert done.returncode == 2
+    assert "the torque must be in a unit that can be converted to N m; got 'V'; write one of" in done.stderr
     # A scale is known by whoever gives it: the unit of the header is no longer that of the numbers.
-    scaled = CliRunner().invoke(main, [*call.split(), "--torque-scale", "0.001", "--stiffness", "constant"])
-    assert scaled.exit_code == 0, scaled.output
-    times = CliRunner().invoke(
-        main, f"derivatives {tmp_path}/x.csv --channel angle --time t -o {tmp_path}/y.csv".split()
-    )
-    assert times.exit_code == 0, times.output
+    scaled = run(*call.split(), "--torque-scale", "0.001", "--stiffness", "constant")
+    assert scaled.returncode == 0, scaled.stderr
+    times = run(*f"derivatives {tmp_path}/x.csv --channel angle --time t -o {tmp_path}/y.csv".split())
+    assert times.returncode == 0, times.stderr
     assert np.loadtxt(tmp_path / "y.csv", delimiter=",", skiprows=1)[1, 0] == pytest.approx(0.001)

@@ -5,10 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import tvident
-from tvident._command_line import main
+from commands import run
 
 GUESS: dict[str, Any] = {"inertia": 0.0123, "damping": 0.05, "stiffness": 13.0, "band": (0.5, 12)}
 
@@ -97,12 +96,12 @@ def test_what_is_missing_is_said(changed: dict[str, Any], words: str) -> None:
 def test_the_command(tmp_path: Any) -> None:
     numbers = "--inertia 0.0123 --damping 0.05 --stiffness 13 --band 0.5 12 --torque-noise 0.02 --torque-rms 0.01"
     words = ["plan", *numbers.split(), "-o"]
-    ran = CliRunner().invoke(main, [*words, str(tmp_path / "torque.csv")])
-    assert ran.exit_code == 0, ran.output
-    assert "stiffness within 2 %: record" in ran.output
+    ran = run(*words, str(tmp_path / "torque.csv"))
+    assert ran.returncode == 0, ran.stderr
+    assert "stiffness within 2 %: record" in ran.stdout
     assert (tmp_path / "torque.csv").exists()
     rig = tvident.simulate_torsional_rig(duration=4.0)
     tvident.identify(rig.angle, rig.torque, sample_rate=1000).save(tmp_path / "one.npz")
-    more = CliRunner().invoke(main, ["plan", str(tmp_path / "one.npz"), "--more", "60"])
-    assert more.exit_code == 0, more.output
-    assert "now" in more.output
+    more = run("plan", str(tmp_path / "one.npz"), "--more", "60")
+    assert more.returncode == 0, more.stderr
+    assert "now" in more.stdout
