@@ -15,13 +15,13 @@ use crate::exec::stages::Stages;
 use crate::least_squares::bandwidth::{Bandwidth, Neighbours};
 use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares};
 use crate::least_squares::sliding_sums::{Side, WIDTH, sliding_sums};
-use crate::record::samples::{Samples, is_usable};
+use crate::record::samples::is_usable;
 use crate::record::subsample::stretches;
 use crate::simd::vectors::{Kernel, Lanes, dispatch};
 use crate::status::Status;
 
-/// Rows in a piece of work, about.
-const PIECE: usize = 1 << 14;
+/// Rows in a piece of work, about: what is kept of them stays in the second nearest cache.
+const PIECE: usize = 1 << 12;
 
 /// Windows that are finished together.
 const TILE: usize = 256;
@@ -47,7 +47,7 @@ impl RollingLeastSquares {
         watch: &mut Watch<'_>,
     ) -> Result<usize, Error> {
         let rows = equations.columns.first().map_or(0, |column| column.len());
-        let pairs = self.regressors * (self.regressors + 1) / 2;
+        let pairs = self.regressors * (self.regressors - 1) / 2;
         let mut normal: Vec<Vec<f64>> = (0..pairs).map(|_| zeros(rows)).collect::<Result<_, _>>()?;
         self.normal = true;
         let mut stages = Stages::new(workers, rows, 2, watch);
@@ -84,7 +84,7 @@ struct Fits<'a> {
     equations: &'a Equations<'a>,
     rhs: usize,
     parameters: Vec<&'a [f64]>,
-    /// The inverse of every window's normal matrix, its upper triangle row by row.
+    /// What is above the diagonal of the inverse of every window's normal matrix, row by row; the diagonal is where errors are to be.
     normal: &'a [Vec<f64>],
     status: &'a [u16],
 }
@@ -97,6 +97,8 @@ struct RowProducts {
     values: Vec<[f64; WIDTH]>,
     /// Rows that count before each row.
     counts: Vec<u32>,
+    /// The columns that a row's products are made of, one after the other: regressors, the right-hand side, weights.
+    columns: Vec<f64>,
 }
 
 /// Memory of one thread.
@@ -127,13 +129,27 @@ impl Fits<'_> {
         self.plan.regressors.div_ceil(WIDTH)
     }
 
+    /// The result whose window would lie best around a row, if it is valid: at the ends the first and the last full windows do.
+    fn centre(&self, row: usize) -> usize {
+        let (plan, total) = (self.plan, self.rows());
+        (row.saturating_sub(plan.window / 2).min(total.saturating_sub(plan.window)) + plan.before).min(total - 1)
+    }
+
+    fn is_valid(&self, row: usize) -> bool {
+        self.status[row] & Status::INVALID.bits() == 0
+    }
+
+    /// The results around some rows where these are one after the other.
+    fn own_fits(&self, rows: &Range<usize>) -> Option<Range<usize>> {
+        let fits = self.centre(rows.start)..self.centre(rows.end - 1) + 1;
+        let is_inside = rows.start >= self.plan.window / 2 && fits.len() == rows.len();
+        (is_inside && fits.clone().all(|row| self.is_valid(row))).then_some(fits)
+    }
+
     /// The result whose window lies best around each of some rows, or the number of rows where there is none.
     fn nearest(&self, rows: Range<usize>) -> Vec<usize> {
         let (plan, total) = (self.plan, self.rows());
-        let is_valid = |row: usize| self.status[row] & Status::INVALID.bits() == 0;
-        // Full windows lie around rows; at the ends the first and the last of them do for the rows beyond.
-        let last = total.saturating_sub(plan.window);
-        let centre = |row: usize| (row.saturating_sub(plan.window / 2).min(last) + plan.before).min(total - 1);
+        let (is_valid, centre) = (|row: usize| self.is_valid(row), |row: usize| self.centre(row));
         let begin = centre(rows.start).saturating_sub(plan.window);
         let end = total.min(centre(rows.end - 1) + plan.window);
         if (begin..end).all(is_valid) {
@@ -167,27 +183,27 @@ impl Fits<'_> {
         products.values.resize(length * vectors, [0.0; WIDTH]);
         products.counts.clear();
         products.counts.resize(length + 1, 0);
-        let read = |samples: &dyn Samples| {
-            let mut into = vec![0.0; rows.len()];
-            samples.read(rows.start, &mut into);
-            into
-        };
         if !rows.is_empty() {
-            let columns: Vec<Vec<f64>> = self.equations.columns[..p].iter().map(|column| read(*column)).collect();
-            let mut residuals = read(self.equations.columns[p + self.rhs]);
-            self.take_off_fits(&rows, &columns, &mut residuals);
-            let weights = self.equations.weights.map(read);
+            let RowProducts { values, counts, columns, .. } = products;
+            let sources = self.equations.columns[..p].iter().chain([&self.equations.columns[p + self.rhs]]);
+            columns.clear();
+            columns.resize((p + 2) * rows.len(), 1.0);
+            for (source, into) in sources.chain(&self.equations.weights).zip(columns.chunks_mut(rows.len())) {
+                source.read(rows.start, into);
+            }
+            let (columns, rest) = columns.split_at_mut(p * rows.len());
+            let (residuals, weights) = rest.split_at_mut(rows.len());
+            self.take_off_fits(&rows, columns, residuals);
             let skipped = (rows.start.cast_signed() - range.start).unsigned_abs();
-            let (values, counts) = (&mut products.values[skipped * vectors..], &mut products.counts[skipped + 1..]);
-            for (place, residual) in residuals.iter_mut().enumerate() {
-                let weight = weights.as_ref().map_or(1.0, |weights| weights[place]);
-                let counted = is_usable(*residual) && weight > 0.0;
-                counts[place] = u32::from(counted);
+            let (values, counts) = (&mut values[skipped * vectors..], &mut counts[skipped + 1..]);
+            for ((count, residual), weight) in counts.iter_mut().zip(&mut *residuals).zip(&*weights) {
+                let counted = is_usable(*residual) && *weight > 0.0;
+                *count = u32::from(counted);
                 *residual = if counted { weight * *residual } else { 0.0 };
             }
-            for (regressor, column) in columns.iter().enumerate() {
+            for (regressor, column) in columns.chunks(rows.len()).enumerate() {
                 let of_rows = values[regressor / WIDTH..].iter_mut().step_by(vectors);
-                for ((row, residual), x) in of_rows.zip(&residuals).zip(column) {
+                for ((row, residual), x) in of_rows.zip(&*residuals).zip(column) {
                     // A row that does not count may hold what is no number.
                     row[regressor % WIDTH] = if *residual == 0.0 { 0.0 } else { residual * x };
                 }
@@ -200,21 +216,22 @@ impl Fits<'_> {
         }
     }
 
-    /// Takes off what fits explain of some rows.
+    /// Takes off what fits explain of some rows, whose regressors stand one after the other.
     #[inline(always)]
-    fn take_off_fits(&self, rows: &Range<usize>, columns: &[Vec<f64>], residuals: &mut [f64]) {
-        let fits = self.nearest(rows.clone());
-        let (first, end) = (fits[0], fits[0] + fits.len());
-        let in_order = end <= self.rows() && fits.iter().zip(first..).all(|(&fit, row)| fit == row);
-        for (column, parameters) in columns.iter().zip(&self.parameters) {
-            if in_order {
-                for ((residual, x), parameter) in residuals.iter_mut().zip(column).zip(&parameters[first..end]) {
+    fn take_off_fits(&self, rows: &Range<usize>, columns: &[f64], residuals: &mut [f64]) {
+        let all = columns.chunks(rows.len()).zip(&self.parameters);
+        if let Some(fits) = self.own_fits(rows) {
+            for (column, parameters) in all {
+                for ((residual, x), parameter) in residuals.iter_mut().zip(column).zip(&parameters[fits.clone()]) {
                     *residual -= x * parameter;
                 }
-            } else {
-                for ((residual, x), &fit) in residuals.iter_mut().zip(column).zip(&fits) {
-                    *residual -= x * parameters.get(fit).copied().unwrap_or(f64::NAN);
-                }
+            }
+            return;
+        }
+        let fits = self.nearest(rows.clone());
+        for (column, parameters) in all {
+            for ((residual, x), &fit) in residuals.iter_mut().zip(column).zip(&fits) {
+                *residual -= x * parameters.get(fit).copied().unwrap_or(f64::NAN);
             }
         }
     }
@@ -225,9 +242,8 @@ impl Fits<'_> {
             .map(|rows| Piece { size: rows.len(), content: rows })
             .collect();
         let (p, vectors) = (self.plan.regressors, self.vectors());
-        let of_rows = |rows: Range<usize>, (): &mut ()| {
-            let mut products = RowProducts::default();
-            self.products(rows.start.cast_signed()..rows.end.cast_signed(), &mut products);
+        let of_rows = |rows: Range<usize>, products: &mut RowProducts| {
+            self.products(rows.start.cast_signed()..rows.end.cast_signed(), products);
             let mut sums = vec![Neighbours::default(); p];
             for (regressor, sums) in sums.iter_mut().enumerate() {
                 let at = |row: usize| products.values[row * vectors + regressor / WIDTH][regressor % WIDTH];
@@ -237,7 +253,7 @@ impl Fits<'_> {
             }
             sums
         };
-        let found = stages.map(pieces, || (), of_rows)?;
+        let found = stages.map(pieces, RowProducts::default, of_rows)?;
         let mut all = vec![Neighbours::default(); p];
         for sums in &found {
             all.iter_mut().zip(sums).for_each(|(all, sums)| all.merge(sums));
@@ -354,7 +370,7 @@ impl<'a, 'b> ErrorScale<'a, 'b> {
         Self { whole: scale.of(rows, 0.0, rows), ..scale }
     }
 
-    /// Writes the errors of some windows from the sums of squares of each.
+    /// Writes the errors of some windows, where the diagonals of their normal matrices are, from the sums of squares of each.
     #[inline(always)]
     fn write<'c>(
         &self,
@@ -364,27 +380,28 @@ impl<'a, 'b> ErrorScale<'a, 'b> {
         errors: impl Iterator<Item = &'c mut [f64]>,
     ) {
         let (p, kept) = (self.fits.plan.regressors, &self.kept);
-        let pair = |i: usize, k: usize| {
-            let (i, k) = (i.min(k), i.max(k));
-            i * p - i * i.saturating_sub(1) / 2 + k - i
-        };
         let mut scale = [0.0; TILE];
         for (scale, row) in scale.iter_mut().zip(rows.clone()) {
             *scale = self.of_window(row, products);
         }
+        let normal = |i: usize, k: usize| {
+            let (i, k) = (i.min(k), i.max(k));
+            &self.fits.normal[i * (2 * p - i - 1) / 2 + k - i - 1][rows.clone()]
+        };
         for (a, into) in errors.enumerate() {
+            let row_of_normal = |k: usize| if k == a { &*into } else { normal(a, k) };
             let mut variance = [0.0; TILE];
             for b in 0..p {
                 let mut inner = [0.0; TILE];
                 for c in 0..p {
                     let kept = kept[b] * kept[c];
-                    let (of, sum) = (&self.fits.normal[pair(c, a)][rows.clone()], &sums[pair(b, c)]);
-                    for ((inner, of), sum) in inner.iter_mut().zip(of).zip(sum) {
+                    let (i, k) = (b.min(c), b.max(c));
+                    let sum = &sums[i * p - i * i.saturating_sub(1) / 2 + k - i];
+                    for ((inner, of), sum) in inner.iter_mut().zip(row_of_normal(c)).zip(sum) {
                         *inner += kept * of * sum;
                     }
                 }
-                let of = &self.fits.normal[pair(b, a)][rows.clone()];
-                for ((variance, of), inner) in variance.iter_mut().zip(of).zip(&inner) {
+                for ((variance, of), inner) in variance.iter_mut().zip(row_of_normal(b)).zip(&inner) {
                     *variance += of * inner;
                 }
             }

@@ -280,7 +280,7 @@ pub(crate) fn finish<S: Lanes, H: Dimensions>(
     });
     let nothing = simd.select_f64s(determined, simd.splat_f64s(0.0), simd.splat_f64s(f64::NAN));
     if plan.normal {
-        let pairs = (0..p).flat_map(|i| (i..p).map(move |k| (i, k)));
+        let pairs = (0..p).flat_map(|i| (i + 1..p).map(move |k| (i, k)));
         for (pair, (i, k)) in pairs.enumerate() {
             let entry = simd.add_f64s(covariance(simd, shape, values, i, k), nothing);
             tile.put(simd, slots.normal + pair, offset, entry);
@@ -301,7 +301,8 @@ pub(crate) fn finish<S: Lanes, H: Dimensions>(
                 Some(variances) => variances[shape.row(i)],
                 None => covariance(simd, shape, values, i, i),
             };
-            let error = simd.mul_f64s(simd.sqrt_f64s(over), deviation);
+            let error =
+                if plan.normal { simd.add_f64s(over, nothing) } else { simd.mul_f64s(simd.sqrt_f64s(over), deviation) };
             tile.put(simd, slots.errors + i * q + rhs, offset, error);
         }
     }

@@ -49,7 +49,7 @@ pub struct RollingLeastSquares {
     pub(crate) at_least: Option<usize>,
     /// Whether the residual of each window at its own row, and R², are wanted.
     pub(crate) fit: bool,
-    /// Whether the inverse of every window's normal matrix is wanted.
+    /// Whether the inverse of every window's normal matrix is wanted: its diagonal in the place of the errors.
     pub(crate) normal: bool,
     /// How weights become less away from the row that a window belongs to.
     pub(crate) fading: Option<Fading>,
@@ -94,7 +94,7 @@ pub struct Regressions<'a> {
     pub own_residuals: Vec<&'a mut [f64]>,
     /// The part of the squares of every right-hand side that is explained, likewise.
     pub rsquared: Vec<&'a mut [f64]>,
-    /// The inverse of the normal matrix, its upper triangle row by row, where the plan asks for it.
+    /// What is above the diagonal of the inverse of the normal matrix, row by row, where the plan asks for it.
     pub normal: Vec<&'a mut [f64]>,
     /// Condition number of the regressors, each scaled to the same norm.
     pub condition: &'a mut [f64],
@@ -281,7 +281,7 @@ impl Slots {
         let fits = if plan.fit { q } else { 0 };
         let rsquared = own_residuals + fits;
         let normal = rsquared + fits;
-        let condition = normal + if plan.normal { p * (p + 1) / 2 } else { 0 };
+        let condition = normal + if plan.normal { p * (p - 1) / 2 } else { 0 };
         Self { errors, covariances, residuals, deviations, own_residuals, rsquared, normal, condition }
     }
 
