@@ -98,10 +98,48 @@ def test_polynomials_are_exact_and_results_are_at_their_own_times() -> None:
     assert np.isfinite(beside.derivatives[0, :190]).all()
 
 
+@settings(max_examples=6)
+@given(seed=st.integers(0, 10_000), scatter=st.floats(0.05, 0.9), gap=st.booleans())
+def test_windows_are_chosen_at_irregular_times(seed: int, scatter: float, gap: bool) -> None:
+    generator = np.random.default_rng(seed)
+    steps = generator.uniform(1 - scatter, 1 + scatter, 1200) / 200
+    steps[600] += 2.0 if gap else 0.0
+    times = 3.0 + np.cumsum(steps)
+    rates = 2 * np.pi * generator.uniform(1, 8, (3, 1))
+    phases = generator.uniform(0, 6, (3, 1))
+    truth = np.array([np.sum(rates**k * np.sin(rates * times + phases + k * np.pi / 2), axis=0) for k in range(3)])
+    y = truth[0] + 0.02 * generator.standard_normal(times.size)
+    found = tvident.fit_local_polynomials(y, "auto", t=times)
+    inside = np.ones(times.size, bool)
+    for end in (0, times.size, *([600] if gap else [])):
+        inside[max(0, end - 100) : end + 100] = False
+    for derivative in range(3):
+        # What a user gets who tries windows and knows the truth: the choice may cost half as much again.
+        tried = [
+            tvident.fit_local_polynomials(y, length, t=times).derivatives[derivative]
+            for length in (15, 25, 41, 65, 101)
+        ]
+        least = min(np.sqrt(np.mean((one - truth[derivative])[inside] ** 2)) for one in tried)
+        assert np.sqrt(np.mean((found.derivatives[derivative] - truth[derivative])[inside] ** 2)) < 1.5 * least
+        away = np.abs(found.derivatives[derivative] - truth[derivative])[inside] / found.stderr[derivative][inside]
+        assert np.mean(away < 1.96) > 0.8
+    assert found.window_length.shape == (3,)  # type: ignore[union-attr]
+    assert found.order.shape == found.status.shape == times.shape
+    every = tvident.fit_local_polynomials(np.stack([y, y]), "auto", t=times, step=7)
+    assert np.array_equal(every.derivatives[:, 1], found.derivatives[:, ::7])
+    assert np.array_equal(every.stderr[:, 0], found.stderr[:, ::7])
+
+
+def test_times_too_irregular_for_a_choice_say_so() -> None:
+    times = np.sort(np.random.default_rng(0).uniform(0, 5, 1000))
+    with pytest.raises(ValueError, match=r"scatter by no more than 1\.5 of a step; .* give a duration"):
+        tvident.fit_local_polynomials(np.sin(times), "auto", t=times)
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        ({"window_length": "auto"}, "window_length='auto' needs uniform times"),
+        ({"window_length": "auto", "selection": "pooled"}, "selection chooses the order in a window that is given"),
         ({"window_length": 21, "selection": "pooled"}, "selection must be 'window' where t is not uniform"),
         ({"window_length": 21, "loss": "huber"}, "loss must be 'squares' where t is not uniform"),
         ({"window_length": "9 s"}, "less than or equal to the length of the record; got 9 s for a record of"),

@@ -163,8 +163,12 @@ def fit_local_polynomials(
     derivative above the order is zero and has no standard error (NaN). This costs some 50 µs a window of 201 samples and thread.
 
     Where `t` is not uniform every window has a design of its own, and derivatives are those at each sample's own time. A duration takes
-    the samples that lie in it, however many; windows with fewer than 5 are NaN. ``"auto"``, ``"pooled"`` and ``"average"`` need uniform
-    times. A window of 201 samples takes some 50 µs.
+    the samples that lie in it, however many; windows with fewer than 5 are NaN. ``"auto"`` chooses window and order of every derivative
+    from the samples as splines bring them onto a uniform grid, and takes the window's duration, or its number of samples where fewer lie
+    in that than the order needs; steps longer than half of it split the record. On sums of sines with noise whose steps scatter by up to
+    1.4 of a step (the most is 1.5) the error is 0.1 to 1.4 times that with the best of six windows. Standard errors are those of the
+    order without its bias: nominal 95 % intervals cover 84 to 96 %. ``"pooled"`` and ``"average"`` need uniform times. A window of 201
+    samples takes some 50 µs.
 
     The cost is about 15 ns a sample and thread for any window length on a processor with AVX-512, about twice that with AVX2; averaged
     about twice as much; pooled about 300 ns, because the orders of every window need logarithms; ``"auto"`` about 5 µs a sample and
@@ -222,17 +226,36 @@ def fit_local_polynomials(
     turned = None if period is None else arguments.unwrapped("y", samples, period)
     samples = samples if turned is None else turned.values
     sampled = Sampled(every, seconds, arguments.begin_of(t), arguments.labels_of(y), times)
+    automatic = isinstance(window_length, str) and window_length.strip() == "auto"
+    if automatic:
+        _check_left_to_the_rule(criterion, selection)
+
+    def plan_of_window(length: int, highest: int = max_order, derivative: int = max_deriv) -> _core.LocalPolynomials:
+        return plan(
+            length,
+            order=order,
+            max_order=highest,
+            criterion=criterion,
+            selection=selection,
+            derivatives=tuple(range(derivative + 1)),
+            delta=seconds,
+            noise=True,
+            quantisation=step_of_rounding,
+        )
+
+    choose_automatically = partial(
+        choose, plan_of_window=plan_of_window, max_order=max_order, order=order, workers=threads
+    )
     if times is not None:
-        check_plain(nan_policy, weights, max_gap, min_observations)
+        check_plain(nan_policy, weights, max_gap, min_observations, selection=selection, loss=loss)
         found = at_own_times(
             samples,
             times,
             window_length,
+            choose_on=partial(choose_automatically, max_deriv=max_deriv, quantisation=None, step=1, progress=None),
             order=order,
             max_order=max_order,
             criterion=criterion,
-            selection=selection,
-            loss=loss,
             max_deriv=max_deriv,
             quantisation=step_of_rounding,
             step=every,
@@ -241,37 +264,17 @@ def fit_local_polynomials(
         )
         found.settings.update(_of_wrapped(turned, period))
         return LocalPolynomialFit(samples, axis, found, sampled)
-    automatic = isinstance(window_length, str) and window_length.strip() == "auto"
     length = 0 if automatic else _window(window_length, seconds, count)
-    if automatic:
-        _check_left_to_the_rule(criterion, selection)
     incomplete = incomplete_given(
         nan_policy, weights, max_gap, min_observations, shape=array.shape, length=length, period=seconds, axis=axis
     )
     if incomplete is not None:
         check_whole_windows(automatic=automatic, selection=selection, loss=loss)
 
-    def plan_of_window(length: int) -> _core.LocalPolynomials:
-        return plan(
-            length,
-            order=order,
-            max_order=max_order,
-            criterion=criterion,
-            selection=selection,
-            derivatives=tuple(range(max_deriv + 1)),
-            delta=seconds,
-            noise=True,
-            quantisation=step_of_rounding,
-        )
-
     choose_automatically = partial(
-        choose,
-        plan_of_window=plan_of_window,
-        max_order=max_order,
-        order=order,
+        choose_automatically,
         delta=seconds,
         quantisation=None if quantisation is None and turned is None else step_of_rounding,
-        workers=threads,
     )
     if arguments.one_of("loss", loss, get_args(Loss)) == "huber":
         for _ in range(_CHOICES if automatic else 1):

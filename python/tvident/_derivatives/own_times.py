@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
+from tvident._derivatives.automatic_times import choose_at_own_times
 from tvident._derivatives.found import Found
 from tvident._derivatives.plans import SHORTEST_WINDOW
 
@@ -21,8 +23,13 @@ def period_or_times(samples: int, **given: Any) -> tuple[float, npt.NDArray[np.f
         return float(error.times[-1] - error.times[0]) / (samples - 1), error.times
 
 
-def check_plain(nan_policy: str, *others: object) -> None:
+def check_plain(nan_policy: str, *others: object, selection: str, loss: str) -> None:
     """Refuse what only windows of uniform times know."""
+    for name, value, known in (("selection", selection, "window"), ("loss", loss, "squares")):
+        if value != known:
+            raise ValueError(
+                f"{name} must be {known!r} where t is not uniform; got {arguments.shown(value)}; leave it out, or resample the record"
+            )
     if nan_policy == "omit" or any(one is not None for one in others):
         raise ValueError(
             "nan_policy='omit', weights, max_gap and min_observations need uniform times; those of t are not; leave them out, or leave the "
@@ -36,27 +43,22 @@ def at_own_times(
     times: npt.NDArray[np.float64],
     window_length: int | str,
     *,
+    choose_on: Callable[..., Found],
     order: int | None,
     max_order: int,
     criterion: str,
-    selection: str,
-    loss: str,
     max_deriv: int,
     quantisation: float,
     step: int,
     workers: int | None,
     progress: arguments.Progress,
 ) -> Found:
-    """Return what was found in windows of so many samples, or of a duration such as ``"0.2 s"``."""
+    """Return what was found in windows of so many samples, of a duration such as ``"0.2 s"``, or chosen as on a uniform grid."""
+    if isinstance(window_length, str) and window_length.strip() == "auto":
+        return choose_at_own_times(
+            samples, times, choose_on, quantisation=quantisation, step=step, workers=workers, progress=progress
+        )
     length = _length(window_length, times)
-    if selection != "window":
-        raise ValueError(
-            f"selection must be 'window' where t is not uniform; got {arguments.shown(selection)}; leave it out, or resample the record"
-        )
-    if loss != "squares":
-        raise ValueError(
-            f"loss must be 'squares' where t is not uniform; got {arguments.shown(loss)}; leave it out, or resample the record"
-        )
     if order is not None and isinstance(length, int) and order >= length:
         raise ValueError(
             f"order must be less than window_length; got order {order} for a window of {length} samples; lower the order or lengthen the "
@@ -78,8 +80,8 @@ def at_own_times(
         "order": order,
         "max_order": max_order,
         "criterion": criterion,
-        "selection": selection,
-        "loss": loss,
+        "selection": "window",
+        "loss": "squares",
         "quantisation": quantisation,
     }
     return Found(
@@ -100,11 +102,6 @@ def _length(window_length: int | str, times: npt.NDArray[np.float64]) -> int | f
         length = arguments.window_length("window_length", window_length, 1.0, odd=True)
         arguments.check_window("window_length", length, times.size, least=SHORTEST_WINDOW)
         return length
-    if window_length.strip() == "auto":
-        raise ValueError(
-            "window_length='auto' needs uniform times; those of t are not; give samples or a duration such as '0.2 s', or resample the "
-            "record"
-        )
     seconds, record = arguments.seconds("window_length", window_length), float(times[-1] - times[0])
     if seconds > record:
         raise ValueError(
