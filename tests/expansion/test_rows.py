@@ -1,5 +1,6 @@
 """Rows of expanded coefficients, their noise, and their least squares, compared with slow references."""
 
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -141,6 +142,37 @@ def test_derivatives_of_families_are_those_of_their_values(name: str) -> None:
         found = family.values(places, size, derivative)
         # Central differences: the third derivative times the step squared, and rounding over the step.
         assert np.abs((after - before) / (2 * step) - found).max() < 1e-6 * max(1, np.abs(found).max())
+
+
+@settings(max_examples=10)
+@given(seed=st.integers(0, 1000), sizes=st.tuples(st.integers(1, 5), st.integers(1, 4)), same=st.booleans())
+def test_blocks_are_summed_and_sizes_compared_as_if_each_were_solved(
+    seed: int, sizes: tuple[int, int], *, same: bool
+) -> None:
+    samples = 900
+    one = record(seed, samples, 16, 6)
+    walk = np.cumsum(np.random.default_rng(seed).standard_normal(samples))
+    channel = Coordinate((walk - walk.min()) / np.ptp(walk), np.zeros((2, samples)), (0.0, 1.0))
+    pulse = family_of("block_pulse", 3)
+    both = Basis([channel, of_time("legendre", 1, samples).coordinates[0]], [pulse, pulse], sizes)
+    # The same functions without their blocks.
+    plain = Basis(both.coordinates, [replace(pulse, block=None)] * 2, sizes)
+    found, expected = (one.columns([Unknown("k", "stiffness", each)], one.angle, slice(None)) for each in (both, plain))
+    np.testing.assert_allclose(found, expected, atol=ROUNDING * np.abs(expected).max())
+    unknowns = [Unknown("k", "stiffness", both), Unknown("c", "damping")]
+    # Columns that are made of others are left to decompositions.
+    unknowns += [Unknown("again", "damping")] if same else []
+    nothing = ("stiffness", [np.zeros(samples)])
+    around = Linearised(one, [nothing], np.zeros(samples), (1e-6, 1.0), [])
+    scored, fitted = around.score(unknowns), around.solve(unknowns)
+    assert scored.criterion == pytest.approx(fitted.scored.criterion, rel=1e-9)
+    white = np.concatenate(list(around.whitened(unknowns)))
+    values, left, rank, _ = np.linalg.lstsq(white[:, :-1], white[:, -1])
+    assert np.isfinite(fitted.condition) == (rank == white.shape[1] - 1)
+    if np.isfinite(fitted.condition):
+        # The condition number, some hundred here, times rounding.
+        np.testing.assert_allclose(fitted.values, values, atol=1e-9 * np.abs(values).max())
+        assert scored.misfit == pytest.approx(float(left[0]), rel=1e-9)
 
 
 def test_functions_of_two_channels_are_products() -> None:

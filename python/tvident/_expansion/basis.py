@@ -73,6 +73,16 @@ class Basis:
         both = _products(second[0], values[1]) + _products(values[0], second[1])
         return np.asarray(both + 2 * _products(first[0], first[1]))
 
+    def blocks(self, samples: slice) -> npt.NDArray[np.int64] | None:
+        """Return which function is one at some samples, where functions are one at a time and zero otherwise; None for others."""
+        if any(family.block is None for family in self.families):
+            return None
+        found = np.zeros(1, np.int64)
+        for coordinate, family, size in zip(self.coordinates, self.families, self.sizes, strict=True):
+            assert family.block is not None  # noqa: S101 - for mypy
+            found = found * size + family.block(coordinate.places[samples], size)
+        return found
+
     def at(self, places: Sequence[Array]) -> Array:
         """Return the functions at places from 0 to 1, shape (places, size)."""
         each = [

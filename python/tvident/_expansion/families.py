@@ -16,6 +16,8 @@ from tvident._expansion.wavelets import haar_values, scaling_values
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
+Blocks: TypeAlias = npt.NDArray[np.int64]
+
 Values: TypeAlias = Callable[[Array, int, int], Array]
 """Of places, a size and the order of a derivative: an array of shape (places, size)."""
 
@@ -34,11 +36,14 @@ class Family:
         Gives the sizes from the smallest on.
     smooth : int
         How many derivatives are continuous, of those that equations need.
+    block : callable, optional
+        Of places and a size: which function is one there, where all others are zero.
     """
 
     values: Values
     sizes: Callable[[], Iterator[int]]
     smooth: int = 2
+    block: Callable[[Array, int], Blocks] | None = None
 
 
 def every(first: int = 1, step: int = 1) -> Iterator[int]:
@@ -99,8 +104,12 @@ def _fourier(places: Array, size: int, derivative: int) -> Array:
 def _block_pulse(places: Array, size: int, derivative: int) -> Array:
     if derivative:
         raise ValueError("block pulses have no derivatives")
-    block = np.clip((places * size).astype(np.int64), 0, size - 1)
-    return np.asarray((block[:, np.newaxis] == np.arange(size)).astype(np.float64))
+    return np.asarray((_block(places, size)[:, np.newaxis] == np.arange(size)).astype(np.float64))
+
+
+def _block(places: Array, size: int) -> Blocks:
+    """Return the block pulse that is one at each place."""
+    return np.clip((places * size).astype(np.int64), 0, size - 1)
 
 
 FAMILIES: dict[str, Family] = {
@@ -110,7 +119,7 @@ FAMILIES: dict[str, Family] = {
     "powers": Family(_legendre, every),
     "fourier": Family(_fourier, partial(every, 1, 2)),
     "laguerre": Family(_laguerre, every),
-    "block_pulse": Family(_block_pulse, every, smooth=-1),
+    "block_pulse": Family(_block_pulse, every, smooth=-1, block=_block),
     "haar": Family(haar_values, _doubled, smooth=-1),
     **{
         f"db{order}": Family(partial(scaling_values, order), partial(every, 2 * order), smooth=0)

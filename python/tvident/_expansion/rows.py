@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -167,7 +167,7 @@ class Record:
             begin, end = max(0, first - ahead), min(self.rows, first + PIECE)
             yield slice(begin, end), slice(begin * self.stride, (end - 1) * self.stride + self.length)
 
-    def windows(self, channel: Array) -> Array:
+    def windows(self, channel: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return the windows of the rows in a stretch of a channel, shape (rows, 2h + 1): a view."""
         return np.lib.stride_tricks.sliding_window_view(channel, self.length)[:: self.stride]
 
@@ -181,12 +181,22 @@ class Record:
             if one.basis is None:
                 found.append((each @ weights[0])[:, np.newaxis])
                 continue
+            blocks = one.basis.blocks(samples)
+            if blocks is not None:
+                found.append(self._sums(each * weights[0], blocks, one.size))
+                continue
             column = np.zeros((len(each), one.size))
             for rate, weight in enumerate(weights):
                 functions = one.basis.along(samples, rate)
                 self._add_products(each * weight, functions, column)
             found.append(column)
         return np.concatenate(found, axis=1)
+
+    def _sums(self, weighted: Array, blocks: npt.NDArray[np.int64], size: int) -> Array:
+        """Return the sums of weighted windows over the samples of every block: the products with functions that are one at a time."""
+        into = self.windows(blocks) + size * np.arange(len(weighted))[:, np.newaxis]
+        sums = np.bincount(into.ravel(), weighted.ravel(), len(weighted) * size)
+        return np.asarray(sums, np.float64).reshape(-1, size)
 
     def _add_products(self, weighted: Array, functions: Array, into: Array) -> None:
         """Add the products of weighted windows with functions, each where it is not zero."""

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from tvident._expansion.basis import Basis, Coordinate
 from tvident._expansion.families import Family
-from tvident._expansion.fit import Curves, Fitted, Linearised
+from tvident._expansion.fit import Curves, Fitted, Linearised, Scored
 from tvident._expansion.rivals import Rival, scatter
 from tvident._expansion.rows import Record, Unknown
 
@@ -116,7 +116,7 @@ class Search:
     known: Curves
     tried: dict[tuple[int, ...], Tried] = field(default_factory=dict)
     rivals: dict[str, list[Rival]] = field(default_factory=dict)
-    _solutions: dict[tuple[int, ...], tuple[list[Unknown], Fitted]] = field(default_factory=dict)
+    _scores: dict[tuple[int, ...], tuple[list[Unknown], Scored]] = field(default_factory=dict)
 
     def run(self, curves: Curves, terms: Array) -> tuple[list[Unknown], Fitted, Linearised]:
         """Return the unknowns with their sizes, their factors, and the rows around them.
@@ -139,13 +139,14 @@ class Search:
         before: list[list[int]] = []
         for _ in range(_ROUNDS):
             self.tried.clear()
-            self._solutions.clear()
-            sizes, fitted = self._chosen(around, sizes, fitted, free)
+            self._scores.clear()
+            sizes = self._chosen(around, sizes, free)
+            compared, fitted = around, self._solved(around, sizes)
             around = self._around(sizes, fitted)
             if not free or sizes == before:
                 break
             before = [list(one) for one in sizes]
-        self.rivals = self._rivals(sizes)
+        self.rivals = self._rivals(compared, sizes)
         for _ in range(_STEPS):
             last, fitted = fitted, self._solved(around, sizes)
             if not abs(fitted.misfit - last.misfit) > _SETTLED * last.misfit:
@@ -153,25 +154,21 @@ class Search:
             around = self._around(sizes, fitted)
         return self._unknowns(sizes), fitted, around
 
-    def _chosen(
-        self, around: Linearised, sizes: list[list[int]], fitted: Fitted, free: Sequence[tuple[int, int]]
-    ) -> tuple[list[list[int]], Fitted]:
+    def _chosen(self, around: Linearised, sizes: list[list[int]], free: Sequence[tuple[int, int]]) -> list[list[int]]:
         """Return the sizes of the lowest criterion: one after the other, as long as that lowers it."""
-        fitted = self._solved(around, sizes)
+        self._score(around, sizes)
         for _ in range(1 if len(free) <= 1 else _ROUNDS):
             start = [list(one) for one in sizes]
             for part, place in free:
-                sizes, fitted = self._one_size(around, sizes, fitted, (part, place))
+                sizes = self._one_size(around, sizes, (part, place))
             if sizes == start:
                 break
-        return sizes, fitted
+        return sizes
 
-    def _one_size(
-        self, around: Linearised, sizes: list[list[int]], fitted: Fitted, free: tuple[int, int]
-    ) -> tuple[list[list[int]], Fitted]:
+    def _one_size(self, around: Linearised, sizes: list[list[int]], free: tuple[int, int]) -> list[list[int]]:
         """Return the sizes with one of them chosen, beside the others."""
         part, place = free
-        found: list[tuple[list[list[int]], Fitted]] = []
+        found: list[tuple[list[list[int]], float]] = []
         best, last = np.inf, 0
         for size in self._sizes(part, place):
             if size > _BEYOND * last + _BEYOND_BY and np.isfinite(best):
@@ -180,12 +177,12 @@ class Search:
             trial[part][place] = size
             if math.prod(trial[part]) > self.parts[part].largest:
                 break
-            found.append((trial, self._solved(around, trial)))
-            if found[-1][1].criterion < best:
-                best, last = found[-1][1].criterion, size
+            found.append((trial, self._score(around, trial).criterion))
+            if found[-1][1] < best:
+                best, last = found[-1][1], size
         if not np.isfinite(best):
-            return sizes, fitted
-        return next(one for one in found if one[1].criterion <= best + SLACK)
+            return sizes
+        return next(one for one, criterion in found if criterion <= best + SLACK)
 
     def _sizes(self, part: int, place: int) -> Iterator[int]:
         one = self.parts[part]
@@ -212,29 +209,38 @@ class Search:
     def _solved(self, around: Linearised, sizes: Sequence[Sequence[int]]) -> Fitted:
         unknowns = self._unknowns(sizes)
         fitted = around.solve(unknowns)
-        expanded = {one.name: tuple(size) for one, size in zip(self.parts, sizes, strict=True) if size}
-        count = sum(one.size for one in unknowns)
-        residual = fitted.misfit / fitted.observations if fitted.observations else float("nan")
-        self._solutions[_key(sizes)] = unknowns, fitted
-        self.tried[_key(sizes)] = Tried(expanded, fitted.criterion, residual, count)
+        self._keep(sizes, unknowns, fitted.scored)
         return fitted
 
-    def _rivals(self, sizes: Sequence[Sequence[int]]) -> dict[str, list[Rival]]:
+    def _score(self, around: Linearised, sizes: Sequence[Sequence[int]]) -> Scored:
+        unknowns = self._unknowns(sizes)
+        found = around.score(unknowns)
+        self._keep(sizes, unknowns, found)
+        return found
+
+    def _keep(self, sizes: Sequence[Sequence[int]], unknowns: list[Unknown], scored: Scored) -> None:
+        """Keep what sizes gave."""
+        expanded = {one.name: tuple(size) for one, size in zip(self.parts, sizes, strict=True) if size}
+        residual = scored.misfit / scored.observations if scored.observations else float("nan")
+        self._scores[_key(sizes)] = unknowns, scored
+        self.tried[_key(sizes)] = Tried(expanded, scored.criterion, residual, scored.size)
+
+    def _rivals(self, around: Linearised, sizes: Sequence[Sequence[int]]) -> dict[str, list[Rival]]:
         """Return the curves of all sizes that explain the record nearly as well, the one that was taken first, by name."""
-        taken = self._solutions[_key(sizes)]
-        least = min(fitted.criterion for _, fitted in self._solutions.values())
+        taken = self._scores[_key(sizes)][0]
+        least = min(scored.criterion for _, scored in self._scores.values())
         if not np.isfinite(least):
             return {}
-        weights = {key: math.exp((least - fitted.criterion) / 2) for key, (_, fitted) in self._solutions.items()}
+        weights = {key: math.exp((least - scored.criterion) / 2) for key, (_, scored) in self._scores.items()}
         whole = sum(weights.values())
         others = [
-            (weights[key] / whole, *solution)
-            for key, solution in self._solutions.items()
+            (weights[key] / whole, unknowns)
+            for key, (unknowns, _) in self._scores.items()
             if key != _key(sizes) and weights[key] > _NEGLIGIBLE * whole
         ]
         found: dict[str, list[Rival]] = {}
-        for weight, unknowns, fitted in [(1.0, *taken), *others]:
-            first = 0
+        for weight, unknowns in [(1.0, taken), *others]:
+            fitted, first = around.solve(unknowns), 0
             for one in unknowns:
                 place = slice(first, first + one.size)
                 first += one.size
