@@ -16,7 +16,7 @@ def told(one: npt.NDArray[np.float64], several: npt.NDArray[np.float64]) -> None
     """Hold calls for mypy, which `make lint` runs and which fails where the class is another one; nobody calls this."""
     diagonal = tvident.Matrix("diagonal")
     assert_type(tvident.identify(one, one, sample_rate=500, stiffness=3.0), tvident.Identification)
-    assert_type(tvident.identify(several[0], several[1], sample_rate=500), tvident.Identification)
+    assert_type(tvident.identify(several, several, sample_rate=500), tvident.Identification)
     assert_type(
         tvident.identify(several, several, sample_rate=500, dof_axis=0, inertia=diagonal), tvident.MergedIdentification
     )
@@ -24,6 +24,16 @@ def told(one: npt.NDArray[np.float64], several: npt.NDArray[np.float64]) -> None
         tvident.identify([one, one], [one, one], sample_rate=500, ensemble_axis=0), tvident.MergedIdentification
     )
     assert_type(tvident.identify([one], [one], sample_rate=500, share=("inertia",)), tvident.IdentifiedRecords)
+    assert_type(tvident.identify(several, several, sample_rate=500, share="inertia"), tvident.IdentifiedRecords)
+    assert_type(
+        tvident.identify([one, one], [one, one], sample_rate=500), tvident.Identification | tvident.IdentifiedRecords
+    )
+    assert_type(tvident.identify([one, one], [one, one], sample_rate=500)[0], tvident.Identification)
+    assert_type(tvident.identify([0.0, 1.0], [0.0, 1.0], sample_rate=500), tvident.Identification)
+    assert_type(tvident.identify(None, one, velocity=one, sample_rate=500), tvident.Identification)
+    assert_type(
+        tvident.identify(one, one, sample_rate=500, stiffness=tvident.Expansion("bspline")), tvident.Identification
+    )
 
 
 def test_all_options_are_among_the_types() -> None:

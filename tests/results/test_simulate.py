@@ -234,8 +234,10 @@ def test_a_part_that_was_held_back_tells_a_good_model_from_a_bad_one(
 
 def test_noise_that_no_model_explains_is_not_explained() -> None:
     generator = np.random.default_rng(3)
-    noise = generator.standard_normal((2, 4000))
-    result = tvident.identify(*noise, sample_rate=1000, inertia="constant", damping="constant", stiffness="constant")
+    angle, torque = generator.standard_normal((2, 4000))
+    result = tvident.identify(
+        angle, torque, sample_rate=1000, inertia="constant", damping="constant", stiffness="constant"
+    )
     held = result.held_back()
     assert held.why_not or held.predicted < 10
 

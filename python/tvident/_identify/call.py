@@ -57,7 +57,11 @@ def identify(
     share: str | Sequence[str],
     **options: Unpack[OfOne],
 ) -> IdentifiedRecords: ...
-# Lists of records are IdentifiedRecords where lengths differ, which types do not say.
+# Whether arrays of a list have one length, and so are a batch, types do not say.
+@overload
+def identify(
+    angle: Sequence[npt.NDArray[Any]], torque: Sequence[npt.NDArray[Any]], **options: Unpack[OfOne]
+) -> Identification | IdentifiedRecords: ...
 @overload
 def identify(angle: npt.ArrayLike | None, torque: npt.ArrayLike, **options: Unpack[OfOne]) -> Identification: ...
 # All but the data are options, as users call it.
