@@ -23,6 +23,9 @@ def told(one: npt.NDArray[np.float64], several: npt.NDArray[np.float64]) -> None
     assert_type(
         tvident.identify([one, one], [one, one], sample_rate=500, ensemble_axis=0), tvident.MergedIdentification
     )
+    assert_type(
+        tvident.identify(several, several, sample_rate=500, ensemble_axis=0, dof_axis=1), tvident.MergedIdentification
+    )
     assert_type(tvident.identify([one], [one], sample_rate=500, share=("inertia",)), tvident.IdentifiedRecords)
     assert_type(tvident.identify(several, several, sample_rate=500, share="inertia"), tvident.IdentifiedRecords)
     assert_type(

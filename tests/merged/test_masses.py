@@ -213,7 +213,7 @@ def test_a_moving_base_drives_a_chain() -> None:
         ({"stiffness": [["windowed"]]}, "rows of 2 entries"),
         ({"structure": tvident.Chain(2, [("base", 0)]), "stiffness": {"spring": "windowed"}}, "must name elements"),
         ({"structure": tvident.Chain(2, [("base", 0)]), "stiffness": ["windowed", "constant"]}, "each of 1 elements"),
-        ({"phase": np.zeros((2, 500))}, "ensemble_axis"),
+        ({"phase": np.zeros((2, 500))}, "leave phase= out"),
         ({"velocity": np.zeros((2, 500))}, "not supported"),
     ],
 )

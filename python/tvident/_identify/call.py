@@ -37,6 +37,7 @@ def identify(
     torque: npt.ArrayLike,
     *,
     dof_axis: int,
+    ensemble_axis: int | None = None,
     structure: Chain | Mechanism | None = None,
     **options: Unpack[OfMasses],
 ) -> MergedIdentification: ...
@@ -57,11 +58,10 @@ def identify(
     share: str | Sequence[str],
     **options: Unpack[OfOne],
 ) -> IdentifiedRecords: ...
-# Whether arrays of a list have one length, and so are a batch, types do not say.
 @overload
 def identify(
     angle: Sequence[npt.NDArray[Any]], torque: Sequence[npt.NDArray[Any]], **options: Unpack[OfOne]
-) -> Identification | IdentifiedRecords: ...
+) -> Identification | IdentifiedRecords: ...  # a batch where lengths are equal, which types do not say
 @overload
 def identify(angle: npt.ArrayLike | None, torque: npt.ArrayLike, **options: Unpack[OfOne]) -> Identification: ...
 # All but the data are options, as users call it.
@@ -203,8 +203,8 @@ def identify(
     structure : Chain or Mechanism, optional
         Springs and dampers between masses, or bodies whose equations follow from their energies, in place of full matrices.
     ensemble_axis : int, optional
-        The axis of repeated trials that share I(t), C(t) and K(t), 0: angle and torque have shape (trials, n), or are lists of
-        records whose lengths may differ. Equations are merged window by window. Returns a :class:`MergedIdentification`.
+        The axis of repeated trials that share I(t), C(t) and K(t), 0: angle and torque have shape (trials, n), or (trials, masses, n)
+        with ``dof_axis=1``, or are lists whose lengths may differ. Rows are merged. Returns a :class:`MergedIdentification`.
     phase : array_like or sequence of array_like, as the angle, optional
         Aligns trials: a number that grows from 0 to 1 within each, as through a cycle of gait, in place of the time. The result is that of
         the phase.

@@ -38,6 +38,7 @@ _ALONE: dict[str, tuple[Any, ...]] = {
     "settings": (None,),
     "loss": (None, "squares"),
     "share": (None, ()),
+    "align": (None,),
     "nan_policy": ("omit", "raise"),
 }
 """Options that merged rows do not know yet, and what they may be."""
@@ -131,16 +132,23 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
         trials = trials.scaled(axis.angle, axis.torque)
         channels: Sequence[tuple[str, Sequence[Numbers]]] = (("angle", trials.angles), ("torque", trials.torques))
     else:
-        masses = masses_of(angle, torque, options.dof_axis, options.structure, mask=options.mask)
-        masses = masses.scaled(axis.angle, axis.torque)
-        channels = (("angle", masses.angles),)
+        masses = [
+            one.scaled(axis.angle, axis.torque)
+            for one in masses_of(
+                angle, torque, options.dof_axis, options.structure, trials=options.ensemble_axis, mask=options.mask
+            )
+        ]
+        channels = [("angle", one.angles) for one in masses]
     for name, arrays in channels:
         for one in arrays:
             arguments.check_nan(name, one, options.alone["nan_policy"], arguments.RowPolicy)
     recorded = (
         (trials.angles, trials.torques)
         if options.dof_axis is None
-        else (masses.angles, [one for one in masses.torques if one is not None])
+        else (
+            [one for of in masses for one in of.angles],
+            [one for of in masses for one in of.torques if one is not None],
+        )
     )
     sampling = _sampling(options, axis, *recorded)
     with arguments.reporter(options.progress, "identification") as report:
@@ -158,7 +166,8 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
         values = _Terms(terms, sampling.period, asked.workers)
         if options.dof_axis is None:
             return identify_trials(trials if sampling.clock is None else trials.on_grid(sampling), asked, values)
-        return identify_masses(masses if sampling.clock is None else masses.on_grid(sampling), asked, values)
+        on_grid = masses if sampling.clock is None else [one.on_grid(sampling) for one in masses]
+        return identify_masses(on_grid, asked, values)
 
 
 def _sampling(options: Options, axis: Axis, angles: Sequence[Numbers], torques: Sequence[Numbers]) -> Sampling:
@@ -167,6 +176,12 @@ def _sampling(options: Options, axis: Axis, angles: Sequence[Numbers], torques: 
     try:
         period, times = sampled(options.time, samples, axis, options.units["time_unit"])
     except arguments.NotUniformError as error:
+        lengths = {one.size for one in (*angles, *torques)}
+        if len(lengths) > 1:
+            raise ValueError(
+                f"t must be uniform beside trials of different lengths; got {min(lengths)} to {max(lengths)} samples and steps that "
+                "scatter; resample each trial"
+            ) from None
         return Sampling.of_grid(grid_of(error.times), angles, torques, workers)
     return Sampling(period, arguments.begin_of(times))
 
@@ -214,17 +229,15 @@ def _check(angle: Any, options: Options) -> None:
             raise ValueError(
                 f"{name}= is not supported beside ensemble_axis= and dof_axis= yet; got {arguments.shown(value)}; leave it out"
             )
-    if options.ensemble_axis is not None and options.dof_axis is not None:
-        raise ValueError(
-            f"trials of several masses are not supported together yet; got ensemble_axis={options.ensemble_axis} and "
-            f"dof_axis={options.dof_axis}; identify one trial of all masses, or the trials of one mass, at a time"
-        )
     if options.structure is not None and options.dof_axis is None:
         raise ValueError(
             f"structure= must come with dof_axis=, the axis of the masses; got {options.structure!r} alone; add dof_axis=0"
         )
     if options.phase is not None and options.dof_axis is not None:
-        raise ValueError("phase= must come with ensemble_axis=, since it aligns trials; got dof_axis=; leave it out")
+        raise ValueError(
+            "phase= aligns trials of one mass; got dof_axis=, beside which it is not supported yet; cut trials to the same length, and "
+            "leave phase= out"
+        )
 
 
 def _weak(method: Any) -> WeakForm:

@@ -16,7 +16,7 @@ from tvident._merged.call import Asked, TermValues
 from tvident._merged.elements import Element, kind_or_number
 from tvident._merged.mechanism import Mechanism
 from tvident._merged.merging import Merging
-from tvident._merged.predicted import Equations
+from tvident._merged.predicted import Equations, Trial
 from tvident._merged.recorded import Recorded
 from tvident._merged.result import MergedIdentification
 from tvident._merged.sampling import Sampling, variances
@@ -124,8 +124,10 @@ class Masses:
         return [mass for mass in self.measured if np.any(np.nan_to_num(np.asarray(self.torques[mass], np.float64)))]
 
 
-def masses_of(angle: Any, torque: Any, axis: int, structure: Any, *, mask: Any = None) -> Masses:
-    """Return masses from arrays of shape (masses, n).
+def masses_of(
+    angle: Any, torque: Any, axis: int, structure: Any, *, trials: int | None, mask: Any = None
+) -> list[Masses]:
+    """Return the masses of every trial, from arrays of shape (masses, n), (trials, masses, n), or lists of the former.
 
     Raises
     ------
@@ -139,11 +141,25 @@ def masses_of(angle: Any, torque: Any, axis: int, structure: Any, *, mask: Any =
             f"structure must be a tvident.Chain or a tvident.Mechanism; got {arguments.shown(structure)}; leave it out for full "
             "matrices, whose entries are given by tvident.Matrix"
         )
+    if trials is None:
+        found = [_one_trial(angle, torque, axis, structure, base=getattr(structure, "base", None), mask=mask)]
+    else:
+        found = _several_trials((angle, torque), (trials, axis), structure, mask)
+    if not any(one.driven for one in found):
+        raise ValueError(
+            "a force must act on one of the masses and be measured; got torques that are all zero or missing; without one "
+            "everything is known up to scale only"
+        )
+    return found
+
+
+def _one_trial(angle: Any, torque: Any, axis: int, structure: Any, *, base: Any, mask: Any) -> Masses:
+    """Return the masses of one trial."""
     angles, torques = arguments.channels(angle=angle, torque=torque)
     if angles.ndim != 2 or axis not in {0, -2}:  # noqa: PLR2004 - masses and time
         raise ValueError(
             f"angle and torque must have shape (masses, n) with dof_axis=0; got {angles.shape} with dof_axis={axis}; transpose "
-            "them, or take one record of a batch"
+            "them, take one record of a batch, or say which axis is that of trials: ensemble_axis="
         )
     count, samples = angles.shape
     each: list[Numbers] = list(angles)
@@ -153,69 +169,142 @@ def masses_of(angle: Any, torque: Any, axis: int, structure: Any, *, mask: Any =
                 f"angle must have a row for each of {structure.masses} masses of the structure; got {count} rows; "
                 "give the angles of all masses"
             )
-        if structure.base is not None:
-            base = arguments.channel("base", structure.base)
-            if base.shape != (samples,):
+        if base is not None:
+            moving = arguments.channel("base", base)
+            if moving.shape != (samples,):
                 raise ValueError(
-                    f"the base of a chain must have shape ({samples},), as time has; got {base.shape}; resample it"
+                    f"the base of a chain must have shape ({samples},), as time has; got {moving.shape}; resample it"
                 )
-            each.append(base)
+            each.append(moving)
     forces = [None if not np.isfinite(np.asarray(row, np.float64)).any() else row for row in torques]
-    found = Masses(each, forces, structure, None if mask is None else _mask(mask, samples))
-    if not found.driven:
-        raise ValueError(
-            "a force must act on one of the masses and be measured; got torques that are all zero or missing; without one "
-            "everything is known up to scale only"
+    return Masses(each, forces, structure, None if mask is None else _mask(mask, samples))
+
+
+def _several_trials(channels: tuple[Any, Any], axes: tuple[int, int], structure: Any, mask: Any) -> list[Masses]:
+    """Return the masses of several trials."""
+    if isinstance(structure, Mechanism):
+        raise ValueError(  # noqa: TRY004 - it goes with one trial
+            "trials of a Mechanism are not supported together yet; got ensemble_axis=; join them to one record, shape (masses, n), with a "
+            "column of NaN between trials"
         )
+    angles, torques = (_by_trial(name, one, axes) for name, one in zip(("angle", "torque"), channels, strict=True))
+    if len(angles) != len(torques):
+        raise ValueError(
+            f"angle and torque must have the same trials; got {len(angles)} and {len(torques)}; leave out those that lack one"
+        )
+    one_for_all = mask is None or (not isinstance(mask, Sequence) and np.ndim(mask) == 1)
+    masks = [mask] * len(angles) if one_for_all else list(mask)
+    base: Any = getattr(structure, "base", None)
+    bases: list[Any] = [None] * len(angles) if base is None else list(base)
+    for name, several in (("mask", masks), ("the base of a chain", bases)):
+        if len(several) != len(angles) or (several is bases and base is not None and np.ndim(several[0]) != 1):
+            raise ValueError(
+                f"{name} must have a row for each of {len(angles)} trials; got {len(several)}; give one for every trial"
+            )
+    found = [
+        _one_trial(moves, drives, 0, structure, base=base, mask=own)
+        for moves, drives, base, own in zip(angles, torques, bases, masks, strict=True)
+    ]
+    counts = sorted({one.count for one in found})
+    if len(counts) > 1:
+        raise ValueError(f"all trials must have the same masses; got {counts} rows; leave out what others lack")
     return found
 
 
-def identify_masses(masses: Masses, asked: Asked, term_values: TermValues) -> MergedIdentification:
-    """Identify the elements of several masses."""
-    masses, elements = masses.with_elements(asked, term_values)
+def _by_trial(name: str, values: Any, axes: tuple[int, int]) -> list[Any]:
+    """Return a channel of every trial, shape (masses, n)."""
+    if isinstance(values, Sequence) and len({np.shape(one) for one in values}) > 1:
+        if axes[0] not in {0, -3} or axes[1] not in {1, -2}:
+            raise ValueError(
+                "a list of trials must have ensemble_axis=0 and dof_axis=1, as an array of shape (trials, masses, n) has; got "
+                f"{axes[0]} and {axes[1]}; give these"
+            )
+        return list(values)
+    array = arguments.channel(name, values)
+    three = 3
+    places = [axis % three for axis in axes if -three <= axis < three]
+    if array.ndim != three or sorted(places) != [0, 1]:
+        raise ValueError(
+            f"{name} must have shape (trials, masses, n) with ensemble_axis=0 and dof_axis=1; got {array.shape} with "
+            f"ensemble_axis={axes[0]} and dof_axis={axes[1]}; transpose it"
+        )
+    return list(np.moveaxis(array, places[0], 0))
+
+
+def _joined(trials: Sequence[Masses]) -> Masses:
+    """Return trials one after the other, as far as it tells what can be known of them."""
+    if len(trials) == 1:
+        return trials[0]
+    lengths = [one.angles[0].size for one in trials]
+    torques: list[Numbers | None] = []
+    for mass in range(trials[0].count):
+        rows = [one.torques[mass] for one in trials]
+        filled = [
+            np.full(length, np.nan) if row is None else np.asarray(row, np.float64)
+            for row, length in zip(rows, lengths, strict=True)
+        ]
+        torques.append(None if all(row is None for row in rows) else np.concatenate(filled))
+    angles = [np.concatenate(channels) for channels in zip(*(one.angles for one in trials), strict=True)]
+    return replace(trials[0], angles=angles, torques=torques, mask=None)
+
+
+def identify_masses(trials: Sequence[Masses], asked: Asked, term_values: TermValues) -> MergedIdentification:
+    """Identify the elements of several masses, from one trial or from several that share them."""
+    joined, elements = _joined(trials).with_elements(asked, term_values)
+    several = [joined] if len(trials) == 1 else trials
     if all(element.is_known for element in elements):
         raise ValueError("at least one element must be unknown; all are given; use 'windowed' or 'constant' for one")
-    unknowable = unknowable_of(masses, elements)
+    unknowable = unknowable_of(joined, elements)
     open_ones = [one for one in elements if not one.is_known and one.name not in unknowable]
-    samples = masses.angles[0].size
+    samples = max(one.angles[0].size for one in several)
     parts = []
     # What is known takes part in all equations, but ties none.
-    for equations in components(masses.measured, open_ones):
+    for equations in components(joined.measured, open_ones):
         inside = [one.at(equations) for one in elements if one.is_known or one in open_ones]
         inside = [one for one in inside if one.entries]
         if all(one.is_known for one in inside):
             continue
         names = dict(_terms_of(inside, elements))
-        terms = np.stack([_term(masses, *one, term_values) for one in names.items()]) if names else None
         order = {place: new for new, place in enumerate(names)}
         inside = [_renumbered(one, order) for one in inside]
-        torques = np.stack([np.asarray(masses.torques[mass], np.float64) for mass in equations])
         # The angle of every equation comes first, in their order.
-        channels = [*equations, *(one for one in range(len(masses.channels)) if one not in equations)]
+        channels = [*equations, *(one for one in range(len(joined.channels)) if one not in equations)]
         inside = [_rewired(one, {channel: place for place, channel in enumerate(channels)}) for one in inside]
-        angles = np.stack([np.asarray(masses.channels[channel], np.float64) for channel in channels])
-        recorded = Equations(inside, equations, [(angles, torques, terms, masses.mask, None)])
-        parts.append(asked.part(recorded, samples, masses.noise(channels, equations, asked.sampling.passed)))
+        given = [_recorded(one, equations, channels, names, term_values) for one in several]
+        noise = joined.noise(channels, equations, asked.sampling.passed)
+        parts.append(asked.part(Equations(inside, equations, given), samples, noise))
     merging = Merging(
         elements,
         parts,
         sampling=asked.sampling,
         step=asked.step,
         samples=samples,
-        trials=1,
-        masses=masses.count,
+        trials=len(several),
+        masses=joined.count,
         units=asked.units_of(elements),
         unknowable=unknowable,
-        inertia=masses.inertia,
+        inertia=joined.inertia,
         recorded=Recorded(
-            [masses.angles[: masses.count]],
-            [masses.torques],
-            [masses.angles[masses.count] if len(masses.angles) > masses.count else None],
-            structure=masses.structure,
+            [one.angles[: one.count] for one in trials],
+            [one.torques for one in trials],
+            [one.angles[one.count] if len(one.angles) > one.count else None for one in trials],
+            structure=joined.structure,
             own=asked.own,
         ),
     )
     return MergedIdentification(merging)
+
+
+def _recorded(
+    masses: Masses, equations: Sequence[int], channels: Sequence[int], names: Mapping[int, str], term_values: TermValues
+) -> Trial:
+    """Return what was recorded of some equations, as the core takes it."""
+    samples = masses.angles[0].size
+    terms = np.stack([_term(masses, *one, term_values) for one in names.items()]) if names else None
+    torques = [masses.torques[mass] for mass in equations]
+    rows = [np.full(samples, np.nan) if one is None else np.asarray(one, np.float64) for one in torques]
+    angles = np.stack([np.asarray(masses.channels[channel], np.float64) for channel in channels])
+    return angles, np.stack(rows), terms, masses.mask, None
 
 
 def components(equations: Sequence[int], elements: Sequence[Element]) -> list[list[int]]:

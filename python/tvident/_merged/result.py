@@ -19,6 +19,7 @@ from tvident._merged.heterogeneity import differences_of, excess
 from tvident._merged.merging import Identifiable, Merging, Part
 from tvident._merged.reported import Reported
 from tvident._merged.stored import store
+from tvident._merged.words import whose
 from tvident._results import scan_of
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
 
@@ -359,5 +360,5 @@ class MergedIdentification(Reported):
         }
 
     def __repr__(self) -> str:
-        shape = f"{self._merging.masses} masses" if self._merging.masses else f"{self._merging.trials} trials"
-        return f"MergedIdentification({shape}, {self.time.size} samples, {len(self.elements)} elements)"
+        what = whose(self._merging.trials, max(self._merging.masses, 1))
+        return f"MergedIdentification({what}, {self.time.size} samples, {len(self.elements)} elements)"

@@ -19,9 +19,6 @@ Array: TypeAlias = npt.NDArray[np.float64]
 _BRIDGED = 3
 """Samples of a torque that may be missing: a straight line stands for them, as for one mass."""
 
-_ALONE = 1
-"""Dimensions of the torque of one trial of one mass."""
-
 
 class Simulated:
     """The part of a result of trials or masses that is compared with recordings.
@@ -57,16 +54,16 @@ class Simulated:
 
         Parameters
         ----------
-        torque : array_like, shape (masses, m); of trials (trials, m), (m,), or a list of them
+        torque : array_like, shape (m,) or (masses, m) of a trial; (trials, m), (trials, masses, m) or a list of several
             Torques at the record's sample rate; as long as the record if elements change with time, of trials at most as long.
-        initial : array_like, shape (2, masses); of trials (2,) or (trials, 2), optional
+        initial : array_like, shape (2,) or (2, masses); (trials, 2) or (trials, 2, masses), optional
             Angles and velocities at the first sample. By default the state in which the record began, estimated from its angles by
             least squares.
         angle : array_like or list, as the torque, optional
             The angles that were recorded with these torques, from which the state at the first sample is estimated instead.
         phase : array_like or list, as the torque, optional
             The phase of every sample, where trials were aligned on one; by default that of the trials that were identified.
-        base : array_like, shape (m,), optional
+        base : array_like, shape (m,) or (trials, m), or a list, optional
             Motion of a base that moves; by default that of the record.
 
         Returns
@@ -94,7 +91,7 @@ class Simulated:
         found = []
         for trial, pushed in enumerate(several):
             position = None if positions is None else positions[trial]
-            moving = self._base(base, pushed.shape[1])
+            moving = self._base(base, trial, pushed.shape[1])
             model = self._model(pushed.shape[1], position, moving)
             state = None if states is None else states[trial]
             seen = None if angles is None else angles[trial]
@@ -122,7 +119,7 @@ class Simulated:
 
         Returns
         -------
-        ndarray, shape (masses,), or (trials,); a float for one trial of shape (m,)
+        ndarray, shape (masses,), (trials,) or (trials, masses); a float for one trial of shape (m,)
 
         Raises
         ------
@@ -135,59 +132,56 @@ class Simulated:
         pushed: Any = torque
         if angle is None:
             recorded = self._record("angle= and torque=")
-            rows = [
-                (_rows(angles), _rows(torques))
-                for angles, torques in zip(recorded.angles, recorded.torques, strict=True)
-            ]
-            seen, pushed = rows[0] if self._merging.masses else ([one[place][0] for one in rows] for place in range(2))
+            seen, pushed = ([_rows(one) for one in of] for of in (recorded.angles, recorded.torques))
+            if not self._merging.masses:
+                seen, pushed = ([one[0] for one in of] for of in (seen, pushed))
+            elif self._merging.trials == 1:
+                seen, pushed = seen[0], pushed[0]
         simulated = self._trials("angle", self.simulate(pushed, angle=seen, phase=phase, base=base))
         shares = [accounted_for(one, found) for one, found in zip(self._trials("angle", seen), simulated, strict=True)]
-        if self._merging.masses:
-            return shares[0]
-        return float(shares[0][0]) if _is_alone(seen) else np.concatenate(shares)
+        if not self._merging.masses:
+            return float(shares[0][0]) if self._is_alone(seen) else np.concatenate(shares)
+        return shares[0] if self._is_alone(seen) else np.stack(shares)
+
+    @property
+    def _dimensions(self) -> int:
+        """Dimensions of a channel of one trial: time, and masses where there are several."""
+        return 2 if self._merging.masses else 1
+
+    def _is_alone(self, values: Any) -> bool:
+        """Return whether a channel is of one trial, not of several."""
+        inner = values[0] if isinstance(values, list | tuple) and len(values) else values
+        return np.ndim(inner) + (inner is not values) == self._dimensions
 
     def _trials(self, name: str, values: Any) -> list[Array]:
         """Return a channel by trial, each of shape (masses, m)."""
-        if self._merging.masses:
-            found = np.asarray(in_units_of(self.units, name, values), np.float64)
-            if found.ndim != 2 or len(found) != self._merging.masses:  # noqa: PLR2004 - masses and time
-                raise ValueError(
-                    f"{name} must have shape ({self._merging.masses}, m); got {found.shape}; give a row for each mass"
-                )
-            return [found]
-        each = [values] if _is_alone(values) else list(values)
+        each = [values] if self._is_alone(values) else list(values)
         several = [np.asarray(in_units_of(self.units, name, one), np.float64) for one in each]
-        if any(one.ndim != _ALONE for one in several):
-            raise ValueError(
-                f"{name} must have shape (trials, m) or (m,), or be a list of such; got {several[0].shape} for a trial; flatten it"
-            )
-        return [one[np.newaxis] for one in several]
+        masses = self._merging.masses
+        for one in several:
+            if one.ndim != self._dimensions or (masses and len(one) != masses):
+                expected, cure = (f"({masses}, m)", "a row for each mass") if masses else ("(m,)", "one row")
+                raise ValueError(f"{name} must have shape {expected} in every trial; got {one.shape}; give {cure}")
+        return several if masses else [one[np.newaxis] for one in several]
 
     def _as_given(self, torque: Any, found: list[Array]) -> Any:
         """Return angles in the shape of the torques."""
-        if self._merging.masses:
-            return found[0]
-        rows = [one[0] for one in found]
-        if _is_alone(torque):
+        rows = found if self._merging.masses else [one[0] for one in found]
+        if self._is_alone(torque):
             return rows[0]
-        return np.stack(rows) if len({row.size for row in rows}) == 1 else rows
+        return np.stack(rows) if len({row.shape for row in rows}) == 1 else rows
 
     def _states(self, initial: npt.ArrayLike, trials: int) -> list[Array]:
         """Return angles and velocities at the first sample, shape (2, masses), of every trial."""
         given = np.asarray(arguments.real_array("initial", initial), np.float64)
-        masses = self._merging.masses
-        if masses and given.shape == (2, masses):
-            each = [given]
-        elif not masses and given.shape in {(2,), (trials, 2)}:
-            each = list(np.broadcast_to(given, (trials, 2))[:, :, np.newaxis])
-        else:
-            expected = (2, masses) if masses else (trials, 2)
+        one = (2, self._merging.masses) if self._merging.masses else (2,)
+        if given.shape not in {one, (trials, *one)}:
             raise ValueError(
-                f"initial must have shape {expected}, angles and velocities; got {given.shape}; give both of each"
+                f"initial must have shape {one} or {(trials, *one)}, angles and velocities; got {given.shape}; give both of each"
             )
         if not np.isfinite(given).all():
             raise ValueError(f"initial must be finite; got {arguments.shown(initial)}; give angles and velocities")
-        return each
+        return list(np.broadcast_to(given, (trials, *one)).reshape(trials, 2, -1))
 
     def _positions(self, phase: Any, torques: Sequence[Array]) -> Sequence[Array] | None:
         """Return the sample of the result that every sample of every trial belongs to; None where it is the sample itself."""
@@ -203,7 +197,7 @@ class Simulated:
                     "the phase of every sample must be known; got torques of other lengths than those that were identified; give phase="
                 )
             return known
-        each = [phase] if _is_alone(phase) else list(phase)
+        each = [phase] if self._is_alone(phase) else list(phase)
         found = [np.asarray(arguments.real_array("phase", one), np.float64) for one in each]
         if [one.shape for one in found] != [one.shape[1:] for one in torques]:
             raise ValueError(
@@ -211,18 +205,21 @@ class Simulated:
             )
         return [one * merging.samples for one in found]
 
-    def _base(self, base: npt.ArrayLike | None, samples: int) -> Array | None:
-        """Return the motion of the base; None where it does not move."""
+    def _base(self, base: Any, trial: int, samples: int) -> Array | None:
+        """Return the motion of the base in a trial; None where it does not move."""
         if not self._merging.base_moves:
             if base is not None:
                 raise ValueError("base= must go with a Chain whose base moves; got it for another; leave it out")
             return None
-        given: Any = self._record("base=").bases[0] if base is None else in_units_of(self.units, "angle", base)
-        if given is None or np.shape(given) != (samples,):
+        bases: Any = self._record("base=").bases if base is None else base
+        alone = base is not None and np.ndim(base[0]) == 0
+        given = bases if alone else bases[trial] if trial < len(bases) else ()
+        moving = np.asarray(in_units_of(self.units, "angle", given), np.float64)
+        if moving.shape != (samples,):
             raise ValueError(
-                f"base must have shape ({samples},), as the torque's time has; got {np.shape(given)}; give the base of these torques"
+                f"base must have shape ({samples},), as the torque's time has; got {moving.shape}; give the base of these torques"
             )
-        return np.asarray(_bridged(np.asarray(given, np.float64)[np.newaxis])[0])
+        return np.asarray(_bridged(moving[np.newaxis])[0])
 
     def _begun(self, trial: int, pushed: Array, trials: int) -> tuple[Array | None, Array | None]:
         """Return the state in which a trial that was identified began, or its angles where these are its torques."""
@@ -278,13 +275,6 @@ class Simulated:
             else:
                 values[name] = np.interp(position, np.arange(merging.samples), along)
         return model_of(merging, values, base)
-
-
-def _is_alone(values: Any) -> bool:
-    """Return whether a channel is of one trial, not of several."""
-    if isinstance(values, list | tuple):
-        return not values or np.ndim(values[0]) == 0
-    return np.ndim(values) == _ALONE
 
 
 def _rows(channels: Sequence[Any]) -> Array:

@@ -35,7 +35,8 @@ class Chain:
     dampers : sequence of (int or "base", int or "base"), optional
         What every damper connects; by default a damper lies beside each spring.
     base : array_like, shape (n,), optional
-        Motion of the base, in the unit of the angle: a road, a motor's shaft. By default it does not move.
+        Motion of the base, in the unit of the angle: a road, a motor's shaft. By default it does not move. Of several trials one row or
+        array for each.
 
     Raises
     ------
@@ -69,7 +70,7 @@ class Chain:
     masses: int
     springs: Sequence[Link]
     dampers: Sequence[Link] | None = None
-    base: npt.ArrayLike | None = field(default=None, repr=False)
+    base: npt.ArrayLike | Sequence[npt.ArrayLike] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         masses = arguments.whole_number("masses", self.masses, least=1)
