@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import tvident
@@ -17,6 +17,8 @@ Array = npt.NDArray[np.float64]
 
 # Legendre polynomials at arbitrary places of a window: a design of condition up to 1e3 here, times rounding, times derivatives' gains.
 ROUNDING = 1e-8
+# What the documentation promises where windows are chosen: errors over those without gaps, and the coverage of nominal 95 % intervals.
+PROMISED, COVERED = 3.0, 0.65
 
 
 def design(places: Array, length: int, order: int, derivative: int = 0) -> Array:
@@ -161,10 +163,45 @@ def test_weights_say_how_much_samples_count() -> None:
     np.testing.assert_allclose(weighted.derivatives[:, 680:720], omitted.derivatives[:, 680:720], rtol=1e-9)
 
 
+@settings(max_examples=5)
+@given(seed=st.integers(0, 10_000), missing=st.sampled_from([(0.01, 1), (0.05, 1), (0.3, 1), (0.05, 8)]))
+def test_windows_are_chosen_as_if_nothing_were_missing(seed: int, missing: tuple[float, int]) -> None:
+    lost, burst = missing
+    generator = np.random.default_rng(seed)
+    t = np.arange(2000) / 200
+    rates, phases = 2 * np.pi * generator.uniform(0.5, 6, (3, 1)), generator.uniform(0, 6, (3, 1))
+    truth = np.array([np.sum(rates**k * np.sin(rates * t + phases + k * np.pi / 2), axis=0) for k in range(3)])
+    y = truth[0] + 0.02 * generator.standard_normal(t.size)
+    holed = y.copy()
+    for first in generator.integers(0, t.size - burst, int(lost * t.size / burst)):
+        holed[first : first + burst] = np.nan
+    # A gap that is longer than any window.
+    holed[900:1300] = np.nan
+    whole = tvident.fit_local_polynomials(y, "auto", sample_rate=200)
+    found = tvident.fit_local_polynomials(np.stack([y, holed]), "auto", sample_rate=200, nan_policy="omit")
+    for name in ("derivatives", "stderr"):
+        assert np.array_equal(getattr(found, name)[:, 0], getattr(whole, name))
+    inside = np.zeros(t.size, bool)
+    inside[100:800] = inside[1400:1900] = True
+    assert np.isfinite(found.derivatives[:, 1, inside]).all()
+    assert np.isnan(found.derivatives[:, 1, 1100]).all()
+    assert found.status[1, 1100] & Status.INVALID
+    for k in range(3):
+        errors = [
+            np.sqrt(np.mean((one[k] - truth[k])[inside] ** 2)) for one in (found.derivatives[:, 1], whole.derivatives)
+        ]
+        assert errors[0] < PROMISED * errors[1]
+        away = np.abs(found.derivatives[k, 1] - truth[k])[inside] / found.stderr[k, 1][inside]
+        assert np.mean(away < 1.96) > COVERED
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        ({"window_length": "auto"}, "window_length must be a length where samples are left out .*; got 'auto'"),
+        (
+            {"window_length": "auto", "weights": np.ones(100)},
+            "window_length must be a length where samples .* have weights .*; got 'auto'",
+        ),
         ({"selection": "pooled"}, "selection must be 'window' where .*; got 'pooled'"),
         ({"loss": "huber"}, "loss must be 'squares' where .*; got 'huber'"),
         (

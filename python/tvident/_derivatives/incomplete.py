@@ -75,9 +75,7 @@ def incomplete_given(
                     f"{name} must go with nan_policy='omit' or weights; got {value!r} with {nan_policy!r}; give one of them, or no {name}"
                 )
         return None
-    longest = length // 2
-    if max_gap is not None:
-        longest = arguments.window_length("max_gap", max_gap, period, odd=False)
+    longest = longest_gap(max_gap, period)
     least = (length + 1) // 2
     if min_observations is not None:
         least = arguments.whole_number("min_observations", min_observations, least=_FEWEST, most=length)
@@ -89,7 +87,12 @@ def incomplete_given(
         leading = [extent for place, extent in enumerate(shape) if place != axis % len(shape)]
         last = given if is_one else np.moveaxis(given, axis, -1)
         given = np.broadcast_to(last, (*leading, shape[axis]))
-    return Incomplete(nan_policy == "omit", given, longest, least)
+    return Incomplete(nan_policy == "omit", given, length // 2 if longest is None else longest, least)
+
+
+def longest_gap(max_gap: int | str | None, period: float) -> int | None:
+    """Return the samples of the longest gap that is asked for; None where that is half a window."""
+    return None if max_gap is None else arguments.window_length("max_gap", max_gap, period, odd=False)
 
 
 def check_whole_windows(*, automatic: bool, selection: str, loss: str) -> None:

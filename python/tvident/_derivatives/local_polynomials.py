@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any, get_args
 
@@ -12,9 +13,10 @@ from tvident import _arguments as arguments
 from tvident import _core
 from tvident._choices import Criterion, Loss, Selection
 from tvident._derivatives.automatic import choose
+from tvident._derivatives.automatic_gaps import choose_beside_gaps
 from tvident._derivatives.fit import LocalPolynomialFit, Sampled
 from tvident._derivatives.found import Found
-from tvident._derivatives.incomplete import check_whole_windows, filled, incomplete_given
+from tvident._derivatives.incomplete import check_whole_windows, filled, incomplete_given, longest_gap
 from tvident._derivatives.own_times import at_own_times, check_plain, period_or_times
 from tvident._derivatives.plans import HIGHEST_ORDER, SHORTEST_WINDOW, plan, quantisation_step
 from tvident._huber import pseudo_values
@@ -133,7 +135,7 @@ def fit_local_polynomials(
         If the window is even, shorter than 5 samples or longer than the record, if an order is too high, if `t` does not increase, if
         `y` spans more than one and a half of `period`, or if a name is unknown. With ``"auto"``, if the record has fewer than 64
         samples, if no order reaches `max_deriv`, or if `criterion` or `selection` is given. With ``nan_policy="omit"`` or `weights`, if
-        the window is ``"auto"``, orders are pooled or averaged, or the loss is Huber's.
+        orders are pooled or averaged, or the loss is Huber's, and with `weights` or `min_observations`, if the window is ``"auto"``.
     TypeError
         If `y` is complex or holds no numbers, or a number is not whole.
 
@@ -155,7 +157,11 @@ def fit_local_polynomials(
     are weighted again in every neighbourhood of five half-widths, so that estimates follow a signal that changes. Near the ends
     coefficients are shrunk towards what other windows predict. The error of θ̈ of the simulated rig is within 3 % of that of the best
     window and order known afterwards, and 20 to 30 % below it if the signal is a chirp. Windows that contain a value that is not finite
-    are left out; samples that no candidate's window reaches are NaN.
+    are left out; samples that no candidate's window reaches are NaN. With ``nan_policy="omit"`` windows are chosen with the missing samples
+    bridged where their neighbours tell them as well as samples would, and estimates within a window of a missing one are made as below, in
+    the best windows: on sums of sines with 1, 5 and 30 % of the samples missing at random the errors are 1.0 to 1.1, 1.0 to 1.2 and mostly
+    1.2 to 1.8 (one of 36 records: 2.8) times those without a gap, and nominal 95 % intervals of the second derivative cover 66 to 90 %.
+    It takes two to five times as long.
 
     With ``nan_policy="omit"`` a window that lacks samples is fitted by the QR decomposition of its own design, and each derivative takes
     the order with the least estimated squared bias plus variance, since such a window is not symmetric. Its standard errors are those of
@@ -265,23 +271,27 @@ def fit_local_polynomials(
         found.settings.update(_of_wrapped(turned, period))
         return LocalPolynomialFit(samples, axis, found, sampled)
     length = 0 if automatic else _window(window_length, seconds, count)
-    incomplete = incomplete_given(
-        nan_policy, weights, max_gap, min_observations, shape=array.shape, length=length, period=seconds, axis=axis
-    )
-    if incomplete is not None:
-        check_whole_windows(automatic=automatic, selection=selection, loss=loss)
-
     choose_automatically = partial(
         choose_automatically,
         delta=seconds,
         quantisation=None if quantisation is None and turned is None else step_of_rounding,
     )
+    beside_gaps = automatic and nan_policy == "omit" and weights is None and min_observations is None
+    if beside_gaps:
+        choose_automatically = partial(
+            choose_beside_gaps, choose_automatically, plan_of_window, longest_gap(max_gap, seconds), workers=threads
+        )
+    incomplete = (
+        None
+        if beside_gaps
+        else incomplete_given(
+            nan_policy, weights, max_gap, min_observations, shape=array.shape, length=length, period=seconds, axis=axis
+        )
+    )
+    if beside_gaps or incomplete is not None:
+        check_whole_windows(automatic=automatic and not beside_gaps, selection=selection, loss=loss)
     if arguments.one_of("loss", loss, get_args(Loss)) == "huber":
-        for _ in range(_CHOICES if automatic else 1):
-            if automatic:
-                value = choose_automatically(samples, max_deriv=0, step=count, progress=None)
-                length = int(np.median(np.asarray(value.window_length)))
-            samples = _with_clipped_residuals(samples, plan_of_window(max(length, SHORTEST_WINDOW)), length, threads)
+        samples = _robust(samples, choose_automatically if automatic else None, plan_of_window, length, threads)
     with arguments.reporter(progress, "local polynomials") as report:
         if automatic:
             found = choose_automatically(samples, max_deriv=max_deriv, step=every, progress=report)
@@ -323,6 +333,22 @@ def _window(window_length: int | str, seconds: float, count: int) -> int:
     length = arguments.window_length("window_length", window_length, seconds, odd=True)
     arguments.check_window("window_length", length, count, least=SHORTEST_WINDOW)
     return length
+
+
+def _robust(
+    samples: npt.NDArray[Any],
+    choose: Callable[..., Found] | None,
+    plan_of_window: Callable[[int], _core.LocalPolynomials],
+    length: int,
+    workers: int | None,
+) -> npt.NDArray[Any]:
+    """Return samples with clipped residuals, in windows of a length or in those that are chosen."""
+    for _ in range(_CHOICES if choose else 1):
+        if choose is not None:
+            value = choose(samples, max_deriv=0, step=samples.shape[-1], progress=None)
+            length = int(np.median(np.asarray(value.window_length)))
+        samples = _with_clipped_residuals(samples, plan_of_window(max(length, SHORTEST_WINDOW)), length, workers)
+    return samples
 
 
 def _with_clipped_residuals(

@@ -1,0 +1,139 @@
+"""Windows chosen for records in which samples are missing: gaps are bridged to choose windows, and left out of the estimates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _core
+from tvident._derivatives.found import Found
+from tvident._derivatives.incomplete import Incomplete, filled
+from tvident._status import Status
+
+Numbers = npt.NDArray[np.float64]
+
+Choose = Callable[..., Found]
+"""Chooses windows and orders for records, and estimates; windows that hold a missing sample are left out."""
+
+PlanOf = Callable[..., _core.LocalPolynomials]
+"""Gives the plan of windows of a length, with orders up to `highest`, for derivatives up to `derivative`."""
+
+_FIRST, _ROUNDS = 17, 4
+"""Samples of the windows that first bridge gaps, of at most half of them, and how often longer windows may bridge longer ones."""
+
+_OF_GAPS = Status.INVALID | Status.GAP | Status.EDGE | Status.EXACT
+"""Flags that do not speak of a choice of order."""
+
+
+# What users give to fit_local_polynomials comes here as it is.
+def choose_beside_gaps(
+    choose: Choose,
+    plan_of: PlanOf,
+    longest_gap: int | None,
+    samples: npt.NDArray[np.number],
+    *,
+    max_deriv: int,
+    step: int,
+    progress: Callable[[int, int], object] | None,
+    workers: int | None,
+) -> Found:
+    """Choose window and order for every record and derivative, and estimate beside and in gaps of at most half a window, or as given."""
+    if np.isfinite(samples).all():
+        return choose(samples, max_deriv=max_deriv, step=step, progress=progress)
+    records = np.asarray(samples, np.float64).reshape(-1, samples.shape[-1])
+    choose_one = partial(choose, max_deriv=max_deriv, step=1, progress=None)
+    each = []
+    for done, record in enumerate(records):
+        each.append(_of_record(choose_one, plan_of, longest_gap, record, workers))
+        if progress is not None:
+            progress(done + 1, len(records))
+    return _together(each, samples.shape[:-1], step)
+
+
+def _of_record(
+    choose: Callable[[Numbers], Found], plan_of: PlanOf, longest_gap: int | None, record: Numbers, workers: int | None
+) -> Found:
+    """Return what is found of one record."""
+    there = np.isfinite(record)
+    if there.all() or not there.any():
+        return choose(record)
+    length, found = _FIRST, choose(record)
+    for _ in range(_ROUNDS):
+        bridged = _bridged(record, plan_of(length, derivative=0), _left_out(length, longest_gap), workers)
+        found = choose(bridged)
+        longer = int(np.ravel(found.window_length)[0])
+        if longer <= length:
+            break
+        length = longer
+    errors = np.array(found.errors())
+    lengths = np.asarray(found.window_length).tolist()
+    for derivative, (own, order) in enumerate(zip(lengths, found.settings["order"], strict=True)):
+        plan = plan_of(own, highest=order, derivative=derivative)
+        beside = filled(
+            plan, plan.estimate(record, workers=workers), record, _left_out(own, longest_gap), step=1, workers=workers
+        )
+        # Windows are averaged with others of up to twice the length.
+        near = _near(~there, own)
+        found.derivatives[derivative, near] = beside.derivatives[derivative, near]
+        errors[derivative, near] = beside.errors()[derivative, near]
+        found.order[near] = beside.order[near]
+        found.status[near] = beside.status[near] & np.uint16(_OF_GAPS)
+    found.status[np.isnan(found.derivatives).any(axis=0)] |= np.uint16(Status.INVALID)
+    return replace(found, errors=lambda: errors)
+
+
+def _left_out(length: int, longest_gap: int | None) -> Incomplete:
+    """Return what is left out of windows of a length."""
+    longest = length // 2 if longest_gap is None else longest_gap
+    return Incomplete(omit=True, weights=None, longest_gap=longest, least=(length + 1) // 2)
+
+
+def _bridged(record: Numbers, plan: _core.LocalPolynomials, left_out: Incomplete, workers: int | None) -> Numbers:
+    """Return a record with what windows say of missing samples as well as the samples would, and noise such as theirs.
+
+    The noise of the record is estimated from it, too.
+    """
+    found = filled(plan, plan.estimate(record, workers=workers), record, left_out, step=1, workers=workers)
+    missing = np.flatnonzero(~np.isfinite(record))
+    noise = np.random.default_rng(missing.size).standard_normal(missing.size)
+    bridged = record.copy()
+    bridged[missing] = found.derivatives[0, missing] + found.sigma[missing] * noise
+    told = found.errors()[0, missing] <= found.sigma[missing]
+    bridged[missing[~told]] = np.nan
+    return bridged
+
+
+def _near(missing: npt.NDArray[np.bool_], reach: int) -> npt.NDArray[np.bool_]:
+    """Return which samples have a missing one at most so many away."""
+    before = np.concatenate([np.zeros(reach + 1, np.intp), np.cumsum(missing), np.full(reach, missing.sum())])
+    return np.asarray(before[2 * reach + 1 :] > before[: missing.size])
+
+
+def _together(each: Sequence[Found], leading: tuple[int, ...], step: int) -> Found:
+    """Return what was found of records one after the other, for the wanted samples."""
+
+    def stacked(arrays: Sequence[npt.NDArray[Any]], axis: int) -> npt.NDArray[Any]:
+        together = np.stack([array[..., ::step] for array in arrays], axis=axis)
+        shape = (*together.shape[:axis], *leading, together.shape[-1])
+        return together.reshape(shape)
+
+    def listed(name: str) -> object:
+        values = np.array([one.settings[name] for one in each]).T
+        return values.reshape((*values.shape[:-1], *leading)).tolist()
+
+    by_record = {name: listed(name) for name in ("window_length", "order", "noise", "quantisation")}
+    return Found(
+        derivatives=stacked([one.derivatives for one in each], 1),
+        order=stacked([one.order for one in each], 0),
+        status=stacked([one.status for one in each], 0),
+        sigma=stacked([one.sigma for one in each], 0),
+        window_length=np.array(by_record["window_length"], np.intp),
+        settings={**each[0].settings, **by_record},
+        errors=lambda: stacked([one.errors() for one in each], 1),
+        plan_of=lambda index: each[int(np.ravel_multi_index(index, leading)) if leading else 0].plan_of(()),
+    )
