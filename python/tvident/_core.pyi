@@ -342,6 +342,7 @@ class StrongForm:
         *,
         lag: Sequence[float],
         masks: Sequence[npt.NDArray[np.bool_]] | None = None,
+        weights: npt.NDArray[np.float64] | None = None,
         workers: int | None = None,
     ) -> list[Scan]: ...
     def rows(
@@ -509,6 +510,7 @@ def identify(
     angle_zero: Sequence[float | None] | None = None,
     quantisation: float | None = None,
     masks: Sequence[npt.NDArray[np.bool_]] | None = None,
+    weights: npt.NDArray[np.float64] | None = None,
     propagate: bool = False,
     step: int = 1,
     wanted: tuple[int, int] | None = None,

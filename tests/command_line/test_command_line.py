@@ -151,6 +151,8 @@ def test_every_setting_has_an_option_and_may_be_kept_in_a_file(recording: Path, 
     angle, torque = channels["angle [rad]"], channels["torque [N m]"]
     usable = (np.arange(angle.size) < 2000) | (np.arange(angle.size) > 2200)
     np.save(tmp_path / "usable.npy", usable.astype(float))
+    weights = np.linspace(1, 2, angle.size)
+    np.save(tmp_path / "weights.npy", weights)
     common = ("identify", recording, "--angle", "angle", "--torque", "torque", "--sample-rate", 1000)
     done = run(
         *(
@@ -172,6 +174,8 @@ def test_every_setting_has_an_option_and_may_be_kept_in_a_file(recording: Path, 
             "--no-averaging",
             "--mask",
             "usable.npy",
+            "--weights",
+            "weights.npy",
             "--term",
             "none",
             "--inertia",
@@ -193,6 +197,7 @@ def test_every_setting_has_an_option_and_may_be_kept_in_a_file(recording: Path, 
             averaging=False,
             lag=0.0005,
             mask=usable,
+            weights=weights,
             terms=(),
             inertia="varying",
         ),
@@ -201,7 +206,8 @@ def test_every_setting_has_an_option_and_may_be_kept_in_a_file(recording: Path, 
     np.testing.assert_array_equal(found["stiffness [N m/rad]"], expected.stiffness)
     assert "offset [N m]" not in found
 
-    again = run(*common, "--settings", "chosen.json", "--mask", "usable.npy", "-o", "two.npz", cwd=tmp_path)
+    files = ("--mask", "usable.npy", "--weights", "weights.npy")
+    again = run(*common, "--settings", "chosen.json", *files, "-o", "two.npz", cwd=tmp_path)
     assert again.returncode == 0, again.stderr
     np.testing.assert_array_equal(recordings.read(tmp_path / "two.npz")["stiffness [N m/rad]"], expected.stiffness)
 

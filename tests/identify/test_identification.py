@@ -43,9 +43,10 @@ def system(seed: int, n: int, rate: float = 1000.0) -> tuple[Array, Array]:
     more=st.integers(60, 200),
     extra=st.sets(st.sampled_from(["offset", "coulomb", "cubic"])),
     known=st.sampled_from(["nothing", "no damping", "inertia", "stiffness over time"]),
+    weighted=st.booleans(),
 )
 def test_every_window_is_the_papers(
-    seed: int, half: int, equations: int, more: int, extra: set[str], known: str
+    seed: int, half: int, equations: int, more: int, extra: set[str], known: str, weighted: bool
 ) -> None:
     n = 2 * half + equations + more
     angle, torque = system(seed, n)
@@ -58,10 +59,12 @@ def test_every_window_is_the_papers(
     }
     call = given[known]
     names: list[Any] = sorted(extra)
+    weights = np.random.default_rng(seed).uniform(0.1, 3, n) if weighted else np.ones(n)
     result = tvident.identify(
         angle,
         torque,
         sample_rate=1000,
+        weights=weights if weighted else None,
         **paper(window_length=2 * half + 1, regression_window=equations, terms=names, **call),
     )
     theta, velocity, acceleration = derivatives(angle, half, 1e-3, result.order)
@@ -72,6 +75,8 @@ def test_every_window_is_the_papers(
         side = side - value * factors[name]
     unknowns = [name for name in ("inertia", "damping", "stiffness", *names) if name not in call]
     A = np.stack([factors[name] for name in unknowns], axis=1)
+    root = np.sqrt(weights / weights.mean())
+    A, side = A * root[:, np.newaxis], side * root
     values: dict[str, Any] = {name: getattr(result, name, None) for name in unknowns} | result.terms
     scale = np.nanmax(np.abs(A), axis=0)
     solutions = windowed(A, side, equations)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import tvident
 from calls import plain_weak, weak
 from parameters import long
-from reference.weak_form import profile, rows
+from reference.weak_form import profile, roots, rows
 from tvident import Status
 
 Array = npt.NDArray[np.float64]
@@ -81,18 +81,26 @@ def test_millions_of_samples_with_a_drift_lose_no_digits(n: int) -> None:
     half=st.integers(5, 60),
     exponent=st.integers(3, 12),
     lag=st.sampled_from([0.0, 3.0, -0.4, 1.7]),
+    weighted=st.booleans(),
 )
-def test_constants_are_least_squares_of_the_rows(seed: int, half: int, exponent: int, lag: float) -> None:
+def test_constants_are_least_squares_of_the_rows(
+    seed: int, half: int, exponent: int, lag: float, weighted: bool
+) -> None:
     generator = np.random.default_rng(seed)
     angle, torque = multisine(2000, seed)
     torque = torque + 0.3 * generator.standard_normal(2000)
+    weights = generator.uniform(0.1, 3, 2000) * np.exp(generator.uniform(-3, 3) * np.linspace(-1, 1, 2000))
     found = tvident.identify(
         angle,
         torque,
         sample_rate=1000,
+        weights=weights if weighted else None,
         **plain_weak(window_length=2 * half + 1, exponent=exponent, lag=lag * 1e-3, **CONSTANT),
     )
     A, b = rows(angle, torque, half, exponent, 1e-3, lag)
+    if weighted:
+        root = roots(weights, half, exponent, 1e-3, lag)
+        A, b = A * root[:, np.newaxis], b * root
     usable = np.isfinite(b)
     expected = np.linalg.lstsq(A[usable], b[usable])[0]
     # The angle is a sum of sines, so what is taken for its noise is rounding, and nothing is corrected for.

@@ -38,6 +38,17 @@ def rows(angle: Array, torque: Array, half: int, exponent: int, delta: float, la
     return A, b
 
 
+def roots(weights: Array, half: int, exponent: int, delta: float, lag: float = 0.0) -> Array:
+    """Give what rows are multiplied by where the variance of a sample's noise is one over its weight: one over their deviation."""
+    whole = int(np.rint(lag))
+    squares = kernels(half, exponent, delta, lag - whole)[2] ** 2
+    found = []
+    for centre in range(half, weights.size - half, max(1, half // 6)):
+        inside = weights[max(0, centre - half + whole) : centre + half + 1 + whole]
+        found.append(np.sqrt(squares.sum() / (squares / inside).sum()) if inside.size == squares.size else np.nan)
+    return np.array(found)
+
+
 def profile(windowed: Array, constant: Array, b: Array, window: int, step: int) -> Array:
     """Give the constants that are best for all windows of rows together, each window with unknowns of its own."""
     normal, side = np.zeros(2 * (constant.shape[1],)), np.zeros(constant.shape[1])

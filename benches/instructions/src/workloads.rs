@@ -176,7 +176,7 @@ fn identify(lengths: usize) -> Result<usize, Error> {
         filter_torque: false,
         linear: false,
     });
-    let task = Task { motion, mask: None, method, lag: Some(0.0), angle_zero: None };
+    let task = Task { motion, mask: None, weights: None, method, lag: Some(0.0), angle_zero: None };
     let options = Options {
         delta: 1e-3,
         kinds: vec![Kind::Windowed; 3],

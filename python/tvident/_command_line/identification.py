@@ -61,6 +61,9 @@ IDENTIFICATION = options_of(
     ),
     click.option("--mask", metavar="NAME", help="Channel, or file, that is not zero where a sample may be used."),
     click.option(
+        "--weights", metavar="NAME", help="Channel, or file, of weights: one over the variance of each sample's noise."
+    ),
+    click.option(
         "--settings",
         type=click.Path(),
         is_eager=True,

@@ -26,6 +26,7 @@ def inputs(file: str | None, options: Mapping[str, Any]) -> dict[str, str | None
         "the velocity": "velocity",
         "the acceleration": "acceleration",
         "the mask": "mask",
+        "the weights": "weights",
         "the instrument": "instrument",
         "earlier settings": "settings",
     }
@@ -57,6 +58,7 @@ def identified(
     torque_time: str | None,
     align: str | None,
     mask: str | None,
+    weights: str | None,
     settings: str | None,
     progress: bool | None,
     **options: Any,
@@ -85,6 +87,7 @@ def identified(
         period=None if turn is None else abs(float(turn)),
         lag=None if lag is None else lag_of(lag),
         mask=None if mask is None else mask_of(source_of(channels, mask, file)),
+        weights=None if weights is None else source_of(channels, weights, file),
         settings=None if settings is None else read_settings(settings),
         terms=terms_of(terms),
         progress=wanted_progress(progress),

@@ -22,10 +22,11 @@ from tvident._identify.own_clocks import lag_found, own_clocks
 from tvident._identify.records import calls_of_records, identify_records, names_shared
 from tvident._identify.robust import Loss, loss_of, with_clipped_torque
 from tvident._identify.settings import Request, resolve
-from tvident._identify.signals import Signals, with_own_step
+from tvident._identify.signals import Signals, channels_of_motion, even_times, instrument_of, with_own_step
 from tvident._identify.task import Task
 from tvident._identify.together import Options, identify_together, sampled
 from tvident._identify.typed import Entries, OfMasses, OfOne
+from tvident._identify.weighted import usable_channels, weights_of
 from tvident._merged import Chain, Mechanism, MergedIdentification
 from tvident._results import Identification, IdentifiedRecords
 from tvident._units import ROTARY, Axis, axis_of, factor_between, scaled, unit_said
@@ -86,6 +87,7 @@ def identify(
     lag: float | Literal["auto"] | None = None,
     quantisation: float | None = None,
     mask: npt.ArrayLike | None = None,
+    weights: npt.ArrayLike | None = None,
     loss: Loss | None = None,
     period: float | None = None,
     share: str | Sequence[str] = (),
@@ -181,6 +183,10 @@ def identify(
         with ``method="paper"``, whose criterion has no such bound. 0 means none.
     mask : array_like of bool, shape (n,) or the angle's, optional
         True where a sample may be the centre of an equation.
+    weights : array_like, shape (n,) or the angle's, optional
+        Weight of every sample, not negative: one over the variance of the noise of its angle and torque, relative to the others. Samples
+        of weight 0 are missing, whatever they hold, and a masked weight is 0. A factor of all weights changes nothing: noise and
+        residuals are those of a sample of mean weight. See Notes.
     loss : {"squares", "huber", "auto"}, optional
         ``"squares"``: least squares. ``"huber"``: residuals of the torque's samples beyond 2.5 standard deviations count linearly, so that
         spikes of few samples move parameters by little, however large they are (Huber 1981, modified residuals): the torque that the
@@ -221,8 +227,8 @@ def identify(
         are NaN if their window contains one. ``"raise"``: raise an error.
     settings : mapping, optional
         Settings of an earlier result, as they are or read from JSON: its choices are used again. Other arguments override them, a
-        `method` other than ``"auto"`` as a whole. They do not contain `mask`, `step`, parameters known at every sample and functions of
-        your own terms.
+        `method` other than ``"auto"`` as a whole. They do not contain `mask`, `weights`, `step`, parameters known at every sample and
+        functions of your own terms.
     workers : int, optional
         Threads; by default ``TVIDENT_WORKERS`` or all processors that this process may use. The numbers do not depend on it.
     progress : bool or callable, optional
@@ -246,6 +252,11 @@ def identify(
     -----
     Within 0.2 s inertia and stiffness are nearly collinear unless several frequencies are excited; with a single sine they cannot be
     separated at all. ``condition`` shows this, and ``stderr`` its effect.
+
+    With weights w, an equation has the weight of the noise of its torque: in strong form that of its sample, in weak form, where an
+    equation sums 2N + 1 samples times φ, Σφ² / Σ(φ²/w). So weights matter where they differ over stretches longer than the test function:
+    among equations that all hold some good and some bad samples there is nothing to choose. Polynomials of the strong form count samples
+    alike. That the noise of angle and torque is larger where weights are smaller is taken from you; errors are those of such noise.
 
     Standard errors of the strong form follow from the scatter between windows that share no equation: see :class:`Identification`. Those
     of the weak form follow from the covariance of its overlapping rows, which the noise determines, times the cross-validation error
@@ -299,7 +310,7 @@ def identify(
     if records is not None:
         return identify_records(identify, records, names, progress)
     motion = {"angle": angle, "velocity": velocity, "acceleration": acceleration}
-    measured = _measured(motion)
+    measured = channels_of_motion(motion)
     first = next(iter(measured.values()))
     axis = axis_of(
         angle,
@@ -337,10 +348,18 @@ def identify(
         "quantisation": _in_units_of_results("quantisation", quantisation, axis.angle),
         "period": _in_units_of_results("period", period, axis.angle),
     }
-    instruments = None if instrument is None else _instrument(instrument, torques.shape)
+    instruments = instrument_of(instrument, torques.shape)
     request = resolve(method, given, settings, 1 / seconds, list(measured), has_instrument=instruments is not None)
-    for name, array in (*channels.items(), ("torque", torques)):
-        arguments.check_nan(name, array, nan_policy, arguments.RowPolicy)
+    asked = loss_of(loss, settings)
+    beside: dict[str, Any] = {
+        "velocity": velocity,
+        "acceleration": acceleration,
+        "instrument": instrument,
+        "align": align,
+    }
+    beside |= {"uneven times": grid, "a clock of the torque": clocks, "loss": asked != "squares" or None}
+    weighted = weights_of(weights, torques.shape, {**beside, "an Expansion": expansions_of(request) or None})
+    channels, torques = usable_channels(channels, torques, weighted, nan_policy)
     doubts: list[tuple[int, str]] = []
     turn = request.period
     if turn is not None:
@@ -354,7 +373,7 @@ def identify(
         torques,
         instruments,
         arguments.mask("mask", mask, torques.shape),
-        _times(samples, seconds, begin),
+        even_times(samples, seconds, begin),
         seconds,
     )
     if grid is not None:
@@ -382,11 +401,11 @@ def identify(
         axis=axis,
         clock=signals.clock,
         passed=(signals.passed, signals.passed),
+        weights=weighted,
     )
     if clocks is not None:
         data = clocks.finished(data, axis.torque, settings, partial(_lag_left, request))
     task = ExpandedTask if expansions_of(request) else Task
-    asked = loss_of(loss, settings)
     data = with_clipped_torque(data, asked, lambda some: task(some, request).run(None))
     return task(data, request).run(progress)
 
@@ -401,22 +420,6 @@ def _lag_left(request: Request, data: Data) -> tuple[float, float]:
     return lag_found(Task(data, looking).run(None, diagnose=False).settings)
 
 
-def _measured(motion: Mapping[str, npt.ArrayLike | None]) -> dict[str, npt.ArrayLike]:
-    measured = {name: values for name, values in motion.items() if values is not None}
-    if not measured:
-        raise ValueError(
-            "identify needs a motion; got angle=None; give velocity= or acceleration= where there is no angle"
-        )
-    return measured
-
-
-def _instrument(instrument: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[np.number]:
-    found = arguments.channel("instrument", instrument)
-    if found.shape != shape:
-        raise ValueError(f"an instrument must have the angle's shape {shape}; got {found.shape}; resample it")
-    return found
-
-
 def _sampling(
     given: Mapping[str, Any], samples: int, axis: Axis, time_unit: str | None, first: npt.ArrayLike
 ) -> tuple[float, Grid | None, float]:
@@ -427,14 +430,6 @@ def _sampling(
         grid = grid_of(error.times)
         return arguments.sample_period(samples, delta=grid.period), grid, grid.start
     return seconds, None, arguments.begin_of(times)
-
-
-def _times(samples: int, seconds: float, begin: float) -> npt.NDArray[np.float64]:
-    """Return the times of samples, in the memory of one array: records may be hours long."""
-    times = np.arange(samples, dtype=np.float64)
-    times *= seconds
-    times += begin
-    return times
 
 
 def _in_units_of_results(name: str, value: float | None, factor: float) -> float | None:

@@ -13,6 +13,7 @@ from tvident import _arguments as arguments
 from tvident import _core
 from tvident._equation import LINEAR_UNITS, UNITS
 from tvident._identify.channels import MotionChannels
+from tvident._identify.weighted import Weights
 from tvident._units import ROTARY, Axis
 
 
@@ -59,6 +60,8 @@ class Data:
         How the channels were brought onto a uniform grid; None where their times are uniform.
     passed : (PassedNoise, PassedNoise), optional
         What that makes of white noise of angle and torque.
+    weights : Weights, optional
+        Those of samples, where they were given.
     """
 
     angles: npt.NDArray[np.number]
@@ -77,6 +80,7 @@ class Data:
     clipped: Sequence[float] | None = None
     clock: Timed | None = None
     passed: tuple[_core.PassedNoise | None, _core.PassedNoise | None] = (None, None)
+    weights: Weights | None = None
 
     @property
     def batch(self) -> tuple[int, ...]:
@@ -91,15 +95,24 @@ class Data:
         return [np.ascontiguousarray(one) for one in self.mask.reshape(-1, self.time.size)]
 
     @property
+    def weights_of_core(self) -> npt.NDArray[np.float64] | None:
+        """The weights as the core asks for them."""
+        if self.weights is None:
+            return None
+        # The core is to know which samples are left out rather than missing.
+        return self.weights.values if self.propagate else self.weights.of_core
+
+    @property
     def records(self) -> int:
         """How many records there are."""
         return int(np.prod(self.batch, dtype=int))
 
     @property
-    def timing(self) -> dict[str, Any]:
-        """What settings keep of times."""
+    def settings(self) -> dict[str, Any]:
+        """What settings keep of records and their times."""
+        channels = {"instrument": self.instruments is not None, "weights": self.weights is not None}
         own = {} if self.clock is None else self.clock.settings
-        return {"sample_rate": 1 / self.period, "step": self.step, **own}
+        return {**channels, "sample_rate": 1 / self.period, "step": self.step, **own}
 
     @property
     def noise(self) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from tvident._status import Status
 Array = npt.NDArray[np.float64]
 Single = Callable[..., Identification]
 
-_CHANNELS = ("angle", "velocity", "acceleration", "torque", "instrument", "mask", "t")
+_CHANNELS = ("angle", "velocity", "acceleration", "torque", "instrument", "mask", "weights", "t")
 """Arguments that have a value for every sample, and so one array a record."""
 
 _OTHERS = ("sample_rate", "delta", "inertia", "damping", "stiffness", "settings")

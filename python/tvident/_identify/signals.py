@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _arguments as arguments
 from tvident import _core
 from tvident._clocks import Clock, Grid, clock_of, earlier_clock
 from tvident._derivatives import quantisation_step
@@ -87,3 +88,31 @@ def with_own_step(request: Request, channels: _Channels) -> Request:
     if "angle" not in channels:
         return request
     return replace(request, quantisation=quantisation_step(channels["angle"], request.quantisation))
+
+
+def channels_of_motion(motion: Mapping[str, npt.ArrayLike | None]) -> dict[str, npt.ArrayLike]:
+    """Return what was measured of a motion; refuse nothing."""
+    measured = {name: values for name, values in motion.items() if values is not None}
+    if not measured:
+        raise ValueError(
+            "identify needs a motion; got angle=None; give velocity= or acceleration= where there is no angle"
+        )
+    return measured
+
+
+def instrument_of(instrument: npt.ArrayLike | None, shape: tuple[int, ...]) -> npt.NDArray[np.number] | None:
+    """Return an instrument of the torque's shape, where there is one."""
+    if instrument is None:
+        return None
+    found = arguments.channel("instrument", instrument)
+    if found.shape != shape:
+        raise ValueError(f"an instrument must have the angle's shape {shape}; got {found.shape}; resample it")
+    return found
+
+
+def even_times(samples: int, seconds: float, begin: float) -> npt.NDArray[np.float64]:
+    """Return the times of samples, in the memory of one array: records may be hours long."""
+    times = np.arange(samples, dtype=np.float64)
+    times *= seconds
+    times += begin
+    return times

@@ -105,6 +105,7 @@ class Task:
             angle_zero=self._angle_zeros(),
             quantisation=request.quantisation,
             masks=data.masks,
+            weights=data.weights_of_core,
             propagate=data.propagate,
             step=data.step,
             diagnose=diagnose,
@@ -236,6 +237,7 @@ class Task:
                 motion=data.motion.part(place, data.batch),
                 instruments=some(data.instruments),
                 mask=some(data.mask),
+                weights=None if data.weights is None else data.weights.part(place),
                 doubts=(),
                 labels=None,
             )
@@ -269,7 +271,8 @@ class Task:
         assert isinstance(form, _core.StrongForm)  # noqa: S101 - weak form compares test functions of all widths while it identifies
         motions = self._motions(self.columns.samples(self._searched(None).values))
         kinds, lags = [one.kind for one in self._unknowns], [late or 0.0 for late in self._lags()]
-        found = form.scan(motions, kinds, lag=lags, masks=data.masks, workers=data.workers)
+        weights = data.weights_of_core
+        found = form.scan(motions, kinds, lag=lags, masks=data.masks, weights=weights, workers=data.workers)
         return tuple(scan_of(one, self._names) for one in found)
 
     def _again(self, settings: dict[str, Any], angles: npt.NDArray[np.number]) -> Identification:
@@ -405,7 +408,6 @@ class Task:
             **lag,
             "quantisation": self._quantisation,
             "period": request.period,
-            "instrument": data.instruments is not None,
             "loss": "squares" if not any(data.clipped or ()) else "huber",
             "kinds": kinds,
             "terms": [[term.name, kinds[term.name]] for term in self._terms],
@@ -413,6 +415,6 @@ class Task:
             "earned": {name: by_record(value.tolist()) for name, value in searched.earned.items()},
             "own_terms": [term.name for term in self._terms if term.own is not None],
             "known": {name: value if isinstance(value, float) else None for name, value in self._known.items()},
-            **data.timing,
+            **data.settings,
             "chosen": chosen,
         }

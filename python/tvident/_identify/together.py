@@ -32,6 +32,7 @@ _ALONE: dict[str, tuple[Any, ...]] = {
     "velocity": (None,),
     "acceleration": (None,),
     "instrument": (None,),
+    "weights": (None,),
     "lag": (None, 0, 0.0),
     "quantisation": (None,),
     "period": (None,),

@@ -97,6 +97,8 @@ class Told:
         # What was made of several channels, or integrated, has no noise above the motion that would be the angle's alone.
         coherences: Sequence[float | None] = [None] * len(variances)
         if not data.motion.recorded:
+            if data.weights is not None:
+                variances = [one * spread for one, spread in zip(variances, data.weights.spread, strict=True)]
             coherences = _core.noise_coherence(data.angles, data.torques, variances)
         return [
             Explained(

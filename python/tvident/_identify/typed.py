@@ -32,6 +32,7 @@ class Given(TypedDict, total=False):
     lag: float | Literal["auto"] | None
     quantisation: float | None
     mask: npt.ArrayLike | None
+    weights: npt.ArrayLike | None
     loss: Loss | None
     period: float | None
     align: Align

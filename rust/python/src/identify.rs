@@ -5,6 +5,7 @@ use std::num::NonZeroUsize;
 use numpy::PyUntypedArray;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use tvident::equation::Motion;
 use tvident::exec::workers as threads;
 use tvident::identify::{
     Identification as Found, InstrumentTest, Kind, Method, Options, StrongForm as Strong, Task, WeakForm as Weak,
@@ -18,7 +19,7 @@ use tvident::simd::Instructions;
 use crate::identified::{Identification, Scan, kind};
 use crate::local_polynomials::LocalPolynomials;
 use crate::motions::Motions;
-use crate::records::{flags, records};
+use crate::records::{copied, flags, records};
 use crate::watch::watched;
 
 /// Settings of the weak form, one of each a record. What is None is chosen from the record.
@@ -96,7 +97,7 @@ impl StrongForm {
     }
 
     /// Estimates of every record by the length of the polynomials' windows.
-    #[pyo3(signature = (motions, kinds, *, lag, masks=None, workers=None))]
+    #[pyo3(signature = (motions, kinds, *, lag, masks=None, weights=None, workers=None))]
     fn scan(
         &self,
         py: Python<'_>,
@@ -104,11 +105,13 @@ impl StrongForm {
         kinds: Vec<String>,
         lag: Vec<f64>,
         masks: Option<Vec<Bound<'_, PyUntypedArray>>>,
+        weights: Option<&Bound<'_, PyUntypedArray>>,
         workers: Option<NonZeroUsize>,
     ) -> PyResult<Vec<Py<Scan>>> {
-        let (kinds, masks) = (kinds_of(&kinds)?, masks_of(masks)?);
+        let kinds = kinds_of(&kinds)?;
+        let beside = Beside::new(masks, weights)?;
         let method = |_| Ok(Method::Strong(self.settings()));
-        let tasks = tasks(motions, lag.into_iter().map(Some), None, masks.as_deref(), method)?;
+        let tasks = tasks(motions, lag.into_iter().map(Some), None, &beside, method)?;
         let mut found = Vec::new();
         watched(py, None, |watch| {
             let form = self.settings();
@@ -214,11 +217,12 @@ impl Form<'_> {
 }
 
 /// Identifies every record. `kinds` holds one word an unknown, `lag` the samples by which the torque of each record comes late (None: estimate
-/// it), `angle_zero` the angle about which each spring is relaxed (None: zero, unless the record contradicts that), `masks` one mask a record, `instrument` a channel a record that noise does not reach, `wanted` the
+/// it), `angle_zero` the angle about which each spring is relaxed (None: zero, unless the record contradicts that), `masks` one mask a record, `weights` a weight
+/// for every sample of every record (those of weight zero must be missing), `instrument` a channel a record that noise does not reach, `wanted` the
 /// first sample that numbers are wanted at and the one after the last.
 #[pyfunction]
 #[pyo3(signature = (
-    motions, kinds, method, *, delta, lag, angle_zero=None, quantisation=None, masks=None, propagate=false, step=1, wanted=None, diagnose=true, instrument=None, workers=None, progress=None
+    motions, kinds, method, *, delta, lag, angle_zero=None, quantisation=None, masks=None, weights=None, propagate=false, step=1, wanted=None, diagnose=true, instrument=None, workers=None, progress=None
 ))]
 pub(crate) fn identify<'py>(
     py: Python<'py>,
@@ -230,6 +234,7 @@ pub(crate) fn identify<'py>(
     angle_zero: Option<Vec<Option<f64>>>,
     quantisation: Option<f64>,
     masks: Option<Vec<Bound<'py, PyUntypedArray>>>,
+    weights: Option<&Bound<'py, PyUntypedArray>>,
     propagate: bool,
     step: usize,
     wanted: Option<(usize, usize)>,
@@ -248,8 +253,8 @@ pub(crate) fn identify<'py>(
         diagnose,
         instructions: Instructions::current(),
     };
-    let masks = masks_of(masks)?;
-    let tasks = tasks(motions, lag.into_iter(), angle_zero, masks.as_deref(), |record| method.of(record))?;
+    let beside = Beside::new(masks, weights)?;
+    let tasks = tasks(motions, lag.into_iter(), angle_zero, &beside, |record| method.of(record))?;
     let instruments = instrument.map(records).transpose()?;
     let mut found: Vec<(Found, Option<InstrumentTest>)> = Vec::new();
     watched(py, progress, |watch| {
@@ -273,9 +278,20 @@ fn kinds_of(names: &[String]) -> PyResult<Vec<Kind>> {
     names.iter().map(of).collect()
 }
 
-/// Masks of records. One may be written by other threads while the interpreter's lock is away, so they are copied.
-fn masks_of(masks: Option<Vec<Bound<'_, PyUntypedArray>>>) -> PyResult<Option<Vec<Vec<bool>>>> {
-    masks.map(|masks| masks.iter().map(flags).collect()).transpose()
+/// Masks and weights of records. They may be written by other threads while the interpreter's lock is away, so they are copied.
+struct Beside {
+    masks: Option<Vec<Vec<bool>>>,
+    weights: Option<Vec<Vec<f64>>>,
+}
+
+impl Beside {
+    fn new(
+        masks: Option<Vec<Bound<'_, PyUntypedArray>>>,
+        weights: Option<&Bound<'_, PyUntypedArray>>,
+    ) -> PyResult<Self> {
+        let masks = masks.map(|masks| masks.iter().map(flags).collect()).transpose()?;
+        Ok(Self { masks, weights: weights.map(copied).transpose()? })
+    }
 }
 
 /// One task a record.
@@ -283,14 +299,19 @@ fn tasks<'a>(
     motions: &'a Motions,
     mut lag: impl Iterator<Item = Option<f64>>,
     angle_zero: Option<Vec<Option<f64>>>,
-    masks: Option<&'a [Vec<bool>]>,
+    beside: &'a Beside,
     method: impl Fn(usize) -> PyResult<Method<'a>>,
 ) -> PyResult<Vec<Task<'a>>> {
-    let task = |(record, motion)| {
+    let task = |(record, motion): (usize, Motion<'a>)| {
         let lag = lag.next().ok_or_else(|| PyValueError::new_err("every record needs a lag"))?;
-        let mask = masks.and_then(|masks| masks.get(record)).map(Vec::as_slice);
+        let mask = beside.masks.as_ref().and_then(|masks| masks.get(record)).map(Vec::as_slice);
         let angle_zero = angle_zero.as_ref().and_then(|zeros| zeros.get(record).copied().flatten());
-        Ok(Task { motion, mask, method: method(record)?, lag, angle_zero })
+        let weights = match beside.weights.as_ref().map(|weights| weights.get(record)) {
+            Some(Some(one)) if one.len() == motion.angle.len() => Some(one.as_slice()),
+            Some(_) => return Err(PyValueError::new_err("every sample of every record needs a weight")),
+            None => None,
+        };
+        Ok(Task { motion, mask, weights, method: method(record)?, lag, angle_zero })
     };
     motions.all()?.into_iter().enumerate().map(task).collect()
 }

@@ -169,6 +169,19 @@ pub(crate) fn records(array: &Bound<'_, PyUntypedArray>) -> PyResult<Vec<Strided
     }
 }
 
+/// Copies all records of an array.
+pub(crate) fn copied(array: &Bound<'_, PyUntypedArray>) -> PyResult<Vec<Vec<f64>>> {
+    let copy = |record: &StridedSamples| {
+        let mut numbers = Vec::new();
+        let bytes = record.len.saturating_mul(size_of::<f64>());
+        numbers.try_reserve_exact(record.len).map_err(|_| exception(&Error::Memory { bytes }))?;
+        numbers.resize(record.len, 0.0);
+        record.read(0, &mut numbers);
+        Ok(numbers)
+    };
+    records(array)?.iter().map(copy).collect()
+}
+
 /// All records of an array, which holds them as a whole or some parts of each: the first sample of every part and the one after its last.
 pub(crate) fn placed(
     array: &Bound<'_, PyUntypedArray>,

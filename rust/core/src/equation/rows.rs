@@ -30,9 +30,27 @@ pub(crate) struct Rows {
     pub(crate) jumps: Vec<usize>,
     /// Seconds from one row to the next.
     pub(crate) period: f64,
+    /// What every row was multiplied by, so that the noise of all is alike: the square root of its weight. Empty where all count alike.
+    pub(crate) roots: Vec<f64>,
 }
 
 impl Rows {
+    /// What a row was multiplied by.
+    pub(crate) fn root(&self, row: usize) -> f64 {
+        self.roots.get(row).copied().unwrap_or(1.0)
+    }
+
+    /// Multiplies every row by the square root of its weight.
+    pub(crate) fn weigh(&mut self, roots: Vec<f64>) {
+        let multiply = |column: &mut [f64]| column.iter_mut().zip(&roots).for_each(|(value, root)| *value *= root);
+        multiply(&mut self.rhs);
+        for Regressor { value, companion, .. } in &mut self.regressors {
+            multiply(value);
+            multiply(companion);
+        }
+        self.roots = roots;
+    }
+
     /// Number of rows.
     pub(crate) fn len(&self) -> usize {
         self.rhs.len()
@@ -56,6 +74,7 @@ impl Rows {
         self.jumps.extend(other.jumps.iter().map(|jump| before + jump));
         self.rhs.append(&mut other.rhs);
         self.usable.append(&mut other.usable);
+        self.roots.append(&mut other.roots);
         for (one, mut more) in self.regressors.iter_mut().zip(other.regressors) {
             one.value.append(&mut more.value);
             one.companion.append(&mut more.companion);

@@ -280,7 +280,7 @@ impl<'a> Identify<'a> {
             diagnose: true,
             instructions: Instructions::current(),
         };
-        let task = Task { motion, mask: self.mask, method, lag: self.lag, angle_zero: None };
+        let task = Task { motion, mask: self.mask, weights: None, method, lag: self.lag, angle_zero: None };
         let mut found = identify_all(&[task], &options, workers(self.workers), watch)?;
         found.pop().ok_or(Error::NotDetermined)
     }

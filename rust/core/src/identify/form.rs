@@ -98,7 +98,7 @@ pub(crate) fn weak(
         not_missing: not_missing(task),
         instructions: options.instructions,
     };
-    let found = identify_weak(&task.motion, task.mask, &weak_options, workers, watch)?;
+    let found = identify_weak(&task.motion, (task.mask, task.weights), &weak_options, workers, watch)?;
     let place = |number: usize| regressors.iter().position(|&one| one == number).unwrap_or(number);
     let outside_mask = found.outside_mask.map(|outside| {
         let differing = outside.differing.iter().map(|&(number, value, error)| (place(number), value, error)).collect();
@@ -165,7 +165,8 @@ pub(crate) fn strong(
         lag: task.lag.unwrap_or(0.0),
         step: options.step,
     };
-    let found = identify_strong(form.derivatives, &task.motion, task.mask, &strong_options, workers, watch)?;
+    let found =
+        identify_strong(form.derivatives, &task.motion, (task.mask, task.weights), &strong_options, workers, watch)?;
     let mut unknowns = Found {
         constants: found.constants,
         changing: found.changing,

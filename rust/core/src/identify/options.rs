@@ -70,6 +70,8 @@ pub struct Task<'a> {
     pub motion: Motion<'a>,
     /// Where a sample may be the centre of an equation; everywhere if `None`.
     pub mask: Option<&'a [bool]>,
+    /// One over the variance of every sample's noise, relative to the others; all alike if `None`. Samples of weight zero must be missing in the channels.
+    pub weights: Option<&'a [f64]>,
     /// Which equations are made.
     pub method: Method<'a>,
     /// By how many samples the torque comes late; estimated if `None`, which the weak form can.

@@ -80,7 +80,9 @@ fn alone(
         }
     };
     if options.propagate {
-        let holes = holes(&task.motion, &mut |_, total| watch(total, total))?;
+        let mut holes = holes(&task.motion, &mut |_, total| watch(total, total))?;
+        // What has no weight is left out, whatever it holds.
+        holes.retain(|&sample| task.weights.is_none_or(|weights| weights[sample] > 0.0));
         if !holes.is_empty() {
             propagate(&mut found, &holes, options.step);
         }
@@ -107,8 +109,11 @@ fn together<'a, 'b>(tasks: &'a [Task<'b>], routes: &[Pieces], pieces: Pieces) ->
 /// How a record is worked on; in weak form as a whole.
 fn route(task: &Task<'_>, options: &Options, watch: &mut Watch<'_>) -> Result<Pieces, Error> {
     let Method::Strong(form) = &task.method else { return Ok(Pieces::Whole) };
-    let is_plain =
-        !form.filter_torque && task.lag == Some(0.0) && task.mask.is_none() && task.motion.measured.noise.is_none();
+    let is_plain = !form.filter_torque
+        && task.lag == Some(0.0)
+        && task.mask.is_none()
+        && task.weights.is_none()
+        && task.motion.measured.noise.is_none();
     let kinds = in_strong_form(&options.kinds, &regressors(&task.motion));
     let all = |kind: Kind| is_plain && kinds.iter().all(|one| *one == kind);
     Ok(if all(Kind::Constant) {

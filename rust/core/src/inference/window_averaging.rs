@@ -26,6 +26,8 @@ const RECORD: [f64; 2] = [16.0, 5.0];
 const COARSE: usize = 8;
 /// If so many of the longest lengths in the subsample are negligible, all longer ones are assumed to be.
 const OVERLAP: usize = 2;
+/// Rows whose weights spread by less than this part have one weight, but for rounding.
+const EVEN: f64 = 1e-9;
 /// A window whose exponent over the record is so much larger than the best one's gets no weight anywhere.
 const HOPELESS: f64 = 24.0;
 
@@ -60,7 +62,64 @@ struct Candidate {
     /// All cells, if they are few.
     cells: Option<Cells>,
     /// Mean squared error over the record, by position; infinite if the length is not used there.
-    record: [f64; POSITIONS],
+    record: [OverRecord; POSITIONS],
+}
+
+impl Candidate {
+    /// Whether it may serve in a position: in rows of the least weight or in those of the greatest.
+    fn promises(&self, which: usize, hopeless: &[(f64, f64)]) -> bool {
+        hopeless.iter().any(|&(weight, most)| self.record[which].at(weight) <= most)
+    }
+}
+
+/// The mean squared error of rows over the record, which grows with their weight: noise is the same in all, what windows do not follow is not.
+#[derive(Clone, Copy, Debug)]
+struct OverRecord {
+    mean: f64,
+    /// By how much the error grows with the weight, and the weight at which it is the mean.
+    growth: f64,
+    middle: f64,
+}
+
+impl OverRecord {
+    const UNUSED: Self = Self { mean: f64::INFINITY, growth: 0.0, middle: 1.0 };
+
+    /// The error that is expected of rows of a weight.
+    fn at(self, weight: f64) -> f64 {
+        (self.mean + self.growth * (weight - self.middle)).max(0.0)
+    }
+}
+
+/// Sums over rows, of which a line of their squared errors by their weights follows.
+#[derive(Clone, Copy, Debug, Default)]
+struct ErrorSums {
+    count: f64,
+    error: f64,
+    weight: f64,
+    squared_weight: f64,
+    product: f64,
+}
+
+impl ErrorSums {
+    fn add(&mut self, error: f64, weight: f64) {
+        self.merge(Self { count: 1.0, error, weight, squared_weight: weight * weight, product: weight * error });
+    }
+
+    fn merge(&mut self, other: Self) {
+        self.count += other.count;
+        self.error += other.error;
+        self.weight += other.weight;
+        self.squared_weight += other.squared_weight;
+        self.product += other.product;
+    }
+
+    fn over_record(self) -> OverRecord {
+        let (mean, middle) = (self.error / self.count, self.weight / self.count);
+        let spread = self.squared_weight - middle * self.weight;
+        let growth = (self.product - middle * self.error) / spread;
+        let differ = spread > EVEN * self.squared_weight;
+        OverRecord { mean, growth: if differ { growth.max(0.0) } else { 0.0 }, middle }
+    }
 }
 
 /// Averages windows of several lengths at every row of a problem without constants. `best` is the length of windows
@@ -78,7 +137,7 @@ pub(crate) fn average(
     let reach = scales.first().map_or(1, |scale| scale.reach);
     let view = View { problem, variance: expected.variance, reach, instructions };
     let mut candidates: Vec<_> =
-        scales.iter().map(|&scale| Candidate { scale, cells: None, record: [f64::INFINITY; POSITIONS] }).collect();
+        scales.iter().map(|&scale| Candidate { scale, cells: None, record: [OverRecord::UNUSED; POSITIONS] }).collect();
     let record = RECORD[0].max(RECORD[1] * best as f64 / expected.variance_inflation);
     let hope = HOPELESS / record;
     let middle = rows / 5..(4 * rows / 5).max(rows / 5 + 1).min(rows);
@@ -91,16 +150,19 @@ pub(crate) fn average(
             short
         }
     };
-    let errors = |candidates: &[Candidate]| {
-        candidates.iter().flat_map(|candidate| candidate.record).fold(f64::INFINITY, f64::min)
+    let ends = ends_of_weights(problem);
+    let errors = |candidates: &[Candidate], weight: f64| {
+        candidates.iter().flat_map(|candidate| candidate.record).map(|one| one.at(weight)).fold(f64::INFINITY, f64::min)
     };
     let long = short.saturating_sub(OVERLAP);
-    if thinned.is_none() || errors(&candidates[long..short]) <= errors(&candidates[..short]) + hope {
+    let promise =
+        |&weight: &f64| errors(&candidates[long..short], weight) <= errors(&candidates[..short], weight) + hope;
+    if thinned.is_none() || ends.iter().any(promise) {
         view.judge(&mut candidates[short..], &middle, stages)?;
     }
-    let hopeless = errors(&candidates) + hope;
+    let hopeless = ends.map(|weight| (weight, errors(&candidates, weight) + hope));
     for candidate in &mut candidates {
-        let chosen = candidate.record.iter().any(|&error| error <= hopeless);
+        let chosen = (0..POSITIONS).any(|which| candidate.promises(which, &hopeless));
         if chosen && candidate.scale.step >= COARSE && candidate.cells.is_none() {
             let all = candidate.scale.one_sided_cells(rows);
             candidate.cells = Some(candidate.scale.solve(problem, &all, instructions, stages)?);
@@ -111,9 +173,17 @@ pub(crate) fn average(
     let mut averages = Averages::new(problem.layout.windowed, rows);
     let nearby = view.nearby(expected);
     stages.fill(averages.columns(), |rows, columns| {
-        view.average((&candidates, &ready), rows, nearby, record, hopeless, columns);
+        view.average((&candidates, &ready), rows, nearby, record, &hopeless, columns);
     })?;
     Ok(averages)
+}
+
+/// The least and the greatest weight of a row.
+fn ends_of_weights(problem: &Problem<'_>) -> [f64; 2] {
+    let used = (0..problem.rows()).filter(|&row| problem.usable[row]).map(|row| problem.weight(row));
+    let (least, greatest) =
+        used.fold((f64::INFINITY, 0.0_f64), |(least, greatest), weight| (least.min(weight), greatest.max(weight)));
+    if least <= greatest { [least, greatest] } else { [1.0; 2] }
 }
 
 /// Windows of the candidates whose cells are all solved, ready to predict in every piece.
@@ -162,10 +232,12 @@ impl View<'_, '_> {
         let sums = stages.map(ranges(self.problem.rows()), || (), work)?;
         for (index, candidate) in candidates.iter_mut().enumerate() {
             for which in 0..POSITIONS {
-                let parts = sums.iter().map(|sums| sums[index][which]);
-                let (sum, count) = parts.fold((0.0, 0.0), |all, part| (all.0 + part.0, all.1 + part.1));
-                if count > 0.0 {
-                    candidate.record[which] = sum / count;
+                let mut all = ErrorSums::default();
+                for sums in &sums {
+                    all.merge(sums[index][which]);
+                }
+                if all.count > 0.0 {
+                    candidate.record[which] = all.over_record();
                 }
             }
         }
@@ -192,9 +264,9 @@ impl View<'_, '_> {
         (error * error / self.variance).min(MOST)
     }
 
-    /// Sums of squared errors and their number, by position.
-    fn sums(&self, candidate: &Candidate, ready: Option<&Around<'_>>, rows: Range<usize>) -> [(f64, f64); POSITIONS] {
-        let mut sums = [(0.0, 0.0); POSITIONS];
+    /// Sums over rows, by position.
+    fn sums(&self, candidate: &Candidate, ready: Option<&Around<'_>>, rows: Range<usize>) -> [ErrorSums; POSITIONS] {
+        let mut sums = [ErrorSums::default(); POSITIONS];
         if rows.start >= rows.end {
             return sums;
         }
@@ -207,10 +279,9 @@ impl View<'_, '_> {
             &here
         };
         for row in rows.filter(|&row| self.problem.usable[row]) {
-            for (which, (sum, count)) in sums.iter_mut().enumerate() {
+            for (which, sums) in sums.iter_mut().enumerate() {
                 if let Some(window) = around.at_row(self.problem, row, which) {
-                    *sum += self.error(&window, row);
-                    *count += 1.0;
+                    sums.add(self.error(&window, row), self.problem.weight(row));
                 }
             }
         }
@@ -224,7 +295,7 @@ impl View<'_, '_> {
         rows: Range<usize>,
         nearby: Nearby,
         record: f64,
-        hopeless: f64,
+        hopeless: &[(f64, f64)],
         columns: &mut [&mut [f64]],
     ) {
         let windowed = self.problem.layout.windowed;
@@ -243,7 +314,8 @@ impl View<'_, '_> {
             if !wanted.contains(&true) {
                 break;
             }
-            let chosen = |candidate: &Candidate| candidate.record.iter().any(|&error| (error <= hopeless) == hope);
+            let chosen =
+                |candidate: &Candidate| (0..POSITIONS).any(|which| candidate.promises(which, hopeless) == hope);
             for (candidate, ready) in candidates.iter().zip(ready).filter(|(candidate, _)| chosen(candidate)) {
                 let (cells, here);
                 let around = if let Some(ready) = ready {
@@ -253,7 +325,7 @@ impl View<'_, '_> {
                     here = Around::new(candidate.scale, &cells, &[]);
                     &here
                 };
-                for which in (0..POSITIONS).filter(|&which| (candidate.record[which] <= hopeless) == hope) {
+                for which in (0..POSITIONS).filter(|&which| candidate.promises(which, hopeless) == hope) {
                     // Running sums of the errors, so that every mean costs two differences; they restart with every piece.
                     let mut errors = vec![[0.0, 0.0]; wide.len() + 1];
                     for (place, row) in wide.clone().enumerate() {
@@ -272,7 +344,8 @@ impl View<'_, '_> {
                         let (sum, count) = (errors[last][0] - errors[first][0], errors[last][1] - errors[first][1]);
                         // Within a gap there are no errors nearby, and those over the record decide.
                         let here = if count == 0.0 { 0.0 } else { nearby.independent * sum / count };
-                        let exponent = 0.5 * (here + record * candidate.record[which].min(MOST));
+                        let expected = candidate.record[which].at(self.problem.weight(row)).min(MOST);
+                        let exponent = 0.5 * (here + record * expected);
                         self.numbers_at_row(&window, &mut numbers_here);
                         let sums = &mut sums[place * numbers..(place + 1) * numbers];
                         if exponent < least[place] {

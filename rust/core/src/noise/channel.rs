@@ -20,7 +20,7 @@ use crate::local_polynomials::coefficients::Projected;
 use crate::local_polynomials::tables::{TablesWanted, tables};
 use crate::noise::passed::{CHANCE, PassedNoise, Shown};
 use crate::noise::quantisation::{STRETCHES, quantisation_step};
-use crate::noise::spectrum::power_of_whole_segments;
+use crate::noise::spectrum::{mean_weight, power_of_whole_segments};
 use crate::record::samples::{Samples, is_usable};
 use crate::record::subsample::stretches;
 use crate::simd::instructions::Instructions;
@@ -59,14 +59,24 @@ pub struct Noise {
 /// # Errors
 /// If there are fewer than [`FEWEST_SAMPLES`].
 pub fn noise(record: &dyn Samples, quantisation: Option<f64>, instructions: Instructions) -> Result<Noise, Error> {
+    noise_of(record, None, quantisation, instructions)
+}
+
+/// The same of a sample of weight one, where the variance of every sample's noise is one over its weight.
+fn noise_of(
+    record: &dyn Samples,
+    weights: Option<&[f64]>,
+    quantisation: Option<f64>,
+    instructions: Instructions,
+) -> Result<Noise, Error> {
     let samples = record.len();
     if samples < FEWEST_SAMPLES {
         return Err(Error::RecordTooShort { samples, least: FEWEST_SAMPLES });
     }
     let quantisation = quantisation.unwrap_or_else(|| quantisation_step(record));
     let halves = HALVES.iter().filter(|&half| 2 * half < samples);
-    let variance = halves.map(|&half| variance(record, half, instructions)).fold(f64::NAN, f64::min);
-    let least = (quantisation * quantisation / 12.0).max((f64::EPSILON * largest(record)).powi(2));
+    let variance = halves.map(|&half| variance(record, half, weights, instructions)).fold(f64::NAN, f64::min);
+    let least = least(quantisation, weights).max((f64::EPSILON * largest(record)).powi(2));
     let sigma = if variance.is_nan() { f64::NAN } else { variance.max(least).sqrt() };
     Ok(Noise { sigma, quantisation })
 }
@@ -75,12 +85,31 @@ pub fn noise(record: &dyn Samples, quantisation: Option<f64>, instructions: Inst
 /// quietest frequency band. This bound holds where a signal with only a few samples per cycle reaches even the shortest
 /// windows. Zero for a record that is too short.
 pub(crate) fn channel_variance(record: &dyn Samples, quantisation: Option<f64>, instructions: Instructions) -> f64 {
-    let Ok(found) = noise(record, quantisation, instructions) else { return 0.0 };
+    weighted_variance(record, None, quantisation, instructions)
+}
+
+/// The same of a sample of weight one, where samples have weights.
+pub(crate) fn weighted_variance(
+    record: &dyn Samples,
+    weights: Option<&[f64]>,
+    quantisation: Option<f64>,
+    instructions: Instructions,
+) -> f64 {
+    let Ok(found) = noise_of(record, weights, quantisation, instructions) else { return 0.0 };
     if found.sigma.is_nan() {
         return 0.0;
     }
-    let least = found.quantisation * found.quantisation / 12.0;
-    (found.sigma * found.sigma).min(quietest_band(record)).max(least)
+    let least = least(found.quantisation, weights);
+    (found.sigma * found.sigma).min(quietest_band(record, weights)).max(least)
+}
+
+/// The variance that rounding to a step leaves; it does not know of weights, so it is that of a sample of mean weight.
+fn least(quantisation: f64, weights: Option<&[f64]>) -> f64 {
+    let mean = weights.map_or(1.0, |weights| {
+        let used = weights.iter().filter(|weight| **weight > 0.0);
+        used.clone().sum::<f64>() / used.count().max(1) as f64
+    });
+    mean * quantisation * quantisation / 12.0
 }
 
 /// The same of a channel that was resampled: what white noise must have had that became what the channel shows, and its density at low frequencies.
@@ -102,25 +131,25 @@ pub fn variance_after(
 
 /// What a channel shows where its signal does not reach, or hardly.
 pub(crate) fn shown(record: &dyn Samples, instructions: Instructions) -> Shown {
-    let of = |half: usize| if 2 * half < record.len() { variance(record, half, instructions) } else { f64::NAN };
-    let (bands, powers) = bands(record);
+    let of = |half: usize| if 2 * half < record.len() { variance(record, half, None, instructions) } else { f64::NAN };
+    let (bands, powers) = bands(record, None);
     Shown { variances: HALVES.map(of).to_vec(), bands, powers }
 }
 
 /// An upper confidence bound of the mean power in the quietest frequency band; infinite for a record that is too short.
-fn quietest_band(record: &dyn Samples) -> f64 {
-    let (bands, powers) = bands(record);
+fn quietest_band(record: &dyn Samples, weights: Option<&[f64]>) -> f64 {
+    let (bands, powers) = bands(record, weights);
     let quietest = bands.into_iter().fold(f64::INFINITY, f64::min);
     // The power at a frequency of a segment scatters by as much as it is.
     quietest * (1.0 + CHANCE / powers.sqrt())
 }
 
 /// The mean power in every frequency band, and of how many independent powers each is the mean; none for a record that is too short.
-fn bands(record: &dyn Samples) -> (Vec<f64>, f64) {
+fn bands(record: &dyn Samples, weights: Option<&[f64]>) -> (Vec<f64>, f64) {
     if record.len() < FEWEST_SEGMENTS * SEGMENT {
         return (Vec::new(), 1.0);
     }
-    let (power, segments) = power_of_whole_segments(record, SEGMENT);
+    let (power, segments) = power_of_whole_segments(record, weights, SEGMENT);
     if segments == 0 {
         return (Vec::new(), 1.0);
     }
@@ -129,19 +158,23 @@ fn bands(record: &dyn Samples) -> (Vec<f64>, f64) {
     (bands.collect(), (segments * width) as f64)
 }
 
-/// The mean of the squared highest coefficients of windows of one half-width.
-fn variance(record: &dyn Samples, half: usize, instructions: Instructions) -> f64 {
+/// The mean of the squared highest coefficients of windows of one half-width, each times the weight of its window.
+fn variance(record: &dyn Samples, half: usize, weights: Option<&[f64]>, instructions: Instructions) -> f64 {
     let length = 2 * half + 1;
     let wanted = TablesWanted { half, highest: MOST_DEGREES - 1, first: LOWEST_DEGREE, step: 1, instructions };
     let tables = tables(wanted);
     let plan = tables.coefficients();
     let (mut scratch, mut projected) = (plan.scratch(), Projected::default());
     let (mut sum, mut count) = (0.0, 0);
+    let ones = vec![1.0; length];
     for windows in stretches(record.len() + 1 - length, MOST_WINDOWS, STRETCHES) {
-        plan.project(record, windows, 1, &mut projected, &mut scratch);
+        plan.project(record, windows.clone(), 1, &mut projected, &mut scratch);
+        let weight =
+            |window: usize| weights.map_or(1.0, |weights| mean_weight(&weights[window..window + length], &ones));
+        let weights: Vec<f64> = windows.map(weight).collect();
         for row in &projected.coefficients {
-            for c in row.iter().filter(|c| !c.is_nan()) {
-                sum += c * c;
+            for (c, weight) in row.iter().zip(&weights).filter(|(c, _)| !c.is_nan()) {
+                sum += weight * c * c;
                 count += 1;
             }
         }

@@ -23,21 +23,27 @@ const TOGETHER: usize = 16;
 ///
 /// Only the changes are of interest, so the mean of each segment is taken off.
 pub(crate) fn power(record: &dyn Samples, length: usize) -> Vec<f64> {
-    Segments::new(record, length).power().0
+    Segments::new(record, None, length).power().0
 }
 
-/// The same from segments without unusable samples only, and their number: a line that bridges samples has no noise.
-pub(crate) fn power_of_whole_segments(record: &dyn Samples, length: usize) -> (Vec<f64>, usize) {
-    Segments { whole: true, ..Segments::new(record, length) }.power()
+/// The same from segments without unusable samples only, and their number: a line that bridges samples has no noise. Segments are
+/// multiplied by their weight where samples have weights: noise is then that of a sample of weight one.
+pub(crate) fn power_of_whole_segments(
+    record: &dyn Samples,
+    weights: Option<&[f64]>,
+    length: usize,
+) -> (Vec<f64>, usize) {
+    Segments { whole: true, ..Segments::new(record, weights, length) }.power()
 }
 
-/// The same, in parallel.
+/// That of all segments with a majority of usable samples, in parallel.
 pub(crate) fn power_in_pieces(
     record: &dyn Samples,
+    weights: Option<&[f64]>,
     length: usize,
     stages: &mut Stages<'_, '_>,
 ) -> Result<Vec<f64>, Error> {
-    let segments = Segments::new(record, length);
+    let segments = Segments::new(record, weights, length);
     let pieces = segments.parts().map(|part| Piece { size: part.len(), content: part });
     let sums = stages.map(pieces.collect(), || (), |part, (): &mut ()| segments.sum(part))?;
     Ok(segments.mean(sums.into_iter()).0)
@@ -46,6 +52,7 @@ pub(crate) fn power_in_pieces(
 /// The segments of a record whose power is averaged.
 struct Segments<'a> {
     record: &'a dyn Samples,
+    weights: Option<&'a [f64]>,
     length: usize,
     /// How many there are, and samples from one to the next.
     count: usize,
@@ -59,14 +66,14 @@ struct Segments<'a> {
 }
 
 impl<'a> Segments<'a> {
-    fn new(record: &'a dyn Samples, length: usize) -> Self {
+    fn new(record: &'a dyn Samples, weights: Option<&'a [f64]>, length: usize) -> Self {
         let fade: Vec<f64> = (0..length).map(|k| (PI * (k as f64 + 0.5) / length as f64).sin().powi(2)).collect();
         let energy = fade.iter().map(|value| value * value).sum();
         let most = (MOST_SAMPLES / length).clamp(FEWEST_SEGMENTS, MOST_SEGMENTS);
         let last = record.len().checked_sub(length);
         let every = (length / 2).max(last.unwrap_or(0) / most).max(1);
         let count = last.map_or(0, |last| last / every + 1);
-        Self { record, length, count, every, fade, energy, transform: Transform::new(length), whole: false }
+        Self { record, weights, length, count, every, fade, energy, transform: Transform::new(length), whole: false }
     }
 
     /// Segments that are summed together.
@@ -92,12 +99,19 @@ impl<'a> Segments<'a> {
             }
             let mean = samples.iter().sum::<f64>() / self.length as f64;
             samples.iter_mut().zip(&self.fade).for_each(|(value, fade)| *value = (*value - mean) * fade);
+            let energy = self.energy / self.weight(segment);
             for (sum, [real, imaginary]) in sum.iter_mut().zip(self.transform.of(&samples)) {
-                *sum += (real * real + imaginary * imaginary) / self.energy;
+                *sum += (real * real + imaginary * imaginary) / energy;
             }
             count += 1;
         }
         (sum, count)
+    }
+
+    /// One over the variance of a segment's noise, in units of that of samples of weight one.
+    fn weight(&self, segment: usize) -> f64 {
+        let first = segment * self.every;
+        self.weights.map_or(1.0, |weights| mean_weight(&weights[first..first + self.length], &self.fade))
     }
 
     /// The mean of all segments that count, and their number.
@@ -109,6 +123,17 @@ impl<'a> Segments<'a> {
         }
         (mean.into_iter().map(|value| value / all.max(1) as f64).collect(), all)
     }
+}
+
+/// One over the mean variance of noise that enters samples with some factors, where their variance is one over their weight. Samples of
+/// weight zero are missing, and others stand in for them.
+pub(crate) fn mean_weight(weights: &[f64], factors: &[f64]) -> f64 {
+    let (mut squares, mut variance) = (0.0, 0.0);
+    for (factor, &weight) in factors.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
+        squares += factor * factor;
+        variance += factor * factor / weight;
+    }
+    if variance > 0.0 { squares / variance } else { 0.0 }
 }
 
 /// Bridges unusable samples by a line. Returns whether at least half of the samples are usable.

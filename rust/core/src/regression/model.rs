@@ -68,6 +68,7 @@ impl Model {
             usable: &rows.usable,
             jumps: &rows.jumps,
             period: rows.period,
+            roots: &rows.roots,
             noise: self.row_noise(rows, &rows.rhs_noise, noise),
         }
     }

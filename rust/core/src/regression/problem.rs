@@ -20,6 +20,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) jumps: &'a [usize],
     /// Seconds from one row to the next.
     pub(crate) period: f64,
+    /// What every row was multiplied by; empty where all count alike.
+    pub(crate) roots: &'a [f64],
     /// The noise of the angle in a row.
     pub(crate) noise: RowNoise,
     /// The windowed regressors times the covariance of the rows; without it standard errors are those of ordinary least squares.
@@ -39,6 +41,16 @@ impl Problem<'_> {
     /// Number of rows.
     pub(crate) fn rows(&self) -> usize {
         self.rhs.len()
+    }
+
+    /// What a row was multiplied by.
+    pub(crate) fn root(&self, row: usize) -> f64 {
+        self.roots.get(row).copied().unwrap_or(1.0)
+    }
+
+    /// The weight of a row: the square of that.
+    pub(crate) fn weight(&self, row: usize) -> f64 {
+        self.root(row) * self.root(row)
     }
 
     /// The rows from the first usable one to the last.
@@ -63,6 +75,7 @@ impl Problem<'_> {
             rhs: &self.rhs[rows.clone()],
             usable: &self.usable[rows.clone()],
             jumps,
+            roots: self.roots.get(rows.clone()).unwrap_or_default(),
             correlated: None,
             ..self.clone()
         }

@@ -42,6 +42,7 @@ pub(crate) fn thinned_rows(rows: &Rows, stretches: &[Range<usize>]) -> Rows {
         usable: thinned_column(&rows.usable, stretches),
         jumps,
         period: rows.period,
+        roots: if rows.roots.is_empty() { Vec::new() } else { column(&rows.roots) },
     }
 }
 

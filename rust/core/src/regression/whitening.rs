@@ -93,7 +93,7 @@ impl Whitening {
         let regressors = regressors.collect();
         let rhs_noise = root(&rows.rhs_noise);
         let (usable, jumps) = (rows.usable.clone(), rows.jumps.clone());
-        Ok(Rows { regressors, rhs, rhs_noise, usable, jumps, period: rows.period })
+        Ok(Rows { regressors, rhs, rhs_noise, usable, jumps, period: rows.period, roots: Vec::new() })
     }
 
     /// Some columns, whitened side by side: every row waits for those before it, so each column alone would wait as long.

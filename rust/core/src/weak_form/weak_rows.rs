@@ -14,6 +14,7 @@ use crate::equation::rows::{Regressor, Rows, joints};
 use crate::error::Error;
 use crate::exec::pool::{self, Piece, Watch};
 use crate::noise::fused::AngleNoise;
+use crate::noise::spectrum::mean_weight;
 use crate::record::derived::{Late, Scaled, Whole};
 use crate::record::samples::Samples;
 use crate::weak_form::angle_noise::entered;
@@ -52,6 +53,8 @@ pub(crate) struct Record<'a> {
     pub(crate) angle_zero: f64,
     /// Where a sample may be the centre of a row.
     pub(crate) mask: Option<&'a [bool]>,
+    /// One over the variance of every sample's noise, relative to the others; samples of weight zero are missing.
+    pub(crate) weights: Option<&'a [f64]>,
 }
 
 /// All rows of a record, and the test function that they were built with.
@@ -141,6 +144,9 @@ impl WeakRows {
             kernels,
         };
         rows.assemble(record, columns);
+        if let Some(weights) = record.weights {
+            rows.weigh(weights, whole, stretches);
+        }
         Ok(rows)
     }
 
@@ -195,10 +201,26 @@ impl WeakRows {
         }
     }
 
+    /// Multiplies every row by the square root of its weight: one over the variance of its noise, where that of every sample is one over its weight
+    /// and enters with the kernel of the torque, which is late by whole samples.
+    fn weigh(&mut self, weights: &[f64], late: f64, stretches: &[Range<usize>]) {
+        #[allow(clippy::cast_possible_truncation, reason = "a lag of a few samples")]
+        let late = late as isize;
+        let weight = |row: usize| {
+            let first = (row * self.stride).saturating_add_signed(late);
+            let weights = weights.get(first..first + self.torque.len());
+            weights.map_or(0.0, |weights| mean_weight(weights, &self.torque))
+        };
+        let roots = stretches.iter().cloned().flatten().map(|row| weight(row).sqrt()).collect();
+        self.rows.weigh(roots);
+    }
+
     /// Moves the angle at which the spring is relaxed.
     pub(crate) fn move_zero(&mut self, by: f64) {
-        let angle = &mut self.rows.regressors[2].value;
-        angle.iter_mut().zip(&self.rows.usable).filter(|(_, usable)| **usable).for_each(|(angle, _)| *angle -= by);
+        for row in (0..self.rows.usable.len()).filter(|&row| self.rows.usable[row]) {
+            let moved = by * self.rows.root(row);
+            self.rows.regressors[2].value[row] -= moved;
+        }
     }
 
     /// Whether windows of so many rows are hardly longer than the test function: they follow anything as if it were motion.

@@ -134,7 +134,7 @@ fn weak(
     let mut built = Vec::new();
     for motion in [&task.motion, explained] {
         let how = (options.delta, options.instructions);
-        let (rows, _) = with_record(motion, (task.mask, lag), how, (workers, &mut *watch), |record, watch| {
+        let (rows, _) = with_record(motion, (task.mask, None, lag), how, (workers, &mut *watch), |record, watch| {
             WeakRows::build(&record, function, options.delta, None, workers, watch)
         })?;
         built.push(rows);
@@ -170,7 +170,7 @@ fn strong(
     for motion in [&task.motion, explained] {
         let lag = (task.lag.unwrap_or(0.0), form.filter_torque);
         let differentiated = differentiate(&plan, motion, lag, &mut stages)?;
-        built.push(strong_rows(&plan, motion, task.mask, false, &differentiated));
+        built.push(strong_rows(&plan, motion, (task.mask, None), false, &differentiated));
     }
     let mut rows = built.into_iter();
     let (recorded, explained) = (rows.next().unwrap_or_default(), rows.next().unwrap_or_default());

@@ -108,7 +108,7 @@ impl MergedSession<'_, '_, '_> {
             if trial.angles[channel].len() < length {
                 continue;
             }
-            let one = power_in_pieces(trial.angles[channel], length, &mut self.stages)?;
+            let one = power_in_pieces(trial.angles[channel], None, length, &mut self.stages)?;
             if one.iter().all(|value| value.is_finite()) {
                 power.resize(one.len(), 0.0);
                 power.iter_mut().zip(one).for_each(|(sum, value)| *sum += value);

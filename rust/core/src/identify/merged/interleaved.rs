@@ -55,6 +55,7 @@ impl Channels {
                 lag: 0.0,
                 angle_zero: 0.0,
                 mask: trial.mask,
+                weights: None,
             };
             let workers = stages.workers;
             each.push(stages.stage(|watch| WeakRows::build(&record, function, delta, None, workers, watch))?);

@@ -81,7 +81,7 @@ pub(crate) struct StrongIdentified {
 pub(crate) fn identify_strong(
     derivatives: &LocalPolynomials,
     motion: &Motion<'_>,
-    mask: Option<&[bool]>,
+    (mask, weights): (Option<&[bool]>, Option<&[f64]>),
     options: &StrongOptions,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
@@ -91,7 +91,7 @@ pub(crate) fn identify_strong(
     memory::ask_for_numbers(samples.saturating_mul(NUMBERS + NUMBERS_OF_AN_UNKNOWN * motion.unknowns()))?;
     let mut stages = Stages::new(workers, samples, STAGES, watch);
     let differentiated = differentiate(derivatives, motion, (options.lag, options.filter_torque), &mut stages)?;
-    let rows = rows(derivatives, motion, mask, options.linear, &differentiated);
+    let rows = rows(derivatives, motion, (mask, weights), options.linear, &differentiated);
     let windowed = options.kinds.iter().map(|kind| *kind == Kind::Windowed);
     let model = Model::new(&unknowns(&motion.coefficients, motion.terms.len()), windowed, options.linear);
     let instructions = derivatives.options().instructions;

@@ -115,11 +115,11 @@ fn smooth_torque(
     Ok(())
 }
 
-/// One row a sample.
+/// One row a sample, with the weight of that sample.
 pub(crate) fn rows(
     plan: &LocalPolynomials,
     motion: &Motion<'_>,
-    mask: Option<&[bool]>,
+    (mask, weights): (Option<&[bool]>, Option<&[f64]>),
     linear: bool,
     differentiated: &Differentiated,
 ) -> Rows {
@@ -165,14 +165,19 @@ pub(crate) fn rows(
     let companion = || if linear { vec![0.0; samples] } else { Vec::new() };
     let regressors =
         columns.into_iter().map(|value| Regressor { value, companion: companion(), noise: Default::default() });
-    Rows {
+    let mut rows = Rows {
         regressors: regressors.collect(),
         rhs,
         rhs_noise: Vec::new(),
         usable,
         jumps: Vec::new(),
         period: plan.options().delta,
+        ..Rows::default()
+    };
+    if let Some(weights) = weights {
+        rows.weigh(weights.iter().map(|weight| weight.sqrt()).collect());
     }
+    rows
 }
 
 /// A function of a channel.

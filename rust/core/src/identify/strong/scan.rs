@@ -83,7 +83,7 @@ fn cycle(motion: &Motion<'_>, options: &PolynomialOptions, stages: &mut Stages<'
     let quantisation = (options.quantisation > 0.0).then_some(options.quantisation);
     let noise = variance_after(motion.measured.passed[0], motion.angle, quantisation, options.instructions);
     let evidence = Evidence {
-        power: power_in_pieces(motion.angle, spectrum_length(samples, 200), stages)?,
+        power: power_in_pieces(motion.angle, None, spectrum_length(samples, 200), stages)?,
         samples,
         noise: [noise, 0.0],
         coloured: None,
@@ -104,10 +104,10 @@ fn rows_to_scan(
     let mut all = Rows::default();
     let mut orders = Vec::new();
     for part in parts {
-        let mask = task.mask.map(|mask| &mask[part.clone()]);
+        let (mask, weights) = (task.mask.map(|mask| &mask[part.clone()]), task.weights.map(|one| &one[part.clone()]));
         let (rows, order) = within(&task.motion, part, |motion| {
             let found = differentiate(plan, motion, (task.lag.unwrap_or(0.0), filter_torque), stages)?;
-            Ok((rows(plan, motion, mask, true, &found), found.order))
+            Ok((rows(plan, motion, (mask, weights), true, &found), found.order))
         })?;
         orders.extend(order.into_iter().zip(&rows.usable).filter(|(_, usable)| **usable).map(|(order, _)| order));
         all.append(rows);

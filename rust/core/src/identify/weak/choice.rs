@@ -75,7 +75,7 @@ impl Session<'_, '_, '_> {
     /// What the choice of a test function is made from, with spectra of some length.
     pub(crate) fn evidence(&mut self, length: usize) -> Result<Evidence, Error> {
         let evidence = Evidence {
-            power: power_in_pieces(self.record.angle, length, &mut self.stages)?,
+            power: power_in_pieces(self.record.angle, self.record.weights, length, &mut self.stages)?,
             samples: self.record.angle.len(),
             noise: self.noise,
             coloured: None,

@@ -18,7 +18,7 @@ use crate::identify::weak::pulses::{add_pulses, are_the_same, without_pulses};
 use crate::identify::weak::session::Session;
 use crate::identify::weak::torque_jumps::without_jumps;
 use crate::noise::breaks::search::{Broken, breaks};
-use crate::noise::channel::variance_after;
+use crate::noise::channel::{variance_after, weighted_variance};
 use crate::noise::defects::{Defect, Within, defects};
 use crate::noise::passed::PassedNoise;
 use crate::noise::quantisation::quantisation_step;
@@ -40,7 +40,7 @@ const PULSE_ROUNDS: usize = 2;
 /// If the record is too short, its rows do not determine what is constant, or the watch cancels.
 pub(crate) fn identify_weak(
     motion: &Motion<'_>,
-    mask: Option<&[bool]>,
+    (mask, weights): (Option<&[bool]>, Option<&[f64]>),
     options: &WeakOptions,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
@@ -55,12 +55,17 @@ pub(crate) fn identify_weak(
     let is_whole = limits.is_none() && places.is_empty();
     let whole = if is_whole { None } else { Some(Motion { angle: &angle, torque: &torque, ..motion.clone() }) };
     let motion = whole.as_ref().unwrap_or(motion);
-    let found =
-        with_record(motion, (mask, lag), (options.delta, options.instructions), (workers, watch), |record, watch| {
+    let found = with_record(
+        motion,
+        (mask, weights, lag),
+        (options.delta, options.instructions),
+        (workers, watch),
+        |record, watch| {
             let jumping: Vec<_> = motion.terms.iter().zip(&record.terms).filter_map(jumping).collect();
             let calm = without_jumps(record.torque, &jumping);
             identify(&record, (calm.as_deref(), motion.measured.passed, is_whole), options, workers, watch)
-        });
+        },
+    );
     found.map(|(found, resting)| {
         if limits.is_some() {
             defects[0].iter_mut().for_each(Defect::leave_out);
@@ -108,7 +113,7 @@ fn is_alone(measured: &Measured<'_>) -> bool {
 /// If the work fails, or the watch cancels.
 pub(crate) fn with_record<R>(
     motion: &Motion<'_>,
-    (mask, lag): (Option<&[bool]>, f64),
+    (mask, weights, lag): (Option<&[bool]>, Option<&[f64]>, f64),
     (delta, instructions): (f64, Instructions),
     (workers, watch): (NonZeroUsize, &mut Watch<'_>),
     work: impl FnOnce(Record<'_>, &mut Watch<'_>) -> Result<R, Error>,
@@ -135,6 +140,7 @@ pub(crate) fn with_record<R>(
         lag,
         angle_zero: 0.0,
         mask,
+        weights,
     };
     Ok((work(record, watch)?, friction.resting))
 }
@@ -169,7 +175,10 @@ fn identify(
     ];
     let pieces = channels.map(|channel| Piece { size: samples, content: channel });
     let level = |(channel, given, step, passed): (_, Option<f64>, _, _), (): &mut ()| {
-        given.unwrap_or_else(|| variance_after(passed, channel, step, options.instructions))
+        given.unwrap_or_else(|| match record.weights {
+            Some(weights) => weighted_variance(channel, Some(weights), step, options.instructions),
+            None => variance_after(passed, channel, step, options.instructions),
+        })
     };
     let levels = stages.map(pieces.into(), || (), level)?;
     settled(record, (options, whole), [levels[0], levels[1]], stages)

@@ -70,7 +70,8 @@ impl Session<'_, '_, '_> {
             rows.rhs = slowly_varying::without(&rows, &decided.slow, &found.varying);
         }
         if let Some(spring) = &decided.spring {
-            rows.regressors.push(spring.regressor(&rows.usable));
+            let regressor = spring.regressor(&rows);
+            rows.regressors.push(regressor);
         }
         rows.clear_unusable();
         let rows = decided.as_white(rows, &mut self.stages)?;

@@ -135,6 +135,7 @@ impl Session<'_, '_, '_> {
         PulseSearch {
             left: &left.rows,
             usable: &left.usable,
+            roots: &weak.rows.roots,
             signal: self.record.angle,
             function: &weak.kernels.values[2],
             first: weak.first,

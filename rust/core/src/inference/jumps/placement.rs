@@ -61,13 +61,14 @@ impl JumpSearch<'_> {
             let origin = (begin as f64 - self.first as f64) * per_sample + (group as f64 - 1.0) / 2.0 - *row as f64;
             squares.fill(0.0);
             let mut total = 0.0;
+            let root = self.whole.root(one);
             for (unknown, (&[from, rise], &[to, growth])) in before.iter().zip(after).enumerate() {
                 self.signals[unknown * group + one % group].read(begin, &mut samples);
                 if !all_usable(&samples) {
                     return None;
                 }
                 for (index, (factor, sample)) in self.function.iter().zip(&samples).enumerate() {
-                    let (weight, now) = (factor * sample, origin + index as f64 * per_sample);
+                    let (weight, now) = (factor * sample * root, origin + index as f64 * per_sample);
                     let later = to + (now + 1.0) * growth;
                     total += weight * later;
                     squares[index + 1] += weight * (later - from - now * rise);
@@ -116,10 +117,14 @@ impl Kernel for PlacementKernel<'_, '_> {
             let origin = (search.begin(first) as f64 - (search.first + row * stride) as f64) * per_sample;
             errors.fill(Packet::ZERO);
             let mut total = Packet::ZERO;
+            let mut root = Packet::ZERO;
+            for (lane, root) in root.0.iter_mut().enumerate() {
+                *root = search.whole.root(first + lane);
+            }
             for (unknown, samples) in signals.iter().enumerate() {
                 let ([from, rise], [to, growth]) = (before[unknown], after[unknown]);
-                let change = [Packet::splat(to + growth - from), Packet::splat(growth - rise)];
-                let held = [Packet::splat(to + growth), Packet::splat(growth)];
+                let change = [root * Packet::splat(to + growth - from), root * Packet::splat(growth - rise)];
+                let held = [root * Packet::splat(to + growth), root * Packet::splat(growth)];
                 let mut later = Packet::splat(origin);
                 for (lane, later) in later.0.iter_mut().enumerate() {
                     *later += lane as f64;

@@ -49,6 +49,8 @@ pub(crate) struct PulseSearch<'a> {
     /// What is left of the rows by windows that hold no row of the pulse, and which rows are equations.
     pub(crate) left: &'a [f64],
     pub(crate) usable: &'a [bool],
+    /// What every row was multiplied by; empty where all count alike.
+    pub(crate) roots: &'a [f64],
     /// What the coefficient is multiplied by.
     pub(crate) signal: &'a dyn Samples,
     /// The test function at its samples.
@@ -176,8 +178,9 @@ impl PulseSearch<'_> {
             if !all_usable(&samples) {
                 return None;
             }
+            let root = self.roots.get(row).copied().unwrap_or(1.0);
             for (place, (factor, sample)) in self.function.iter().zip(&samples).enumerate() {
-                sums[place + 1] = sums[place] + factor * sample;
+                sums[place + 1] = sums[place] + root * factor * sample;
             }
             for (value, &place) in column.iter_mut().zip(&products.places) {
                 *value = sums[place.saturating_sub(begin).min(length)];
@@ -250,6 +253,7 @@ mod tests {
         let search = PulseSearch {
             left: &left,
             usable: &vec![true; rows],
+            roots: &[],
             signal: &signal.as_slice(),
             function: &function,
             first: half,

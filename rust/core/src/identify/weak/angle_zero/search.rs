@@ -188,7 +188,8 @@ impl Session<'_, '_, '_> {
         let mut rows = chosen.weak.rows.clone();
         let Some(spring) = SpringColumn::new(&decided.model, fit, rows.len(), rows.period) else { return Ok(None) };
         let place = rows.regressors.len();
-        rows.regressors.push(spring.regressor(&rows.usable));
+        let regressor = spring.regressor(&rows);
+        rows.regressors.push(regressor);
         let correlated = decided.model.correlated(&rows, &decided.covariance, &mut self.stages)?;
         let judged = JudgedTerm {
             rows: &rows,
@@ -226,7 +227,8 @@ impl Session<'_, '_, '_> {
         let Some(fit) = &decided.fit else { return Ok(false) };
         let Some(spring) = SpringColumn::new(&decided.model, fit, rows.len(), rows.period) else { return Ok(false) };
         decided.model.constant.push(rows.regressors.len());
-        rows.regressors.push(spring.regressor(&rows.usable));
+        let regressor = spring.regressor(rows);
+        rows.regressors.push(regressor);
         decided.spring = Some(spring);
         let problem = decided.problem(rows, self.noise[0]);
         let again = fit.again(&problem, decided.expected, self.options.instructions, &mut self.stages)?;

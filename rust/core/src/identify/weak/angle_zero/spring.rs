@@ -1,6 +1,6 @@
 //! The windowed stiffness row by row, as the regressor of the angle at which the spring is relaxed.
 
-use crate::equation::rows::Regressor;
+use crate::equation::rows::{Regressor, Rows};
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
 use crate::regression::predictor::Predictor;
@@ -46,9 +46,9 @@ impl SpringColumn {
     }
 
     /// The regressor, in rows of which some are equations.
-    pub(crate) fn regressor(&self, usable: &[bool]) -> Regressor {
-        let value = |(stiffness, &usable): (&f64, &bool)| if usable { -stiffness } else { 0.0 };
-        let value: Vec<f64> = self.stiffness.iter().zip(usable).map(value).collect();
+    pub(crate) fn regressor(&self, rows: &Rows) -> Regressor {
+        let value = |(row, stiffness): (usize, &f64)| if rows.usable[row] { -stiffness * rows.root(row) } else { 0.0 };
+        let value: Vec<f64> = self.stiffness.iter().enumerate().map(value).collect();
         Regressor { companion: vec![0.0; value.len()], value, noise: Default::default() }
     }
 }

@@ -54,8 +54,11 @@ impl Session<'_, '_, '_> {
         }
         // A constant offset leaves no less of rows than there is about their mean.
         if still.windowed.is_empty() && decided.white.is_none() {
-            let mean = used().sum::<f64>() / count;
-            let without = used().map(|rhs| (rhs - mean).powi(2)).sum();
+            // In rows that were multiplied by the root of their weight, an offset is the mean times that root.
+            let roots = || (0..rows.len()).filter(|&row| rows.usable[row]).map(|row| rows.root(row));
+            let mean = used().zip(roots()).map(|(rhs, root)| rhs * root).sum::<f64>()
+                / roots().map(|root| root * root).sum::<f64>();
+            let without = used().zip(roots()).map(|(rhs, root)| (rhs - mean * root).powi(2)).sum();
             let squares = Squares { torque: squares, without, left: variance * count };
             if squares.are_plainly_explained() {
                 return Ok(Explained::Plainly);

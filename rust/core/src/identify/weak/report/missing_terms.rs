@@ -24,7 +24,8 @@ impl Session<'_, '_, '_> {
         if !self.options.diagnose {
             return Ok(Vec::new());
         }
-        let (velocity, samples) = (weak.rows.regressors[1].value.clone(), self.record.angle.len());
+        let (mut velocity, samples) = (weak.rows.regressors[1].value.clone(), self.record.angle.len());
+        velocity.iter_mut().zip(&weak.rows.roots).for_each(|(value, root)| *value /= root.max(f64::MIN_POSITIVE));
         let velocity = Interpolated { values: &velocity, first: weak.first, stride: weak.stride, samples };
         let candidates = self.candidates();
         let mapped: Vec<_> = candidates.iter().map(|missing| missing.samples(self.record.angle, &velocity)).collect();

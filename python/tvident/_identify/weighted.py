@@ -1,0 +1,100 @@
+"""Weights of samples: what they are one over the variance of, and what does not go with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Weights:
+    r"""Weights of the samples of records.
+
+    Parameters
+    ----------
+    values : ndarray, shape (\\*, n)
+        Their mean is one in every record, that of samples that count. A sample of weight zero is missing.
+    """
+
+    values: Array
+
+    @property
+    def of_core(self) -> Array | None:
+        """The weights as the core asks for them; None where all are alike, which costs nothing and keeps every bit."""
+        return None if ((self.values == 1) | (self.values == 0)).all() else self.values
+
+    @property
+    def spread(self) -> list[float]:
+        """Variance of white noise over that of a sample of mean weight, of every record."""
+        records = self.values.reshape(-1, self.values.shape[-1])
+        return [float(np.mean(1 / one[one > 0])) if one.any() else 1.0 for one in records]
+
+    def part(self, place: Any) -> Weights:
+        """Return those of some records."""
+        return Weights(self.values[place])
+
+
+def weights_of(given: npt.ArrayLike | None, shape: tuple[int, ...], beside: Mapping[str, Any]) -> Weights | None:
+    """Return weights of records of some shape, or nothing.
+
+    Parameters
+    ----------
+    given : array_like, optional
+    shape : tuple of int
+    beside : mapping of str to object
+        Arguments that do not go with weights, as they were given.
+
+    Raises
+    ------
+    ValueError
+        If weights are no weights of the samples, or something is given that they do not go with.
+    TypeError
+        If they are no numbers.
+    """
+    if given is None:
+        return None
+    for name, value in beside.items():
+        if value is not None:
+            raise ValueError(
+                f"weights need one angle and one torque at the same uniform times, and least squares; got {name} beside them; leave one of "
+                "them out: samples that are not to count at all may be NaN"
+            )
+    is_one = arguments.any_array("weights", given).ndim == 1
+    found = np.broadcast_to(_checked(given, shape[-1:] if is_one else shape), shape)
+    counted = found > 0
+    means = found.sum(axis=-1, keepdims=True) / np.maximum(counted.sum(axis=-1, keepdims=True), 1)
+    greatest = found.max(axis=-1, keepdims=True)
+    alike = np.where(counted, found, greatest).min(axis=-1, keepdims=True) == greatest
+    relative = found / np.where(means > 0, means, 1)
+    return Weights(np.ascontiguousarray(np.where(alike & counted, 1.0, relative)))
+
+
+def usable_channels(
+    channels: Mapping[str, npt.NDArray[np.number]],
+    torques: npt.NDArray[np.number],
+    weights: Weights | None,
+    policy: str,
+) -> tuple[dict[str, npt.NDArray[np.number]], npt.NDArray[np.number]]:
+    """Return channels of the motion and the torque, what has no weight missing, with a policy for values that are missing anyway."""
+    every = {**channels, "torque": torques}
+    counted = None if weights is None else weights.values > 0
+    for name, samples in every.items():
+        one = samples if counted is None else np.where(counted, samples, 0)
+        arguments.check_nan(name, one, policy, arguments.RowPolicy)
+        if counted is not None and not counted.all():
+            every[name] = np.where(counted, samples, np.nan)
+    return {name: every[name] for name in channels}, every["torque"]
+
+
+def _checked(given: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
+    found = arguments.weights("weights", given, shape)
+    assert found is not None  # noqa: S101 - they were given
+    return found
