@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from tvident import _core
 from tvident._advice import Explained
 from tvident._equation import BUILT_IN, Unknown
@@ -16,9 +18,13 @@ from tvident._identify.remedies import Trial
 from tvident._identify.settings import Request, resolve
 from tvident._results import Identification, Words
 from tvident._status import Status
+from tvident._units import ROTARY
 
 _LENGTHS = ("window_length", "exponent", "regression_window")
 """Arguments of the form that a trial may keep."""
+
+_LARGE = 0.4
+"""Radians beyond which a pendulum is no spring: the sine is 2.6 % smaller than its angle."""
 
 _DOUBTED = (
     Status.TERM_SUSPECTED | Status.LAG_SUSPECTED | Status.NOISE_MODEL | Status.WINDOW_LIMIT | Status.SCALES_DISAGREE
@@ -118,6 +124,9 @@ class Improvement:
         """What may be missing: what the core suspects, friction and a lag, and anything where the equations of no scale can be believed."""
         suspects = [one.name for one in self._explained.suspects]
         others = ["lag", "coulomb"]
+        is_large = float(np.nanmax(np.abs(self.data.angles), initial=0.0)) > _LARGE
+        if self.data.axis.system is ROTARY and ("cubic" in suspects or is_large):
+            others.append("gravity")
         if self.found.record_status & Status.SCALES_DISAGREE:
             others += [name for name, term in BUILT_IN.items() if not getattr(term, "inner", ())]
         present = {*suspects, *(one.name for one in self.terms)}

@@ -20,6 +20,7 @@ from tvident._identify.columns import Columns, Range, fixed, secant
 from tvident._identify.criterion import criterion_of
 from tvident._identify.data import Data
 from tvident._identify.improved import Improvement, is_to_be_tried, of_one
+from tvident._identify.lacking import lacking_terms
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm, exponent_of
 from tvident._identify.polynomials import Polynomials, odd_window
 from tvident._identify.searched import Searched, factor_of, search
@@ -196,10 +197,10 @@ class Task:
             batch = replace(batch, labels=data.labels.at(slice(None, None, data.step)))
         constants = {**batch.constants, **constants_of(data.motion, data.batch)}
         batch, settings = replace(batch, constants=constants, units=data.units), self._settings(found, searched)
-        told = Told(data, self._request, self._unknowns, found, batch, settings)
+        lacking = lacking_terms(data, self._request, self._unknowns, found, self._polynomials, self._known)
+        told = Told(data, self._request, self._unknowns, found, batch, settings, lacking)
         words = told.words(names, searched.told(self.inner, self.ranges, batch, self.columns.samples_of_fading))
-        if data.doubts:
-            batch = told.doubted()
+        batch = told.doubted()
         jumps = tuple(tuple(data.time[one.jumps].tolist()) for one in found)
         return Identification(
             batch,

@@ -12,9 +12,10 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._advice import Explained, ExplainedStrong, FoundBySearch, Plausible, words_of_search, words_with_instrument
-from tvident._equation import Unknown
+from tvident._equation import COEFFICIENTS, Unknown
 from tvident._identify.data import Data
 from tvident._identify.improved import is_doubted
+from tvident._identify.lacking import Lacking
 from tvident._identify.methods import StrongForm
 from tvident._identify.settings import Request
 from tvident._results import Estimates, Words, of_batch
@@ -34,6 +35,8 @@ class Told:
     found : sequence of _core.Identification
     batch : Estimates
     settings : mapping
+    lacking : sequence of Lacking or None
+        The term that every record in strong form lacks.
     """
 
     data: Data
@@ -42,6 +45,7 @@ class Told:
     found: Sequence[_core.Identification]
     batch: Estimates
     settings: Mapping[str, Any]
+    lacking: Sequence[Lacking | None] = ()
 
     def words(self, names: Sequence[str], searched: Sequence[Sequence[FoundBySearch]]) -> Words | Callable[[], Words]:
         """Return reasons and advice; of several records the advice, since reasons differ too much from one to the next.
@@ -59,7 +63,7 @@ class Told:
         if isinstance(self.request.form, StrongForm) and data.instruments is None:
             # What to say takes longer than to identify a short record, so it waits until it is asked for.
             later = partial(_later, self._of_strong_form(), plausible, data.angles, self.batch, more)
-            if not data.doubts and data.clock is None and not any(data.clipped or ()):
+            if not any(self.lacking) and not data.doubts and data.clock is None and not any(data.clipped or ()):
                 return later
             words = later()
         else:
@@ -68,7 +72,13 @@ class Told:
             words = replace(words, advice=(*words.advice, *self._where_remedies_are_tried()))
         if data.clock is not None:
             words = replace(words, reasons=(data.clock.words, *words.reasons))
-        return _with_doubts(_with_clipped(words, data.clipped, several=several), data.doubts, several=several)
+        terms = [one.name for one in self.unknowns if one.name not in COEFFICIENTS]
+        lacking = [
+            (record, one.words(terms, data.units.get(one.name, ""))) for record, one in enumerate(self.lacking) if one
+        ]
+        return _with_doubts(
+            _with_clipped(words, data.clipped, several=several), [*data.doubts, *lacking], several=several
+        )
 
     def _where_remedies_are_tried(self) -> list[str]:
         """Return where to look for remedies of the records of a batch, which are tried when a record is asked for its words."""
@@ -84,6 +94,10 @@ class Told:
         data = self.data
         flags = np.zeros(data.records, np.uint16)
         flags[[record for record, _ in data.doubts]] = Status.CHANNEL_SUSPECTED
+        lacking = [record for record, term in enumerate(self.lacking) if term is not None]
+        flags[lacking] |= np.uint16(Status.TERM_SUSPECTED)
+        if not flags.any():
+            return self.batch
         more: Any = flags.reshape(data.batch) if data.batch else Status(int(flags[0]))
         return replace(self.batch, record_status=self.batch.record_status | more)
 
