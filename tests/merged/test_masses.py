@@ -22,6 +22,9 @@ identify: Any = tvident.identify
 OPTIONS: dict[str, Any] = {"sample_rate": 1000, "dof_axis": 0}
 
 
+CONSTANTS: dict[str, Any] = dict.fromkeys(("inertia", "damping", "stiffness"), "constant")
+
+
 def springs(masses: int) -> list[tuple[Any, int]]:
     return [("base" if mass == 0 else mass - 1, mass) for mass in range(masses)]
 
@@ -203,6 +206,25 @@ def test_a_moving_base_drives_a_chain() -> None:
         value, error = found.constants[name]
         assert abs(value / true - 1) < 0.01
         assert abs(value - true) < 4 * error
+
+
+def test_a_base_alone_is_enough_where_a_mass_is_known() -> None:
+    simulated = chain([constant(12.0), constant(18.0)], 6000, seed=9, driven=(), base=True)
+    structure = tvident.Chain(2, springs(2), base=simulated.base)
+    silent = np.zeros_like(simulated.torque)
+    found = identify(simulated.angle, silent, structure=structure, inertia={1: 0.03}, **OPTIONS)
+    for name, true in (("stiffness_base_0", 12.0), ("stiffness_0_1", 18.0), ("inertia_0", 0.02)):
+        assert abs(found.value(name).value / true - 1) < 0.02
+    with pytest.raises(ValueError, match="give one element, such as inertia_0, a number"):
+        identify(simulated.angle, silent, structure=structure, **OPTIONS)
+
+
+def test_what_is_held_back_is_bridged_from_windows_that_are_full() -> None:
+    simulated = chain([changing, constant(18.0)], 5000, seed=2, angle_noise=1e-4)
+    form = tvident.WeakForm(window_length=33, exponent=9, regression_window=60)
+    options = {"stiffness": ["windowed", "constant"], "structure": tvident.Chain(2, springs(2)), **OPTIONS}
+    found = identify(simulated.angle, simulated.torque, method=form, **options)
+    assert (found.held_back().predicted > 98).all()
 
 
 @pytest.mark.parametrize(

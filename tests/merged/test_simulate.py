@@ -11,7 +11,7 @@ import pytest
 
 import tvident
 from merged.simulated import chain, double_pendulum, simulated
-from merged.test_masses import OPTIONS, changing, constant, springs
+from merged.test_masses import CONSTANTS, OPTIONS, changing, constant, springs
 from merged.test_mechanisms import FRICTION, pendulum
 from tvident import _core
 from tvident._merged.not_linear import General, NotLinear
@@ -23,8 +23,6 @@ identify: Any = tvident.identify
 """Its type is that of a single record."""
 
 FORM = tvident.WeakForm(window_length=41, exponent=8)
-
-CONSTANT: dict[str, Any] = dict.fromkeys(("inertia", "damping", "stiffness"), "constant")
 
 
 def not_linear(matrices: tuple[Array, Array, Array], samples: int, friction: float = 0.0, **options: Any) -> NotLinear:
@@ -126,7 +124,7 @@ def test_trials_along_a_phase_respond_along_it() -> None:
 def test_a_base_that_moves_drives_what_is_simulated() -> None:
     one, other = (chain([constant(12.0), constant(18.0)], n, seed=n, base=True, angle_noise=1e-4) for n in (4000, 1500))
     structure = tvident.Chain(2, springs(2), base=one.base)
-    found = identify(one.angle, one.torque, structure=structure, method=FORM, **CONSTANT, **OPTIONS)
+    found = identify(one.angle, one.torque, structure=structure, method=FORM, **CONSTANTS, **OPTIONS)
     assert (found.vaf() > 99.9).all()
     left = 100 - found.vaf(other.angle, other.torque, base=other.base)
     assert (left < 0.1).all()
@@ -139,7 +137,7 @@ def test_terms_of_masses_are_simulated() -> None:
     one = chain([constant(12.0), constant(18.0)], 2000, seed=11, angle_noise=1e-4)
     drag = tvident.Term("drag", lambda _t, _angle, velocity: velocity * np.abs(velocity))
     structure = tvident.Chain(2, springs(2))
-    options = {"structure": structure, "method": FORM, **CONSTANT, **OPTIONS}
+    options = {"structure": structure, "method": FORM, **CONSTANTS, **OPTIONS}
     # What the term takes is added to the torque, so that it is there to be found.
     torque = one.torque + 5.0 * one.angle**3
     found = identify(one.angle, torque, terms=["offset", "cubic", "coulomb", drag], **options)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._equation import COEFFICIENTS, Kind, parameter
+from tvident._expansion import Expansion
 
 Entry = tuple[int, int | None, int, float]
 """Equation, coefficient of the motion (0 inertia, 1 damping, 2 stiffness; None for a term), channel or term, factor."""
@@ -67,6 +68,11 @@ def kind_or_number(name: str, value: object) -> Kind | float:
     ValueError
         If it is an array, or varies slowly, which merged rows cannot follow yet.
     """
+    if isinstance(value, Expansion):
+        raise ValueError(  # noqa: TRY004 - it is right beside one record
+            f"{name} must be 'windowed', 'constant', 'auto' or a number beside ensemble_axis= and dof_axis=; got an Expansion, which is "
+            "not supported there yet; use 'windowed', or identify one trial of one mass"
+        )
     found = parameter(name, value, ())
     if found == "varying":
         raise ValueError(

@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from tvident._merged.merging import Merging, Part
 from tvident._merged.predicted import Equations, predicted
-from tvident._results import every_sample, parts_of, percent, where_held_back, without_gaps
+from tvident._results import POOR, every_sample, parts_of, percent, where_held_back, without_gaps
+from tvident._status import Status
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -92,7 +93,12 @@ def _values_without(part: Part, held: Sequence[Sequence[tuple[int, int]]], mergi
         one.name: np.full(merging.samples, float(one.value)) for one in elements if not isinstance(one.value, str)
     }
     size = found.found.status.size
+    beside = found.found.status & int(Status.GAP | Status.EDGE) != 0
     for one in found.found.elements:
         along = np.array(np.broadcast_to(one.values, size), np.float64)
+        # Beside what is held back windows hold few equations: values between its sides are better than these.
+        error = np.broadcast_to(one.stderr, size)
+        usual = np.median(error[np.isfinite(error)]) if np.isfinite(error).any() else np.inf
+        along[beside & (error > POOR * usual)] = np.nan
         values[found.names[one.element]] = every_sample(without_gaps(along), merging.samples, merging.step)
     return values

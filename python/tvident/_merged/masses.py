@@ -132,7 +132,7 @@ def masses_of(
     Raises
     ------
     ValueError
-        If shapes differ, do not belong to the structure, or no force is known.
+        If shapes differ, or do not belong to the structure.
     TypeError
         If the structure is none.
     """
@@ -145,11 +145,6 @@ def masses_of(
         found = [_one_trial(angle, torque, axis, structure, base=getattr(structure, "base", None), mask=mask)]
     else:
         found = _several_trials((angle, torque), (trials, axis), structure, mask)
-    if not any(one.driven for one in found):
-        raise ValueError(
-            "a force must act on one of the masses and be measured; got torques that are all zero or missing; without one "
-            "everything is known up to scale only"
-        )
     return found
 
 
@@ -254,6 +249,11 @@ def identify_masses(trials: Sequence[Masses], asked: Asked, term_values: TermVal
     several = [joined] if len(trials) == 1 else trials
     if all(element.is_known for element in elements):
         raise ValueError("at least one element must be unknown; all are given; use 'windowed' or 'constant' for one")
+    if not joined.driven and not any(one.is_known and one.value for one in elements):
+        raise ValueError(
+            "a force must act on one of the masses and be measured, or one of their coefficients be given: without either everything is "
+            f"known up to scale only; got torques that are all zero or missing; give one element, such as {elements[0].name}, a number"
+        )
     unknowable = unknowable_of(joined, elements)
     open_ones = [one for one in elements if not one.is_known and one.name not in unknowable]
     samples = max(one.angles[0].size for one in several)

@@ -148,6 +148,7 @@ def _matched(likeness: Real) -> npt.NDArray[np.intp]:
     return order
 
 
+@np.errstate(all="ignore")
 def _errors(
     elements: Sequence[Element],
     covariance: Real,

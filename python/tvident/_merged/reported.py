@@ -19,7 +19,7 @@ from tvident._merged.predicted import predicted
 from tvident._merged.simulated import Simulated
 from tvident._merged.verdict import verdict_of
 from tvident._merged.words import summary_of, words_of
-from tvident._results import Scan, Telling, Words, every_sample
+from tvident._results import Measured, Scan, Telling, Words, every_sample, known_name, number_of
 from tvident._status import Status
 from tvident._tables import Table, Tabular
 
@@ -138,6 +138,27 @@ class Reported(Simulated, Telling, Tabular):
     @cached_property
     def _held_back(self) -> HeldBackTorque:
         return held_back(self._merging)
+
+    def value(self, name: str) -> Measured:
+        """Return one number for an element, with its error, whatever its kind, as :meth:`Identification.value` does.
+
+        Parameters
+        ----------
+        name : str
+            One of ``elements``.
+
+        Returns
+        -------
+        Measured
+            ``value`` and ``stderr`` first; ``str()`` of it has even digits and the unit.
+
+        Raises
+        ------
+        KeyError
+            If there is no such element.
+        """
+        values = self.elements[known_name(name, self.elements)]
+        return number_of(values, self.stderr[name], self.kinds[name], self.units.get(name, ""), self.trusted)
 
     def held_back(self) -> HeldBackTorque:
         """Return how much of the torques the equations explain in parts that they are not fitted to: the last tenth of every tenth.

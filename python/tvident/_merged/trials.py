@@ -17,6 +17,9 @@ Numbers = npt.NDArray[np.number]
 
 _PAIR = 2
 
+_LONGEST = 1.5
+"""Of a phase: trials may overlap into the next cycle, but two are none."""
+
 
 @dataclass(frozen=True)
 class Trials:
@@ -95,10 +98,11 @@ def trials_of(angle: Any, torque: Any, axis: int, *, phase: Any = None, mask: An
     rates = np.concatenate([np.diff(one) for one in checked])
     samples = round(1 / float(np.median(rates)))
     inside = any(one[0] < 1 and one[-1] > 0 for one in checked)
-    if samples < 1 or not inside:
+    longest = max(float(one[-1] - one[0]) for one in checked)
+    if samples < 1 or not inside or longest > _LONGEST:
         raise ValueError(
             f"phase must grow from 0 to 1 in every trial; got {checked[0][0]:g} to {checked[0][-1]:g} in the first; "
-            "divide it by its period (2π, 100 %)"
+            "divide it by its period (2π, 100 %), and cut the recording into one trial a cycle"
         )
     return Trials(angles, torques, masks, [one * samples for one in checked], samples, np.arange(samples) / samples)
 
@@ -114,7 +118,7 @@ def _records(name: str, values: Any, axis: int) -> list[Numbers]:
         if array.ndim != _PAIR:
             raise ValueError(
                 f"{name} must have shape (trials, n) beside ensemble_axis=, or be a list of records; got {array.shape}; "
-                "identify batches of ensembles, and ensembles of masses, one at a time: they are not supported together yet"
+                "add dof_axis=1 where trials are of several masses, and identify batches one at a time"
             )
         if axis not in {0, -_PAIR}:
             raise ValueError(

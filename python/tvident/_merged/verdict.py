@@ -50,20 +50,26 @@ def verdict_of(result: Any, merging: Merging) -> str:
 def _known(result: Any, merging: Merging) -> str:
     """Return how well elements are known; terms beside the equation are left to the table."""
     of_masses = merging.masses > 0
-    found = []
+    found, lost = [], []
     for one in merging.elements:
         # Factors of a mechanism have names of their own, a term of a mass is called after both.
         if one.is_known or not (one.of in COEFFICIENTS or (of_masses and one.of == one.name)):
             continue
         relative = relative_error(result.elements[one.name], result.stderr[one.name], result.trusted)
-        if relative is not None:
+        if of_masses and relative is not None and relative >= 1:
+            # Most entries of full matrices are zero.
+            lost.append(one.name)
+        elif relative is not None:
             name = one.name if of_masses else _SYMBOLS[one.of]
             found.append((f"{name}(t)" if result.kinds[one.name] in CHANGING else name, relative))
     if len(found) <= _MOST:
-        return known_to(found)
-    found.sort(key=lambda one: one[1])
-    ends = " to ".join(two_digits(100 * relative) for _, relative in (found[0], found[-1]))
-    return f"{len(found)} elements known to ± {ends} %, worst {found[-1][0]}"
+        words = known_to(found)
+    else:
+        found.sort(key=lambda one: one[1])
+        ends = " to ".join(two_digits(100 * relative) for _, relative in (found[0], found[-1]))
+        words = f"{len(found)} elements known to ± {ends} %, worst {found[-1][0]}"
+    more = f" and {len(lost) - 1} more" if len(lost) > 1 else ""
+    return ", ".join(filter(None, (words, f"{lost[0]}{more} not told from zero" if lost else "")))
 
 
 def _explained(result: Any, merging: Merging) -> float | None:

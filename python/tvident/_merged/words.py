@@ -18,7 +18,6 @@ _DOUBTS = {
     "the numbers; look at scan(), for a term that is missing, a lag or noise that one channel gets from the other",
     Status.NOISE_MODEL: "the equations leave more than the noise of the channels explains: a term may be missing, a channel may be late "
     "or coupled in another way",
-    Status.KIND_CONTRADICTED: "an element that is taken as constant differs between parts of the record: give it the kind 'windowed'",
 }
 
 
@@ -30,6 +29,7 @@ def words_of(
     for one in found:
         reasons += _reasons_of(one)
         advice += [words for flag, words in _DOUBTS.items() if one.record_status & flag]
+    advice += _changing(result)
     for name, probability in result.tests.items():
         kind = result.kinds[name]
         if kind == "constant" and probability < _core.NO_CHANCE:
@@ -50,6 +50,16 @@ def words_of(
         if not verdict:
             advice.append(f"{name} cannot be known: {verdict.reason}")
     return Words(tuple(dict.fromkeys(reasons)), tuple(dict.fromkeys(advice)))
+
+
+def _changing(result: Any) -> list[str]:
+    """Return what to do about elements that are taken as constant and differ between parts of the record."""
+    names = [name for name, p in result.tests.items() if p < _core.NO_CHANCE and result.kinds[name] == "constant"]
+    if not names:
+        return []
+    differ = "differs" if len(names) == 1 else "differ"
+    words = f"{' and '.join(names)} {differ} between parts of the record, though taken as constant"
+    return [f"{words}: ask for the kind 'windowed', or look for a term that is missing"]
 
 
 def _reasons_of(one: _core.MergedIdentification) -> list[str]:

@@ -5,13 +5,14 @@ from tvident._results.estimates import Estimates
 from tvident._results.explained import explained_steps
 from tvident._results.held_back import parts_of, percent, where_held_back
 from tvident._results.loaded import from_file
+from tvident._results.measured import Measured, known_name, number_of
 from tvident._results.parts import chosen, of_records, settings_of
 from tvident._results.recorded import Recorded, mark_of
 from tvident._results.records import IdentifiedRecords, Shared, covariance_between, with_shared
 from tvident._results.response import Model, accounted_for, every_sample, without_gaps
 from tvident._results.result import Identification
 from tvident._results.scan import Scan, scan_of
-from tvident._results.simulated import in_units_of, predicted_at_samples
+from tvident._results.simulated import POOR, in_units_of, predicted_at_samples
 from tvident._results.stored import plain_scan, plain_words, scan_from, words_from
 from tvident._results.summary import COLUMNS, row_of, sentences_of
 from tvident._results.told import Telling
@@ -32,10 +33,12 @@ from tvident._results.words import Words, of_batch
 __all__ = [
     "CHANGING",
     "COLUMNS",
+    "POOR",
     "Estimates",
     "ExpandedParameter",
     "Identification",
     "IdentifiedRecords",
+    "Measured",
     "Model",
     "Recorded",
     "Scan",
@@ -53,9 +56,11 @@ __all__ = [
     "from_file",
     "in_units_of",
     "kernels_of",
+    "known_name",
     "known_to",
     "mark_of",
     "negative",
+    "number_of",
     "of_batch",
     "of_powers",
     "of_records",

@@ -50,7 +50,7 @@ class Measured(NamedTuple):
         return f"{words} {self.unit}".rstrip()
 
 
-def measured(values: Array, errors: Array, kind: str, unit: str, where: npt.NDArray[np.bool_]) -> Measured:
+def number_of(values: Array, errors: Array, kind: str, unit: str, where: npt.NDArray[np.bool_]) -> Measured:
     """Return one number for the values of a record, of those that can be trusted if there are some."""
     there = np.isfinite(values) & np.isfinite(errors)
     some = there & where if (there & where).any() else there

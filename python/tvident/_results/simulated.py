@@ -18,7 +18,7 @@ from tvident._units import LINEAR, ROTARY, factor_to, scaled, unit_said
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
-_POOR = 2.0
+POOR = 2.0
 """Beside a gap values count whose errors are up to so many times the usual ones."""
 
 _SHORTEST = 9
@@ -213,7 +213,7 @@ class Simulated:
             error = self.stderr[name]
             there = np.isfinite(error)
             usual = np.median(error[there]) if there.any() else np.inf
-            poor |= error > _POOR * usual
+            poor |= error > POOR * usual
         return np.asarray(poor & (self.status & (Status.GAP | Status.EDGE) != 0))
 
     def _record(self, cure: str) -> Recorded:

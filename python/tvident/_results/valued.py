@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._results.estimates import Estimates
-from tvident._results.measured import Measured, known_name, measured
+from tvident._results.measured import Measured, known_name, number_of
 from tvident._tables import Tabular
 
 
@@ -78,7 +78,7 @@ class Valued(Tabular):
         kinds |= dict.fromkeys(("natural_frequency", "damping_ratio"), changing[0] if changing else "constant")
         each = {name: values.reshape(-1, self.time.size)[record] for name, values in table.columns.items()}
         return {
-            name: measured(each[name], each[f"{name}_stderr"], kinds[name], self.units.get(name, ""), trusted)
+            name: number_of(each[name], each[f"{name}_stderr"], kinds[name], self.units.get(name, ""), trusted)
             for name in each
             if f"{name}_stderr" in each
         }
