@@ -84,6 +84,35 @@ def test_a_drift_is_found_from_the_equation() -> None:
     within_errors(result, 3)
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_errors_know_how_well_clocks_are_aligned(seed: int) -> None:
+    # Far below the resonance a lag looks like damping: K times the offset's error is 15 times the damping's own.
+    generator = np.random.default_rng(seed)
+    truth = {"inertia": 0.01, "damping": 0.05, "stiffness": 20.0}
+    rates, phases = 2 * np.pi * generator.uniform(0.5, 4, (8, 1)), generator.uniform(0, 6, (8, 1))
+
+    def motion(t: Array, derivative: int) -> Array:
+        return np.asarray(np.sum(rates**derivative * np.sin(rates * t + phases + derivative * np.pi / 2), axis=0))
+
+    ours, theirs = clock(500.0), clock(500.0, 0.6)
+    angle = motion(ours, 0) + 1e-4 * generator.standard_normal(ours.size)
+    torque = sum(value * motion(theirs, 2 - place) for place, value in enumerate(truth.values()))
+    torque += 0.5 * generator.standard_normal(theirs.size)
+    times = (ours, theirs + 0.1)
+    found = tvident.identify(angle, torque, t=times, align="offset", **CONSTANT)
+    offset, error = found.constants["clock_offset"]
+    known, later = (
+        tvident.identify(angle, torque, t=times, align=offset + move, settings=found.settings) for move in (0, error)
+    )
+    for name, value in truth.items():
+        (estimate, all_of_it), (same, own), (moved, _) = (one.constants[name] for one in (found, known, later))
+        assert estimate == pytest.approx(same, rel=1e-6)
+        assert all_of_it == pytest.approx(np.hypot(own, moved - same), rel=1e-3)
+        assert abs(estimate - value) < 4 * all_of_it
+    assert found.constants["damping"][1] > 5 * known.constants["damping"][1]
+    assert found.stderr["damping"][0] == pytest.approx(found.constants["damping"][1])
+
+
 def test_what_cannot_be_aligned_is_said() -> None:
     t = clock(1000.0)
     angle, torque = sampled(4, "angle", t, 1e-3), sampled(4, "torque", t, 0.05)

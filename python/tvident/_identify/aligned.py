@@ -42,11 +42,14 @@ class Aligned:
         Standard errors; NaN where the record does not tell.
     doubt : str
         What is wrong; empty where nothing is.
+    moves : tuple of (float, float)
+        By how much the alignment moves with each of its errors that are independent of each other, one standard error of each.
     """
 
     late: Late
     errors: Late
     doubt: str = ""
+    moves: tuple[Late, ...] = ()
 
 
 def aligned(
@@ -67,6 +70,7 @@ def aligned(
     shift, share = _coarse(data.angles, data.torques)
     late: Late = (shift * period, 0.0)
     errors: Late = (math.nan, math.nan)
+    moves: tuple[Late, ...] = ()
     doubt = ""
     if not share <= _BELIEVED:
         doubt = "the record hardly tells how the clocks of angle and torque are aligned: excite several frequencies, or give both times"
@@ -76,13 +80,13 @@ def aligned(
         parts = [_part(data, part, count) for part in range(count)]
         lags = [lag_of(part) for part in parts]
         middles = [float(part.time.mean()) - start for part in parts]
-        left, errors = _line(middles, lags, align)
+        left, errors, moves = _line(middles, lags, align)
         if not all(math.isfinite(one) for one in (*left, errors[0])):
             return Aligned(late, (math.nan, math.nan), doubt or "no lag could be told from the damping")
         late = (late[0] + left[0], late[1] + left[1])
         if abs(left[0]) <= errors[0] / 2 and abs(left[1]) <= (errors[1] / 2 if align == "drift" else 0.0):
             break
-    return Aligned(late, errors, doubt)
+    return Aligned(late, errors, doubt, moves)
 
 
 def _part(data: Data, part: int, parts: int) -> Data:
@@ -103,13 +107,15 @@ def _part(data: Data, part: int, parts: int) -> Data:
     )
 
 
-def _line(middles: Sequence[float], lags: Sequence[tuple[float, float]], align: str) -> tuple[Late, Late]:
-    """Return the line through lags, and its errors, which know how far the lags are from it."""
+def _line(
+    middles: Sequence[float], lags: Sequence[tuple[float, float]], align: str
+) -> tuple[Late, Late, tuple[Late, ...]]:
+    """Return the line through lags, its errors, which know how far the lags are from it, and those that are independent of each other."""
     there = [
         (at, lag, error) for at, (lag, error) in zip(middles, lags, strict=True) if math.isfinite(lag) and error > 0
     ]
     if len(there) < (1 if align == "offset" else 2):
-        return (math.nan, math.nan), (math.nan, math.nan)
+        return (math.nan, math.nan), (math.nan, math.nan), ()
     at, values, errors = (np.array(one) for one in zip(*there, strict=True))
     columns = np.stack([np.ones_like(at), at], axis=1)[:, : 1 if align == "offset" else 2]
     weighted = columns / errors[:, np.newaxis]
@@ -119,10 +125,13 @@ def _line(middles: Sequence[float], lags: Sequence[tuple[float, float]], align: 
     free = at.size - columns.shape[1]
     if free > 0:
         covariance *= max(1.0, float(np.sum((left / errors) ** 2)) / free)
-    spread = np.sqrt(np.diag(covariance))
-    if align == "offset":
-        return (float(found[0]), 0.0), (float(spread[0]), 0.0)
-    return (float(found[0]), float(found[1])), (float(spread[0]), float(spread[1]))
+    padded = np.zeros((2, 2))
+    padded[: len(found), : len(found)] = covariance
+    sizes, directions = np.linalg.eigh(padded)
+    moves = (np.sqrt(np.maximum(sizes, 0.0)) * directions).T.tolist()
+    offset, drift = [*found.tolist(), 0.0][:2]
+    of_offset, of_drift = np.sqrt(np.diag(padded)).tolist()
+    return (offset, drift), (of_offset, of_drift), tuple((one, other) for one, other in moves if one or other)
 
 
 def _coarse(angle: npt.NDArray[np.number], torque: npt.NDArray[np.number]) -> tuple[int, float]:

@@ -216,9 +216,10 @@ def identify(
         the phase.
     align : {"offset", "drift"} or float, optional
         By how much stamps of the torque are late. A number: so many seconds. ``"offset"``: it is found from the equation itself, wherever
-        within a tenth of the record, and is in ``constants["clock_offset"]`` with its standard error. ``"drift"``: the clocks may run at
-        different speeds, too; ``constants["clock_drift"]`` is by how many seconds stamps become later each second. Weak form, a single
-        record, angle and torque alone. As a lag, an offset is told from damping only where the motion has several frequencies.
+        within a tenth of the record, and is in ``constants["clock_offset"]`` with its standard error, which those of parameters
+        contain. ``"drift"``: the clocks may run at different speeds, too; ``constants["clock_drift"]`` is by how many seconds stamps
+        become later each second. Weak form, a single record, angle and torque alone. As a lag, an offset is told from damping only where
+        the motion has several frequencies.
     step : int, optional
         Every how many samples a result is wanted.
     nan_policy : {"omit", "propagate", "raise"}, optional

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -62,6 +62,8 @@ class Data:
         What that makes of white noise of angle and torque.
     weights : Weights, optional
         Those of samples, where they were given.
+    moved : sequence of callable
+        Give by how much the torque changes with each independent error of the alignment of its clock, one standard error of each.
     """
 
     angles: npt.NDArray[np.number]
@@ -81,6 +83,7 @@ class Data:
     clock: Timed | None = None
     passed: tuple[_core.PassedNoise | None, _core.PassedNoise | None] = (None, None)
     weights: Weights | None = None
+    moved: Sequence[Callable[[], npt.NDArray[np.float64]]] = ()
 
     @property
     def batch(self) -> tuple[int, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -109,7 +110,13 @@ class OwnClocks:
         if self.align is not None:
             motion = replace(motion, biases={**motion.biases, **constants})
         doubts = [*final.doubts, *([(0, found.doubt)] if found.doubt else [])]
-        return replace(final, motion=motion, doubts=doubts, clock=Alignment(self.clocks, found.late))
+
+        def change(move: Late) -> npt.NDArray[np.float64]:
+            later = data_of((found.late[0] + move[0], found.late[1] + move[1]))
+            return np.asarray(later.torques - final.torques, dtype=np.float64)
+
+        moved = [partial(change, move) for move in found.moves]
+        return replace(final, motion=motion, doubts=doubts, clock=Alignment(self.clocks, found.late), moved=moved)
 
     def _angle(self) -> tuple[npt.NDArray[np.float64], _core.PassedNoise | None]:
         return self.clocks.on_grid(self.clocks.angle, self.recorded[0], propagate=self.propagate)

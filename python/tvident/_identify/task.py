@@ -14,6 +14,7 @@ from tvident import _arguments as arguments
 from tvident import _core
 from tvident._derivatives import quantisation_step
 from tvident._equation import COEFFICIENTS, Kind, Unknown, all_terms, parameter
+from tvident._identify.alignment_errors import with_errors_of_alignment
 from tvident._identify.batch import estimates, of_windows, with_inner
 from tvident._identify.channels import constants_of
 from tvident._identify.columns import Columns, Range, fixed, secant
@@ -66,6 +67,10 @@ class Task:
             searched = self._searched(report)
             found = self.found(searched.values, slopes=diagnose, diagnose=diagnose, report=report)
         return self._result(found, searched)
+
+    def estimates(self) -> Estimates:
+        """Identify every record, and return its numbers alone."""
+        return self.run(None, diagnose=False)._found  # noqa: SLF001 - what a result is made of
 
     def found(
         self,
@@ -197,6 +202,10 @@ class Task:
             batch = replace(batch, labels=data.labels.at(slice(None, None, data.step)))
         constants = {**batch.constants, **constants_of(data.motion, data.batch)}
         batch, settings = replace(batch, constants=constants, units=data.units), self._settings(found, searched)
+        if data.moved:
+            torques = (data.torques, *(data.torques + change() for change in data.moved))
+            again = [self._replayed(plain(settings), replace(data, torques=one)).estimates() for one in torques]
+            batch = with_errors_of_alignment(batch, again[0], again[1:])
         lacking = lacking_terms(data, self._request, self._unknowns, found, self._polynomials, self._known)
         told = Told(data, self._request, self._unknowns, found, batch, settings, lacking)
         words = told.words(names, searched.told(self.inner, self.ranges, batch, self.columns.samples_of_fading))
@@ -221,7 +230,7 @@ class Task:
         def run(request: Request, data: Data, *, diagnose: bool) -> Identification:
             return Task(data, request).run(progress=None, diagnose=diagnose)
 
-        return Improvement(self._data, self._request, found[0], given, self._terms, run).words
+        return Improvement(replace(self._data, moved=()), self._request, found[0], given, self._terms, run).words
 
     def _recorded(self, settings: dict[str, Any], found: Estimates) -> Recorded:
         """Return the records, which can be identified once more, all or some of them."""
@@ -290,7 +299,7 @@ class Task:
         request = resolve(
             "auto", given, settings, settings["sample_rate"], data.motion.names, has_instrument=has_instrument
         )
-        return Task(data, request)
+        return Task(replace(data, moved=()), request)
 
     @cached_property
     def columns(self) -> Columns:
