@@ -225,6 +225,10 @@ def test_what_is_held_back_is_bridged_from_windows_that_are_full() -> None:
     options = {"stiffness": ["windowed", "constant"], "structure": tvident.Chain(2, springs(2)), **OPTIONS}
     found = identify(simulated.angle, simulated.torque, method=form, **options)
     assert (found.held_back().predicted > 98).all()
+    # A tenth of the torques is noise, which moves masses little.
+    assert found.held_back().simulated.shape == (2,)
+    assert (found.held_back().simulated > 98).all()
+    assert "of the angles simulated" in found.summary().splitlines()[1]
 
 
 @pytest.mark.parametrize(

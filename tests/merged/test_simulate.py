@@ -76,6 +76,7 @@ def test_trials_respond_as_they_were_simulated() -> None:
     found = identify(trials.angle, trials.torque, sample_rate=1000, ensemble_axis=0, stiffness="windowed")
     # A tenth of the torques is noise.
     assert (found.vaf() > 99).all()
+    assert found.held_back().simulated > 98
     shares = found.vaf(other.angle, other.torque)
     assert shares.shape == (3,)
     assert (shares > 99).all()
@@ -159,3 +160,4 @@ def test_a_mechanism_responds_as_it_was_simulated() -> None:
     shown = slice(0, 250)
     # Its joints stick and break away; straight lines stand for torques of up to 4 Hz within 2 ms.
     assert (found.vaf(one.angle[:, shown], one.torque[:, shown]) > 99.9).all()
+    assert not found.held_back().simulated.size

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
@@ -10,7 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._merged.merging import Merging, Part
+from tvident._merged.models import model_of
+from tvident._merged.not_linear import NotLinear
 from tvident._merged.predicted import Equations, predicted
+from tvident._merged.simulated import bridged, rows_of
 from tvident._results import POOR, every_sample, parts_of, percent, where_held_back, without_gaps
 from tvident._status import Status
 
@@ -25,6 +28,9 @@ class HeldBackTorque:
     ----------
     predicted : ndarray, shape (equations,)
         Percent of the variance of every torque, as averages over the test function; NaN where it was not measured or nothing can be known.
+    simulated : ndarray, shape (masses,)
+        Percent of the variance of every angle, simulated from the state before each held-back part, of equations that are linear or of one
+        mass; empty for others, and where something cannot be known.
     parts : int
         Parts of every trial whose last tenth was held back.
     why_not : str
@@ -32,6 +38,7 @@ class HeldBackTorque:
     """
 
     predicted: Array = field(default_factory=lambda: np.zeros(0))
+    simulated: Array = field(default_factory=lambda: np.zeros(0))
     parts: int = 1
     why_not: str = ""
 
@@ -40,12 +47,16 @@ class HeldBackTorque:
         known = self.predicted[np.isfinite(self.predicted)]
         if self.why_not or not known.size:
             return f"how much of a held-back part the equations explain is not known: {self.why_not or 'no torque is left there'}"
-        shares = " to ".join(dict.fromkeys(percent(float(share)) for share in (known.min(), known.max())))
-        which = "torque" if self.predicted.size == 1 else "torques"
-        return (
-            f"explains {shares} of the {which}, averaged over the test function, in {where_held_back(self.parts)}, held back "
-            "from the fit"
-        )
+        several = "" if self.predicted.size == 1 else "s"
+        words = f"explains {_range(known)} of the torque{several}, averaged over the test function, "
+        if self.simulated.size:
+            words += f"and {_range(self.simulated)} of the angle{several} simulated, "
+        return f"{words}in {where_held_back(self.parts)}, held back from the fit"
+
+
+def _range(shares: Array) -> str:
+    """Return the least and the greatest of some shares."""
+    return " to ".join(dict.fromkeys(percent(float(share)) for share in (shares.min(), shares.max())))
 
 
 def held_back(merging: Merging) -> HeldBackTorque:
@@ -54,10 +65,12 @@ def held_back(merging: Merging) -> HeldBackTorque:
         return HeldBackTorque(why_not="the record was not kept with the result, or nothing of it can be known")
     count = max(merging.masses, 1)
     left, spread, samples, parts = np.zeros(count), np.zeros(count), np.zeros(count), 1
+    everything: dict[str, Array] = {}
     for part in merging.parts:
         held = [_held(trial[0].shape[-1], part.found.window_length) for trial in part.equations.trials]
         parts = max(len(ends) for ends in held)
         values = _values_without(part, held, merging)
+        everything |= values
         for trial, ends in enumerate(held):
             form = (part.found.window_length, part.found.exponent)
             recorded, expected = predicted(part.equations, trial, values, form, merging.sampling.period)
@@ -70,7 +83,43 @@ def held_back(merging: Merging) -> HeldBackTorque:
                 samples[equation] += both.shape[1]
     with np.errstate(all="ignore"):
         shares = 100 * (1 - left / spread)
-    return HeldBackTorque(np.where(samples > 0, shares, np.nan), parts)
+    length = max(part.found.window_length for part in merging.parts)
+    return HeldBackTorque(np.where(samples > 0, shares, np.nan), _simulated(merging, everything, length), parts)
+
+
+@np.errstate(all="ignore")
+def _simulated(merging: Merging, values: Mapping[str, Array], window_length: int) -> Array:
+    """Return how much of the angles a simulation explains; nothing where it would take long, or cannot be done."""
+    recorded, nothing = merging.recorded, np.zeros(0)
+    whole = {one.name for one in merging.elements} == set(values) and all(
+        np.isfinite(one).all() for one in values.values()
+    )
+    if recorded is None or recorded.own or not recorded.is_unchanged or not whole:
+        return nothing
+    left, spread = np.zeros((2, max(merging.masses, 1)))
+    for trial in range(merging.trials):
+        angles, base = rows_of(recorded.angles[trial]), recorded.bases[trial]
+        places = np.arange(angles.shape[1]) if recorded.positions is None else recorded.positions[trial]
+        along = {name: np.interp(places, np.arange(merging.samples), one) for name, one in values.items()}
+        for begin, first, end in parts_of(angles.shape[1], window_length):
+            some = slice(begin, end)
+            try:
+                moving = None if base is None else bridged(rows_of([base[some]]))[0]
+                model = model_of(merging, {name: one[some] for name, one in along.items()}, moving)
+                if isinstance(model, NotLinear):
+                    return nothing
+                seen = angles[:, some].copy()
+                seen[:, first - begin :] = np.nan
+                found, _ = model.respond(bridged(rows_of(recorded.torques[trial])[:, some]), None, seen)
+            except ValueError:
+                return nothing
+            true, found = angles[:, first:end], found[:, first - begin :]
+            there = np.isfinite(true) & np.isfinite(found)
+            left += np.sum(np.where(there, (true - found) ** 2, 0.0), axis=1)
+            mean = np.mean(true, axis=1, where=there, keepdims=True)
+            spread += np.sum(np.where(there, (true - mean) ** 2, 0.0), axis=1)
+    shares = 100 * (1 - left / spread)
+    return shares if np.isfinite(shares).all() else nothing
 
 
 def _held(samples: int, window_length: int) -> list[tuple[int, int]]:

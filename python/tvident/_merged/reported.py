@@ -169,7 +169,8 @@ class Reported(Simulated, Telling, Tabular):
         Returns
         -------
         HeldBackTorque
-            ``predicted``: percent of the variance of every torque, as averages over the test function; ``words()`` says it.
+            ``predicted``: percent of the variance of every torque, as averages over the test function; ``simulated``: that of every angle,
+            simulated from the state before each part, of equations that are linear or of one mass; ``words()`` says it.
         """
         return self._held_back
 

@@ -97,7 +97,7 @@ class Simulated:
             seen = None if angles is None else angles[trial]
             if state is None and seen is None:
                 state, seen = self._begun(trial, pushed, len(several))
-            found.append(model.respond(_bridged(pushed), state, seen)[0])
+            found.append(model.respond(bridged(pushed), state, seen)[0])
         return self._as_given(torque, found)
 
     def vaf(
@@ -132,7 +132,7 @@ class Simulated:
         pushed: Any = torque
         if angle is None:
             recorded = self._record("angle= and torque=")
-            seen, pushed = ([_rows(one) for one in of] for of in (recorded.angles, recorded.torques))
+            seen, pushed = ([rows_of(one) for one in of] for of in (recorded.angles, recorded.torques))
             if not self._merging.masses:
                 seen, pushed = ([one[0] for one in of] for of in (seen, pushed))
             elif self._merging.trials == 1:
@@ -219,7 +219,7 @@ class Simulated:
             raise ValueError(
                 f"base must have shape ({samples},), as the torque's time has; got {moving.shape}; give the base of these torques"
             )
-        return np.asarray(_bridged(moving[np.newaxis])[0])
+        return np.asarray(bridged(moving[np.newaxis])[0])
 
     def _begun(self, trial: int, pushed: Array, trials: int) -> tuple[Array | None, Array | None]:
         """Return the state in which a trial that was identified began, or its angles where these are its torques."""
@@ -229,13 +229,13 @@ class Simulated:
                 f"the state at the first sample must be known; got {trials} trials, where {self._merging.trials} were identified; "
                 "give initial=, or angle= of the same recording"
             )
-        torques, angles = (_rows(of[trial]) for of in (recorded.torques, recorded.angles))
+        torques, angles = (rows_of(of[trial]) for of in (recorded.torques, recorded.angles))
         if np.array_equal(torques, pushed, equal_nan=True):
             return None, angles
         position = None if recorded.positions is None else recorded.positions[trial]
         base = recorded.bases[trial]
-        model = self._model(angles.shape[1], position, None if base is None else _bridged(_rows([base]))[0])
-        return model.respond(_bridged(torques), None, angles)[1], None
+        model = self._model(angles.shape[1], position, None if base is None else bridged(rows_of([base]))[0])
+        return model.respond(bridged(torques), None, angles)[1], None
 
     def _record(self, cure: str) -> Recorded:
         """Return the record that was identified, if it is still there."""
@@ -277,13 +277,13 @@ class Simulated:
         return model_of(merging, values, base)
 
 
-def _rows(channels: Sequence[Any]) -> Array:
+def rows_of(channels: Sequence[Any]) -> Array:
     """Return channels of masses as an array; those that were not measured are missing."""
     samples = max(np.size(one) for one in channels if one is not None)
     return np.stack([np.full(samples, np.nan) if one is None else np.asarray(one, np.float64) for one in channels])
 
 
-def _bridged(channels: Array) -> Array:
+def bridged(channels: Array) -> Array:
     """Return channels with straight lines over few missing samples.
 
     Raises
