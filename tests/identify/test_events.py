@@ -80,6 +80,23 @@ def test_short_pulses_of_the_stiffness_are_found(length: float, seed: int) -> No
     assert any("for a short while" in reason for reason in result.reasons)
 
 
+@pytest.mark.parametrize(("length", "seed"), [(0.1, 29), (0.05, 3)])
+def test_few_pulses_are_found_beside_rows_that_stand_out_little(length: float, seed: int) -> None:
+    starts = np.sort(np.random.default_rng(seed + 77).uniform(0.3, 19.5, 10))
+    starts = starts[np.concatenate([[True], np.diff(starts) > 0.6])]
+
+    def free_length(t: Array) -> Array:
+        since = t[..., np.newaxis] - starts
+        return np.where(((since >= 0) & (since < length)).any(axis=-1), LENGTH / 2, LENGTH)
+
+    rig = tvident.simulate_torsional_rig(20.0, seed=seed, pattern=free_length, damping=0.041, angle_noise=1e-3)
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=RATE)
+    assert len(result.jumps) == 2 * starts.size
+    inside = rig.stiffness > 1.5 * np.median(rig.stiffness)
+    covered = np.abs(result.stiffness - rig.stiffness) < 1.96 * result.stderr["stiffness"]
+    assert min(covered[inside].mean(), covered[~inside].mean()) > COVERAGE
+
+
 @pytest.mark.parametrize(("pattern", "seed"), [("slider", 4), ("square", 0), ("ramp", 2)])
 def test_records_without_events_have_none(pattern: Any, seed: int) -> None:
     # Jumps and bends of the stiffness leave something, too, and so do the steps of an encoder.

@@ -14,7 +14,7 @@ use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::found::WeakIdentified;
 use crate::identify::weak::friction::FrictionDirection;
 use crate::identify::weak::options::WeakOptions;
-use crate::identify::weak::pulses::{add_pulses, are_the_same, without_pulses};
+use crate::identify::weak::pulses::{add_pulses, allow_hidden, are_the_same, without_pulses};
 use crate::identify::weak::session::Session;
 use crate::identify::weak::torque_jumps::without_jumps;
 use crate::noise::breaks::search::{Broken, breaks};
@@ -217,8 +217,12 @@ fn settled(
                 continue;
             }
         }
+        let hidden = session.hidden_pulses(&chosen, &pulses);
         let mut found = session.finished(chosen, &model)?;
         if let Some(place) = found.changing.iter().position(|&unknown| unknown == STIFFNESS) {
+            if let Some(hidden) = hidden {
+                allow_hidden(&mut found, place, options.step, &hidden, &pulses);
+            }
             add_pulses(&mut found, place, options.step, &pulses);
         }
         session.stages.finish()?;

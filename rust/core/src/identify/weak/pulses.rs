@@ -31,13 +31,22 @@ const MOST: f64 = 0.3;
 /// pulse by which the stiffness may differ before and after it: what does not come back is a jump.
 const LEAST: f64 = 0.1;
 const COMES_BACK: f64 = 0.25;
-/// The least part of what stands out that must be pulses.
-const EXPLAINED: f64 = 0.6;
+/// Standard errors within which 95 % of normal numbers are.
+const WITHIN: f64 = 1.96;
+/// The least part of the squares of what stands out that must be pulses.
+const EXPLAINED: f64 = 0.9;
 /// By how much less the squared errors of independent rows must be with pulses than without, or with a touch or a spike of the torque in their
 /// places, over the noise's variance.
 const BETTER: f64 = 20.0;
 
+/// Where pulses would not be seen, and how large they are.
+pub(crate) struct Hidden {
+    places: Vec<Range<usize>>,
+    change: f64,
+}
+
 /// What windows leave of every row, whether they say anything of it, and their stiffness there.
+#[derive(Default)]
 struct Left {
     rows: Vec<f64>,
     usable: Vec<bool>,
@@ -55,7 +64,7 @@ impl Left {
         let last = self.stiffness.len() - 1;
         let [before, after] =
             [rows.start.saturating_sub(reach), (rows.end + reach).min(last)].map(|row| self.stiffness[row]);
-        let change = pulse.change.iter().fold(0.0_f64, |most, change| most.max(change.abs()));
+        let change = largest_change(pulse);
         change > LEAST * f64::midpoint(before.abs(), after.abs()) && (after - before).abs() < COMES_BACK * change
     }
 }
@@ -101,10 +110,15 @@ impl Session<'_, '_, '_> {
         }
         let search = self.search(&chosen.weak, expected, &left);
         let pulse = |rows: &Range<usize>| search.within(rows).filter(|pulse| left.comes_back(pulse, rows));
-        let pulses: Vec<Pulse> = over.iter().filter_map(pulse).collect();
-        let explain = pulses.len() as f64 >= EXPLAINED * over.len() as f64;
+        let found: Vec<Option<Pulse>> = over.iter().map(pulse).collect();
+        // A few rows that stand out little do not speak against pulses that stand out much.
+        let squares = |rows: &Range<usize>| -> f64 { left.rows[rows.clone()].iter().map(|left| left * left).sum() };
+        let all: f64 = over.iter().map(squares).sum();
+        let explained: f64 =
+            over.iter().zip(&found).filter(|(_, pulse)| pulse.is_some()).map(|(rows, _)| squares(rows)).sum();
+        let pulses: Vec<Pulse> = found.into_iter().flatten().collect();
         let above_torque: f64 = pulses.iter().map(|pulse| pulse.above_torque).sum();
-        Ok(if explain && above_torque > BETTER { pulses } else { Vec::new() })
+        Ok(if explained >= EXPLAINED * all && above_torque > BETTER { pulses } else { Vec::new() })
     }
 
     /// Whether rows with pulses taken off, which were predicted with some error, are predicted better than the same rows of the torque as it was
@@ -127,6 +141,19 @@ impl Session<'_, '_, '_> {
         chosen.weak.rows.rhs = calm;
         let independent = self.record.angle.len() as f64 / function.half_width() as f64;
         Ok((without? - error) * independent > BETTER)
+    }
+
+    /// Samples at which a pulse like those that were found would hardly be seen, and the change of such a pulse.
+    pub(crate) fn hidden_pulses(&self, chosen: &Chosen, pulses: &[Pulse]) -> Option<Hidden> {
+        let expected = chosen.fitted.as_ref()?.expected;
+        let mut lengths: Vec<usize> = pulses.iter().map(|pulse| pulse.samples.len()).collect();
+        let mut changes: Vec<f64> = pulses.iter().map(largest_change).collect();
+        lengths.sort_unstable();
+        changes.sort_by(f64::total_cmp);
+        let (&length, &change) = (lengths.get(lengths.len() / 2)?, changes.get(changes.len() / 2)?);
+        let left = Left { usable: chosen.weak.rows.usable.clone(), ..Left::default() };
+        let search = self.search(&chosen.weak, expected, &left);
+        Some(Hidden { places: search.hidden(length, change), change })
     }
 
     fn search<'a>(&'a self, weak: &'a WeakRows, expected: Expected, left: &'a Left) -> PulseSearch<'a> {
@@ -171,6 +198,26 @@ impl Session<'_, '_, '_> {
         problem.usable = usable;
         let (rows, usable) = residuals(&problem, fit, &mut self.stages)?;
         Ok(Some(Left { rows, usable, stiffness: spring.stiffness().to_vec(), span: fit.span, others_change: false }))
+    }
+}
+
+fn largest_change(pulse: &Pulse) -> f64 {
+    pulse.change.iter().fold(0.0, |most, change| most.max(change.abs()))
+}
+
+/// Makes the errors of values such that they hold a pulse where one would not be seen, but for where one was.
+pub(crate) fn allow_hidden(found: &mut WeakIdentified, place: usize, step: usize, hidden: &Hidden, pulses: &[Pulse]) {
+    let errors = &mut found.results.errors[place];
+    let mut unseen = vec![false; errors.len()];
+    let elements = |samples: &Range<usize>| samples.start.div_ceil(step)..samples.end.div_ceil(step);
+    for places in &hidden.places {
+        unseen[elements(places)].fill(true);
+    }
+    for pulse in pulses {
+        unseen[elements(&(pulse.first..pulse.first + pulse.change.len()))].fill(false);
+    }
+    for (error, _) in errors.iter_mut().zip(unseen).filter(|(_, unseen)| *unseen) {
+        *error = error.hypot(hidden.change / WITHIN);
     }
 }
 

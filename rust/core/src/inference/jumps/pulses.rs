@@ -25,6 +25,10 @@ const NEAR: usize = 2;
 const BELIEVED: f64 = 40.0;
 const LEFT: f64 = 0.25;
 
+/// A pulse that reduces the sum of squares by so much on average is believed in 19 of 20 cases: (√40 + 1.64)². And places for a length of it.
+const SEEN: f64 = 63.4;
+const STEPS_OF_PULSE: usize = 4;
+
 /// Pairs so much worse than the best have no probability.
 const IMPOSSIBLE: f64 = 40.0;
 
@@ -102,6 +106,35 @@ impl ColumnProducts {
     }
 }
 
+/// The samples of a row times its test function, summed up.
+struct Running {
+    begin: usize,
+    samples: Vec<f64>,
+    sums: Vec<f64>,
+}
+
+impl Running {
+    fn new(length: usize) -> Self {
+        Self { begin: 0, samples: vec![0.0; length], sums: vec![0.0; length + 1] }
+    }
+
+    /// Takes a row. Returns whether its signal is all there.
+    fn take(&mut self, search: &PulseSearch<'_>, row: usize) -> bool {
+        self.begin = search.first + row * search.stride - search.function.len() / 2;
+        search.signal.read(self.begin, &mut self.samples);
+        let root = search.roots.get(row).copied().unwrap_or(1.0);
+        for (place, (factor, sample)) in search.function.iter().zip(&self.samples).enumerate() {
+            self.sums[place + 1] = self.sums[place] + root * factor * sample;
+        }
+        all_usable(&self.samples)
+    }
+
+    /// The sum of what lies before a sample.
+    fn before(&self, sample: usize) -> f64 {
+        self.sums[sample.saturating_sub(self.begin).min(self.samples.len())]
+    }
+}
+
 impl PulseSearch<'_> {
     /// Stretches of rows that leave more than noise, and those whose test function touches theirs.
     pub(crate) fn conspicuous(&self) -> Vec<Range<usize>> {
@@ -168,22 +201,16 @@ impl PulseSearch<'_> {
     /// The products of the columns that begin at each place and never end, so that a pulse is the difference of two. `None` where the signal
     /// is not all there.
     fn products(&self, over: &[usize], places: Vec<usize>) -> Option<ColumnProducts> {
-        let (length, half, count) = (self.function.len(), self.function.len() / 2, places.len());
-        let (mut samples, mut sums) = (vec![0.0; length], vec![0.0; length + 1]);
+        let count = places.len();
+        let mut running = Running::new(self.function.len());
         let mut products = ColumnProducts { with_left: vec![0.0; count], between: vec![0.0; count * count], places };
         let mut column = vec![0.0; count];
         for &row in over {
-            let begin = self.first + row * self.stride - half;
-            self.signal.read(begin, &mut samples);
-            if !all_usable(&samples) {
+            if !running.take(self, row) {
                 return None;
             }
-            let root = self.roots.get(row).copied().unwrap_or(1.0);
-            for (place, (factor, sample)) in self.function.iter().zip(&samples).enumerate() {
-                sums[place + 1] = sums[place] + root * factor * sample;
-            }
             for (value, &place) in column.iter_mut().zip(&products.places) {
-                *value = sums[place.saturating_sub(begin).min(length)];
+                *value = running.before(place);
             }
             for (one, value) in column.iter().enumerate() {
                 products.with_left[one] += value * self.left[row];
@@ -192,6 +219,26 @@ impl PulseSearch<'_> {
             }
         }
         Some(products)
+    }
+
+    /// Samples at which a pulse of a length and a change would hardly be seen: the coefficient is multiplied by next to nothing there, or no row tells.
+    pub(crate) fn hidden(&self, length: usize, change: f64) -> Vec<Range<usize>> {
+        let step = (length / STEPS_OF_PULSE).max(1);
+        // By how much a pulse from every so manieth sample on would reduce the sum of squares.
+        let mut squares = vec![0.0; self.signal.len() / step];
+        let mut running = Running::new(self.function.len());
+        for row in (0..self.usable.len()).filter(|&row| self.usable[row]) {
+            if !running.take(self, row) {
+                continue;
+            }
+            let end = running.begin + self.function.len();
+            for place in running.begin.saturating_sub(length).div_ceil(step)..end.div_ceil(step).min(squares.len()) {
+                squares[place] += (running.before(place * step + length) - running.before(place * step)).powi(2);
+            }
+        }
+        let least = SEEN * self.inflation * self.variance / (change * change);
+        let unseen = squares.iter().enumerate().filter(|(_, square)| **square < least);
+        unseen.map(|(place, _)| place * step..(place * step + length).min(self.signal.len())).collect()
     }
 
     /// The pulse whose mean and variance come from all pairs of places.
