@@ -179,8 +179,8 @@ def _several_trials(channels: tuple[Any, Any], axes: tuple[int, int], structure:
     """Return the masses of several trials."""
     if isinstance(structure, Mechanism):
         raise ValueError(  # noqa: TRY004 - it goes with one trial
-            "trials of a Mechanism are not supported together yet; got ensemble_axis=; join them to one record, shape (masses, n), with a "
-            "column of NaN between trials"
+            "trials of a Mechanism are not supported together yet; got ensemble_axis=; join them to one record, shape (masses, n), with "
+            "ten columns of NaN between trials, over which nothing is bridged"
         )
     angles, torques = (_by_trial(name, one, axes) for name, one in zip(("angle", "torque"), channels, strict=True))
     if len(angles) != len(torques):
