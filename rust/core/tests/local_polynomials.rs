@@ -65,7 +65,7 @@ fn run(options: PolynomialOptions, record: &[f64]) -> Everything {
 fn by_hand(window: &[f64], highest: usize) -> (Vec<[f64; 3]>, Vec<f64>) {
     let m = window.len();
     let degrees = (0..=highest).take_while(|&n| Criterion::Aicc.penalty(n, m).is_some()).count();
-    let basis = Basis::new(m, degrees);
+    let basis = Basis::new(m, degrees).expect("little memory");
     let level = window[m / 2];
     let mut rest: Vec<f64> = window.iter().map(|value| value - level).collect();
     let mut derivatives = Vec::new();

@@ -67,7 +67,7 @@ pub(crate) fn estimate_automatically<'py>(
                 let found = noise(record, quantisation, instructions)?;
                 let coloured = coloured_noise(record, found.sigma * found.sigma, instructions);
                 noises.push((coloured.variance().sqrt(), found.quantisation));
-                let prepared = AutomaticRecord::new(record, &coloured, highest, instructions);
+                let prepared = AutomaticRecord::new(record, &coloured, highest, instructions)?;
                 for (row, &derivative) in derivatives.iter().enumerate() {
                     let options = AutomaticOptions { derivative, highest, fixed, delta };
                     let place = (row * records.len() + index) * count;

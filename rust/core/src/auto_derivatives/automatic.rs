@@ -10,8 +10,9 @@ use std::num::NonZeroUsize;
 use crate::auto_derivatives::boundary;
 use crate::auto_derivatives::candidate_weights::Refinement;
 use crate::auto_derivatives::candidates::Target;
-use crate::auto_derivatives::global_choice::{Pair, SHORTEST, Survey, rounded};
-use crate::auto_derivatives::local_average::DerivativeOutputs;
+use crate::auto_derivatives::global_choice::{Pair, SHORTEST, rounded};
+use crate::auto_derivatives::local_weights::DerivativeOutputs;
+use crate::auto_derivatives::survey::{CLOSELY, Survey};
 use crate::auto_derivatives::trend::trend;
 use crate::error::Error;
 use crate::exec::memory;
@@ -54,8 +55,15 @@ pub struct AutomaticRecord<'a> {
 
 impl<'a> AutomaticRecord<'a> {
     /// Prepares a record for orders up to the highest, with the noise that [`crate::noise`] finds.
-    #[must_use]
-    pub fn new(record: &'a dyn Samples, noise: &CorrelatedNoise, highest: usize, instructions: Instructions) -> Self {
+    ///
+    /// # Errors
+    /// If there is not the memory.
+    pub fn new(
+        record: &'a dyn Samples,
+        noise: &CorrelatedNoise,
+        highest: usize,
+        instructions: Instructions,
+    ) -> Result<Self, Error> {
         let variance = noise.variance();
         let (shortest, noise) = match samples_per_step(record, variance.sqrt()) {
             // A caller who denies quantisation may give less noise than rounding makes.
@@ -66,9 +74,9 @@ impl<'a> AutomaticRecord<'a> {
             }
             None => (SHORTEST, noise.clone()),
         };
-        let trend = trend(record, &noise);
-        let survey = Survey::new(record, highest.min(HIGHEST_ORDER), instructions);
-        Self { survey, noise, shortest, trend, instructions }
+        let trend = trend(record, &noise)?;
+        let survey = Survey::new(record, highest.min(HIGHEST_ORDER), instructions)?;
+        Ok(Self { survey, noise, shortest, trend, instructions })
     }
 }
 
@@ -148,7 +156,8 @@ pub fn estimate_automatically(
         return Err(Error::OrderTooLow { order: highest, derivative });
     }
     memory::ask_for_numbers(samples.saturating_mul(NUMBERS))?;
-    let target = Target { derivative, highest, fixed, shortest: *shortest, delta, noise, instructions: *instructions };
+    let (shortest, instructions, of_means) = (*shortest, *instructions, samples > CLOSELY);
+    let target = Target { derivative, highest, fixed, shortest, of_means, delta, noise, instructions };
     let total = 2 * samples;
     let trend = trend.and_then(|degree| Some((longest_window(&target, degree, samples)?, degree)));
     let (best, target, at_ends) = match trend {
@@ -158,8 +167,8 @@ pub fn estimate_automatically(
         }
         None => (survey.best(&target, &mut || check_cancelled(watch, 0, total))?, target, target),
     };
-    let planned = best.and_then(|pair| Some((pair, Refinement::new(samples, pair, &target)?)));
-    let Some((pair, refinement)) = planned else {
+    let planned = best.map(|pair| Ok((pair, Refinement::new(samples, pair, &target)?))).transpose()?;
+    let Some((pair, Some(refinement))) = planned else {
         estimates.values.fill(f64::NAN);
         estimates.errors.fill(f64::NAN);
         estimates.order.fill(0);
@@ -168,7 +177,7 @@ pub fn estimate_automatically(
         return Ok(None);
     };
     let mut outputs = DerivativeOutputs { values: estimates.values, errors: estimates.errors, order: estimates.order };
-    refinement.estimate(record, &mut outputs, workers, watch)?;
+    refinement.estimate(survey.means(), &mut outputs, workers, watch)?;
     for end in [End::First, End::Last] {
         let mut check_cancelled = || check_cancelled(watch, total, total);
         let at_end = boundary::estimate(survey, end, pair, &at_ends, &mut check_cancelled)?;

@@ -24,10 +24,13 @@ use faer::linalg::solvers::{Llt, Qr};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Mat, Par, Side};
 
+use crate::auto_derivatives::block_means::{mean, step_at_end};
 use crate::auto_derivatives::candidate_weights::Reference;
 use crate::auto_derivatives::candidates::{Target, correlated};
-use crate::auto_derivatives::global_choice::{CLOSELY, CheckCancelled, Pair, Survey, rounded};
-use crate::auto_derivatives::slopes::Slopes;
+use crate::auto_derivatives::deconvolution::AtCentre;
+use crate::auto_derivatives::global_choice::{CheckCancelled, Pair, rounded};
+use crate::auto_derivatives::slopes::{slopes, slopes_between};
+use crate::auto_derivatives::survey::{CLOSELY, Survey};
 use crate::error::Error;
 use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
 use crate::local_polynomials::boundary::End;
@@ -97,7 +100,9 @@ pub(crate) fn estimate(
     check_cancelled: &mut CheckCancelled<'_>,
 ) -> Result<AtEnd, Error> {
     let samples = survey.record().len();
-    let Some(reference) = Reference::new(pair, REFERENCE, target) else { return Ok(average(&[], pair.half)) };
+    // Made of samples: near an end its places matter, and there are few of them.
+    let target = &Target { of_means: false, ..*target };
+    let Some(reference) = Reference::new(pair, REFERENCE, target)? else { return Ok(average(&[], pair.half)) };
     let length = (NEAR * pair.half).max(LEAST_NEAR).min(samples);
     let near = match end {
         End::First => 0..length,
@@ -110,7 +115,7 @@ pub(crate) fn estimate(
         let half = rounded(pair.half as f64 * (0.5 * f64::from(step)).exp2());
         let half = if closely { half } else { survey.nearest_known(half) };
         if (SHORTEST..samples.div_ceil(4)).contains(&half) && 2 * half < samples / 2 {
-            found.extend(near.shrink(half, pair.half, target, closely));
+            found.extend(near.shrink(half, pair.half, target, closely)?);
         }
         check_cancelled()?;
     }
@@ -151,39 +156,53 @@ impl<'a> Near<'a> {
         let mut compare = vec![f64::NAN; samples.len()];
         if !centres.is_empty() {
             let (mut scratch, mut projected) = (bank.scratch(), Projected::default());
-            let estimates = bank.estimates(record, centres.clone(), 1, &mut scratch, &mut projected);
+            let estimates = bank.estimates(survey.means(), centres.clone(), 1, &mut scratch, &mut projected);
             compare[centres.start - samples.start..centres.end - samples.start].copy_from_slice(&estimates[*candidate]);
         }
         Self { survey, end, samples, compare, kernel: bank.kernel(*candidate), gain: bank.gains[*candidate] }
     }
 
     /// The estimates of windows of one length at the first `count` places, or `None` if the outermost window cannot be used.
-    fn shrink(&self, half: usize, count: usize, target: &Target<'_>, closely: bool) -> Option<Shrunk> {
+    fn shrink(&self, half: usize, count: usize, target: &Target<'_>, closely: bool) -> Result<Option<Shrunk>, Error> {
         let variance = target.noise.variance();
-        let (length, derivative) = (2 * half + 1, target.derivative);
-        let (highest, count) = (target.highest(half), count.min(length));
+        let step = if closely { 1 } else { step_at_end(half) };
+        let (inner, derivative) = (half / step, target.derivative);
+        let length = (2 * inner + 1) * step;
+        let (highest, count) = (target.highest(inner), count.min(length));
         if highest < derivative || length > self.samples.len() {
-            return None;
+            return Ok(None);
         }
         let last = self.end == End::Last;
         let most = if closely { CLOSE_WINDOWS } else { MOST_WINDOWS };
-        let tables = self.survey.tables(half);
+        let tables = self.survey.tables(inner)?;
         let basis = &tables.basis;
         let mut samples = vec![0.0; length];
         self.survey.record().read(if last { self.samples.end - length } else { self.samples.start }, &mut samples);
         if last {
             samples.reverse();
         }
+        let means: Vec<f64> = samples.chunks_exact(step).map(mean).collect();
         // In reversed time odd derivatives change their sign.
         let sign = if last && derivative % 2 == 1 { -1.0 } else { 1.0 };
-        let outermost = Window::project(basis, &samples, 0.0)?;
-        let (starts, mut projected) = self.survey.windows(half, &self.samples, most, last);
-        projected.coefficients.truncate(highest + 1);
-        let correlations = correlations(basis, highest, target.noise);
-        let shrinkage = shrinkage(&projected, variance, &correlations);
-        let scale = target.scale();
-        let slopes = Slopes::new(basis);
-        let at_place = |place: usize| slopes.at(basis, place, derivative);
+        let Some(outermost) = Window::project(basis, &means, 0.0) else { return Ok(None) };
+        let windows = self.survey.windows(half, &self.samples, most, last)?;
+        let (starts, projected) = (&windows.starts, &windows.projected);
+        let correlations = correlations(basis, highest, step, target.noise);
+        let shrinkage = shrinkage(projected, highest, variance, &correlations);
+        let power = i32::try_from(derivative).unwrap_or(i32::MAX);
+        let scale = target.scale() / (step as f64).powi(power);
+        let polynomials = AtCentre::new(basis, step).polynomials(highest + 1);
+        let at_place = |place: usize| {
+            if step == 1 {
+                return slopes(basis, place, derivative);
+            }
+            let slopes = slopes_between(basis, (place as f64 - (length / 2) as f64) / step as f64, derivative);
+            let mut at_place = [0.0; MOST_DEGREES];
+            for (value, polynomial) in at_place.iter_mut().zip(&polynomials) {
+                *value = polynomial.iter().zip(slopes).map(|(factor, slope)| factor * slope).sum();
+            }
+            at_place
+        };
         let shrunk_coefficients: Vec<f64> = (0..=highest)
             .map(|j| shrinkage.iter().zip(&outermost.coefficients).map(|(row, c)| row[j] * c).sum::<f64>())
             .collect();
@@ -199,7 +218,7 @@ impl<'a> Near<'a> {
                 .iter()
                 .map(|row| scale * row.iter().zip(&at_place).map(|(a, q)| a * q).sum::<f64>())
                 .collect();
-            let estimates = BoundaryEstimates::new(&projected, &weights, constant, derivative);
+            let estimates = BoundaryEstimates::new(projected, &weights, constant, derivative);
             let difference = |window: usize| {
                 let start = starts[window] - self.samples.start;
                 [
@@ -211,30 +230,31 @@ impl<'a> Near<'a> {
             let (sum, compared) =
                 differences.fold((0.0, 0_usize), |(sum, count), difference| (sum + difference * difference, count + 1));
             let own = quadratic(&weights, &correlations);
-            let shared = self.shared(basis, &weights, place, target.noise);
+            let shared = self.shared(basis, step, &weights, (place, target.noise));
             let risk = sum / compared as f64 + variance * (2.0 * shared - self.gain);
             if compared < FEWEST_WINDOWS { f64::INFINITY } else { risk.max(variance * own) }
         };
-        Some(Shrunk {
+        Ok(Some(Shrunk {
             values,
             risks: if closely { (0..count).map(risk).collect() } else { interpolated(count, risk) },
             order: highest,
-        })
+        }))
     }
 
     /// The product of the kernel at a place of a window, given by the weights of its coefficients, with that of the reference.
-    fn shared(&self, basis: &Basis, weights: &[f64], place: usize, noise: &CorrelatedNoise) -> f64 {
-        let length = basis.length();
+    fn shared(&self, basis: &Basis, step: usize, weights: &[f64], (place, noise): (usize, &CorrelatedNoise)) -> f64 {
+        let length = basis.length() * step;
         let reference = correlated(self.kernel.clone(), place.max(length - place), noise);
         let reach = reference.len() / 2;
         let meeting = place.saturating_sub(reach)..length.min(place + reach + 1);
+        let at = |index: usize| reference[reach + index - place];
         // Of even and of odd degrees.
         let mut sums = [0.0; MOST_DEGREES];
-        for (index, value) in meeting.clone().zip(&reference[reach + meeting.start - place..]) {
-            let mirrored = index < length / 2;
-            let outward = if mirrored { length / 2 - index } else { index - length / 2 };
-            let row = basis.rows().nth(outward).unwrap_or_default();
-            let signs = if mirrored { [*value, -*value] } else { [*value; 2] };
+        for mean in meeting.start / step..meeting.end.div_ceil(step) {
+            let samples = meeting.start.max(mean * step)..meeting.end.min((mean + 1) * step);
+            let value = samples.map(at).sum::<f64>() / step as f64;
+            let (row, mirrored) = basis.row(mean);
+            let signs = if mirrored { [value, -value] } else { [value; 2] };
             for (pair, q) in sums.chunks_exact_mut(2).zip(row.chunks(2)) {
                 for ((sum, q), sign) in pair.iter_mut().zip(q).zip(signs) {
                     *sum += q * sign;
@@ -294,12 +314,16 @@ impl BoundaryEstimates {
     }
 }
 
-/// The correlations `QᵀRQ` that the noise gives to the coefficients of a window.
-fn correlations(basis: &Basis, highest: usize, noise: &CorrelatedNoise) -> Mat<f64> {
+/// The correlations `QᵀRQ` that the noise gives to the coefficients of a window of means of so many samples.
+fn correlations(basis: &Basis, highest: usize, step: usize, noise: &CorrelatedNoise) -> Mat<f64> {
+    let share = 1.0 / step as f64;
     if noise.is_white() {
-        return Mat::identity(highest + 1, highest + 1);
+        return Mat::from_fn(highest + 1, highest + 1, |i, j| if i == j { share } else { 0.0 });
     }
-    let row = |degree: usize| (0..basis.length()).map(|index| basis.value(degree, index)).collect();
+    let row = |degree: usize| {
+        let values = (0..basis.length()).map(|index| basis.value(degree, index) * share);
+        values.flat_map(|value| std::iter::repeat_n(value, step)).collect()
+    };
     let rows: Vec<Vec<f64>> = (0..=highest).map(row).collect();
     let correlated: Vec<Vec<f64>> = rows.iter().map(|row| noise.correlate(row)).collect();
     // Even and odd degrees are uncorrelated; sums of what cancels would leave rounding.
@@ -316,8 +340,8 @@ fn quadratic(weights: &[f64], matrix: &Mat<f64>) -> f64 {
 /// The matrix that shrinks coefficients, row by row: `ĉ = Σ_i matrix_ij c_j` for the weights of derivatives, which are rows from the left.
 ///
 /// With `σ² LLᵀ` the covariance of the noise, `L⁻¹c` has noise of equal variance in all directions.
-fn shrinkage(projected: &Projected, variance: f64, correlations: &Mat<f64>) -> Vec<Vec<f64>> {
-    let rows = &projected.coefficients;
+fn shrinkage(projected: &Projected, highest: usize, variance: f64, correlations: &Mat<f64>) -> Vec<Vec<f64>> {
+    let rows = &projected.coefficients[..=highest];
     let usable: Vec<usize> = (0..projected.level.len()).filter(|&window| !projected.level[window].is_nan()).collect();
     let mut matrix = vec![vec![0.0; rows.len()]; rows.len()];
     matrix[0][0] = 1.0;
@@ -394,13 +418,13 @@ mod tests {
     #[test]
     fn coefficients_shrink_as_wiener_says() {
         // Moments of 10 and 4 are signals of 9 and 3 beside noise of 1; a signal below the noise counts as none.
-        assert_shrinks(&shrinkage(&projected([10.0, 4.0]), 1.0, &white()), [0.9, 0.75]);
-        assert_shrinks(&shrinkage(&projected([10.0, 1.9]), 1.0, &white()), [0.9, 0.0]);
+        assert_shrinks(&shrinkage(&projected([10.0, 4.0]), 3, 1.0, &white()), [0.9, 0.75]);
+        assert_shrinks(&shrinkage(&projected([10.0, 1.9]), 3, 1.0, &white()), [0.9, 0.0]);
     }
 
     #[test]
     fn without_noise_small_coefficients_stay_beside_large_ones() {
         // The square of the smaller one is below the rounding of the larger one's.
-        assert_shrinks(&shrinkage(&projected([1.0, 1e-20]), 0.0, &white()), [1.0, 1.0]);
+        assert_shrinks(&shrinkage(&projected([1.0, 1e-20]), 3, 0.0, &white()), [1.0, 1.0]);
     }
 }

@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 
+use crate::auto_derivatives::block_means::{BlockMeans, COARSER, Grid};
 use crate::auto_derivatives::candidates::{Bank, Target, correlated};
-use crate::auto_derivatives::global_choice::{CLOSELY, OPTIMISM, Pair, rounded, squared_distance};
-use crate::auto_derivatives::symmetric_grid::{Blocks, within};
-use crate::lanes::output::Elements;
+use crate::auto_derivatives::global_choice::{OPTIMISM, Pair, rounded, squared_distance};
+use crate::auto_derivatives::survey::CLOSELY;
+use crate::auto_derivatives::symmetric_grid::Blocks;
+use crate::error::Error;
 use crate::local_polynomials::coefficients::{CoefficientScratch, Projected};
-use crate::record::samples::Samples;
 
 /// The windows over the record's best.
 const WINDOWS: [f64; 5] = [0.125, 0.25, 0.5, 1.0, 2.0];
@@ -31,10 +32,16 @@ const REACHES: f64 = 16.0;
 const PIECE: usize = 1 << 14;
 const RUNS: usize = 2;
 
+/// A piece is longer by as many samples as a mean has, but not by more.
+const MOST_IN_MEANS: usize = 3;
+
 /// Places in a half-width at which candidates are compared, at least, and samples from one to the next, at most. The shortest wave that order 15
 /// follows is `2π/15` half-widths long, three places: mean squares over them are nearly those over all samples.
 const PLACES: usize = 8;
-const LONGEST_STEP: usize = 8;
+const LONGEST_STEP: usize = 9;
+
+/// Places in a half-width of the record's best window, at least: the weights of shorter windows are decided by far more than they scatter.
+const PLACES_OF_BEST: usize = 12;
 
 /// The candidates of a record's neighbourhoods.
 #[derive(Debug)]
@@ -42,8 +49,9 @@ pub(crate) struct Refinement {
     pub(crate) banks: Vec<Bank>,
     reference: Reference,
     pub(crate) blocks: Blocks,
-    samples: usize,
-    /// Samples in half a neighbourhood.
+    pub(crate) samples: usize,
+    /// Half-width of the record's best window, and samples in half a neighbourhood.
+    pub(crate) half: usize,
     reach: f64,
     /// By candidate of all banks: twice the covariance with the reference and what optimism adds; variance of the difference from the
     /// reference; `T`; variance; order.
@@ -63,13 +71,17 @@ pub(crate) struct Reference {
 
 impl Reference {
     /// The same order in a window so much shorter, or else in the same window.
-    pub(crate) fn new(pair: Pair, shorter: f64, target: &Target<'_>) -> Option<Self> {
-        let with_order = |half: usize| {
-            let bank = Bank::new(half, target)?;
-            let candidate = bank.orders.iter().position(|&order| order == pair.order)?;
-            Some(Self { bank, candidate })
-        };
-        with_order(rounded(pair.half as f64 / shorter).max(target.shortest)).or_else(|| with_order(pair.half))
+    ///
+    /// # Errors
+    /// If there is not the memory.
+    pub(crate) fn new(pair: Pair, shorter: f64, target: &Target<'_>) -> Result<Option<Self>, Error> {
+        for half in [rounded(pair.half as f64 / shorter).max(target.shortest), pair.half] {
+            let Some(bank) = Bank::new(half, target)? else { continue };
+            if let Some(candidate) = bank.orders.iter().position(|&order| order == pair.order) {
+                return Ok(Some(Self { bank, candidate }));
+            }
+        }
+        Ok(None)
     }
 }
 
@@ -92,19 +104,28 @@ pub(crate) struct AverageScratch {
     /// The reference at its own places and at those of a bank.
     compare: Vec<f64>,
     compare_at: Vec<f64>,
+    /// Candidates at all samples of a run, or at their own means.
     pub(crate) rows: Vec<Vec<f64>>,
+    /// By bank, the first of these means.
+    pub(crate) firsts: Vec<usize>,
 }
 
 impl Refinement {
     /// Prepares the candidates around a record's best pair.
-    pub(crate) fn new(samples: usize, pair: Pair, target: &Target<'_>) -> Option<Self> {
+    ///
+    /// # Errors
+    /// If there is not the memory.
+    pub(crate) fn new(samples: usize, pair: Pair, target: &Target<'_>) -> Result<Option<Self>, Error> {
         let variance = target.noise.variance();
         let half = pair.half as f64;
-        let reference = Reference::new(pair, REFERENCE, target)?;
+        let Some(reference) = Reference::new(pair, REFERENCE, target)? else { return Ok(None) };
         let mut halves: Vec<usize> = WINDOWS.iter().map(|ratio| rounded(half * ratio)).collect();
         halves.dedup();
         halves.retain(|&half| half >= target.shortest && 2 * half < samples / 2);
-        let banks: Vec<Bank> = halves.into_iter().filter_map(|half| Bank::new(half, target)).collect();
+        let mut banks = Vec::new();
+        for half in halves {
+            banks.extend(Bank::new(half, target)?);
+        }
         let reference_gain = reference.bank.gains[reference.candidate];
         let (mut offsets, mut differences, mut temperatures) = (Vec::new(), Vec::new(), Vec::new());
         let (mut variances, mut orders) = (Vec::new(), Vec::new());
@@ -122,7 +143,20 @@ impl Refinement {
         let shortest = if samples > CLOSELY { SHORTEST_BLOCK } else { 1 };
         let blocks = Blocks::new(samples, (pair.half / BLOCKS).max(shortest));
         let reach = NEIGHBOURHOOD * half;
-        Some(Self { banks, reference, blocks, samples, reach, offsets, differences, temperatures, variances, orders })
+        let half = pair.half;
+        Ok(Some(Self {
+            banks,
+            reference,
+            blocks,
+            samples,
+            half,
+            reach,
+            offsets,
+            differences,
+            temperatures,
+            variances,
+            orders,
+        }))
     }
 
     /// Ranges of blocks that are worked on one after the other.
@@ -130,10 +164,11 @@ impl Refinement {
         self.together(&(0..self.blocks.count()), CHUNK.max(rounded(REACHES * self.reach)))
     }
 
-    /// Ranges of some blocks that form one piece of work.
+    /// Ranges of some blocks that form one piece of work: of as many means as there would be samples.
     pub(crate) fn pieces(&self, blocks: &Range<usize>) -> impl Iterator<Item = Range<usize>> + use<> {
-        let run = self.banks.iter().map(Bank::run).max().unwrap_or(0);
-        self.together(blocks, PIECE.max(RUNS * run))
+        let step = self.banks.iter().map(|bank| bank.step).max().unwrap_or(1).min(MOST_IN_MEANS);
+        let run = self.banks.iter().filter(|bank| bank.step <= step).map(Bank::run).max().unwrap_or(0);
+        self.together(blocks, (PIECE * step).max(RUNS * run))
     }
 
     /// Ranges of some blocks, of about so many samples each.
@@ -164,6 +199,7 @@ impl Refinement {
             compare: Vec::new(),
             compare_at: Vec::new(),
             rows: vec![Vec::new(); self.offsets.len()],
+            firsts: vec![0; self.banks.len()],
         }
     }
 
@@ -171,59 +207,74 @@ impl Refinement {
     /// candidate, and bank by bank, for each block.
     pub(crate) fn compare(
         &self,
-        record: &dyn Samples,
+        means: &BlockMeans<'_>,
         blocks: Range<usize>,
         sums: &mut [f64],
         counts: &mut [f64],
         scratch: &mut AverageScratch,
     ) {
         let (samples, own) = (self.samples(&blocks), &self.reference);
-        let step = self.banks.iter().map(|bank| self.step(bank)).min().unwrap_or(1);
+        let finest = self.banks.iter().map(|bank| self.step(bank)).min().unwrap_or(own.bank.step);
         let AverageScratch { banks, reference, projected, compare, compare_at, .. } = scratch;
-        for (side, place) in self.sides(&samples) {
-            let known = places(&within(&side, &own.bank.centres(self.samples)), place, step);
-            compare.clear();
-            if !known.is_empty() {
-                let estimates = own.bank.estimates(record, known.clone(), step, reference, projected);
-                compare.extend(&estimates[own.candidate]);
-            }
-            let mut column = 0;
-            for (index, (bank, scratch)) in self.banks.iter().zip(&mut *banks).enumerate() {
-                let own_step = self.step(bank);
-                let own = places(&within(&known, &bank.centres(self.samples)), place, own_step);
-                if !own.is_empty() {
-                    compare_at.clear();
-                    compare_at.extend(compare[(own.start - known.start) / step..].iter().step_by(own_step / step));
-                    let elements = Elements { first: own.start, step: own_step };
-                    let rows = bank.estimates(record, own.clone(), own_step, scratch, projected);
-                    for block in self.blocks.of(own.start)..=self.blocks.of(own.end - 1) {
-                        let part = elements.of(within(&self.blocks.samples(block), &own));
-                        let (compare, from) = (&compare_at[part.clone()], block - blocks.start);
-                        let sums = &mut sums[from * self.offsets.len() + column..];
-                        let mut count = 0.0;
-                        for (row, sum) in rows.iter().zip(sums) {
-                            let (squares, compared) = squared_differences(&row[part.clone()], compare);
-                            *sum += squares;
-                            count = compared;
-                        }
-                        counts[from * self.banks.len() + index] += count;
+        let every = Grid::new(self.samples, finest);
+        let (known, centres) = own.bank.places(self.samples, every, &every.means(&samples));
+        compare.clear();
+        if known.is_empty() {
+            return;
+        }
+        let estimates = own.bank.estimates(means, centres, finest / own.bank.step, reference, projected);
+        compare.extend(&estimates[own.candidate]);
+        let mut column = 0;
+        for (index, (bank, scratch)) in self.banks.iter().zip(banks).enumerate() {
+            let grid = Grid::new(self.samples, self.step(bank));
+            let of_reference = grid.means(&(every.sample(known.start)..every.sample(known.end - 1) + 1));
+            let (places, centres) = bank.places(self.samples, grid, &of_reference);
+            if !places.is_empty() {
+                let first = (grid.sample(places.start) - every.first) / finest - known.start;
+                compare_at.clear();
+                compare_at.extend(compare[first..].iter().step_by(grid.step / finest).take(places.len()));
+                let rows = bank.estimates(means, centres, grid.step / bank.step, scratch, projected);
+                for block in self.blocks.of(grid.sample(places.start))..=self.blocks.of(grid.sample(places.end - 1)) {
+                    let part = grid.means(&self.blocks.samples(block));
+                    let part = part.start.max(places.start) - places.start..part.end.min(places.end) - places.start;
+                    let (compare, from) = (&compare_at[part.clone()], block - blocks.start);
+                    let sums = &mut sums[from * self.offsets.len() + column..];
+                    let mut count = 0.0;
+                    for (row, sum) in rows.iter().zip(sums) {
+                        let (squares, compared) = squared_differences(&row[part.clone()], compare);
+                        *sum += squares;
+                        count = compared;
                     }
+                    counts[from * self.banks.len() + index] += count;
                 }
-                column += bank.orders.len();
             }
+            column += bank.orders.len();
         }
     }
 
-    /// Samples from one place of a bank to the next.
-    fn step(&self, bank: &Bank) -> usize {
-        let wanted = if self.samples > CLOSELY { (bank.half / PLACES).clamp(1, LONGEST_STEP) } else { 1 };
-        1 << wanted.ilog2()
+    /// The means that a bank's windows are made of.
+    pub(crate) fn grid(&self, bank: usize) -> Grid {
+        Grid::new(self.samples, self.banks[bank].step)
     }
 
-    /// The parts of some samples on both sides of the record's middle, with a place of all banks: places are the same from both ends.
-    fn sides(&self, samples: &Range<usize>) -> [(Range<usize>, usize); 2] {
-        let (end, middle) = (self.samples, self.samples / 2);
-        [(within(samples, &(0..middle)), 0), (within(samples, &(middle..end)), end - 1)]
+    /// The candidates of a bank.
+    pub(crate) fn candidates_of(&self, bank: usize) -> Range<usize> {
+        let first: usize = self.banks[..bank].iter().map(|bank| bank.orders.len()).sum();
+        first..first + self.banks[bank].orders.len()
+    }
+
+    /// The bank of a candidate.
+    pub(crate) fn bank_of(&self, candidate: usize) -> usize {
+        (0..self.banks.len()).find(|&bank| candidate < self.candidates_of(bank).end).unwrap_or(0)
+    }
+
+    /// Samples from one place to the next at which the candidates of a bank are compared.
+    fn step(&self, bank: &Bank) -> usize {
+        let wanted = match self.samples {
+            ..=CLOSELY => 1,
+            _ => (bank.half / PLACES).clamp(1, LONGEST_STEP).max(self.half / PLACES_OF_BEST),
+        };
+        COARSER.pow(wanted.ilog(COARSER)).max(bank.step).max(self.reference.bank.step)
     }
 
     /// The logarithm of every candidate's weight and its squared bias in some blocks, from the risk around each. Sums and counts begin with a block.
@@ -286,13 +337,6 @@ fn squared_differences(row: &[f64], compare: &[f64]) -> (f64, f64) {
     squares.fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0))
 }
 
-/// Samples from the first on that is a multiple of a step away from a place.
-fn places(samples: &Range<usize>, place: usize, step: usize) -> Range<usize> {
-    let before = samples.start % step;
-    let first = samples.start + (step + place % step - before) % step;
-    first..samples.end.max(first)
-}
-
 /// Adds numbers with a weight.
 fn add(sums: &mut [f64], numbers: &[f64], weight: f64) {
     for (sum, number) in sums.iter_mut().zip(numbers) {
@@ -313,21 +357,35 @@ mod tests {
         let noisy = |(i, e): (usize, f64)| (i as f64 / 300.0).sin() + 0.1 * e;
         let record: Vec<f64> = uniform(samples).into_iter().enumerate().map(noisy).collect();
         let (record, noise) = (record.as_slice(), CorrelatedNoise::white(0.01 / 12.0));
+        let means = BlockMeans::new(&record, 200).expect("little memory");
         for derivative in 0..3 {
             let instructions = Instructions::current();
-            let target =
-                Target { derivative, highest: 15, fixed: false, shortest: 4, delta: 1.0, noise: &noise, instructions };
-            let of = Refinement::new(samples, Pair { half: 100, order: derivative + 2 }, &target).expect("long enough");
+            let target = Target {
+                derivative,
+                highest: 15,
+                fixed: false,
+                shortest: 4,
+                of_means: true,
+                delta: 1.0,
+                noise: &noise,
+                instructions,
+            };
+            let of = Refinement::new(samples, Pair { half: 100, order: derivative + 2 }, &target);
+            let of = of.expect("little memory").expect("long enough");
             let (mut sums, mut counts) =
                 (vec![0.0; of.blocks.count() * of.offsets.len()], vec![0.0; of.blocks.count() * of.banks.len()]);
-            of.compare(&record, 0..of.blocks.count(), &mut sums, &mut counts, &mut of.scratch());
+            of.compare(&means, 0..of.blocks.count(), &mut sums, &mut counts, &mut of.scratch());
             let mut column = 0;
             for (index, bank) in of.banks.iter().enumerate() {
-                let (from, end) = (400, samples - 400);
+                let grid = Grid::new(samples, bank.step.max(of.reference.bank.step));
+                let inside = grid.means(&(400..samples - 400));
+                let at = |bank: &Bank| (bank.places(samples, grid, &inside).1, grid.step / bank.step);
+                let ((own, every), (centres, every_centre)) = (at(bank), at(&of.reference.bank));
                 let (mut scratch, mut reference) = (bank.scratch(), of.reference.bank.scratch());
                 let (mut of_reference, mut of_bank) = (Projected::default(), Projected::default());
-                let compare = of.reference.bank.estimates(&record, from..end, 1, &mut reference, &mut of_reference);
-                let rows = bank.estimates(&record, from..end, 1, &mut scratch, &mut of_bank);
+                let compare =
+                    of.reference.bank.estimates(&means, centres, every_centre, &mut reference, &mut of_reference);
+                let rows = bank.estimates(&means, own, every, &mut scratch, &mut of_bank);
                 let count: f64 = counts[index..].iter().step_by(of.banks.len()).sum();
                 assert!(count > (samples / 10) as f64);
                 for row in rows {

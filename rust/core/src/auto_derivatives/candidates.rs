@@ -6,14 +6,20 @@
 //! ```text
 //! d_i = Σ_{l≤i} w_l c_{d+2l},   w_l = q_{d+2l}^(d)(0) / Δ^d,   variance σ² g_i,   g_i = Σ_{l≤i} w_l².
 //! ```
+//!
+//! Long windows are made of means of `r` samples ([`crate::auto_derivatives::block_means`]): `w_l` are those of the polynomial whose means are
+//! `q_{d+2l}`, and variances `r` times as small.
 
 use std::ops::Range;
 use std::sync::Arc;
 
+use crate::auto_derivatives::block_means::{BlockMeans, Grid, step_for};
+use crate::auto_derivatives::deconvolution::AtCentre;
+use crate::auto_derivatives::symmetric_grid::within;
+use crate::error::Error;
 use crate::local_polynomials::coefficients::{CoefficientScratch, Projected};
 use crate::local_polynomials::tables::{TablesWanted, WindowTables, tables};
 use crate::noise::correlated::CorrelatedNoise;
-use crate::record::samples::Samples;
 use crate::simd::instructions::Instructions;
 
 /// The derivative to be estimated, and its orders.
@@ -25,6 +31,8 @@ pub(crate) struct Target<'a> {
     pub(crate) fixed: bool,
     /// Half-width of the shortest window.
     pub(crate) shortest: usize,
+    /// Whether long windows are made of means.
+    pub(crate) of_means: bool,
     pub(crate) delta: f64,
     pub(crate) noise: &'a CorrelatedNoise,
     pub(crate) instructions: Instructions,
@@ -56,6 +64,8 @@ impl Target<'_> {
 #[derive(Debug)]
 pub(crate) struct Bank {
     pub(crate) half: usize,
+    /// Samples of a mean that the windows are made of; one where they are made of samples.
+    pub(crate) step: usize,
     /// By candidate: order, variance over that of the noise, and weight of a sample in the value at its own place.
     pub(crate) orders: Vec<usize>,
     pub(crate) gains: Vec<f64>,
@@ -70,25 +80,32 @@ pub(crate) struct Bank {
 }
 
 impl Bank {
-    /// Prepares the tables, or returns `None` if windows of this length have no candidate.
-    pub(crate) fn new(half: usize, target: &Target<'_>) -> Option<Self> {
-        let orders = target.orders(half);
-        let (derivative, highest) = (target.derivative, *orders.last()?);
+    /// Prepares the tables of windows of about this length, or returns `None` if they have no candidate.
+    ///
+    /// # Errors
+    /// If there is not the memory.
+    pub(crate) fn new(half: usize, target: &Target<'_>) -> Result<Option<Self>, Error> {
+        let step = if target.of_means { step_for(half) } else { 1 };
+        let inner = half / step;
+        let half = inner * step + step / 2;
+        let orders = target.orders(inner);
+        let derivative = target.derivative;
+        let Some(&highest) = orders.last() else { return Ok(None) };
         // One basis serves all derivatives.
-        let (all, instructions) = (target.highest(half), target.instructions);
-        let wanted = TablesWanted { half, highest: all, first: derivative, step: 2, instructions };
-        let tables = tables(wanted);
-        let basis = &tables.basis;
+        let (all, instructions) = (target.highest(inner), target.instructions);
+        let tables = tables(TablesWanted { half: inner, highest: all, first: derivative, step: 2, instructions })?;
+        let at_centre = AtCentre::new(&tables.basis, step);
         let degrees: Vec<usize> = (derivative..=highest).step_by(2).collect();
         let first = degrees.len() - orders.len();
-        let (at_centre, scale) = (basis.evaluate(0.0, derivative), target.scale());
-        let weights: Vec<f64> = degrees.iter().map(|&degree| at_centre[degree] * scale).collect();
-        let gains: Vec<f64> = running_sums(weights.iter().map(|weight| weight * weight)).skip(first).collect();
-        let values = basis.evaluate(0.0, 0);
-        let leverages: Vec<f64> = running_sums(values.iter().map(|value| value * value)).collect();
+        let (scale, share) = (target.scale(), 1.0 / step as f64);
+        let weights: Vec<f64> =
+            degrees.iter().map(|&degree| at_centre.derivative(derivative, degree) * scale).collect();
+        let gains = running_sums(weights.iter().map(|weight| weight * weight * share)).skip(first).collect();
+        let leverage = |degree: usize| at_centre.derivative(0, degree) * at_centre.of_means[0][degree] * share;
+        let leverages: Vec<f64> = running_sums((0..=highest).map(leverage)).collect();
         let leverages = orders.iter().map(|&order| leverages[order]).collect();
         let constant = f64::from(u8::from(derivative == 0));
-        let mut bank = Self { half, orders, gains, leverages, tables, weights, first, derivative, constant };
+        let mut bank = Self { half, step, orders, gains, leverages, tables, weights, first, derivative, constant };
         if !target.noise.is_white() {
             let gain = |candidate| {
                 let kernel = bank.kernel(candidate);
@@ -96,34 +113,51 @@ impl Bank {
             };
             bank.gains = (0..bank.orders.len()).map(gain).collect();
         }
-        Some(bank)
+        Ok(Some(bank))
     }
 
     pub(crate) fn scratch(&self) -> CoefficientScratch {
         self.tables.coefficients().scratch()
     }
 
-    /// Centres that are worked on together.
+    /// Samples that are worked on together.
     pub(crate) fn run(&self) -> usize {
-        self.tables.coefficients().run()
+        self.tables.coefficients().run() * self.step
     }
 
-    /// The samples of a record that can be centres of windows.
+    /// Means in half a window.
+    fn inner(&self) -> usize {
+        self.tables.basis.length() / 2
+    }
+
+    /// The means, or samples, of a record that can be centres of windows.
     pub(crate) fn centres(&self, samples: usize) -> Range<usize> {
-        self.half..samples.saturating_sub(self.half).max(self.half)
+        let (inner, count) = (self.inner(), Grid::new(samples, self.step).count);
+        inner..count.saturating_sub(inner).max(inner)
     }
 
-    /// Estimates of every candidate at every `step`-th of some centres, a row each; NaN where a window holds an unusable sample.
+    /// The places of a grid, out of some, at which windows fit, and the means, or samples, there. The grid is not finer than that of the means.
+    pub(crate) fn places(&self, samples: usize, grid: Grid, wanted: &Range<usize>) -> (Range<usize>, Range<usize>) {
+        let (own, centres) = (Grid::new(samples, self.step), self.centres(samples));
+        let fits = within(wanted, &grid.means(&(own.sample(centres.start)..own.sample(centres.end))));
+        if centres.is_empty() || fits.is_empty() {
+            return (0..0, 0..0);
+        }
+        let mean = |place: usize| (grid.sample(place) - own.first) / own.step;
+        (fits.clone(), mean(fits.start)..mean(fits.end - 1) + 1)
+    }
+
+    /// Estimates of every candidate at every `every`-th of some centres, a row each; NaN where a window holds an unusable sample.
     pub(crate) fn estimates<'a>(
         &self,
-        record: &dyn Samples,
+        means: &BlockMeans<'_>,
         centres: Range<usize>,
-        step: usize,
+        every: usize,
         scratch: &mut CoefficientScratch,
         projected: &'a mut Projected,
     ) -> &'a mut [Vec<f64>] {
-        let windows = centres.start - self.half..centres.end - self.half;
-        self.tables.coefficients().project(record, windows, step, projected, scratch);
+        let windows = centres.start - self.inner()..centres.end - self.inner();
+        self.tables.coefficients().project(means.of(self.step), windows, every, projected, scratch);
         let Projected { level: sums, coefficients: rows, .. } = projected;
         for sum in sums.iter_mut() {
             // NaN stays NaN.
@@ -156,17 +190,22 @@ impl Bank {
 
     /// The products of every candidate's kernel and a sequence around its centre that is even or odd as the kernels are.
     pub(crate) fn products(&self, sequence: &[f64]) -> Vec<f64> {
-        let middle = sequence.len() / 2;
+        let outwards = &sequence[sequence.len() / 2..];
+        let (own, others) = outwards.split_at((self.step / 2 + 1).min(outwards.len()));
+        // Both halves of what is at the centre.
+        let at_centre = own[0] + 2.0 * own[1..].iter().sum::<f64>();
         let mut sums = vec![0.0; self.weights.len()];
-        for (row, value) in self.tables.basis.rows().zip(&sequence[middle..]).skip(1) {
+        let mut rows = self.tables.basis.rows();
+        let centre = rows.next().unwrap_or_default();
+        for (row, part) in rows.zip(others.chunks(self.step)) {
+            let value: f64 = part.iter().sum();
             for (sum, q) in sums.iter_mut().zip(row[self.derivative..].iter().step_by(2)) {
                 *sum += q * value;
             }
         }
-        let centre = self.tables.basis.rows().next().unwrap_or_default();
         let products = sums.iter().enumerate().map(|(l, sum)| {
-            let at_centre = centre.get(self.derivative + 2 * l).map_or(0.0, |q| q * sequence[middle]);
-            self.weights[l] * (2.0 * sum + at_centre)
+            let at_centre = centre.get(self.derivative + 2 * l).map_or(0.0, |q| q * at_centre);
+            self.weights[l] * (2.0 * sum + at_centre) / self.step as f64
         });
         running_sums(products).skip(self.first).collect()
     }
@@ -175,13 +214,11 @@ impl Bank {
     pub(crate) fn kernel(&self, candidate: usize) -> Vec<f64> {
         let weights = &self.weights[..=self.first + candidate];
         let weight = |index| {
-            weights
-                .iter()
-                .enumerate()
-                .map(|(l, weight)| weight * self.tables.basis.value(self.derivative + 2 * l, index))
-                .sum()
+            let products =
+                weights.iter().enumerate().map(|(l, w)| w * self.tables.basis.value(self.derivative + 2 * l, index));
+            products.sum::<f64>() / self.step as f64
         };
-        (0..self.tables.basis.length()).map(weight).collect()
+        (0..self.tables.basis.length()).flat_map(|index| std::iter::repeat_n(weight(index), self.step)).collect()
     }
 }
 

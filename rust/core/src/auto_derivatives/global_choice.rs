@@ -18,36 +18,19 @@
 //! candidate, has another mean square at each set of places: over 200 places it varies by a tenth, ten times the
 //! variance that is sought. So a window is compared with the best of the shorter ones where both fit. Its risk is the
 //! other one's plus their difference there.
-//!
-//! Long records are subsampled in sixteen stretches.
 
-use std::cell::RefCell;
-use std::f64::consts::LN_2;
 use std::ops::Range;
-use std::rc::Rc;
-use std::sync::Arc;
 
 use crate::auto_derivatives::candidates::{Bank, Target, correlated};
+use crate::auto_derivatives::survey::{LONGEST, Survey, Surveyed};
 use crate::auto_derivatives::symmetric_grid::within;
 use crate::error::Error;
-use crate::local_polynomials::coefficients::Projected;
-use crate::local_polynomials::tables::{TablesWanted, WindowTables, tables};
 use crate::noise::correlated::CorrelatedNoise;
-use crate::record::samples::Samples;
-use crate::simd::instructions::Instructions;
 
 /// Half-width of the shortest window.
 pub(crate) const SHORTEST: usize = 4;
 
-/// Half-width of the longest window tried.
-const LONGEST: usize = 10_000;
-
-/// Longer records are subsampled in stretches.
-const WHOLE: usize = 1 << 16;
-const STRETCHES: usize = 16;
-
-/// Places at which candidates are compared, at most, and at least.
-const MOST_PLACES: usize = 1 << 13;
+/// Places at which candidates are compared, at least.
 const FEWEST_PLACES: usize = 16;
 
 /// A reference judges candidates whose variance is at least its own over this.
@@ -59,31 +42,8 @@ pub(crate) const OPTIMISM: f64 = 1.3;
 /// The steps, in halvings and doublings, with which the best window is refined.
 const REFINEMENTS: [f64; 4] = [0.25, 0.125, 0.0625, 0.031_25];
 
-/// Records that are looked at more closely: there it costs little, and a few windows decide.
-pub(crate) const CLOSELY: usize = 1 << 11;
-
 /// Called repeatedly; an error ends the work.
 pub(crate) type CheckCancelled<'a> = dyn FnMut() -> Result<(), Error> + 'a;
-
-/// Where candidates are compared, and what is known there: the coefficients of windows serve all derivatives.
-pub(crate) struct Survey<'a> {
-    record: &'a dyn Samples,
-    highest: usize,
-    instructions: Instructions,
-    stretches: Vec<Range<usize>>,
-    step: usize,
-    /// By half-width, the coefficients at all places; NaN where there is no window.
-    known: RefCell<Vec<(usize, Rc<Projected>)>>,
-}
-
-/// The candidates of one window at all places, a row each; NaN where there is none.
-#[derive(Debug)]
-struct Surveyed {
-    bank: Bank,
-    rows: Vec<Vec<f64>>,
-    /// The places where windows fit, if they fit at all of these: no sample is missing.
-    whole: Option<Range<usize>>,
-}
 
 /// What candidates are compared with: the weights of its samples are the same for all of them.
 struct ReferenceCandidate<'a> {
@@ -93,15 +53,6 @@ struct ReferenceCandidate<'a> {
 }
 
 impl Surveyed {
-    fn new(bank: Bank, rows: Vec<Vec<f64>>) -> Self {
-        let row = &rows[0];
-        let first = row.iter().position(|value| !value.is_nan());
-        let last = row.iter().rposition(|value| !value.is_nan());
-        let fits = first.zip(last).map(|(first, last)| first..last + 1);
-        let whole = fits.filter(|places| !row[places.clone()].iter().any(|value| value.is_nan()));
-        Self { bank, rows, whole }
-    }
-
     fn compared(&self, candidate: usize) -> ReferenceCandidate<'_> {
         ReferenceCandidate { looked: self, candidate, kernel: self.bank.kernel(candidate) }
     }
@@ -122,26 +73,7 @@ pub(crate) struct Pair {
     pub(crate) order: usize,
 }
 
-impl<'a> Survey<'a> {
-    pub(crate) fn new(record: &'a dyn Samples, highest: usize, instructions: Instructions) -> Self {
-        let samples = record.len();
-        let known = RefCell::new(Vec::new());
-        if samples <= WHOLE {
-            // The same places from both ends: what is left over is even.
-            let least = samples.div_ceil(MOST_PLACES).max(1);
-            let step =
-                (least..=samples.max(least)).find(|step| samples.saturating_sub(1) % step % 2 == 0).unwrap_or(least);
-            let margin = samples.saturating_sub(1) % step / 2;
-            let stretches = std::iter::once(margin..samples - margin).collect();
-            return Self { record, highest, instructions, stretches, step, known };
-        }
-        let length = WHOLE / STRETCHES;
-        let first = |index: usize| (samples - length) * index / (STRETCHES - 1);
-        let stretches = (0..STRETCHES).map(|index| first(index)..first(index) + length).collect();
-        let step = WHOLE.div_ceil(MOST_PLACES);
-        Self { record, highest, instructions, stretches, step, known: RefCell::new(Vec::new()) }
-    }
-
+impl Survey<'_> {
     /// The pair of least risk, or `None` if no window is free of unusable samples. `check_cancelled` is called repeatedly.
     ///
     /// # Errors
@@ -152,9 +84,9 @@ impl<'a> Survey<'a> {
         check_cancelled: &mut CheckCancelled<'_>,
     ) -> Result<Option<Pair>, Error> {
         let mut ladder = Vec::new();
-        for half in ladder_of_windows(self.record.len(), target.shortest) {
-            if let Some(bank) = Bank::new(half, target) {
-                ladder.push(self.look(bank));
+        for half in ladder_of_windows(self.record().len(), target.shortest) {
+            if let Some(bank) = Bank::new(half, target)? {
+                ladder.push(self.look(bank, true)?);
             }
             check_cancelled()?;
         }
@@ -174,20 +106,21 @@ impl<'a> Survey<'a> {
     ) -> Result<Pair, Error> {
         // The best of a window, compared with the best so far.
         let best_of = |half: usize, best: Option<&(Surveyed, usize, f64)>| {
-            let looked = self.look(Bank::new(half, target)?);
+            let Some(bank) = Bank::new(half, target)? else { return Ok(None) };
+            let looked = self.look(bank, false)?;
             let best = best.map(|&(ref looked, candidate, risk)| JudgedWindow { looked, candidate, risk });
-            let risks = risks(reference, &looked, best, 0.0, target.noise);
-            let (candidate, risk) = risks.into_iter().enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
-            Some((looked, candidate, risk))
+            let risks = risks(reference, &looked, best, 0.0, target.noise).into_iter().enumerate();
+            let least = risks.min_by(|a, b| a.1.total_cmp(&b.1));
+            Ok::<_, Error>(least.map(|(candidate, risk)| (looked, candidate, risk)))
         };
-        let Some(mut best) = best_of(pair.half, None) else { return Ok(pair) };
+        let Some(mut best) = best_of(pair.half, None)? else { return Ok(pair) };
         for step in REFINEMENTS {
             let centre = best.0.bank.half;
             for half in [rounded(centre as f64 * (-step).exp2()), rounded(centre as f64 * step.exp2())] {
-                if half == best.0.bank.half || half < target.shortest || 2 * half >= self.record.len() / 2 {
+                if half == best.0.bank.half || half < target.shortest || 2 * half >= self.record().len() / 2 {
                     continue;
                 }
-                if let Some(found) = best_of(half, Some(&best))
+                if let Some(found) = best_of(half, Some(&best))?
                     && found.2 < best.2
                 {
                     best = found;
@@ -197,97 +130,6 @@ impl<'a> Survey<'a> {
         }
         let (looked, candidate, _) = best;
         Ok(Pair { half: looked.bank.half, order: looked.bank.orders[candidate] })
-    }
-
-    fn look(&self, bank: Bank) -> Surveyed {
-        let rows = bank.combine(&self.coefficients(bank.half));
-        Surveyed::new(bank, rows)
-    }
-
-    /// The record that is surveyed.
-    pub(crate) fn record(&self) -> &'a dyn Samples {
-        self.record
-    }
-
-    /// The half-width of a window of about the same length whose coefficients are known, if there is one.
-    pub(crate) fn nearest_known(&self, half: usize) -> usize {
-        let distance = |one: usize| (one as f64 / half as f64).ln().abs();
-        let known = self.known.borrow();
-        let nearest = known.iter().map(|(one, _)| *one).min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
-        nearest.filter(|&one| distance(one) < LN_2 / 4.0).unwrap_or(half)
-    }
-
-    /// Tables of windows with all degrees.
-    pub(crate) fn tables(&self, half: usize) -> Arc<WindowTables> {
-        let highest = self.highest.min(2 * half - 2);
-        tables(TablesWanted { half, highest, first: 0, step: 1, instructions: self.instructions })
-    }
-
-    /// The first samples and the coefficients of windows in a part of the record, about so many, at equal distances from one of its ends.
-    pub(crate) fn windows(&self, half: usize, part: &Range<usize>, most: usize, last: bool) -> (Vec<usize>, Projected) {
-        let (samples, length) = (self.record.len(), 2 * half + 1);
-        let room = (part.end + 1).saturating_sub(part.start + length);
-        if samples > WHOLE {
-            let step = room.div_ceil(most).max(1);
-            let first = part.start + if last { room.saturating_sub(1) % step } else { 0 };
-            let tables = self.tables(half);
-            let (mut scratch, mut projected) = (tables.coefficients().scratch(), Projected::default());
-            let windows = first..part.start + room;
-            tables.coefficients().project(self.record, windows.clone(), step, &mut projected, &mut scratch);
-            return (windows.step_by(step).collect(), projected);
-        }
-        let known = self.coefficients(half);
-        let start = |place: &usize| (self.stretches[0].start + place * self.step).checked_sub(half);
-        let fits = |place: &usize| start(place).is_some_and(|first| part.start <= first && first + length <= part.end);
-        let mut places: Vec<usize> = (0..known.level.len()).filter(fits).collect();
-        let every = places.len().div_ceil(most).max(1);
-        if last {
-            places.reverse();
-        }
-        let places: Vec<usize> = places.into_iter().step_by(every).collect();
-        let pick = |row: &Vec<f64>| places.iter().map(|&place| row[place]).collect();
-        let projected = Projected {
-            level: pick(&known.level),
-            coefficients: known.coefficients.iter().map(pick).collect(),
-            residual: Vec::new(),
-        };
-        (places.iter().filter_map(start).collect(), projected)
-    }
-
-    /// The coefficients of all windows of a length at all places.
-    fn coefficients(&self, half: usize) -> Rc<Projected> {
-        if let Some((_, known)) = self.known.borrow().iter().find(|(one, _)| *one == half) {
-            return Rc::clone(known);
-        }
-        let tables = self.tables(half);
-        let mut scratch = tables.coefficients().scratch();
-        let (mut all, mut part) = (Projected::default(), Projected::default());
-        all.coefficients.resize_with(tables.basis.degrees(), Vec::new);
-        for stretch in &self.stretches {
-            let places = stretch.len().div_ceil(self.step);
-            let centres = half..self.record.len().saturating_sub(half).max(half);
-            // The places of this stretch that are centres.
-            let place = |sample: usize| sample.saturating_sub(stretch.start).div_ceil(self.step).min(places);
-            let wanted = place(centres.start)..place(centres.end).max(place(centres.start));
-            let before = all.level.len();
-            for row in all.coefficients.iter_mut().chain([&mut all.level]) {
-                row.resize(before + places, f64::NAN);
-            }
-            if wanted.is_empty() {
-                continue;
-            }
-            let first = stretch.start + wanted.start * self.step;
-            let end = centres.end.min(stretch.end);
-            tables.coefficients().project(self.record, first - half..end - half, self.step, &mut part, &mut scratch);
-            let own = before + wanted.start..before + wanted.end;
-            all.level[own.clone()].copy_from_slice(&part.level);
-            for (row, found) in all.coefficients.iter_mut().zip(&part.coefficients) {
-                row[own.clone()].copy_from_slice(found);
-            }
-        }
-        let all = Rc::new(all);
-        self.known.borrow_mut().push((half, Rc::clone(&all)));
-        all
     }
 }
 
@@ -334,18 +176,19 @@ fn risks(
     let variance = noise.variance();
     let longest = looked.bank.half.max(beside.map_or(0, |other| other.looked.bank.half));
     let kernel = correlated(reference.kernel.clone(), longest, noise);
-    let compare = &reference.looked.rows[reference.candidate];
-    let both = looked.whole.as_ref().zip(reference.looked.whole.as_ref()).map(|(a, b)| within(a, b));
-    let all = match beside {
-        Some(other) => both.zip(other.looked.whole.as_ref()).map(|(both, other)| within(&both, other)),
-        None => both,
+    // Where all of them are known.
+    let surveyed: Vec<&Surveyed> =
+        [reference.looked, looked].into_iter().chain(beside.map(|other| other.looked)).collect();
+    let grid = surveyed.iter().map(|one| one.grid).max_by_key(|grid| grid.step).unwrap_or(looked.grid);
+    let compare = reference.looked.at(reference.candidate, grid);
+    let all = surveyed.iter().try_fold(0..usize::MAX, |all, one| Some(within(&all, one.whole.as_ref()?)));
+    let all = all.map(|samples| grid.means(&samples));
+    let some: Vec<usize> = if all.is_some() {
+        Vec::new()
+    } else {
+        let rows: Vec<_> = surveyed.iter().map(|one| one.at(0, grid)).collect();
+        (0..grid.count).filter(|&place| !rows.iter().any(|row| row[place].is_nan())).collect()
     };
-    let fits = |place: usize| {
-        let other = beside.map_or(0.0, |other| other.looked.rows[other.candidate][place]);
-        !(looked.rows[0][place] + compare[place] + other).is_nan()
-    };
-    let some: Vec<usize> =
-        if all.is_some() { Vec::new() } else { (0..compare.len()).filter(|&place| fits(place)).collect() };
     let count = all.as_ref().map_or(some.len(), Range::len);
     if count < FEWEST_PLACES {
         return nothing();
@@ -358,7 +201,8 @@ fn risks(
         sum / count as f64
     };
     let risk = |looked: &Surveyed, candidate: usize, shared: f64| {
-        distance(&looked.rows[candidate]) + variance * (2.0 * shared + (OPTIMISM - 1.0) * looked.bank.gains[candidate])
+        distance(&looked.at(candidate, grid))
+            + variance * (2.0 * shared + (OPTIMISM - 1.0) * looked.bank.gains[candidate])
     };
     let shift = beside.map_or(0.0, |other| {
         let shared = other.looked.bank.products(&kernel)[other.candidate];
@@ -410,6 +254,8 @@ pub(crate) fn rounded(number: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::auto_derivatives::block_means::Grid;
+    use crate::simd::instructions::Instructions;
 
     #[test]
     fn a_window_is_judged_where_it_and_what_it_is_compared_with_fit() {
@@ -419,16 +265,17 @@ mod tests {
             highest: 3,
             fixed: false,
             shortest: 4,
+            of_means: false,
             delta: 1.0,
             noise: &noise,
             instructions: Instructions::current(),
         };
         let surveyed = |half: usize, outside: f64, inside: f64| {
-            let bank = Bank::new(half, &target).expect("a window of enough samples");
+            let bank = Bank::new(half, &target).expect("little memory").expect("a window of enough samples");
             let row: Vec<f64> =
                 (0..100).map(|place| if (30..70).contains(&place) { inside } else { outside }).collect();
             let rows = vec![row; bank.orders.len()];
-            Surveyed::new(bank, rows)
+            Surveyed::new(bank, rows, Grid::new(100, 1))
         };
         // The longest fits in the middle only, and what all are compared with is far off wherever it does not.
         let (reference, short, long) = (surveyed(4, 9.0, 0.0), surveyed(8, 0.0, 0.1), surveyed(30, f64::NAN, 0.3));

@@ -23,36 +23,41 @@
 use std::num::NonZeroUsize;
 use std::ops::Range;
 
+use crate::auto_derivatives::block_means::{BlockMeans, Grid};
 use crate::auto_derivatives::candidate_weights::{AverageScratch, Refinement, Weighed};
-use crate::auto_derivatives::symmetric_grid::within;
+use crate::auto_derivatives::interpolated_average::{POINTS, fill_between};
+use crate::auto_derivatives::local_weights::{DerivativeOutputs, LocalWeights};
 use crate::error::Error;
 use crate::exec::pool::{self, Piece, Watch};
 use crate::lanes::output::split_off;
-use crate::record::samples::Samples;
 
-/// Candidates of less weight are left out.
-const NEGLIGIBLE: f64 = 1e-9;
+/// Candidates of less weight are left out, unless they add more than that to the variance: a window of an eighth has the weight of a millionth where
+/// its variance is as much larger.
+const NEGLIGIBLE: f64 = 1e-5;
+const NEGLIGIBLE_VARIANCE: f64 = 1e-3;
 
 /// The logarithm of a weight that adds nothing to one, in any number of candidates.
 const NOTHING: f64 = -46.0;
 
-/// Where the estimates of one record go. Slices that are empty are not wanted.
-#[derive(Debug)]
-pub(crate) struct DerivativeOutputs<'a> {
-    pub(crate) values: &'a mut [f64],
-    pub(crate) errors: &'a mut [f64],
-    pub(crate) order: &'a mut [u8],
-}
-
-/// Turns logarithms of weights, of which the largest is zero, into weights.
-fn normalise(weights: &mut [f64]) {
+/// Turns logarithms of weights, of which the largest is zero, into weights. Where all are left out there is nothing to average.
+fn normalise(weights: &mut [f64], variances: &[f64]) {
+    let best = (0..weights.len()).max_by(|&a, &b| weights[a].total_cmp(&weights[b]));
+    let variance = best.map_or(0.0, |best| variances[best]);
     for weight in weights.iter_mut() {
         *weight = if *weight > NOTHING { weight.exp() } else { 0.0 };
     }
     let total: f64 = weights.iter().sum();
-    for weight in weights {
+    let mut kept = 0.0;
+    for (weight, own) in weights.iter_mut().zip(variances) {
         let share = *weight / total;
-        *weight = if share > NEGLIGIBLE { share } else { 0.0 };
+        let counts = share > NEGLIGIBLE || share * own > NEGLIGIBLE_VARIANCE * variance;
+        *weight = if counts { share } else { 0.0 };
+        kept += *weight;
+    }
+    if kept > 0.0 {
+        for weight in weights {
+            *weight /= kept;
+        }
     }
 }
 
@@ -60,19 +65,19 @@ impl Refinement {
     /// Estimates wherever a window of any candidate lies in the record; NaN elsewhere.
     pub(crate) fn estimate(
         &self,
-        record: &dyn Samples,
+        means: &BlockMeans<'_>,
         outputs: &mut DerivativeOutputs<'_>,
         workers: NonZeroUsize,
         watch: &mut Watch<'_>,
     ) -> Result<(), Error> {
-        let (samples, total) = (record.len(), 2 * record.len());
+        let (samples, total) = (self.samples, 2 * self.samples);
         let DerivativeOutputs { values, errors, order } = outputs;
         let (mut values, mut errors, mut order) = (&mut **values, &mut **errors, &mut **order);
         for chunk in self.chunks() {
             // What is done of both passes.
             let (before, size) = (2 * self.samples(&chunk).start, self.samples(&chunk).len());
             let weighed =
-                self.weigh_around(record, &chunk, workers, &mut |done, _| watch(before + done.min(size), total))?;
+                self.weigh_around(means, &chunk, workers, &mut |done, _| watch(before + done.min(size), total))?;
             let mut pieces = Vec::new();
             for part in self.pieces(&chunk) {
                 let size = self.samples(&part).len();
@@ -84,23 +89,23 @@ impl Refinement {
                 pieces.push(Piece { size, content: (part, own) });
             }
             let work = |(part, mut outputs): (Range<usize>, DerivativeOutputs<'_>), scratch: &mut AverageScratch| {
-                self.average(record, part, &weighed, &mut outputs, scratch);
+                self.average(means, part, &weighed, &mut outputs, scratch);
             };
             pool::run(pieces, workers, || self.scratch(), work, &mut |done, _| watch(before + size + done, total))?;
         }
         if watch(2 * samples, total) { Ok(()) } else { Err(Error::Cancelled) }
     }
 
-    /// The weights of some blocks and of one more on either side.
+    /// The weights of some blocks and of those beside them.
     fn weigh_around(
         &self,
-        record: &dyn Samples,
+        means: &BlockMeans<'_>,
         chunk: &Range<usize>,
         workers: NonZeroUsize,
         watch: &mut Watch<'_>,
     ) -> Result<Weighed, Error> {
         let candidates = self.offsets.len();
-        let around = self.blocks_around(chunk, 1);
+        let around = self.blocks_around(chunk, self.blocks_beside());
         let known = self.blocks_around(&around, self.reach());
         let mut sums = vec![0.0; known.len() * candidates];
         let mut counts = vec![0.0; known.len() * self.banks.len()];
@@ -112,7 +117,7 @@ impl Refinement {
             pieces.push(Piece { size: self.samples(&part).len(), content: (part, own, own_counts) });
         }
         let work = |(part, sums, counts): (Range<usize>, &mut [f64], &mut [f64]), scratch: &mut AverageScratch| {
-            self.compare(record, part, sums, counts, scratch);
+            self.compare(means, part, sums, counts, scratch);
         };
         pool::run(pieces, workers, || self.scratch(), work, watch)?;
         Ok(self.weigh(around, known.start, &sums, &counts))
@@ -121,7 +126,7 @@ impl Refinement {
     /// Averages the candidates of some blocks' samples.
     fn average(
         &self,
-        record: &dyn Samples,
+        means: &BlockMeans<'_>,
         blocks: Range<usize>,
         weighed: &Weighed,
         outputs: &mut DerivativeOutputs<'_>,
@@ -129,57 +134,67 @@ impl Refinement {
     ) {
         let (samples, candidates) = (self.samples(&blocks), self.offsets.len());
         // Weights are linear between the centres of neighbouring blocks.
-        let around = self.blocks_around(&blocks, 1);
+        let around = self.blocks_around(&blocks, self.blocks_beside());
         let part = (around.start - weighed.first) * candidates..(around.end - weighed.first) * candidates;
         let (logarithms, biases) = (&weighed.logarithms[part.clone()], &weighed.biases[part]);
         let mut weights = logarithms.to_vec();
-        weights.chunks_exact_mut(candidates).for_each(normalise);
+        weights.chunks_exact_mut(candidates).for_each(|row| normalise(row, &self.variances));
         let weighed = |candidate: usize| weights[candidate..].iter().step_by(candidates).any(|&weight| weight > 0.0);
-        let used: Vec<bool> = (0..candidates).map(weighed).collect();
-        self.fill(record, &samples, &used, scratch);
-        let mut missing = Vec::new();
-        let (mut between, mut active) = ((usize::MAX, usize::MAX), Vec::new());
-        let mut first = samples.start;
-        while first < samples.end {
-            let (low, high, distance) = self.blocks.between(first);
-            if between != (low, high) {
-                between = (low, high);
-                active.clear();
-                let of = |numbers: &[f64], one: usize| {
-                    let of = |block: usize| numbers[(block - around.start) * candidates + one];
-                    (of(low), of(high) - of(low))
-                };
-                let candidates = (0..candidates).filter(|&one| used[one]);
-                let candidates =
-                    candidates.map(|one| Share { candidate: one, weight: of(&weights, one), bias: of(biases, one) });
-                active.extend(candidates.filter(|share| share.weight != (0.0, 0.0)));
-            }
-            // A few samples between the same centres.
-            let mut distances = [distance; TOGETHER];
-            let mut count = 1;
-            while count < TOGETHER.min(samples.end - first) {
-                let (below, above, distance) = self.blocks.between(first + count);
-                if (below, above) != between {
-                    break;
-                }
-                distances[count] = distance;
-                count += 1;
-            }
-            let places = first - samples.start..first - samples.start + count;
-            for place in self.mix(&active, &distances, places, outputs, scratch) {
-                missing.push((place, self.blocks.of(samples.start + place)));
-            }
-            first += count;
+        let used = (0..candidates).map(weighed).collect();
+        let local = LocalWeights { first: around.start, candidates, logarithms, biases, weights: &weights, used };
+        for run in self.interpolate(means, &samples, &local, outputs, scratch) {
+            self.average_run(means, &run, samples.start, &local, outputs, scratch);
         }
+    }
+
+    /// Averages the candidates at every sample of a run, wherever any of them fits.
+    fn average_run(
+        &self,
+        means: &BlockMeans<'_>,
+        run: &Range<usize>,
+        begin: usize,
+        local: &LocalWeights<'_>,
+        outputs: &mut DerivativeOutputs<'_>,
+        scratch: &mut AverageScratch,
+    ) {
+        let candidates = local.candidates;
+        let inside = run.start - begin..run.end - begin;
+        let wanted = |all: &mut [f64]| if all.is_empty() { 0..0 } else { inside.clone() };
+        let (in_errors, in_order) =
+            (wanted(outputs.errors), if outputs.order.is_empty() { 0..0 } else { inside.clone() });
+        let outputs = &mut DerivativeOutputs {
+            values: &mut outputs.values[inside],
+            errors: &mut outputs.errors[in_errors],
+            order: &mut outputs.order[in_order],
+        };
+        self.fill(means, run, &local.used, scratch);
+        let mut missing = Vec::new();
+        self.between_centres(Grid::new(self.samples, 1), run.clone(), |part, place| {
+            let shares = (0..candidates).filter(|&one| local.used[one]);
+            let shares = shares.map(|one| Share {
+                candidate: one,
+                weight: local.weight(one, place),
+                bias: local.bias(one, place),
+            });
+            let active: Vec<Share> = shares.filter(|share| share.weight != (0.0, 0.0)).collect();
+            // A few samples between the same centres.
+            for first in part.clone().step_by(TOGETHER) {
+                let distance = |i: usize| place.advance * (first - part.start + i) as f64;
+                let places = first - run.start..part.end.min(first + TOGETHER) - run.start;
+                for place in self.mix(&active, &std::array::from_fn(distance), places, outputs, scratch) {
+                    missing.push((place, self.blocks.of(run.start + place)));
+                }
+            }
+        });
         if missing.is_empty() {
             return;
         }
         // Near the ends and near unusable samples the best windows do not fit: take the best of those that do.
-        let rest: Vec<bool> = used.iter().map(|used| !used).collect();
-        self.fill(record, &samples, &rest, scratch);
+        let rest: Vec<bool> = local.used.iter().map(|used| !used).collect();
+        self.fill(means, run, &rest, scratch);
         for (place, block) in missing {
-            let own = (block - around.start) * candidates..(block - around.start + 1) * candidates;
-            let (row, biases) = (&logarithms[own.clone()], &biases[own]);
+            let own = (block - local.first) * candidates..(block - local.first + 1) * candidates;
+            let (row, biases) = (&local.logarithms[own.clone()], &local.biases[own]);
             let fits =
                 (0..candidates).filter(|&one| !scratch.rows[one][place].is_nan() && row[one] > f64::NEG_INFINITY);
             let best = fits.max_by(|&a, &b| row[a].total_cmp(&row[b]));
@@ -188,31 +203,30 @@ impl Refinement {
         }
     }
 
-    /// Fills the rows of the candidates wanted; NaN where a window does not fit.
-    fn fill(&self, record: &dyn Samples, samples: &Range<usize>, wanted: &[bool], scratch: &mut AverageScratch) {
-        let AverageScratch { banks, projected, rows, .. } = scratch;
-        let mut first = 0;
-        for (bank, scratch) in self.banks.iter().zip(banks) {
-            let own = first..first + bank.orders.len();
-            first = own.end;
-            let centres = within(samples, &bank.centres(record.len()));
+    /// Fills the rows of the candidates wanted at all samples of a run; NaN where a window does not fit.
+    fn fill(&self, means: &BlockMeans<'_>, run: &Range<usize>, wanted: &[bool], scratch: &mut AverageScratch) {
+        for bank in 0..self.banks.len() {
+            let (own, grid) = (self.candidates_of(bank), self.grid(bank));
             if !wanted[own.clone()].contains(&true) {
                 continue;
             }
-            if centres == *samples {
-                let estimates = bank.estimates(record, centres, 1, scratch, projected);
-                rows[own].iter_mut().zip(estimates).for_each(|(row, estimates)| std::mem::swap(row, estimates));
+            let margin = POINTS * (grid.step - 1);
+            let around = run.start.saturating_sub(margin)..(run.end + margin).min(self.samples);
+            let (first, _) = self.fill_own(means, bank, &around, scratch);
+            let rows = &mut scratch.rows[own.clone()];
+            if grid.step == 1 && rows[0].len() == run.len() {
                 continue;
             }
-            for row in &mut rows[own.clone()] {
-                row.clear();
-                row.resize(samples.len(), f64::NAN);
+            let known: Vec<Vec<f64>> = rows.iter_mut().map(std::mem::take).collect();
+            for row in &mut *rows {
+                row.resize(run.len(), f64::NAN);
             }
-            if !centres.is_empty() {
-                let estimates = bank.estimates(record, centres.clone(), 1, scratch, projected);
-                for (row, estimates) in rows[own].iter_mut().zip(estimates) {
-                    row[centres.start - samples.start..centres.end - samples.start].copy_from_slice(estimates);
-                }
+            if grid.step > 1 {
+                fill_between(rows, run, grid, first, &known);
+                continue;
+            }
+            for (row, known) in rows.iter_mut().zip(known) {
+                row[first.max(run.start) - run.start..][..known.len()].copy_from_slice(&known);
             }
         }
     }

@@ -2,36 +2,36 @@
 
 use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
 
-/// Derivatives of the polynomials of a basis in working precision, for many places: [`Basis::evaluate`] has twice that and takes ten times as long.
-pub(crate) struct Slopes {
-    /// `b_0 = 0, b_1, …` of the recurrence in [`crate::local_polynomials::basis`].
-    recurrence: Vec<f64>,
+/// The derivative of every polynomial of a basis at a sample of the window, in working precision: [`Basis::evaluate`] has twice that and takes ten
+/// times as long.
+pub(crate) fn slopes(basis: &Basis, place: usize, derivative: usize) -> [f64; MOST_DEGREES] {
+    let mut values = [0.0; MOST_DEGREES];
+    let known = values.iter_mut().take(basis.degrees()).enumerate();
+    known.for_each(|(degree, value)| *value = basis.value(degree, place));
+    for d in 1..=derivative {
+        climb(basis, basis.position(place), d, &mut values);
+    }
+    values
 }
 
-impl Slopes {
-    pub(crate) fn new(basis: &Basis) -> Self {
-        let m = basis.length() as f64;
-        let square = |j: f64| j * j * (m * m - j * j) / (4.0 * (4.0 * j * j - 1.0));
-        Self { recurrence: (0..basis.degrees()).map(|j| square(j as f64).abs().sqrt()).collect() }
+/// The same at any position, from the centre, of a window that is much longer than the basis has polynomials.
+pub(crate) fn slopes_between(basis: &Basis, x: f64, derivative: usize) -> [f64; MOST_DEGREES] {
+    let mut values = [0.0; MOST_DEGREES];
+    for d in 0..=derivative {
+        climb(basis, x, d, &mut values);
     }
+    values
+}
 
-    /// The derivative of every polynomial at a sample of the window: differentiating the recurrence `d` times adds `d q_j^(d-1)`.
-    pub(crate) fn at(&self, basis: &Basis, place: usize, derivative: usize) -> [f64; MOST_DEGREES] {
-        let (x, degrees) = (basis.position(place), basis.degrees());
-        let mut values = [0.0; MOST_DEGREES];
-        values.iter_mut().take(degrees).enumerate().for_each(|(degree, value)| *value = basis.value(degree, place));
-        for d in 1..=derivative {
-            // The derivative of the last degree and of this one, while `values` still holds the one below.
-            let (mut last, mut current) = (0.0, 0.0);
-            for (j, value) in values.iter_mut().enumerate().take(degrees) {
-                let below = std::mem::replace(value, current);
-                if let Some(next) = self.recurrence.get(j + 1) {
-                    let following = (x * current + d as f64 * below - self.recurrence[j] * last) / next;
-                    (last, current) = (current, following);
-                }
-            }
-        }
-        values
+/// The `d`-th derivatives from those below.
+fn climb(basis: &Basis, x: f64, d: usize, values: &mut [f64; MOST_DEGREES]) {
+    // The derivative of the last degree and of this one, while `values` still holds the one below.
+    let mut last = 0.0;
+    let mut current = if d == 0 { 1.0 / (basis.length() as f64).sqrt() } else { 0.0 };
+    for (value, (ratio, inverse)) in values.iter_mut().zip(basis.steps()).take(basis.degrees()) {
+        let below = std::mem::replace(value, current);
+        let following = (x * current + d as f64 * below) * inverse - ratio * last;
+        (last, current) = (current, following);
     }
 }
 
@@ -42,10 +42,10 @@ mod tests {
     #[test]
     fn derivatives_in_working_precision_are_as_good_as_it() {
         for length in [17, 51, 201, 2001] {
-            let basis = Basis::new(length, 16);
+            let basis = Basis::new(length, 16).expect("little memory");
             for place in (0..length).step_by(1 + length / 50) {
                 for derivative in 0..4 {
-                    let found = Slopes::new(&basis).at(&basis, place, derivative);
+                    let found = slopes(&basis, place, derivative);
                     let expected = basis.evaluate(basis.position(place), derivative);
                     let mut size = 0.0_f64;
                     for (value, expected) in found.iter().zip(&expected) {

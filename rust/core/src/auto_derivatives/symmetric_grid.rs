@@ -20,6 +20,11 @@ impl Blocks {
         Self { samples, length, before: boundary % length }
     }
 
+    /// The first sample of the first block that is not cut.
+    pub(crate) fn first_whole(self) -> usize {
+        self.before
+    }
+
     /// How many there are.
     pub(crate) fn count(self) -> usize {
         (self.samples + self.missing()).div_ceil(self.length)
@@ -39,6 +44,12 @@ impl Blocks {
     pub(crate) fn samples(self, block: usize) -> Range<usize> {
         let start = (block * self.length).saturating_sub(self.missing());
         start..((block + 1) * self.length - self.missing()).min(self.samples)
+    }
+
+    /// The first centre of a block beyond a sample, or the next end of what would be one.
+    pub(crate) fn next_centre(self, sample: usize) -> usize {
+        let place = sample + self.missing() + self.length - self.length / 2;
+        sample + self.length - place % self.length
     }
 
     /// The two blocks between whose centres a sample lies, and its distance from the first of these in blocks.

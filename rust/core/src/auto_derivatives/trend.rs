@@ -9,7 +9,9 @@
 //! mean of c_j² / q_jᵀΓq_j = 1 ± √(2/ν).
 //! ```
 
-use crate::local_polynomials::basis::Basis;
+use crate::error::Error;
+use crate::exec::memory;
+use crate::local_polynomials::tables::basis;
 use crate::noise::correlated::CorrelatedNoise;
 use crate::record::samples::{Samples, is_usable};
 
@@ -33,36 +35,42 @@ const WHITE: f64 = 0.05;
 const COLOURED: f64 = 0.25;
 
 /// The degree of the trend that is all there is, 0 to 2, or `None`.
-pub(crate) fn trend(record: &dyn Samples, noise: &CorrelatedNoise) -> Option<usize> {
+///
+/// # Errors
+/// If there is not the memory.
+pub(crate) fn trend(record: &dyn Samples, noise: &CorrelatedNoise) -> Result<Option<usize>, Error> {
     let samples = record.len();
     if samples > LONGEST || noise.variance().is_nan() || noise.variance() <= 0.0 {
-        return None;
+        return Ok(None);
     }
+    memory::ask_for_numbers(samples)?;
     let mut values = vec![0.0; samples];
     record.read(0, &mut values);
     if !values.iter().all(|&value| is_usable(value)) {
-        return None;
+        return Ok(None);
     }
     let known = if noise.is_white() { WHITE } else { COLOURED };
     let mut degree = 0;
     let halving = std::iter::successors(Some(samples), |length| Some(length / SHORTER));
     // The shortest windows see the highest frequencies.
     for length in halving.take_while(|&length| length > 2 * SHORTEST).chain([SHORTEST]) {
-        let power = powers(&values, length, noise);
+        let power = powers(&values, length, noise)?;
         let count = (samples / length) as f64;
         let noise_alone = |group: &[f64]| {
             let freedom = count * group.len() as f64;
             let excess = group.iter().sum::<f64>() / group.len() as f64 - 1.0;
             excess <= CHANCE * (2.0 / freedom + known * known).sqrt()
         };
-        degree = (degree..TRENDS).find(|&degree| power[degree + 1..].chunks(GROUP).all(noise_alone))?;
+        let found = (degree..TRENDS).find(|&degree| power[degree + 1..].chunks(GROUP).all(noise_alone));
+        let Some(found) = found else { return Ok(None) };
+        degree = found;
     }
-    Some(degree)
+    Ok(Some(degree))
 }
 
 /// By degree, the mean square of the coefficients of windows side by side, over that of the noise.
-fn powers(values: &[f64], length: usize, noise: &CorrelatedNoise) -> Vec<f64> {
-    let basis = Basis::new(length, DEGREES);
+fn powers(values: &[f64], length: usize, noise: &CorrelatedNoise) -> Result<Vec<f64>, Error> {
+    let basis = basis(length, DEGREES)?;
     let total = noise.variance();
     let power = |degree: usize| {
         let row: Vec<f64> = (0..length).map(|index| basis.value(degree, index)).collect();
@@ -75,7 +83,7 @@ fn powers(values: &[f64], length: usize, noise: &CorrelatedNoise) -> Vec<f64> {
         };
         windows.map(square).sum::<f64>() / count / (expected * total)
     };
-    (0..DEGREES).map(power).collect()
+    Ok((0..DEGREES).map(power).collect())
 }
 
 #[cfg(test)]
@@ -90,7 +98,7 @@ mod tests {
 
     fn found(signal: impl Fn(f64) -> f64) -> Option<usize> {
         let samples: Vec<f64> = noise().iter().enumerate().map(|(i, e)| e + signal(i as f64 / 4000.0)).collect();
-        trend(&samples.as_slice(), &CorrelatedNoise::white(1.0))
+        trend(&samples.as_slice(), &CorrelatedNoise::white(1.0)).expect("little memory")
     }
 
     #[test]
@@ -111,8 +119,8 @@ mod tests {
     #[test]
     fn missing_samples_and_no_noise_are_no_trend() {
         let mut samples = noise();
-        assert_eq!(trend(&samples.as_slice(), &CorrelatedNoise::white(0.0)), None);
+        assert_eq!(trend(&samples.as_slice(), &CorrelatedNoise::white(0.0)), Ok(None));
         samples[100] = f64::NAN;
-        assert_eq!(trend(&samples.as_slice(), &CorrelatedNoise::white(1.0)), None);
+        assert_eq!(trend(&samples.as_slice(), &CorrelatedNoise::white(1.0)), Ok(None));
     }
 }

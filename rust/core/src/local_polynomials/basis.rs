@@ -57,11 +57,13 @@ impl Basis {
     ///
     /// Costs `O(length · degrees)`.
     ///
+    /// # Errors
+    /// If there is not the memory.
+    ///
     /// # Panics
-    /// If `degrees` is zero or larger than `length`: that many polynomials are not independent on the window. If there is not the memory.
-    #[must_use]
-    pub fn new(length: usize, degrees: usize) -> Self {
-        Self::watched(length, degrees, &mut |_, _| true).unwrap_or_else(|error| panic!("{error}"))
+    /// If `degrees` is zero or larger than `length`: that many polynomials are not independent on the window.
+    pub fn new(length: usize, degrees: usize) -> Result<Self, Error> {
+        Self::watched(length, degrees, &mut |_, _| true)
     }
 
     /// The same for windows of any length, watched.
@@ -243,7 +245,7 @@ mod tests {
 
     #[test]
     fn the_first_polynomials_are_the_mean_and_the_slope() {
-        let basis = Basis::new(5, 2);
+        let basis = Basis::new(5, 2).expect("little memory");
         let slope = [-2.0, -1.0, 0.0, 1.0, 2.0].map(|k| k / 10_f64.sqrt());
         for (index, expected) in slope.into_iter().enumerate() {
             assert!((basis.value(0, index) - 1.0 / 5_f64.sqrt()).abs() < f64::EPSILON);

@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn derivatives_in_working_precision_are_as_good_as_it() {
         for length in [5, 17, 18, 51, 201, 2001, 20_001] {
-            let basis = Basis::new(length, length.min(MOST_DEGREES));
+            let basis = Basis::new(length, length.min(MOST_DEGREES)).expect("little memory");
             for index in (0..length).step_by(1 + length / 50) {
                 let found = tabulated(&basis, 4, index, Instructions::Scalar);
                 for (derivative, found) in found.chunks_exact(basis.degrees()).enumerate() {
@@ -224,7 +224,7 @@ mod tests {
 
     #[test]
     fn every_path_and_lane_gives_the_same_bits() {
-        let basis = Basis::new(51, 16);
+        let basis = Basis::new(51, 16).expect("little memory");
         let coefficients: Vec<f64> = (0..16).map(|j| (f64::from(j) * 0.7).sin() / f64::from(1 + j)).collect();
         let tops = [3, 7, 15].map(|order| Top { order, share: 0.25, variance: 1e-3 });
         for tops in [&tops[..], &tops[1..2]] {

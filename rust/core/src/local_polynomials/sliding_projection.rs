@@ -338,7 +338,7 @@ mod tests {
 
     /// Worst errors over some recordings of a sine with uniform noise, five radians a window.
     fn farthest(length: usize, noise: f64) -> (f64, f64) {
-        let basis = Basis::new(length, 16.min(length - 2));
+        let basis = Basis::new(length, 16.min(length - 2)).expect("little memory");
         let mut state = 88_172_645_463_325_252_u64;
         let mut random = || {
             state ^= state << 13;
@@ -377,7 +377,7 @@ mod tests {
     fn spans_fill_blocks() {
         for length in (5..400).chain([2001, 20_001]) {
             for degrees in [1, 4, 16.min(length)] {
-                let projection = Projection::<16>::new(&Basis::new(length, degrees));
+                let projection = Projection::<16>::new(&Basis::new(length, degrees).expect("little memory"));
                 let (span, block) = (projection.span(), projection.block());
                 assert!(span.is_power_of_two() || span % 8 == 0, "span {span} at length {length}");
                 assert!(block % span == 0 && block % SHORTEST_BLOCK == 0, "block {block} at length {length}");

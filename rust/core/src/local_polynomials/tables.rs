@@ -1,8 +1,10 @@
 //! Tables of windows, kept from call to call: those of a window of a thousand samples cost as much as what they are used for in a record of a
 //! few thousand.
 
+use std::convert::Infallible;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use crate::error::Error;
 use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::coefficients::Coefficients;
 use crate::simd::instructions::Instructions;
@@ -50,6 +52,12 @@ impl<K: PartialEq, V: Clone> Kept<K, V> {
 
     /// Makes a value of some size, or finds it where it was made before.
     pub(crate) fn get(&self, wanted: K, size: usize, make: impl FnOnce() -> V) -> V {
+        let Ok(value) = self.try_get(wanted, size, || Ok::<_, Infallible>(make()));
+        value
+    }
+
+    /// The same where it may fail.
+    pub(crate) fn try_get<E>(&self, wanted: K, size: usize, make: impl FnOnce() -> Result<V, E>) -> Result<V, E> {
         let found = {
             let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             kept.iter().position(|(one, ..)| *one == wanted).map(|place| {
@@ -60,9 +68,9 @@ impl<K: PartialEq, V: Clone> Kept<K, V> {
             })
         };
         if let Some(found) = found {
-            return found;
+            return Ok(found);
         }
-        let made = make();
+        let made = make()?;
         if size <= KEPT / 4 {
             let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             kept.push((wanted, size, made.clone()));
@@ -74,19 +82,33 @@ impl<K: PartialEq, V: Clone> Kept<K, V> {
             let old = kept.len() - fits.count();
             kept.drain(..old);
         }
-        made
+        Ok(made)
     }
 }
 
-/// By half-width and degree, whatever coefficients are wanted.
+/// By length and number of polynomials, whatever coefficients are wanted.
 static BASES: Kept<(usize, usize), Arc<Basis>> = Kept::new();
 static TABLES: Kept<TablesWanted, Arc<WindowTables>> = Kept::new();
 
+/// Makes a basis, or finds it where it was made before.
+///
+/// # Errors
+/// If there is not the memory.
+pub(crate) fn basis(length: usize, degrees: usize) -> Result<Arc<Basis>, Error> {
+    BASES.try_get((length, degrees), length / 2, || Basis::new(length, degrees).map(Arc::new))
+}
+
 /// Makes tables, or finds them where they were made before.
-pub(crate) fn tables(wanted: TablesWanted) -> Arc<WindowTables> {
+///
+/// # Errors
+/// If there is not the memory.
+pub(crate) fn tables(wanted: TablesWanted) -> Result<Arc<WindowTables>, Error> {
     let TablesWanted { half, highest, .. } = wanted;
-    let basis = || BASES.get((half, highest), half, || Arc::new(Basis::new(2 * half + 1, highest + 1)));
-    TABLES.get(wanted, half, || Arc::new(WindowTables { basis: basis(), wanted, coefficients: OnceLock::new() }))
+    let make = || {
+        let basis = basis(2 * half + 1, highest + 1)?;
+        Ok(Arc::new(WindowTables { basis, wanted, coefficients: OnceLock::new() }))
+    };
+    TABLES.try_get(wanted, half, make)
 }
 
 #[cfg(test)]
@@ -96,6 +118,7 @@ mod tests {
     #[test]
     fn tables_are_made_once_and_the_oldest_are_let_go() {
         let wanted = |half| TablesWanted { half, highest: 3, first: 0, step: 1, instructions: Instructions::current() };
+        let tables = |wanted| tables(wanted).expect("little memory");
         let first = tables(wanted(1001));
         assert!(Arc::ptr_eq(&first, &tables(wanted(1001))));
         assert!(Arc::ptr_eq(&first.basis, &tables(TablesWanted { first: 1, step: 2, ..wanted(1001) }).basis));

@@ -162,7 +162,8 @@ fn bands(record: &dyn Samples, weights: Option<&[f64]>) -> (Vec<f64>, f64) {
 fn variance(record: &dyn Samples, half: usize, weights: Option<&[f64]>, instructions: Instructions) -> f64 {
     let length = 2 * half + 1;
     let wanted = TablesWanted { half, highest: MOST_DEGREES - 1, first: LOWEST_DEGREE, step: 1, instructions };
-    let tables = tables(wanted);
+    // Windows are short, and little memory is not asked for.
+    let Ok(tables) = tables(wanted) else { return f64::NAN };
     let plan = tables.coefficients();
     let (mut scratch, mut projected) = (plan.scratch(), Projected::default());
     let (mut sum, mut count) = (0.0, 0);

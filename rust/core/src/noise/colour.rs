@@ -19,6 +19,9 @@ use std::f64::consts::{LN_2, PI};
 use std::ops::Range;
 use std::sync::Arc;
 
+use faer::linalg::solvers::{Llt, Solve};
+use faer::{Mat, Side};
+
 use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::coefficients::Projected;
 use crate::local_polynomials::tables::{Kept, TablesWanted, tables};
@@ -66,8 +69,8 @@ const STEEPEST: f64 = 24.0;
 /// noise falls 8 times and more in the next two, below it hardly in the first.
 const FALL: Range<f64> = 2.0..6.5;
 
-/// Rounds and relative change of the search for amounts.
-const ROUNDS: usize = 1000;
+/// Rounds of the search for amounts, and what is gained by one more at least.
+const ROUNDS: usize = 50;
 const CHANGE: f64 = 1e-6;
 
 /// The powers of all noises, by half-width and lowest degree.
@@ -181,7 +184,10 @@ fn corners() -> impl Iterator<Item = f64> {
 fn look(record: &dyn Samples, half: usize, groups: &[Range<usize>], instructions: Instructions) -> Vec<Seen> {
     let length = 2 * half + 1;
     let first = groups.iter().map(|group| group.start).min().unwrap_or(0);
-    let tables = tables(TablesWanted { half, highest: HIGH.end - 1, first, step: 1, instructions });
+    // Windows are short, and little memory is not asked for.
+    let Ok(tables) = tables(TablesWanted { half, highest: HIGH.end - 1, first, step: 1, instructions }) else {
+        return Vec::new();
+    };
     let plan = tables.coefficients();
     let (mut scratch, mut projected) = (plan.scratch(), Projected::default());
     let (mut squares, mut fourths) = (vec![0.0; HIGH.end - first], vec![0.0; HIGH.end - first]);
@@ -240,7 +246,7 @@ fn misfit(seen: &Seen, noises: &[usize], amounts: &[f64]) -> f64 {
     (sum / seen.power - 1.0) / seen.deviation
 }
 
-/// The amounts, none below zero, of least squared misfit, and that misfit: by descent along one after the other.
+/// The amounts, none below zero, of least squared misfit, and that misfit: by active sets (Lawson and Hanson 1974, chapter 23).
 fn fit(seen: &[Seen], noises: &[usize]) -> (f64, Vec<f64>) {
     let row = |one: &Seen| -> Vec<f64> {
         noises.iter().map(|&noise| one.of_noises[noise] / one.power / one.deviation).collect()
@@ -248,30 +254,43 @@ fn fit(seen: &[Seen], noises: &[usize]) -> (f64, Vec<f64>) {
     let rows: Vec<Vec<f64>> = seen.iter().map(row).collect();
     let sum = |term: &dyn Fn(&[f64], &Seen) -> f64| rows.iter().zip(seen).map(|(row, one)| term(row, one)).sum::<f64>();
     let count = noises.len();
-    let normal: Vec<Vec<f64>> =
-        (0..count).map(|i| (0..count).map(|j| sum(&|row, _| row[i] * row[j])).collect()).collect();
+    let normal = Mat::from_fn(count, count, |i, j| sum(&|row, _| row[i] * row[j]));
     let right: Vec<f64> = (0..count).map(|i| sum(&|row, one| row[i] / one.deviation)).collect();
-    let mut amounts = vec![0.0; count];
-    // In four sums, for which a processor need not wait one after the other.
-    let dot = |a: &[f64], b: &[f64]| {
-        let mut sums = [0.0; 4];
-        for (a, b) in a.chunks(4).zip(b.chunks(4)) {
-            sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum += a * b);
-        }
-        sums.iter().sum::<f64>()
-    };
+    let (mut amounts, mut free) = (vec![0.0; count], Vec::new());
     for _ in 0..ROUNDS {
-        let mut largest = 0.0_f64;
-        for i in 0..count {
-            let product = dot(&normal[i], &amounts);
-            let new = (amounts[i] + (right[i] - product) / normal[i][i]).max(0.0);
-            // In the unit of what is seen: noises of different memory are of different size.
-            largest = largest.max((new - amounts[i]).abs() * normal[i][i].sqrt());
-            amounts[i] = new;
-        }
-        if largest <= CHANGE {
-            break;
+        // In the unit of what is seen: noises of different memory are of different size.
+        let gain = |i: usize| {
+            let known: f64 = free.iter().map(|&j: &usize| normal[(i, j)] * amounts[j]).sum();
+            (right[i] - known) / normal[(i, i)].sqrt()
+        };
+        let held = (0..count).filter(|i| !free.contains(i)).map(|i| (i, gain(i)));
+        let best = held.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|&(_, gain)| gain > CHANGE);
+        let Some((next, _)) = best else { break };
+        free.push(next);
+        while !free.is_empty() {
+            let part = Mat::from_fn(free.len(), free.len(), |i, j| normal[(free[i], free[j])]);
+            let Ok(factor) = Llt::new(part.as_ref(), Side::Lower) else {
+                // Two noises that cannot be told apart here.
+                free.retain(|&one| one != next);
+                return (squared_misfit(seen, noises, &amounts), amounts);
+            };
+            let wanted = factor.solve(Mat::from_fn(free.len(), 1, |i, _| right[free[i]]));
+            // As far towards these as none goes below zero; the first that would is held.
+            let below = free.iter().enumerate().filter(|&(place, _)| wanted[(place, 0)] <= 0.0);
+            let share = |(place, &one): (usize, &usize)| (amounts[one] / (amounts[one] - wanted[(place, 0)]), one);
+            let first = below.map(share).min_by(|a, b| a.0.total_cmp(&b.0));
+            let part = first.map_or(1.0, |(part, _)| part);
+            for (place, &one) in free.iter().enumerate() {
+                amounts[one] += part * (wanted[(place, 0)] - amounts[one]);
+            }
+            let Some((_, held)) = first else { break };
+            amounts[held] = 0.0;
+            free.retain(|&one| one != held);
         }
     }
-    (seen.iter().map(|one| misfit(one, noises, &amounts).powi(2)).sum(), amounts)
+    (squared_misfit(seen, noises, &amounts), amounts)
+}
+
+fn squared_misfit(seen: &[Seen], noises: &[usize], amounts: &[f64]) -> f64 {
+    seen.iter().map(|one| misfit(one, noises, amounts).powi(2)).sum()
 }

@@ -1,0 +1,268 @@
+//! Where windows are compared for a record as a whole, and what is known there.
+//!
+//! Every window is looked at where its means lie: at all places of a grid, or of one that lies within it. Long records are subsampled in
+//! sixteen stretches.
+
+use std::borrow::Cow;
+use std::cell::RefCell;
+use std::f64::consts::LN_2;
+use std::ops::Range;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use crate::auto_derivatives::block_means::{BlockMeans, COARSER, Grid, mean, step_at_end, step_for};
+use crate::auto_derivatives::candidates::Bank;
+use crate::error::Error;
+use crate::exec::memory;
+use crate::local_polynomials::coefficients::Projected;
+use crate::local_polynomials::tables::{TablesWanted, WindowTables, tables};
+use crate::record::samples::Samples;
+use crate::simd::instructions::Instructions;
+
+/// Half-width of the longest window tried.
+pub(crate) const LONGEST: usize = 10_000;
+
+/// Longer records are subsampled in stretches.
+const WHOLE: usize = 1 << 16;
+const STRETCHES: usize = 16;
+
+/// Samples from one place to the next in stretches, and means of the longest windows that a stretch holds.
+const STEP: usize = 9;
+const MEANS: usize = 18;
+
+/// Places at which candidates are compared, at most.
+const MOST_PLACES: usize = 12 << 10;
+
+/// Places in a half-width, at least, and windows in a half-width near an end, at most.
+const PLACES: usize = 8;
+const STRIDES: usize = 8;
+
+/// Records that are looked at more closely: there it costs little, and a few windows decide.
+pub(crate) const CLOSELY: usize = 1 << 11;
+
+/// Where candidates are compared, and what is known there: the coefficients of windows serve all derivatives.
+pub(crate) struct Survey<'a> {
+    means: BlockMeans<'a>,
+    highest: usize,
+    instructions: Instructions,
+    stretches: Vec<Range<usize>>,
+    /// Samples from one place to the next.
+    step: usize,
+    closely: bool,
+    /// By half-width, the coefficients at all places; NaN where there is no window.
+    known: RefCell<Vec<(usize, Rc<Projected>)>>,
+    parts: RefCell<Vec<Rc<PartOfWindows>>>,
+}
+
+/// Windows in a part of a record.
+pub(crate) struct PartOfWindows {
+    half: usize,
+    part: Range<usize>,
+    /// Their first samples, and the first of all.
+    begin: usize,
+    pub(crate) starts: Vec<usize>,
+    pub(crate) projected: Projected,
+}
+
+/// Means of a part of a record.
+struct Means<'a>(&'a [f64]);
+
+impl Samples for Means<'_> {
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    fn read(&self, first: usize, into: &mut [f64]) {
+        self.0.read(first, into);
+    }
+}
+
+/// The candidates of one window at all places, a row each; NaN where there is none.
+#[derive(Debug)]
+pub(crate) struct Surveyed {
+    pub(crate) bank: Bank,
+    pub(crate) rows: Vec<Vec<f64>>,
+    /// The places: of one stretch after the other as if they were one.
+    pub(crate) grid: Grid,
+    /// The samples where windows fit, if they fit at all places between: no sample is missing.
+    pub(crate) whole: Option<Range<usize>>,
+}
+
+impl Surveyed {
+    pub(crate) fn new(bank: Bank, rows: Vec<Vec<f64>>, grid: Grid) -> Self {
+        let row = &rows[0];
+        let first = row.iter().position(|value| !value.is_nan());
+        let last = row.iter().rposition(|value| !value.is_nan());
+        let fits = first.zip(last).filter(|&(first, last)| !row[first..=last].iter().any(|value| value.is_nan()));
+        let whole = fits.map(|(first, last)| grid.sample(first)..grid.sample(last) + 1);
+        Self { bank, rows, grid, whole }
+    }
+
+    /// A candidate at the places of a grid that is not finer.
+    pub(crate) fn at(&self, candidate: usize, grid: Grid) -> Cow<'_, [f64]> {
+        let row = &self.rows[candidate];
+        if grid.step == self.grid.step {
+            return Cow::Borrowed(row);
+        }
+        let first = (grid.first - self.grid.first) / self.grid.step;
+        row[first..].iter().step_by(grid.step / self.grid.step).take(grid.count).copied().collect()
+    }
+}
+
+impl<'a> Survey<'a> {
+    /// Prepares to look at a record.
+    ///
+    /// # Errors
+    /// If there is not the memory.
+    pub(crate) fn new(record: &'a dyn Samples, highest: usize, instructions: Instructions) -> Result<Self, Error> {
+        let samples = record.len();
+        // Twice the longest window is a candidate, too.
+        let longest = if samples > CLOSELY { (2 * LONGEST).min(samples / 4) } else { 0 };
+        let (means, closely) = (BlockMeans::new(record, longest)?, samples <= CLOSELY);
+        let (known, parts) = (RefCell::new(Vec::new()), RefCell::new(Vec::new()));
+        if samples <= WHOLE {
+            let mut steps = std::iter::successors(Some(1), |step| Some(step * COARSER));
+            let step = steps.find(|step| samples <= step * MOST_PLACES).unwrap_or(STEP);
+            let stretches = std::iter::once(0..samples).collect();
+            return Ok(Self { means, highest, instructions, stretches, step, closely, known, parts });
+        }
+        // Stretches of whole means of any window.
+        let most = step_for(longest);
+        let (grid, length) = (Grid::new(samples, most), MEANS.min(samples / most / STRETCHES));
+        let first = |index: usize| grid.sample((grid.count - length) * index / (STRETCHES - 1)) - most / 2;
+        let stretches = (0..STRETCHES).map(|index| first(index)..first(index) + length * most).collect();
+        Ok(Self { means, highest, instructions, stretches, step: STEP, closely, known, parts })
+    }
+
+    /// Looks at the candidates of a window. What is kept serves other derivatives.
+    pub(crate) fn look(&self, bank: Bank, keep: bool) -> Result<Surveyed, Error> {
+        let coefficients = self.coefficients(&bank, keep)?;
+        let rows = bank.combine(&coefficients);
+        let grid = self.grid(&bank);
+        Ok(Surveyed::new(bank, rows, grid))
+    }
+
+    /// The record that is surveyed, and its means.
+    pub(crate) fn record(&self) -> &'a dyn Samples {
+        self.means.record()
+    }
+
+    pub(crate) fn means(&self) -> &BlockMeans<'a> {
+        &self.means
+    }
+
+    /// The half-width of a window of about the same length that was looked at, if there is one: tables are kept.
+    pub(crate) fn nearest_known(&self, half: usize) -> usize {
+        let distance = |one: usize| (one as f64 / half as f64).ln().abs();
+        let known = self.known.borrow();
+        let nearest = known.iter().map(|(one, _)| *one).min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
+        nearest.filter(|&one| distance(one) < LN_2 / 4.0).unwrap_or(half)
+    }
+
+    /// Tables of windows of so many samples, or means, with all degrees.
+    pub(crate) fn tables(&self, half: usize) -> Result<Arc<WindowTables>, Error> {
+        let highest = self.highest.min(2 * half - 2);
+        tables(TablesWanted { half, highest, first: 0, step: 1, instructions: self.instructions })
+    }
+
+    /// The first samples and the coefficients of windows in a part of the record, about so many, at equal distances from its ends: for the reversed
+    /// record, the same seen from the other.
+    ///
+    /// # Errors
+    /// If there is not the memory.
+    pub(crate) fn windows(
+        &self,
+        half: usize,
+        part: &Range<usize>,
+        most: usize,
+        last: bool,
+    ) -> Result<Rc<PartOfWindows>, Error> {
+        let step = if self.closely { 1 } else { step_at_end(half) };
+        let inner = half / step;
+        // Means that begin at the end in question.
+        let cut = if last { part.len() % step } else { 0 };
+        let room = (part.len() / step).saturating_sub(2 * inner);
+        let every = room.div_ceil(most).max(if self.closely { 1 } else { inner / STRIDES }).max(1);
+        let beside = room.saturating_sub(1) % every;
+        let beside = if last { beside - beside / 2 } else { beside / 2 };
+        let begin = part.start + cut + beside * step;
+        let found = |one: &&Rc<PartOfWindows>| one.half == half && one.begin == begin && one.part == *part;
+        if let Some(known) = self.parts.borrow().iter().find(found) {
+            return Ok(Rc::clone(known));
+        }
+        let mut means = Vec::new();
+        if step > 1 {
+            memory::ask_for_numbers(part.len() / step)?;
+            let mut samples = vec![0.0; step << 10];
+            for first in (part.start + cut..part.end + 1 - step).step_by(samples.len()) {
+                let count = (part.end - first).min(samples.len());
+                self.record().read(first, &mut samples[..count]);
+                means.extend(samples[..count].chunks_exact(step).map(mean));
+            }
+        }
+        let (record, first): (&dyn Samples, usize) =
+            if step > 1 { (&Means(&means), beside) } else { (self.record(), begin) };
+        let tables = self.tables(inner)?;
+        let (mut scratch, mut projected) = (tables.coefficients().scratch(), Projected::default());
+        let windows = first..first + room.saturating_sub(beside);
+        tables.coefficients().project(record, windows.clone(), every, &mut projected, &mut scratch);
+        let starts = windows.step_by(every).map(|start| begin + (start - first) * step).collect();
+        let found = Rc::new(PartOfWindows { half, part: part.clone(), begin, starts, projected });
+        self.parts.borrow_mut().push(Rc::clone(&found));
+        Ok(found)
+    }
+
+    /// Samples from one place of a window to the next.
+    fn step_of(&self, bank: &Bank) -> usize {
+        let enough = if self.closely { 1 } else { COARSER.pow((bank.half / PLACES).clamp(1, STEP).ilog(COARSER)) };
+        self.step.max(bank.step).max(enough)
+    }
+
+    /// The places of a window, in samples of one stretch after the other.
+    fn grid(&self, bank: &Bank) -> Grid {
+        let step = self.step_of(bank);
+        if let [whole] = &*self.stretches {
+            return Grid::new(whole.len(), step);
+        }
+        let samples: usize = self.stretches.iter().map(Range::len).sum();
+        Grid { step, first: step / 2, count: samples / step }
+    }
+
+    /// The coefficients of all windows of a length at all places.
+    fn coefficients(&self, bank: &Bank, keep: bool) -> Result<Rc<Projected>, Error> {
+        if let Some((_, known)) = self.known.borrow().iter().find(|(one, _)| *one == bank.half) {
+            return Ok(Rc::clone(known));
+        }
+        let samples = self.record().len();
+        let tables = self.tables(bank.half / bank.step)?;
+        let mut scratch = tables.coefficients().scratch();
+        let (mut all, mut part) = (Projected::default(), Projected::default());
+        all.coefficients.resize_with(tables.basis.degrees(), Vec::new);
+        let places = Grid::new(samples, self.step_of(bank));
+        let (every, own) = (places.step / bank.step, bank.half / bank.step);
+        for stretch in &self.stretches {
+            let inside = places.means(stretch);
+            let (wanted, centres) = bank.places(samples, places, &inside);
+            let before = all.level.len();
+            for row in all.coefficients.iter_mut().chain([&mut all.level]) {
+                row.resize(before + inside.len(), f64::NAN);
+            }
+            if wanted.is_empty() {
+                continue;
+            }
+            let windows = centres.start - own..centres.end - own;
+            let record = self.means.of(bank.step);
+            tables.coefficients().project(record, windows, every, &mut part, &mut scratch);
+            let own = before + wanted.start - inside.start..before + wanted.end - inside.start;
+            all.level[own.clone()].copy_from_slice(&part.level);
+            for (row, found) in all.coefficients.iter_mut().zip(&part.coefficients) {
+                row[own.clone()].copy_from_slice(found);
+            }
+        }
+        let all = Rc::new(all);
+        if keep {
+            self.known.borrow_mut().push((bank.half, Rc::clone(&all)));
+        }
+        Ok(all)
+    }
+}
