@@ -7,6 +7,12 @@ from tvident import _core
 _SHOWN = 6
 """Pulses that are listed at most."""
 
+_TREATED = (
+    ("angle", "what their neighbours say took their place"),
+    ("torque", "equations with them were left out"),
+)
+"""What becomes of spikes, by channel."""
+
 
 def lost_samples(found: _core.Identification) -> list[str]:
     """Return at how many places samples seem to be lost."""
@@ -16,6 +22,20 @@ def lost_samples(found: _core.Identification) -> list[str]:
         for _, defect, amount in found.defects
         if defect == "broken"
     ]
+
+
+def spikes(found: _core.Identification) -> list[str]:
+    """Return how many samples of each channel stand out of their neighbours, and what became of them."""
+    words = []
+    for channel, defect, amount in found.defects:
+        if defect == "spikes":
+            name, treated = _TREATED[channel]
+            many = "1 sample" if amount == 1 else f"{amount:.0f} samples"
+            stand = "stands" if amount == 1 else "stand"
+            words.append(
+                f"{many} of the {name} {stand} far out of the neighbours on both sides, as spikes of a disturbed line do: {treated}"
+            )
+    return words
 
 
 def pulses(found: _core.Identification, period: float) -> list[str]:

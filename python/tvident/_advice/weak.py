@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tvident import _core
-from tvident._advice.events import jumps_beside_pulses, lost_samples, pulses
+from tvident._advice.events import jumps_beside_pulses, lost_samples, pulses, spikes
 from tvident._advice.lists import listed
 from tvident._equation import BUILT_IN, COEFFICIENTS, UNITS
 from tvident._results import Words
@@ -92,6 +92,7 @@ class Explained:
             self._test_function(),
             *self._scales(),
             *lost_samples(self.found),
+            *spikes(self.found),
             *self._rest(),
             *self._lag(),
             *self._angle_zero(),
@@ -182,7 +183,7 @@ class Explained:
     def _defects(self) -> list[str]:
         words = []
         for channel, defect, amount in self.found.defects:
-            if defect == "broken":
+            if defect in {"broken", "spikes"}:
                 continue
             name = ("angle", "torque", "velocity", "acceleration")[channel]
             if defect == "clipped":

@@ -26,6 +26,7 @@ from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm, expone
 from tvident._identify.polynomials import Polynomials, odd_window
 from tvident._identify.searched import Searched, factor_of, search
 from tvident._identify.settings import Request, plain, resolve
+from tvident._identify.spikes import without_spikes
 from tvident._identify.told import Told
 from tvident._results import Estimates, Identification, Recorded, Scan, Words, chosen, of_records, scan_of, settings_of
 
@@ -206,8 +207,9 @@ class Task:
             torques = (data.torques, *(data.torques + change() for change in data.moved))
             again = [self._replayed(plain(settings), replace(data, torques=one)).estimates() for one in torques]
             batch = with_errors_of_alignment(batch, again[0], again[1:])
-        lacking = lacking_terms(data, self._request, self._unknowns, found, self._polynomials, self._known)
-        told = Told(data, self._request, self._unknowns, found, batch, settings, lacking)
+        used = without_spikes(data, found)
+        lacking = lacking_terms(used, self._request, self._unknowns, found, self._polynomials, self._known)
+        told = Told(used, self._request, self._unknowns, found, batch, settings, lacking)
         words = told.words(names, searched.told(self.inner, self.ranges, batch, self.columns.samples_of_fading))
         batch = told.doubted()
         jumps = tuple(tuple(data.time[one.jumps].tolist()) for one in found)
@@ -218,7 +220,7 @@ class Task:
             jumps=jumps if data.batch else jumps[0],
             words=words,
             settings=plain(settings),
-            recorded=replace(self._recorded(plain(settings), batch), improve=self._improve(found)),
+            recorded=replace(self._recorded(plain(settings), batch, used), improve=self._improve(found)),
         )
 
     def _improve(self, found: Sequence[_core.Identification]) -> Callable[[Any, Words], Words] | None:
@@ -232,8 +234,8 @@ class Task:
 
         return Improvement(replace(self._data, moved=()), self._request, found[0], given, self._terms, run).words
 
-    def _recorded(self, settings: dict[str, Any], found: Estimates) -> Recorded:
-        """Return the records, which can be identified once more, all or some of them."""
+    def _recorded(self, settings: dict[str, Any], found: Estimates, used: Data) -> Recorded:
+        """Return the records as they were used, which can be identified once more, all or some of them."""
         data = self._data
 
         def part(place: Any) -> Recorded:
@@ -251,20 +253,22 @@ class Task:
                 doubts=(),
                 labels=None,
             )
+            some_used = replace(some_data, angles=used.angles[place], torques=used.torques[place])
             kinds = {name: np.asarray(kind)[place] for name, kind in found.kinds.items()}
             alone = some_data.angles.ndim == 1
             own = settings_of(settings, chosen(place, data.batch), kinds, alone=alone)
             known = {name: value if isinstance(value, float) else value[place] for name, value in self._known.items()}
             request = replace(self._request, parameters={**self._request.parameters, **known})
             one, run = of_records(found, place), Task(some_data, request).run
-            recorded = Task(some_data, replace(request, by_record={}, lag=0.0))._recorded(own, one)  # noqa: SLF001 - of this class
+            recorded = Task(some_data, replace(request, by_record={}, lag=0.0))._recorded(own, one, some_used)  # noqa: SLF001 - of this class
             return replace(recorded, improve=of_one(some_data, request, int(one.record_status), run) if alone else None)
 
         inner = {name: np.ravel(value) for name, value in settings["inner"].items()}
         is_strong = isinstance(self._request.form, StrongForm)
         return Recorded(
-            data.angles,
-            data.torques,
+            used.angles,
+            used.torques,
+            (data.angles, data.torques),
             own={term.name: fixed(term.own, term, inner) for term in self._terms if term.own is not None},
             again=partial(self._again, settings),
             scans=partial(self._scans, settings) if is_strong and data.instruments is None else None,

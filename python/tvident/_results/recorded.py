@@ -26,6 +26,9 @@ class Recorded:
     Parameters
     ----------
     angles, torques : ndarray, shape (\*, n)
+        As they were used: copies where there were spikes.
+    given : tuple of ndarray
+        Both as they were given.
     own : mapping of str to FixedTerm
         Terms of the user's own, with their inner parameters.
     again : callable
@@ -40,6 +43,7 @@ class Recorded:
 
     angles: Numbers
     torques: Numbers
+    given: tuple[Numbers, Numbers]
     own: Mapping[str, FixedTerm]
     again: Callable[[Numbers], Any]
     part: Callable[[Any], Recorded] | None = None
@@ -48,7 +52,7 @@ class Recorded:
     _mark: bytes = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_mark", mark_of(self.angles) + mark_of(self.torques))
+        object.__setattr__(self, "_mark", self._mark_of_given())
 
     def of(self, place: Any) -> Recorded | None:
         """Return some of several records."""
@@ -57,7 +61,10 @@ class Recorded:
     @property
     def is_unchanged(self) -> bool:
         """Whether nobody has written another record into the arrays meanwhile."""
-        return self._mark == mark_of(self.angles) + mark_of(self.torques)
+        return self._mark == self._mark_of_given()
+
+    def _mark_of_given(self) -> bytes:
+        return b"".join(mark_of(channel) for channel in self.given)
 
 
 def mark_of(channel: Numbers) -> bytes:

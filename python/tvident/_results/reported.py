@@ -38,7 +38,7 @@ def report(
         compared = [_report.Compared(torque, *torques)]
         shown = [
             _report.series_of(result, name, of, values)
-            for name, of, values in ((angle, "angle", recorded.angles), (torque, "torque", recorded.torques))
+            for name, of, values in ((angle, "angle", recorded.given[0]), (torque, "torque", recorded.given[1]))
         ]
     page = _report.Shown(
         result,

@@ -104,6 +104,7 @@ pub(crate) struct Identification {
     defects: Vec<(usize, &'static str, f64)>,
     resting: f64,
     pulses: Vec<(usize, usize)>,
+    spikes: Vec<(usize, usize, f64)>,
     scan: Option<Py<Scan>>,
     outside_mask: Option<Py<OutsideMask>>,
     /// With an instrument: the probability of the test of exogeneity, and the smallest F statistic of the first stage.
@@ -173,6 +174,7 @@ impl Identification {
             defects: weak.map(defects).unwrap_or_default(),
             resting: weak.map_or(0.0, |weak| weak.resting),
             pulses: weak.map_or_else(Vec::new, |weak| weak.pulses.iter().map(|one| (one.start, one.end)).collect()),
+            spikes: weak.map_or_else(Vec::new, |weak| weak.spikes.clone()),
             scan: weak.map(|weak| Scan::new(py, &weak.scan)).transpose()?,
             outside_mask: found
                 .weak

@@ -122,6 +122,7 @@ pub(crate) fn weak(
         defects: found.defects,
         resting: found.resting,
         pulses: found.pulses,
+        spikes: found.spikes,
         scan: Scan { unknowns: found.scan.unknowns.iter().map(|&one| place(one)).collect(), ..found.scan },
         outside_mask,
     };

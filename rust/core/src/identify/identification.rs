@@ -104,6 +104,9 @@ pub struct WeakDetails {
     pub resting: f64,
     /// Samples of pulses of the stiffness: the first, and the first after it. Both are among the jumps.
     pub pulses: Vec<Range<usize>>,
+    /// Samples that stand out of their neighbours: the channel (0 for the angle, 1 for the torque), the sample, and what took its place, NaN where it
+    /// was left out.
+    pub spikes: Vec<(usize, usize, f64)>,
     /// Estimates by the width of the test function.
     pub scan: Scan,
     /// What the rows say that the mask keeps out; `None` without a mask.

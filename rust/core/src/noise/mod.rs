@@ -10,6 +10,7 @@ pub(crate) mod fused;
 pub(crate) mod passed;
 pub(crate) mod quantisation;
 pub(crate) mod spectrum;
+pub(crate) mod spikes;
 pub(crate) mod transform;
 
 pub use channel::{FEWEST_SAMPLES, noise, variance_after};

@@ -22,6 +22,7 @@ use crate::noise::channel::{variance_after, weighted_variance};
 use crate::noise::defects::{Defect, Within, defects};
 use crate::noise::passed::PassedNoise;
 use crate::noise::quantisation::quantisation_step;
+use crate::noise::spikes::{LONGEST, Repaired, spikes};
 use crate::record::samples::Samples;
 use crate::regression::model::Model;
 use crate::simd::instructions::Instructions;
@@ -34,23 +35,63 @@ const STAGES: usize = 50;
 /// Times that pulses are looked for, with those of the last time taken off the torque.
 const PULSE_ROUNDS: usize = 2;
 
-/// Identifies one record in weak form.
+/// The samples that count, and how much.
+type Counted<'a> = (Option<&'a [bool]>, Option<&'a [f64]>);
+
+/// Identifies one record in weak form, without spikes: those of the angle are replaced by what their neighbours say, those of the torque are left out,
+/// unless nothing is known without them: then they are what moves the machine.
 ///
 /// # Errors
 /// If the record is too short, its rows do not determine what is constant, or the watch cancels.
 pub(crate) fn identify_weak(
     motion: &Motion<'_>,
-    (mask, weights): (Option<&[bool]>, Option<&[f64]>),
+    counted: Counted<'_>,
+    options: &WeakOptions,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<WeakIdentified, Error> {
+    // A torque can be there for two samples, and the machine feels it.
+    let of_angle = if is_as_recorded(&motion.measured) { spikes(motion.angle, LONGEST, watch)? } else { Vec::new() };
+    let of_torque = if motion.measured.passed[1].is_none() { spikes(motion.torque, 1, watch)? } else { Vec::new() };
+    let angle = Repaired { channel: motion.angle, spikes: &of_angle };
+    let repaired = if of_angle.is_empty() { None } else { Some(Motion { angle: &angle, ..motion.clone() }) };
+    let motion = repaired.as_ref().unwrap_or(motion);
+    let mut left_out: Vec<usize> = of_torque.iter().map(|spike| spike.place).collect();
+    let mut found = without(motion, &left_out, counted, options, workers, watch);
+    let is_known = found.as_ref().is_ok_and(|found| !found.record_status.contains(Status::RANK_DEFICIENT));
+    if !left_out.is_empty() && !is_known {
+        left_out.clear();
+        found = without(motion, &left_out, counted, options, workers, watch);
+    }
+    found.map(|mut found| {
+        found.defects[0].extend((!of_angle.is_empty()).then_some(Defect::Spikes(of_angle.len())));
+        found.defects[1].extend((!left_out.is_empty()).then_some(Defect::Spikes(left_out.len())));
+        found.spikes = of_angle.iter().map(|spike| (0, spike.place, spike.instead)).collect();
+        found.spikes.extend(left_out.iter().map(|&place| (1, place, f64::NAN)));
+        found
+    })
+}
+
+/// Identifies one record without some samples of its torque, and without what a recorder spoilt.
+///
+/// # Errors
+/// If the record is too short, its rows do not determine what is constant, or the watch cancels.
+fn without(
+    motion: &Motion<'_>,
+    left_out: &[usize],
+    (mask, weights): Counted<'_>,
     options: &WeakOptions,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<WeakIdentified, Error> {
     let lag = options.lag.unwrap_or(0.0);
     let mut defects = defects_of_motion(motion);
-    let places = lost_samples(motion, &defects, watch)?;
+    let lost = lost_samples(motion, &defects, watch)?;
     let limits = clipped_at(motion, &defects);
     let within = Within { channel: motion.angle, limits: limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]) };
-    let angle = Broken { channel: &within, places: &places };
+    let angle = Broken { channel: &within, places: &lost };
+    let mut places = [&lost, left_out].concat();
+    places.sort_unstable();
     let torque = Broken { channel: motion.torque, places: &places };
     let is_whole = limits.is_none() && places.is_empty();
     let whole = if is_whole { None } else { Some(Motion { angle: &angle, torque: &torque, ..motion.clone() }) };
@@ -70,7 +111,7 @@ pub(crate) fn identify_weak(
         if limits.is_some() {
             defects[0].iter_mut().for_each(Defect::leave_out);
         }
-        defects[0].extend((!places.is_empty()).then_some(Defect::Broken(places.len())));
+        defects[0].extend((!lost.is_empty()).then_some(Defect::Broken(lost.len())));
         let doubtful = defects.iter().flatten().any(Defect::is_doubtful);
         let suspected = if doubtful { Status::CHANNEL_SUSPECTED } else { Status::GOOD };
         WeakIdentified { record_status: found.record_status | suspected, resting, defects, ..found }
@@ -88,8 +129,7 @@ fn defects_of_motion(motion: &Motion<'_>) -> Vec<Vec<Defect>> {
 
 /// The samples before which some were lost: only of an angle that was measured alone and uniformly, and as it was recorded otherwise.
 fn lost_samples(motion: &Motion<'_>, defects: &[Vec<Defect>], watch: &mut Watch<'_>) -> Result<Vec<usize>, Error> {
-    let alone = is_alone(&motion.measured) && motion.measured.passed[0].is_none();
-    if alone && defects[0].is_empty() { breaks(motion.angle, watch) } else { Ok(Vec::new()) }
+    if is_as_recorded(&motion.measured) && defects[0].is_empty() { breaks(motion.angle, watch) } else { Ok(Vec::new()) }
 }
 
 /// The limits at which an angle that was measured alone is clipped.
@@ -105,6 +145,11 @@ fn clipped_at(motion: &Motion<'_>, defects: &[Vec<Defect>]) -> Option<[f64; 2]> 
 fn is_alone(measured: &Measured<'_>) -> bool {
     let [_, rates @ ..] = measured.channels;
     rates.iter().all(Option::is_none)
+}
+
+/// Whether the angle is what was measured, sample by sample.
+fn is_as_recorded(measured: &Measured<'_>) -> bool {
+    is_alone(measured) && measured.passed[0].is_none()
 }
 
 /// Does something with the record that a motion is, its terms evaluated at every sample, and says which part of it rests.

@@ -64,6 +64,8 @@ pub(crate) struct WeakIdentified {
     pub(crate) jumps: Vec<usize>,
     /// Samples of pulses of the stiffness, whose ends are among the jumps.
     pub(crate) pulses: Vec<Range<usize>>,
+    /// Samples that stand out of their neighbours: the channel, the sample, and what took its place, NaN where it was left out.
+    pub(crate) spikes: Vec<(usize, usize, f64)>,
     /// Estimates by the width of the test function.
     pub(crate) scan: Scan,
     /// What was done to angle, torque and other channels.

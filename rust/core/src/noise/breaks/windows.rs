@@ -41,7 +41,7 @@ impl Size {
                 left.push(found.left);
             }
         }
-        let (size, left) = (median(&mut sizes)? / MEDIAN, median(&mut left)? / 2.0);
+        let (size, left) = (deviation(&mut sizes)?, median(&mut left)? / 2.0);
         Some(Self { size: size.max(quantum / 2.0), left: left.max(quantum * quantum / 4.0) })
     }
 
@@ -117,6 +117,11 @@ pub(crate) fn orthonormal(mut column: Vec<f64>, others: &[Vec<f64>], first: usiz
 /// The sum of products.
 pub(crate) fn product(one: &[f64], other: &[f64]) -> f64 {
     one.iter().zip(other).map(|(one, other)| one * other).sum()
+}
+
+/// The standard deviation of a normal variable that has such magnitudes.
+pub(crate) fn deviation(magnitudes: &mut [f64]) -> Option<f64> {
+    median(magnitudes).map(|magnitude| magnitude / MEDIAN)
 }
 
 /// The median, of an even number the larger of both.

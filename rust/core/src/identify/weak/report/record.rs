@@ -152,6 +152,7 @@ impl Session<'_, '_, '_> {
             pairs: Vec::new(),
             jumps: decided.jumps.iter().map(|jump| jump.sample).collect(),
             pulses: Vec::new(),
+            spikes: Vec::new(),
             scan: Scan::default(),
             resting: 0.0,
             defects: Vec::new(),

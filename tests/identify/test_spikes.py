@@ -1,0 +1,80 @@
+"""Samples that a disturbed sensor or line spoils: none of them moves what is found."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.signal import lsim
+
+import tvident
+from parameters import long
+
+Array = npt.NDArray[np.float64]
+
+RIG = tvident.simulate_torsional_rig(20.0, seed=8, pattern="slider", angle_noise=1e-3)
+CLEAN = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000)
+MOVED = 0.3
+"""Of a standard error: five samples in 20 000 less, or a little more noise in them."""
+
+
+def spoilt(channel: Array, spikes: int, size: float) -> Array:
+    draw = np.random.default_rng(spikes)
+    channel = channel.copy()
+    channel[draw.choice(np.arange(500, 19_500, 40), spikes, replace=False)] += size * draw.choice([-1, 1], spikes)
+    return channel
+
+
+@pytest.mark.parametrize("size", [1.0, *long(0.1, 20.0)])
+@pytest.mark.parametrize("channel", ["angle", "torque"])
+def test_spikes_move_nothing_and_are_said(channel: str, size: float) -> None:
+    angle, torque = RIG.angle, RIG.torque
+    if channel == "angle":
+        angle = spoilt(angle, 40, size)
+    else:
+        torque = spoilt(torque, 5, 10 * size)
+    before = angle.copy(), torque.copy()
+    result = tvident.identify(angle, torque, sample_rate=1000)
+    np.testing.assert_array_equal((angle, torque), before)
+    assert result.record_status == 0
+    for name in ("inertia", "damping"):
+        value, error = result.constants[name]
+        assert abs(value - CLEAN.constants[name][0]) < MOVED * error, name
+    off = (result.stiffness - RIG.stiffness) / RIG.stiffness
+    assert np.sqrt(np.mean(off**2)) < 1.2 * np.sqrt(np.mean((CLEAN.stiffness / RIG.stiffness - 1) ** 2))
+    words = {"angle": "40 samples of the angle stand", "torque": "5 samples of the torque stand"}[channel]
+    assert any(words in reason for reason in result.reasons)
+    # Nothing is said of degrees, turns or a model that fails: the rest is told without the spikes, too.
+    assert result.advice == CLEAN.advice
+    assert result.held_back().predicted > CLEAN.held_back().predicted - 0.1
+    assert result.vaf() > CLEAN.vaf() - 1
+
+
+def test_each_record_of_a_batch_has_its_own() -> None:
+    angles = np.stack([RIG.angle, spoilt(RIG.angle, 3, 5.0)])[:, :8000]
+    torques = np.stack([RIG.torque] * 2)[:, :8000]
+    both = tvident.identify(angles, torques, sample_rate=1000)
+    alone = tvident.identify(angles[1], torques[1], sample_rate=1000)
+    np.testing.assert_array_equal(both[1].stiffness, alone.stiffness)
+    assert both[1].vaf() == alone.vaf()
+
+
+def test_hits_that_move_the_machine_are_no_spikes_of_its_torque() -> None:
+    samples, rate = 20_000, 1000
+    draw = np.random.default_rng(2)
+    torque = np.zeros(samples)
+    torque[draw.choice(np.arange(100, samples, 50), 60, replace=False)] = draw.uniform(2, 4, 60)
+    inertia, damping, stiffness = 0.012, 0.03, 13.0
+    # The torque between samples is what a straight line says.
+    _, angle, _ = lsim(([1.0], [inertia, damping, stiffness]), torque, np.arange(samples) / rate)
+    noise = draw.standard_normal((2, samples))
+    result = tvident.identify(
+        angle + 1e-5 * noise[0],
+        torque + 1e-3 * noise[1],
+        sample_rate=rate,
+        inertia="constant",
+        damping="constant",
+        stiffness="constant",
+    )
+    for name, true in (("inertia", inertia), ("damping", damping), ("stiffness", stiffness)):
+        assert abs(result.constants[name][0] / true - 1) < 0.02, name
