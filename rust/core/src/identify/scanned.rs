@@ -1,7 +1,7 @@
 //! What a scan of the test function's width found, and what it says of a result.
 
 use crate::identify::results::Constant;
-use crate::inference::scales::{AtScale, LEAST_PLATEAU, Plateau, plateau};
+use crate::inference::scales::{AGREE, AtScale, LEAST_PLATEAU, Plateau, plateau};
 use crate::status::Status;
 
 /// From one half-width to the next.
@@ -56,6 +56,13 @@ impl Scan {
     /// By what factor widths that agree differ.
     pub(crate) fn factor(&self) -> f64 {
         self.plateau.map_or(1.0, |plateau| plateau.factor(&self.scales))
+    }
+
+    /// Whether another scan has other constants where its plateau begins, if this one is to be believed.
+    pub(crate) fn contradicts(&self, other: &Self) -> bool {
+        let (true, Some(one)) = (self.factor() >= LEAST_PLATEAU, other.narrowest()) else { return false };
+        let same = self.scales.iter().find(|scale| scale.half_width == one.half_width);
+        same.is_some_and(|same| !same.agrees(one, AGREE))
     }
 
     /// The narrowest scale of the plateau.
@@ -138,5 +145,35 @@ impl Scans {
         };
         let on_its_own = self.corrected.believable().is_some_and(|own| own.holds(place));
         !on_its_own && !believed.agrees(chosen, CONTRADICTS)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Widths that all agree about one constant.
+    fn scan(value: f64, error: f64, widths: usize) -> Scan {
+        let at = |place: usize| AtScale {
+            half_width: 4 << place,
+            band: 100.0 / f64::from(1 << place),
+            values: vec![value],
+            errors: vec![error],
+        };
+        let mut scan = Scan { tried: widths, scales: (0..widths).map(at).collect(), ..Scan::default() };
+        scan.find_plateau();
+        scan
+    }
+
+    #[test]
+    fn only_a_plateau_contradicts_another_that_differs_beyond_its_errors() {
+        let shorter = scan(1.0, 0.01, 6);
+        assert!(shorter.contradicts(&scan(0.95, 0.01, 6)));
+        assert!(!shorter.contradicts(&scan(0.985, 0.01, 6)));
+        // Errors are the smaller of the two.
+        assert!(shorter.contradicts(&scan(0.95, 0.1, 6)));
+        // Too few widths are no plateau.
+        assert!(!scan(1.0, 0.01, 2).contradicts(&scan(0.95, 0.01, 6)));
+        assert!(!shorter.contradicts(&scan(0.95, 0.01, 2)));
     }
 }

@@ -87,15 +87,26 @@ impl Widths {
         Ok(())
     }
 
+    /// What blocks of each length say with one of the corrections, from the shortest on and up to where longer ones contradict them: in these
+    /// what is windowed does not grow linearly, which makes all widths wrong alike.
+    fn unbiased(&self, noise: usize) -> Vec<Scan> {
+        let mut found: Vec<Scan> = Vec::new();
+        for scan in self.scans.iter().map(|scans| &scans[noise]) {
+            if found.last().is_some_and(|shorter| shorter.contradicts(scan)) {
+                break;
+            }
+            found.push(scan.clone());
+        }
+        found
+    }
+
     /// The longest plateau, and the longest of those with the correction for noise. Where plateaus are equally long, the one with the
     /// correction stands.
     pub(crate) fn plateaus(mut self) -> Scans {
         self.scans.iter_mut().flatten().for_each(Scan::find_plateau);
         let is_noisy = self.noises[0] > 0.0;
         let (mut best, mut corrected): (Option<Scan>, Option<Scan>) = (None, None);
-        let by_noise =
-            (0..self.noises.len()).flat_map(|noise| self.scans.iter().map(move |scans| scans[noise].clone()));
-        for scan in by_noise {
+        for scan in (0..self.noises.len()).flat_map(|noise| self.unbiased(noise)) {
             let longer = |than: &Option<Scan>| than.as_ref().is_none_or(|than| scan.factor() > LONGER * than.factor());
             if scan.corrected == is_noisy && longer(&corrected) {
                 corrected = Some(scan.clone());

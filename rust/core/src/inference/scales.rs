@@ -8,7 +8,7 @@
 use crate::regression::block_fit::BlockFit;
 
 /// Estimates agree that differ by no more than so many standard errors, the smaller of the two.
-const AGREE: f64 = 2.0;
+pub(crate) const AGREE: f64 = 2.0;
 
 /// Widths that agree span at least this factor, or they agree by chance.
 pub(crate) const LEAST_PLATEAU: f64 = 2.0;
