@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,9 @@ _ROUNDING = 1e-12
 
 _AS_GOOD = 1.05
 """A pendulum is named before a spring that softens where it leaves at most so many times as much."""
+
+_BUFFERS = 256 << 20
+"""Bytes that OpenBLAS takes at most when it is used first."""
 
 _NO_SPRING = 0.1
 """Beside gravity there is no other spring worth a word where its stiffness is less than this part of it."""
@@ -132,6 +136,20 @@ def lacking_terms(
     return [_Test(one[0], one[1], windowed, constant, names, spring).result() for one in zip(*squares, strict=True)]
 
 
+@cache
+def _start_blas() -> None:
+    """Have OpenBLAS take its buffers once there is memory for them: where there is none it ends the process.
+
+    Raises
+    ------
+    MemoryError
+        If there is none.
+    """
+    np.empty(_BUFFERS, np.uint8)
+    one = np.eye(2)
+    np.linalg.lstsq(one, one @ np.linalg.solve(one, one), rcond=None)
+
+
 def _products(rows: Array, length: int) -> tuple[Array, Array] | None:
     """Return products of columns of norm one in every block of rows, and the norms; None where blocks are few.
 
@@ -141,6 +159,7 @@ def _products(rows: Array, length: int) -> tuple[Array, Array] | None:
     blocks = samples // length
     if blocks < _FEWEST_BLOCKS:
         return None
+    _start_blas()
     blocked = rows[:, : blocks * length].reshape(records, blocks, length, columns)
     products = np.swapaxes(blocked, -1, -2) @ blocked
     norms = np.sqrt(np.einsum("rbii->ri", products))
