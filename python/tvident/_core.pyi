@@ -50,6 +50,7 @@ __all__ = [
     "respond",
     "rolling_least_squares",
     "sliding_velocity",
+    "spike_counts",
     "status_flags",
 ]
 
@@ -495,6 +496,7 @@ def fuse(
     others: Sequence[tuple[int, float, npt.NDArray[np.number]]],
     delta: float,
 ) -> npt.NDArray[np.float64]: ...
+def spike_counts(channel: npt.NDArray[np.number], longest: int) -> list[int]: ...
 def parts_of_quantisation(samples: int) -> list[tuple[int, int]]: ...
 def merged_rows(
     one: tuple[list[float], int, int], other: tuple[list[float], int, int]

@@ -78,3 +78,12 @@ def test_hits_that_move_the_machine_are_no_spikes_of_its_torque() -> None:
     )
     for name, true in (("inertia", inertia), ("damping", damping), ("stiffness", stiffness)):
         assert abs(result.constants[name][0] / true - 1) < 0.02, name
+
+
+def test_where_nothing_takes_them_out_the_summary_says_so() -> None:
+    angle = spoilt(RIG.angle, 3, 1.0)
+    result = tvident.identify(angle, RIG.torque, sample_rate=1000, method="paper")
+    assert result.advice[0].startswith("3 samples of the angle stand far out of the neighbours on both sides")
+    assert "method='auto'" in result.advice[0]
+    clean = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, method="paper")
+    assert not any("neighbours" in line for line in clean.advice)

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
+import numpy.typing as npt
+
 from tvident import _core
 
 _SHOWN = 6
 """Pulses that are listed at most."""
+
+_LONGEST = 3
+"""Samples of a spike of the angle at most; a torque can be there for two, and the machine feels it."""
 
 _TREATED = (
     ("angle", "what their neighbours say took their place"),
@@ -25,17 +31,27 @@ def lost_samples(found: _core.Identification) -> list[str]:
 
 
 def spikes(found: _core.Identification) -> list[str]:
-    """Return how many samples of each channel stand out of their neighbours, and what became of them."""
-    words = []
-    for channel, defect, amount in found.defects:
-        if defect == "spikes":
-            name, treated = _TREATED[channel]
-            many = "1 sample" if amount == 1 else f"{amount:.0f} samples"
-            stand = "stands" if amount == 1 else "stand"
-            words.append(
-                f"{many} of the {name} {stand} far out of the neighbours on both sides, as spikes of a disturbed line do: {treated}"
-            )
-    return words
+    """Return how many samples of each channel stand far out of their neighbours, and what became of them."""
+    return [
+        f"{_out_of_neighbours(amount, _TREATED[channel][0])}: {_TREATED[channel][1]}"
+        for channel, defect, amount in found.defects
+        if defect == "spikes"
+    ]
+
+
+def spikes_that_stay(angles: npt.NDArray[np.number], torques: npt.NDArray[np.number]) -> list[tuple[int, str]]:
+    """Return what to do about spikes, by record, where nothing took them out."""
+    return [
+        (record, f"{_out_of_neighbours(count, name)}: make them NaN, or use method='auto', which takes them out")
+        for channel, name, longest in ((angles, "angle", _LONGEST), (torques, "torque", 1))
+        for record, count in enumerate(_core.spike_counts(channel, longest))
+        if count
+    ]
+
+
+def _out_of_neighbours(count: float, name: str) -> str:
+    many, stand = ("1 sample", "stands") if count == 1 else (f"{count:.0f} samples", "stand")
+    return f"{many} of the {name} {stand} far out of the neighbours on both sides, as spikes of a disturbed line do"
 
 
 def pulses(found: _core.Identification, period: float) -> list[str]:

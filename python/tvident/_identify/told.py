@@ -11,7 +11,15 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
-from tvident._advice import Explained, ExplainedStrong, FoundBySearch, Plausible, words_of_search, words_with_instrument
+from tvident._advice import (
+    Explained,
+    ExplainedStrong,
+    FoundBySearch,
+    Plausible,
+    spikes_that_stay,
+    words_of_search,
+    words_with_instrument,
+)
 from tvident._equation import COEFFICIENTS, Unknown
 from tvident._identify.data import Data
 from tvident._identify.improved import is_doubted
@@ -62,7 +70,8 @@ class Told:
         more = [words_of_search(terms) for terms in searched]
         if isinstance(self.request.form, StrongForm) and data.instruments is None:
             # What to say takes longer than to identify a short record, so it waits until it is asked for.
-            later = partial(_later, self._of_strong_form(), plausible, data.angles, self.batch, more)
+            channels = (data.angles, data.torques)
+            later = partial(_later, self._of_strong_form(), plausible, channels, self.batch, more)
             if not any(self.lacking) and not data.doubts and data.clock is None and not any(data.clipped or ()):
                 return later
             words = later()
@@ -136,14 +145,16 @@ class Told:
 def _later(
     explained: ExplainedStrong,
     plausible: Plausible,
-    angles: npt.NDArray[np.number],
+    channels: tuple[npt.NDArray[np.number], npt.NDArray[np.number]],
     batch: Estimates,
     more: Sequence[Words],
 ) -> Words:
     """Return what there is to say of the strong form, and of what was searched."""
     words = explained.words()
-    more_lines = of_batch(more) if batch.status.ndim > 1 else more[0]
-    return plausible.before(replace(words + more_lines, each=words.each), angles, batch)
+    several = batch.status.ndim > 1
+    words = replace(words + (of_batch(more) if several else more[0]), each=words.each)
+    doubts = spikes_that_stay(*channels)
+    return _with_doubts(plausible.before(words, channels[0], batch), doubts, several=several)
 
 
 def _with_clipped(words: Words, clipped: Sequence[float] | None, *, several: bool) -> Words:

@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use tvident::Error;
 use tvident::noise::{
     Beside, fuse as core_fuse, noise as core_noise, noise_coherence as core_coherence, quantisation_step as core_step,
-    searched, variance_after,
+    searched, spike_count, variance_after,
 };
 use tvident::record::Samples;
 use tvident::simd::Instructions;
@@ -134,4 +134,17 @@ pub(crate) fn noise_coherence(
         Ok::<(), Error>(())
     })?;
     Ok(found)
+}
+
+/// How many samples of every record stand far out of calm neighbours, in runs of at most so many.
+#[pyfunction]
+pub(crate) fn spike_counts(channel: &Bound<'_, PyUntypedArray>, longest: usize) -> PyResult<Vec<usize>> {
+    let (records, mut counts) = (records(channel)?, Vec::new());
+    watched(channel.py(), None, |watch| {
+        for record in &records {
+            counts.push(spike_count(record, longest, watch)?);
+        }
+        Ok::<(), Error>(())
+    })?;
+    Ok(counts)
 }
