@@ -78,15 +78,6 @@ impl RowCovariance {
         self.lags[0]
     }
 
-    /// The same correlations with at least some variance.
-    pub(crate) fn of_at_least(mut self, variance: f64) -> Self {
-        let factor = (variance / self.variance()).max(1.0);
-        if factor.is_finite() {
-            self.lags.iter_mut().for_each(|lag| *lag *= factor);
-        }
-        self
-    }
-
     /// The variance inflation, the number of rows that carry the information of one independent row: the sum of the squared correlations.
     pub(crate) fn variance_inflation(&self) -> f64 {
         let squared = |lag: &f64| (lag / self.lags[0]).powi(2);

@@ -108,7 +108,7 @@ impl Session<'_, '_, '_> {
 
     /// What a fit leaves of rows that it did not see, over the variance that is expected: of the usual row, so that jumps, touches and spikes
     /// do not count. Nothing where it cannot be more than that.
-    pub(crate) fn left_over_expected(&mut self, weak: &WeakRows, fitted: &Decided) -> Result<Option<f64>, Error> {
+    fn left_over_expected(&mut self, weak: &WeakRows, fitted: &Decided) -> Result<Option<f64>, Error> {
         let Some(fit) = fitted.fit.as_ref().filter(|_| fitted.white.is_none()) else { return Ok(None) };
         if self.noise[1] == self.channel_noise[1] && !fitted.model.windowed.is_empty() && fitted.error <= MORE {
             return Ok(None);

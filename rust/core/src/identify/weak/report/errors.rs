@@ -1,4 +1,4 @@
-//! Standard errors: from the noise of the channels, or from the residuals where the equations show more than that.
+//! Standard errors: from the noise of the channels, or from the residuals where that noise model fails.
 
 use crate::error::Error;
 use crate::identify::weak::decided::Decided;
@@ -56,15 +56,9 @@ impl Session<'_, '_, '_> {
             errors.status |= Status::NOISE_MODEL;
         }
         if fails {
-            // Windows take some of the noise for what they follow: of rows that they do not hold they leave all of it.
-            let unseen = if whole { None } else { self.left_over_expected(weak, decided)? };
-            let least = unseen.map_or(0.0, |left| left * decided.expected.variance);
             errors.inflation = 1.0;
-            errors.covariance = shown.of_at_least(least);
-            errors.expected = Expected::new(&errors.covariance, errors.covariance.variance());
-        } else if raised > 1.0 {
-            // Noise that the channels do not show by themselves is coloured: its power at the motion's frequencies counts, not its mean.
-            errors.covariance = shown.of_at_least(errors.covariance.variance());
+            errors.expected = Expected::new(&shown, shown.variance());
+            errors.covariance = shown;
         }
         Ok(errors)
     }
