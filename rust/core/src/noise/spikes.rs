@@ -86,8 +86,8 @@ pub(crate) fn spikes(channel: &dyn Samples, longest: usize, watch: &mut Watch<'_
     let Some(begins) = Size::usual(channel, 3, quantum, second).map(|usual| BEGINS * usual.size) else {
         return Ok(Vec::new());
     };
-    let widths: Option<Vec<Between>> =
-        (1..=longest.min(LONGEST)).map(|width| Between::new(width, channel, quantum)).collect();
+    let widths: Option<Vec<Surrounded>> =
+        (1..=longest.min(LONGEST)).map(|width| Surrounded::new(width, channel, quantum)).collect();
     let (Some(widths), mut found) = (widths, Vec::new()) else {
         return Ok(Vec::new());
     };
@@ -194,7 +194,7 @@ fn seldom(found: Vec<Alone>, others: &Others, samples: usize) -> Vec<Spike> {
 }
 
 /// What stands between neighbours.
-struct Between {
+struct Surrounded {
     width: usize,
     /// Orthonormal polynomials: their values at the neighbours, then at what stands between.
     basis: Vec<Vec<f64>>,
@@ -202,7 +202,7 @@ struct Between {
     usual: f64,
 }
 
-impl Between {
+impl Surrounded {
     /// `None` where all windows hold a missing sample.
     fn new(width: usize, channel: &dyn Samples, quantum: f64) -> Option<Self> {
         let middle = (2 * SIDE + width - 1) as f64 / 2.0;
