@@ -12,7 +12,6 @@ BENCH := .venv-bench
 BENCH_BUILT := $(BENCH)/.built
 ACCURACY := .venv-accuracy
 WHEELS := .venv-wheels
-NOT_OPTIMISED := $(foreach crate,tvident tvident-python,--config profile.checked.package.$(crate).opt-level=0)
 export CARGO_TERM_COLOR ?= auto
 
 .PHONY: help
@@ -33,7 +32,7 @@ test:  ## every test but the longest, and every lint; the last line says which t
 test-rust:  ## tests of the core
 	# Cargo has a job server of its own. Tests inside the core have it compiled for themselves: not optimised, that takes a fifth of the
 	# time, and they are short. All other tests share one core, as optimised as what is shipped.
-	MAKEFLAGS= cargo test --workspace --lib --profile checked --quiet $(NOT_OPTIMISED)
+	MAKEFLAGS= cargo test --package tvident --lib --profile checked --quiet --config profile.checked.package.tvident.opt-level=0
 	MAKEFLAGS= cargo test --workspace --test '*' --profile checked --quiet
 	MAKEFLAGS= cargo test --workspace --doc --profile checked --quiet
 

@@ -1,12 +1,10 @@
 //! A stream gives the bits of the batch, whatever the pieces that it comes in, and goes on from its state.
 
-mod columns;
-
 use std::num::NonZeroUsize;
 use std::ops::Range;
 use std::sync::Arc;
 
-use columns::{Columns, kinds_of_regression};
+use crate::columns::{Columns, kinds_of_regression};
 use proptest::prelude::*;
 use tvident::lanes::Elements;
 use tvident::least_squares::{Equations, HALF_OF_THE_DIGITS, Regressions, RollingLeastSquares};
@@ -64,7 +62,7 @@ fn regressions(
     let kinds = kinds_of_regression(p, q);
     let mut found = Columns::new(kinds.iter().sum(), count);
     let numbers = found.numbers.iter_mut().map(Vec::as_mut_slice).collect();
-    take(&mut columns::regressions(kinds, numbers, &mut found.status, elements));
+    take(&mut crate::columns::regressions(kinds, numbers, &mut found.status, elements));
     found
 }
 

@@ -1,11 +1,9 @@
 //! Any cutting of a record gives the same bits: every kind of plan, on every path of instructions, with samples that are no number and
 //! glitches that make lanes start afresh.
 
-mod columns;
-
 use std::num::NonZeroUsize;
 
-use columns::{Columns, kinds_of_regression, regressions};
+use crate::columns::{Columns, kinds_of_regression, regressions};
 use proptest::prelude::*;
 use tvident::lanes::Elements;
 use tvident::least_squares::HALF_OF_THE_DIGITS;

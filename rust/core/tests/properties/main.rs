@@ -1,0 +1,10 @@
+//! Properties of what the core offers. One program: the core is linked once.
+
+mod basis;
+mod columns;
+mod cutting;
+mod local_polynomials;
+mod noise;
+mod rolling;
+mod streams;
+mod test_function;
