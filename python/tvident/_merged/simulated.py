@@ -12,7 +12,15 @@ from tvident import _arguments as arguments
 from tvident._merged.merging import Identifiable, Merging
 from tvident._merged.models import Responding, model_of
 from tvident._merged.recorded import Recorded
-from tvident._results import accounted_for, every_sample, in_units_of, without_gaps
+from tvident._results import (
+    accounted_for,
+    begins_once,
+    both_or_none,
+    every_sample,
+    in_units_of,
+    still_there,
+    without_gaps,
+)
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -84,8 +92,7 @@ class Simulated:
             raise ValueError(
                 "angle and torque must have the same shape; got {} and {}; cut one of them".format(*map(str, shapes))
             )
-        if initial is not None and angles is not None:
-            raise ValueError("the state must come from initial= or from angle=; got both; drop one")
+        begins_once(initial, angle)
         states = None if initial is None else self._states(initial, len(several))
         positions = self._positions(phase, several)
         found = []
@@ -126,8 +133,7 @@ class Simulated:
         ValueError
             As in :meth:`simulate`, and if only one of the channels is given.
         """
-        if (angle is None) != (torque is None):
-            raise ValueError("angle and torque must be of the same recording; got only one of them; give both")
+        both_or_none(angle, torque)
         seen: Any = angle
         pushed: Any = torque
         if angle is None:
@@ -239,14 +245,7 @@ class Simulated:
 
     def _record(self, cure: str) -> Recorded:
         """Return the record that was identified, if it is still there."""
-        recorded = self._merging.recorded
-        if recorded is None:
-            raise ValueError(f"the record must be there; got a result that was stored without it; give {cure}")
-        if not recorded.is_unchanged:
-            raise ValueError(
-                f"the record must be as it was identified; its arrays hold other samples by now; give {cure}, or pass copies to identify"
-            )
-        return recorded
+        return still_there(self._merging.recorded, cure)
 
     def _model(self, samples: int, position: Array | None, base: Array | None) -> Responding:
         """Return the equations of one trial, along its samples."""

@@ -7,7 +7,7 @@ from tvident._results.held_back import parts_of, percent, where_held_back
 from tvident._results.loaded import from_file
 from tvident._results.measured import Measured, known_name, number_of
 from tvident._results.parts import chosen, of_records, settings_of
-from tvident._results.recorded import Recorded, mark_of
+from tvident._results.recorded import Recorded, begins_once, both_or_none, mark_of, still_there
 from tvident._results.records import IdentifiedRecords, Shared, covariance_between, with_shared
 from tvident._results.response import Model, accounted_for, every_sample, without_gaps
 from tvident._results.result import Identification
@@ -46,7 +46,9 @@ __all__ = [
     "Telling",
     "Words",
     "accounted_for",
+    "begins_once",
     "believed",
+    "both_or_none",
     "chosen",
     "correlated_with",
     "covariance_between",
@@ -76,6 +78,7 @@ __all__ = [
     "sentences_of",
     "settings_of",
     "share_of",
+    "still_there",
     "touched_by",
     "two_digits",
     "where_held_back",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import Any, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,17 @@ from tvident._results.scan import Scan
 from tvident._results.words import Words
 
 Numbers: TypeAlias = npt.NDArray[np.number]
+
+
+class Changeable(Protocol):
+    """A record whose arrays somebody else may write into."""
+
+    @property
+    def is_unchanged(self) -> bool:
+        """Whether nobody has."""
+
+
+OneRecord = TypeVar("OneRecord", bound=Changeable)
 
 _LOOKED_AT = 1024
 """Samples of each channel by which a record is known again: whoever writes another recording into the same arrays changes most of them."""
@@ -72,3 +83,32 @@ def mark_of(channel: Numbers) -> bytes:
     flat = channel.reshape(-1, channel.shape[-1])
     rows, samples = (max(1, size // some) for size, some in ((flat.shape[0], 8), (flat.shape[1], _LOOKED_AT)))
     return np.ascontiguousarray(flat[::rows, ::samples]).tobytes()
+
+
+def still_there(recorded: OneRecord | None, cure: str) -> OneRecord:
+    """Return the record that was identified.
+
+    Raises
+    ------
+    ValueError
+        If it was not kept, or its arrays hold something else by now; the cure is what to give instead.
+    """
+    if recorded is None:
+        raise ValueError(f"the record must be there; got a result that was stored without it; give {cure}")
+    if not recorded.is_unchanged:
+        raise ValueError(
+            f"the record must be as it was identified; its arrays hold other samples by now; give {cure}, or pass copies to identify"
+        )
+    return recorded
+
+
+def both_or_none(angle: Any, torque: Any) -> None:
+    """Raise ValueError if only one channel of a recording is given."""
+    if (angle is None) != (torque is None):
+        raise ValueError("angle and torque must be of the same recording; got only one of them; give both")
+
+
+def begins_once(initial: Any, angle: Any) -> None:
+    """Raise ValueError if the state at the first sample is given in two ways."""
+    if initial is not None and angle is not None:
+        raise ValueError("the state must come from initial= or from angle=; got both; drop one")

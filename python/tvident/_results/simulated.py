@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._results.held_back import HeldBack, evaluated, parts_of
-from tvident._results.recorded import Recorded
+from tvident._results.recorded import Recorded, begins_once, both_or_none, still_there
 from tvident._results.response import Model, accounted_for, every_sample
 from tvident._results.torque import compared
 from tvident._status import Status
@@ -88,8 +88,7 @@ class Simulated:
         torques = self._channel("torque", torque)
         model = self._model()
         model.check(torques)
-        if initial is not None and angle is not None:
-            raise ValueError("the state must come from initial= or from angle=; got both; drop one")
+        begins_once(initial, angle)
         if angle is not None:
             return model.respond(torques, angle=_like_torque("angle", self._channel("angle", angle), torques))[0]
         if initial is None:
@@ -126,8 +125,7 @@ class Simulated:
         ValueError
             As in :meth:`simulate`, and if only one of the channels is given.
         """
-        if (angle is None) != (torque is None):
-            raise ValueError("angle and torque must be of the same recording; got only one of them; give both")
+        both_or_none(angle, torque)
         if angle is None or torque is None:
             recorded = self._record("angle= and torque=")
             angle, torque = recorded.angles, recorded.torques
@@ -218,13 +216,7 @@ class Simulated:
 
     def _record(self, cure: str) -> Recorded:
         """Return the record that was identified, if it is still there."""
-        if self._recorded is None:
-            raise ValueError(f"the record must be there; got a result that was stored without it; give {cure}")
-        if not self._recorded.is_unchanged:
-            raise ValueError(
-                f"the record must be as it was identified; its arrays hold other samples by now; give {cure}, or pass copies to identify"
-            )
-        return self._recorded
+        return still_there(self._recorded, cure)
 
     def _channel(self, name: str, values: npt.ArrayLike) -> npt.NDArray[np.number]:
         return in_units_of(self.units, name, values)
