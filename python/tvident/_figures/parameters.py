@@ -29,7 +29,7 @@ from tvident._figures.style import (
     unit_of,
 )
 from tvident._simulate import Recording
-from tvident._status import DOUBTFUL, Status
+from tvident._status import DOUBTFUL, Status, stretches_of
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -224,9 +224,9 @@ def draw_flags(ax: Axes, result: Identified) -> None:
     flagged = result.status & doubtful != 0
     if not flagged.any():
         return
-    edges = np.flatnonzero(np.diff(flagged.astype(np.int8), prepend=0, append=0))
+    begins, ends = stretches_of(flagged)
     shade: Any = {"color": FAINT, "alpha": 0.4, "linewidth": 0}
-    spans = np.stack([time[edges[::2]], time[edges[1::2] - 1]], axis=1)
+    spans = np.stack([time[begins], time[ends - 1]], axis=1)
     # Thousands of slivers are one grey area on any screen.
     for number, (first, last) in enumerate(spans[:: max(1, len(spans) // 500)]):
         ax.axvspan(first, last, label="flagged" if number == 0 else None, **shade)

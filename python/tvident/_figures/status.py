@@ -8,7 +8,7 @@ from matplotlib.ticker import MaxNLocator
 
 from tvident._figures.parameters import Identified, check_single, flagged_everywhere
 from tvident._figures.style import FOUND, TRUTH, Place, panels, style
-from tvident._status import DOUBTFUL, Status
+from tvident._status import DOUBTFUL, Status, stretches_of
 
 _MOST_STRETCHES = 2000
 """Of a flag that are drawn one by one; more are drawn as they look: joined where they are closer than a line is wide."""
@@ -66,8 +66,8 @@ def plot_status(result: Identified, ax: Place = None) -> Figure:
             axes[0].yaxis.set_major_locator(MaxNLocator(integer=True, nbins=5))
         panel = axes[-1]
         for row, flag in enumerate(flags):
-            edges = np.flatnonzero(np.diff((result.status & flag != 0).astype(np.int8), prepend=0, append=0))
-            begins, ends = result.time[edges[::2]], result.time[edges[1::2] - 1] + period
+            first, end = stretches_of(result.status & flag != 0)
+            begins, ends = result.time[first], result.time[end - 1] + period
             if begins.size > _MOST_STRETCHES:
                 gap = (result.time[-1] - result.time[0]) / _MOST_STRETCHES
                 apart = np.flatnonzero(begins[1:] - ends[:-1] > gap)

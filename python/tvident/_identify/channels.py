@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
+from tvident._status import stretches_of
 
 _Numbers = npt.NDArray[np.float64]
 
@@ -269,9 +270,8 @@ class _Pair:
         return _Judged(bias, math.sqrt(variance), self._factor(bias, noises))
 
     def _stretches(self) -> list[tuple[int, int]]:
-        there = np.isfinite(self.reference)
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(np.int8)))
-        pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+        begins, ends = stretches_of(np.isfinite(self.reference))
+        pairs = zip(begins.tolist(), ends.tolist(), strict=True)
         return [(first, end) for first, end in pairs if end - first >= _SHORTEST]
 
     def _parts(self, stretch: tuple[int, int]) -> list[tuple[int, int]]:

@@ -21,6 +21,7 @@ from tvident._results import (
     still_there,
     without_gaps,
 )
+from tvident._status import stretches_of
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -294,8 +295,8 @@ def bridged(channels: Array) -> Array:
     if not missing.any():
         return channels
     for row, lacks in enumerate(missing):
-        edges = np.flatnonzero(np.diff(lacks.view(np.int8), prepend=0, append=0))
-        longest = int(np.max(edges[1::2] - edges[::2], initial=0))
+        first, end = stretches_of(lacks)
+        longest = int(np.max(end - first, initial=0))
         if longest > _BRIDGED:
             raise ValueError(
                 f"what drives a simulation must be there; got {longest} missing samples in a row of channel {row}, where {_BRIDGED} can "

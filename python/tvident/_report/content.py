@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._report.packed import Series
-from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
+from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status, stretches_of
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -313,10 +313,9 @@ def _warnings(result: Reported, marks: Mapping[Status, npt.NDArray[np.bool_]]) -
     for flag, mark in marks.items():
         if int(result.record_status) & flag and mark.all():
             continue  # said already
-        edges = np.flatnonzero(np.diff(mark.view(np.int8), prepend=0, append=0))
-        first, last = edges[::2], edges[1::2] - 1
-        longest = np.sort(np.argsort(first - last, kind="stable")[:_STRETCHES])
-        times = [[float(result.time[first[one]]), float(result.time[last[one]])] for one in longest]
+        first, end = stretches_of(mark)
+        longest = np.sort(np.argsort(first - end, kind="stable")[:_STRETCHES])
+        times = [[float(result.time[first[one]]), float(result.time[end[one] - 1])] for one in longest]
         share = float(mark.mean())
         where = f"{share:.1%} of the samples" if share >= _FEW else f"{int(mark.sum())} samples"
         warnings.append(
