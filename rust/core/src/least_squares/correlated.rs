@@ -13,24 +13,19 @@ use crate::exec::huge_pages::zeros;
 use crate::exec::pool::{Piece, Watch};
 use crate::exec::stages::Stages;
 use crate::least_squares::bandwidth::{Bandwidth, Neighbours};
+use crate::least_squares::error_scale::{ErrorScale, TILE};
 use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares};
-use crate::least_squares::sliding_sums::{Side, WIDTH, sliding_sums};
+use crate::least_squares::sliding_sums::{sliding_sums, sums_of_block};
 use crate::record::samples::is_usable;
 use crate::record::subsample::stretches;
 use crate::simd::vectors::{Kernel, Lanes, dispatch};
 use crate::status::Status;
 
 /// Rows in a piece of work, about: what is kept of them stays in the second nearest cache.
-const PIECE: usize = 1 << 12;
-
-/// Windows that are finished together.
-const TILE: usize = 256;
+const PIECE: usize = 3 << 11;
 
 /// Rows of which the correlation of the residuals is learnt: it is known to a few thousandths then.
 const LEARNT_OF: usize = 1 << 17;
-
-/// Windows that keep less of the variance than this beside what their fit takes have no standard error.
-const LEAST_LEFT: f64 = 0.05;
 
 impl RollingLeastSquares {
     /// The same as [`RollingLeastSquares::run`], with standard errors that know of correlated residuals: over so many rows, or over as
@@ -93,8 +88,8 @@ struct Fits<'a> {
 #[derive(Default)]
 struct RowProducts {
     first: isize,
-    /// Vectors of `WIDTH` numbers a row.
-    values: Vec<[f64; WIDTH]>,
+    /// As many numbers a row as [`side`] says.
+    values: Vec<f64>,
     /// Rows that count before each row.
     counts: Vec<u32>,
     /// The columns that a row's products are made of, one after the other: regressors, the right-hand side, weights.
@@ -105,28 +100,35 @@ struct RowProducts {
 #[derive(Default)]
 struct Scratch {
     products: RowProducts,
-    /// Sums of neighbouring rows, the products of each pair of them, and the sums of those.
-    neighbours: Vec<[f64; WIDTH]>,
-    squares: Vec<[f64; WIDTH]>,
-    sums: Vec<[f64; WIDTH]>,
+    /// Sums of neighbouring rows, then of one block and of the next the products of each pair of these, and the sums of the block.
+    neighbours: Vec<f64>,
+    here: Vec<f64>,
+    next: Vec<f64>,
+    sums: Vec<f64>,
 }
 
-/// So many vectors of each of some rows. What they held before is left there.
-fn side_by_side<const V: usize>(vectors: &mut Vec<[f64; WIDTH]>, rows: usize) -> &mut [Side<V>] {
-    if vectors.len() < rows * V {
-        vectors.resize(rows * V, [0.0; WIDTH]);
+/// Numbers of a row that stand side by side for so many regressors: whole vectors.
+const fn side(regressors: usize) -> usize {
+    if regressors <= 4 {
+        4
+    } else if regressors <= 8 {
+        8
+    } else {
+        16
     }
-    vectors[..rows * V].as_chunks_mut::<V>().0
+}
+
+/// So many numbers of each of some rows. What they held before is left there.
+fn side_by_side<const N: usize>(numbers: &mut Vec<f64>, rows: usize) -> &mut [[f64; N]] {
+    if numbers.len() < rows * N {
+        numbers.resize(rows * N, 0.0);
+    }
+    numbers[..rows * N].as_chunks_mut::<N>().0
 }
 
 impl Fits<'_> {
     fn rows(&self) -> usize {
         self.status.len()
-    }
-
-    /// Vectors that the products of a row take.
-    fn vectors(&self) -> usize {
-        self.plan.regressors.div_ceil(WIDTH)
     }
 
     /// The result whose window would lie best around a row, if it is valid: at the ends the first and the last full windows do.
@@ -174,20 +176,23 @@ impl Fits<'_> {
     /// The products of some rows; those outside of the record are zero.
     #[inline(always)]
     fn products(&self, range: Range<isize>, products: &mut RowProducts) {
-        let (p, vectors, total) = (self.plan.regressors, self.vectors(), self.rows());
+        let (p, side, total) = (self.plan.regressors, side(self.plan.regressors), self.rows());
         let clamp = |row: isize| row.clamp(0, total.cast_signed()).unsigned_abs();
         let rows = clamp(range.start)..clamp(range.end);
         let length = (range.end - range.start).max(0).unsigned_abs();
         products.first = range.start;
         products.values.clear();
-        products.values.resize(length * vectors, [0.0; WIDTH]);
+        products.values.resize(length * side, 0.0);
         products.counts.clear();
         products.counts.resize(length + 1, 0);
         if !rows.is_empty() {
             let RowProducts { values, counts, columns, .. } = products;
             let sources = self.equations.columns[..p].iter().chain([&self.equations.columns[p + self.rhs]]);
-            columns.clear();
-            columns.resize((p + 2) * rows.len(), 1.0);
+            if columns.len() < (p + 2) * rows.len() {
+                columns.resize((p + 2) * rows.len(), 0.0);
+            }
+            let columns = &mut columns[..(p + 2) * rows.len()];
+            columns[(p + 1) * rows.len()..].fill(1.0);
             for (source, into) in sources.chain(&self.equations.weights).zip(columns.chunks_mut(rows.len())) {
                 source.read(rows.start, into);
             }
@@ -195,17 +200,16 @@ impl Fits<'_> {
             let (residuals, weights) = rest.split_at_mut(rows.len());
             self.take_off_fits(&rows, columns, residuals);
             let skipped = (rows.start.cast_signed() - range.start).unsigned_abs();
-            let (values, counts) = (&mut values[skipped * vectors..], &mut counts[skipped + 1..]);
+            let (values, counts) = (&mut values[skipped * side..], &mut counts[skipped + 1..]);
             for ((count, residual), weight) in counts.iter_mut().zip(&mut *residuals).zip(&*weights) {
                 let counted = is_usable(*residual) && *weight > 0.0;
                 *count = u32::from(counted);
                 *residual = if counted { weight * *residual } else { 0.0 };
             }
             for (regressor, column) in columns.chunks(rows.len()).enumerate() {
-                let of_rows = values[regressor / WIDTH..].iter_mut().step_by(vectors);
-                for ((row, residual), x) in of_rows.zip(&*residuals).zip(column) {
+                for ((row, residual), x) in values.chunks_exact_mut(side).zip(&*residuals).zip(column) {
                     // A row that does not count may hold what is no number.
-                    row[regressor % WIDTH] = if *residual == 0.0 { 0.0 } else { residual * x };
+                    row[regressor] = if *residual == 0.0 { 0.0 } else { residual * x };
                 }
             }
         }
@@ -241,12 +245,12 @@ impl Fits<'_> {
         let pieces = stretches(self.rows(), LEARNT_OF.max(8 * self.plan.window), 8)
             .map(|rows| Piece { size: rows.len(), content: rows })
             .collect();
-        let (p, vectors) = (self.plan.regressors, self.vectors());
+        let (p, side) = (self.plan.regressors, side(self.plan.regressors));
         let of_rows = |rows: Range<usize>, products: &mut RowProducts| {
             self.products(rows.start.cast_signed()..rows.end.cast_signed(), products);
             let mut sums = vec![Neighbours::default(); p];
             for (regressor, sums) in sums.iter_mut().enumerate() {
-                let at = |row: usize| products.values[row * vectors + regressor / WIDTH][regressor % WIDTH];
+                let at = |row: usize| products.values[row * side + regressor];
                 for row in 1..rows.len() {
                     sums.add(at(row - 1), at(row));
                 }
@@ -294,24 +298,24 @@ impl Kernel for Sandwich<'_, '_, '_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, _simd: S) {
-        // Vectors that hold the products of a row, and those of pairs of them.
+        // Numbers of a row side by side, and of the pairs of them.
         match self.fits.plan.regressors {
-            1 => self.run_with::<1, 1>(1),
-            2 => self.run_with::<1, 1>(2),
-            3 => self.run_with::<1, 1>(3),
-            4 => self.run_with::<1, 2>(4),
-            5 => self.run_with::<1, 2>(5),
-            p @ ..=8 => self.run_with::<1, 5>(p),
-            p => self.run_with::<2, 17>(p),
+            1 => self.run_with::<4, 1>(1),
+            2 => self.run_with::<4, 4>(2),
+            3 => self.run_with::<4, 8>(3),
+            4 => self.run_with::<4, 16>(4),
+            5 => self.run_with::<8, 16>(5),
+            p @ ..=8 => self.run_with::<8, 40>(p),
+            p => self.run_with::<16, 136>(p),
         }
     }
 }
 
 impl Sandwich<'_, '_, '_> {
     #[inline(always)]
-    fn run_with<const V: usize, const P: usize>(self, p: usize) {
+    fn run_with<const N: usize, const P: usize>(self, p: usize) {
         let Self { fits, bandwidth, rows, mut errors, scratch } = self;
-        let Scratch { products, neighbours, squares, sums } = scratch;
+        let Scratch { products, neighbours, here, next, sums } = scratch;
         let (correlated, length) = (bandwidth.rows, fits.plan.window - bandwidth.rows + 1);
         let first = rows.start.cast_signed() - fits.plan.before.cast_signed();
         // Blocks are tied to the rows of the record: those of windows, and those of neighbours before them.
@@ -320,125 +324,50 @@ impl Sandwich<'_, '_, '_> {
         let begin_of_neighbours = of_block(begin, correlated);
         let end = of_block(first + rows.len().cast_signed(), length) + 2 * length.cast_signed();
         fits.products(begin_of_neighbours..end + correlated.cast_signed(), products);
-        let neighbours = side_by_side::<V>(neighbours, (end - begin_of_neighbours).unsigned_abs());
-        sliding_sums(correlated, products.values.as_chunks::<V>().0, neighbours);
-        let squares = side_by_side::<P>(squares, (end - begin).unsigned_abs());
-        for (found, of) in squares.iter_mut().zip(&neighbours[(begin - begin_of_neighbours).unsigned_abs()..]) {
-            let mut pair = 0;
-            for i in 0..p {
-                for k in i..p {
-                    found[pair / WIDTH][pair % WIDTH] = of[i / WIDTH][i % WIDTH] * of[k / WIDTH][k % WIDTH];
-                    pair += 1;
-                }
-            }
-        }
-        let skipped = (first - begin).unsigned_abs();
-        let sums = side_by_side::<P>(sums, skipped + rows.len());
-        sliding_sums(length, squares, sums);
-        let scale = ErrorScale::new(fits, bandwidth);
+        let neighbours = side_by_side::<N>(neighbours, (end - begin_of_neighbours).unsigned_abs());
+        sliding_sums(correlated, products.values.as_chunks::<N>().0, neighbours);
+        let neighbours = &neighbours[(begin - begin_of_neighbours).unsigned_abs()..];
+        let [mut here, mut next, sums] = [here, next, sums].map(|vectors| side_by_side::<P>(vectors, length));
+        squares(p, &neighbours[..length], next);
+        let scale = ErrorScale::new(fits.plan, fits.normal, fits.rows(), bandwidth);
         let mut tile = vec![[0.0; TILE]; p * (p + 1) / 2];
-        for (number, some) in sums[skipped..].chunks(TILE).enumerate() {
-            for (pair, tile) in tile.iter_mut().enumerate() {
-                for (into, sum) in tile.iter_mut().zip(some) {
-                    *into = sum[pair / WIDTH][pair % WIDTH];
-                }
+        let skipped = (first - begin).unsigned_abs();
+        let mut done = 0;
+        for (block, after) in neighbours[length..].chunks_exact(length).enumerate() {
+            // What was next is here, and stays in the nearest cache until its sums are used.
+            std::mem::swap(&mut here, &mut next);
+            squares(p, after, next);
+            sums_of_block(here, next, sums);
+            let wanted = skipped.max(block * length)..(skipped + rows.len()).min((block + 1) * length);
+            if wanted.is_empty() {
+                break;
             }
-            let place = number * TILE;
-            let some_rows = rows.start + place..rows.start + place + some.len();
-            let into = errors.iter_mut().map(|errors| &mut errors[place..place + some.len()]);
-            scale.write(some_rows, &tile, products, into);
-        }
-    }
-}
-
-/// Makes standard errors of the sums over windows.
-struct ErrorScale<'a, 'b> {
-    fits: &'a Fits<'b>,
-    correlated: f64,
-    /// One over the roots of what the sums of neighbours keep of the variance, by regressor.
-    kept: Vec<f64>,
-    /// For a window all of whose rows count.
-    whole: f64,
-}
-
-impl<'a, 'b> ErrorScale<'a, 'b> {
-    #[inline(always)]
-    fn new(fits: &'a Fits<'b>, bandwidth: &Bandwidth) -> Self {
-        let kept = bandwidth.kept.iter().map(|kept| kept.sqrt().recip()).collect();
-        let scale = Self { fits, correlated: bandwidth.rows as f64, kept, whole: 0.0 };
-        let rows = fits.plan.window as f64;
-        Self { whole: scale.of(rows, 0.0, rows), ..scale }
-    }
-
-    /// Writes the errors of some windows, where the diagonals of their normal matrices are, from the sums of squares of each.
-    #[inline(always)]
-    fn write<'c>(
-        &self,
-        rows: Range<usize>,
-        sums: &[[f64; TILE]],
-        products: &RowProducts,
-        errors: impl Iterator<Item = &'c mut [f64]>,
-    ) {
-        let (p, kept) = (self.fits.plan.regressors, &self.kept);
-        let mut scale = [0.0; TILE];
-        for (scale, row) in scale.iter_mut().zip(rows.clone()) {
-            *scale = self.of_window(row, products);
-        }
-        let normal = |i: usize, k: usize| {
-            let (i, k) = (i.min(k), i.max(k));
-            &self.fits.normal[i * (2 * p - i - 1) / 2 + k - i - 1][rows.clone()]
-        };
-        for (a, into) in errors.enumerate() {
-            let row_of_normal = |k: usize| if k == a { &*into } else { normal(a, k) };
-            let mut variance = [0.0; TILE];
-            for b in 0..p {
-                let mut inner = [0.0; TILE];
-                for c in 0..p {
-                    let kept = kept[b] * kept[c];
-                    let (i, k) = (b.min(c), b.max(c));
-                    let sum = &sums[i * p - i * i.saturating_sub(1) / 2 + k - i];
-                    for ((inner, of), sum) in inner.iter_mut().zip(row_of_normal(c)).zip(sum) {
-                        *inner += kept * of * sum;
+            for some in sums[wanted.start - block * length..wanted.end - block * length].chunks(TILE) {
+                for (pair, tile) in tile.iter_mut().enumerate() {
+                    for (into, sum) in tile.iter_mut().zip(some) {
+                        *into = sum[pair];
                     }
                 }
-                for ((variance, of), inner) in variance.iter_mut().zip(row_of_normal(b)).zip(&inner) {
-                    *variance += of * inner;
-                }
-            }
-            for ((error, variance), scale) in into.iter_mut().zip(&variance).zip(&scale) {
-                // Where there are no parameters there is no error, and it stays NaN.
-                *error = (scale * variance).sqrt() + 0.0 * *error;
+                let places = done..done + some.len();
+                let some_rows = rows.start + places.start..rows.start + places.end;
+                let into = errors.iter_mut().map(|errors| &mut errors[places.clone()]);
+                scale.write(some_rows, &tile, (products.first, &products.counts), into);
+                done = places.end;
             }
         }
     }
+}
 
-    /// What the sum over the window of a row is to be multiplied by.
-    #[inline(always)]
-    fn of_window(&self, row: usize, products: &RowProducts) -> f64 {
-        let plan = self.fits.plan;
-        let first = row.cast_signed() - plan.before.cast_signed();
-        let end = first + plan.window.cast_signed();
-        let there = first.max(0)..end.min(self.fits.rows().cast_signed());
-        let at = |row: isize| (row - products.first).unsigned_abs();
-        let count = products.counts[at(there.end)] - products.counts[at(there.start)];
-        if count as usize == plan.window {
-            return self.whole;
+/// The products of each pair of the first numbers of rows.
+#[inline(always)]
+fn squares<const N: usize, const P: usize>(numbers: usize, rows: &[[f64; N]], products: &mut [[f64; P]]) {
+    for (products, row) in products.iter_mut().zip(rows) {
+        let mut pair = 0;
+        for i in 0..numbers {
+            for k in i..numbers {
+                products[pair] = row[i] * row[k];
+                pair += 1;
+            }
         }
-        // Sums that reach out of a window are left out, but for those over an end of the record, of which a part is there.
-        let over = |rows: isize| {
-            let rows = (rows as f64).min(self.correlated - 1.0);
-            rows * (1.0 - (rows + 1.0) / (2.0 * self.correlated))
-        };
-        let outside = over(there.start - first) + over(end - there.end);
-        self.of((there.end - there.start) as f64, outside, f64::from(count))
-    }
-
-    /// The same for a window that spans so many rows, beside sums over the ends that are partly there, of which so many count.
-    #[inline(always)]
-    fn of(&self, spanned: f64, outside: f64, count: f64) -> f64 {
-        let complete = spanned - self.correlated + 1.0 + outside;
-        // What fits take of the sums of neighbours: of one row the part p / w, of B rows about (B + p - 1) / w.
-        let left = 1.0 - (self.correlated + self.fits.plan.regressors as f64 - 1.0) / count;
-        if left < LEAST_LEFT || complete <= 0.0 { f64::NAN } else { spanned / (complete * self.correlated * left) }
     }
 }

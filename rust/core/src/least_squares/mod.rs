@@ -2,6 +2,7 @@
 
 pub(crate) mod bandwidth;
 pub(crate) mod correlated;
+pub(crate) mod error_scale;
 pub(crate) mod fading;
 pub(crate) mod givens_factor;
 pub(crate) mod kernel;
