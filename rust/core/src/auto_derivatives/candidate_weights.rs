@@ -193,8 +193,8 @@ impl Refinement {
 
     pub(crate) fn scratch(&self) -> AverageScratch {
         AverageScratch {
-            banks: self.banks.iter().map(Bank::scratch).collect(),
-            reference: self.reference.bank.scratch(),
+            banks: self.banks.iter().map(|_| CoefficientScratch::default()).collect(),
+            reference: CoefficientScratch::default(),
             projected: Projected::default(),
             compare: Vec::new(),
             compare_at: Vec::new(),
@@ -381,7 +381,7 @@ mod tests {
                 let inside = grid.means(&(400..samples - 400));
                 let at = |bank: &Bank| (bank.places(samples, grid, &inside).1, grid.step / bank.step);
                 let ((own, every), (centres, every_centre)) = (at(bank), at(&of.reference.bank));
-                let (mut scratch, mut reference) = (bank.scratch(), of.reference.bank.scratch());
+                let (mut scratch, mut reference) = (CoefficientScratch::default(), CoefficientScratch::default());
                 let (mut of_reference, mut of_bank) = (Projected::default(), Projected::default());
                 let compare =
                     of.reference.bank.estimates(&means, centres, every_centre, &mut reference, &mut of_reference);

@@ -11,13 +11,14 @@
 //! `q_{d+2l}`, and variances `r` times as small.
 
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::auto_derivatives::block_means::{BlockMeans, Grid, step_for};
 use crate::auto_derivatives::deconvolution::AtCentre;
 use crate::auto_derivatives::symmetric_grid::within;
 use crate::error::Error;
 use crate::local_polynomials::coefficients::{CoefficientScratch, Projected};
+use crate::local_polynomials::mirrored_kernels::{LONGEST, MirroredKernel, MirroredKernels};
 use crate::local_polynomials::tables::{TablesWanted, WindowTables, tables};
 use crate::noise::correlated::CorrelatedNoise;
 use crate::simd::instructions::Instructions;
@@ -77,6 +78,9 @@ pub(crate) struct Bank {
     derivative: usize,
     /// What a constant signal of one gives.
     constant: f64,
+    /// The candidates as sums over the samples of short windows, made when they are first needed.
+    mirrored: OnceLock<MirroredKernels>,
+    instructions: Instructions,
 }
 
 impl Bank {
@@ -105,7 +109,21 @@ impl Bank {
         let leverages: Vec<f64> = running_sums((0..=highest).map(leverage)).collect();
         let leverages = orders.iter().map(|&order| leverages[order]).collect();
         let constant = f64::from(u8::from(derivative == 0));
-        let mut bank = Self { half, step, orders, gains, leverages, tables, weights, first, derivative, constant };
+        let mirrored = OnceLock::new();
+        let mut bank = Self {
+            half,
+            step,
+            orders,
+            gains,
+            leverages,
+            tables,
+            weights,
+            first,
+            derivative,
+            constant,
+            mirrored,
+            instructions,
+        };
         if !target.noise.is_white() {
             let gain = |candidate| {
                 let kernel = bank.kernel(candidate);
@@ -117,7 +135,7 @@ impl Bank {
     }
 
     pub(crate) fn scratch(&self) -> CoefficientScratch {
-        self.tables.coefficients().scratch()
+        CoefficientScratch::default()
     }
 
     /// Samples that are worked on together.
@@ -157,7 +175,20 @@ impl Bank {
         projected: &'a mut Projected,
     ) -> &'a mut [Vec<f64>] {
         let windows = centres.start - self.inner()..centres.end - self.inner();
-        self.tables.coefficients().project(means.of(self.step), windows, every, projected, scratch);
+        let record = means.of(self.step);
+        let degrees = self.tables.basis.degrees();
+        if let Some(mirrored) = self.mirrored().filter(|mirrored| mirrored.serve(every, degrees)) {
+            let rows = &mut projected.coefficients;
+            rows.resize_with(self.orders.len(), Vec::new);
+            let count = windows.len().div_ceil(every);
+            for row in &mut *rows {
+                row.resize(count, 0.0);
+            }
+            let mut slices: Vec<&mut [f64]> = rows.iter_mut().map(Vec::as_mut_slice).collect();
+            mirrored.apply(record, windows, every, (&mut [], &mut slices), &mut scratch.mirrored);
+            return rows;
+        }
+        self.tables.coefficients().project(record, windows, every, projected, scratch);
         let Projected { level: sums, coefficients: rows, .. } = projected;
         for sum in sums.iter_mut() {
             // NaN stays NaN.
@@ -170,6 +201,21 @@ impl Bank {
             }
         }
         &mut rows[self.first..]
+    }
+
+    /// The candidates of a short window as sums over its samples.
+    fn mirrored(&self) -> Option<&MirroredKernels> {
+        let inner = self.inner();
+        let kernel = |candidate: usize| MirroredKernel {
+            odd: self.derivative % 2 == 1,
+            constant: self.constant,
+            outwards: (inner + 1..=2 * inner).map(|index| self.weight(candidate, index)).collect(),
+        };
+        let make = || {
+            let kernels: Vec<MirroredKernel> = (0..self.orders.len()).map(kernel).collect();
+            MirroredKernels::new(inner, &kernels, self.instructions)
+        };
+        (inner <= LONGEST).then(|| self.mirrored.get_or_init(make))
     }
 
     /// The same from the coefficients of all degrees.
@@ -212,13 +258,14 @@ impl Bank {
 
     /// The weights of a window's samples in a candidate.
     pub(crate) fn kernel(&self, candidate: usize) -> Vec<f64> {
-        let weights = &self.weights[..=self.first + candidate];
-        let weight = |index| {
-            let products =
-                weights.iter().enumerate().map(|(l, w)| w * self.tables.basis.value(self.derivative + 2 * l, index));
-            products.sum::<f64>() / self.step as f64
-        };
+        let weight = |index| self.weight(candidate, index) / self.step as f64;
         (0..self.tables.basis.length()).flat_map(|index| std::iter::repeat_n(weight(index), self.step)).collect()
+    }
+
+    /// The weight of one of a window's means in a candidate.
+    fn weight(&self, candidate: usize, index: usize) -> f64 {
+        let weights = self.weights[..=self.first + candidate].iter().enumerate();
+        weights.map(|(l, weight)| weight * self.tables.basis.value(self.derivative + 2 * l, index)).sum()
     }
 }
 

@@ -86,7 +86,7 @@ impl Survey<'_> {
         let mut ladder = Vec::new();
         for half in ladder_of_windows(self.record().len(), target.shortest) {
             if let Some(bank) = Bank::new(half, target)? {
-                ladder.push(self.look(bank, true)?);
+                ladder.push(self.look(bank)?);
             }
             check_cancelled()?;
         }
@@ -107,7 +107,7 @@ impl Survey<'_> {
         // The best of a window, compared with the best so far.
         let best_of = |half: usize, best: Option<&(Surveyed, usize, f64)>| {
             let Some(bank) = Bank::new(half, target)? else { return Ok(None) };
-            let looked = self.look(bank, false)?;
+            let looked = self.look_once(bank);
             let best = best.map(|&(ref looked, candidate, risk)| JudgedWindow { looked, candidate, risk });
             let risks = risks(reference, &looked, best, 0.0, target.noise).into_iter().enumerate();
             let least = risks.min_by(|a, b| a.1.total_cmp(&b.1));

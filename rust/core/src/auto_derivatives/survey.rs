@@ -14,7 +14,7 @@ use crate::auto_derivatives::block_means::{BlockMeans, COARSER, Grid, mean, step
 use crate::auto_derivatives::candidates::Bank;
 use crate::error::Error;
 use crate::exec::memory;
-use crate::local_polynomials::coefficients::Projected;
+use crate::local_polynomials::coefficients::{CoefficientScratch, Projected};
 use crate::local_polynomials::tables::{TablesWanted, WindowTables, tables};
 use crate::record::samples::Samples;
 use crate::simd::instructions::Instructions;
@@ -134,12 +134,30 @@ impl<'a> Survey<'a> {
         Ok(Self { means, highest, instructions, stretches, step: STEP, closely, known, parts })
     }
 
-    /// Looks at the candidates of a window. What is kept serves other derivatives.
-    pub(crate) fn look(&self, bank: Bank, keep: bool) -> Result<Surveyed, Error> {
-        let coefficients = self.coefficients(&bank, keep)?;
-        let rows = bank.combine(&coefficients);
+    /// Looks at the candidates of a window. The coefficients that they are made of are kept for other derivatives.
+    ///
+    /// # Errors
+    /// If there is not the memory.
+    pub(crate) fn look(&self, bank: Bank) -> Result<Surveyed, Error> {
+        let rows = bank.combine(&*self.coefficients(&bank)?);
         let grid = self.grid(&bank);
         Ok(Surveyed::new(bank, rows, grid))
+    }
+
+    /// The same without keeping anything.
+    pub(crate) fn look_once(&self, bank: Bank) -> Surveyed {
+        let rows = self.known_coefficients(&bank).map_or_else(
+            || {
+                let (mut scratch, mut part) = (CoefficientScratch::default(), Projected::default());
+                self.at_places(&bank, bank.orders.len(), |centres, every, rows| {
+                    let found = bank.estimates(&self.means, centres, every, &mut scratch, &mut part);
+                    rows.iter_mut().zip(found).for_each(|(row, found)| row.extend(&*found));
+                })
+            },
+            |known| bank.combine(&known),
+        );
+        let grid = self.grid(&bank);
+        Surveyed::new(bank, rows, grid)
     }
 
     /// The record that is surveyed, and its means.
@@ -203,7 +221,7 @@ impl<'a> Survey<'a> {
         let (record, first): (&dyn Samples, usize) =
             if step > 1 { (&Means(&means), beside) } else { (self.record(), begin) };
         let tables = self.tables(inner)?;
-        let (mut scratch, mut projected) = (tables.coefficients().scratch(), Projected::default());
+        let (mut scratch, mut projected) = (CoefficientScratch::default(), Projected::default());
         let windows = first..first + room.saturating_sub(beside);
         tables.coefficients().project(record, windows.clone(), every, &mut projected, &mut scratch);
         let starts = windows.step_by(every).map(|start| begin + (start - first) * step).collect();
@@ -229,40 +247,56 @@ impl<'a> Survey<'a> {
     }
 
     /// The coefficients of all windows of a length at all places.
-    fn coefficients(&self, bank: &Bank, keep: bool) -> Result<Rc<Projected>, Error> {
-        if let Some((_, known)) = self.known.borrow().iter().find(|(one, _)| *one == bank.half) {
-            return Ok(Rc::clone(known));
+    fn coefficients(&self, bank: &Bank) -> Result<Rc<Projected>, Error> {
+        if let Some(known) = self.known_coefficients(bank) {
+            return Ok(known);
         }
+        let own = bank.half / bank.step;
+        let tables = self.tables(own)?;
+        let (mut scratch, mut part) = (CoefficientScratch::default(), Projected::default());
+        let mut rows = self.at_places(bank, tables.basis.degrees() + 1, |centres, every, rows| {
+            let (windows, record) = (centres.start - own..centres.end - own, self.means.of(bank.step));
+            tables.coefficients().project(record, windows, every, &mut part, &mut scratch);
+            let found = part.coefficients.iter().chain([&part.level]);
+            rows.iter_mut().zip(found).for_each(|(row, found)| row.extend(found));
+        });
+        let level = rows.pop().unwrap_or_default();
+        let all = Rc::new(Projected { level, coefficients: rows, residual: Vec::new() });
+        self.known.borrow_mut().push((bank.half, Rc::clone(&all)));
+        Ok(all)
+    }
+
+    fn known_coefficients(&self, bank: &Bank) -> Option<Rc<Projected>> {
+        let known = self.known.borrow();
+        known.iter().find(|(one, _)| *one == bank.half).map(|(_, coefficients)| Rc::clone(coefficients))
+    }
+
+    /// Rows of numbers at all places of a window, NaN where it does not fit. The function appends to every row the numbers at every so many of
+    /// some centres.
+    fn at_places(
+        &self,
+        bank: &Bank,
+        rows: usize,
+        mut append: impl FnMut(Range<usize>, usize, &mut [Vec<f64>]),
+    ) -> Vec<Vec<f64>> {
         let samples = self.record().len();
-        let tables = self.tables(bank.half / bank.step)?;
-        let mut scratch = tables.coefficients().scratch();
-        let (mut all, mut part) = (Projected::default(), Projected::default());
-        all.coefficients.resize_with(tables.basis.degrees(), Vec::new);
         let places = Grid::new(samples, self.step_of(bank));
-        let (every, own) = (places.step / bank.step, bank.half / bank.step);
+        let mut rows = vec![Vec::new(); rows];
+        let resize = |rows: &mut [Vec<f64>], count: usize| {
+            for row in rows {
+                row.resize(count, f64::NAN);
+            }
+        };
         for stretch in &self.stretches {
             let inside = places.means(stretch);
             let (wanted, centres) = bank.places(samples, places, &inside);
-            let before = all.level.len();
-            for row in all.coefficients.iter_mut().chain([&mut all.level]) {
-                row.resize(before + inside.len(), f64::NAN);
+            let before = rows[0].len();
+            if !wanted.is_empty() {
+                resize(&mut rows, before + wanted.start - inside.start);
+                append(centres, places.step / bank.step, &mut rows);
             }
-            if wanted.is_empty() {
-                continue;
-            }
-            let windows = centres.start - own..centres.end - own;
-            let record = self.means.of(bank.step);
-            tables.coefficients().project(record, windows, every, &mut part, &mut scratch);
-            let own = before + wanted.start - inside.start..before + wanted.end - inside.start;
-            all.level[own.clone()].copy_from_slice(&part.level);
-            for (row, found) in all.coefficients.iter_mut().zip(&part.coefficients) {
-                row[own.clone()].copy_from_slice(found);
-            }
+            resize(&mut rows, before + inside.len());
         }
-        let all = Rc::new(all);
-        if keep {
-            self.known.borrow_mut().push((bank.half, Rc::clone(&all)));
-        }
-        Ok(all)
+        rows
     }
 }

@@ -7,6 +7,7 @@ use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::engine::{self, Walk, engine};
 use crate::local_polynomials::estimates::Estimates;
 use crate::local_polynomials::evaluate::Finish;
+use crate::local_polynomials::mirrored_kernels::{LONGEST, MirroredKernel, MirroredKernels, MirroredScratch};
 use crate::local_polynomials::options::{Order, PolynomialOptions, Selection};
 use crate::record::samples::Samples;
 use crate::simd::instructions::Instructions;
@@ -15,6 +16,8 @@ use crate::simd::instructions::Instructions;
 #[derive(Debug)]
 pub(crate) struct Coefficients {
     engine: Box<dyn Walk>,
+    /// The same for windows by themselves, where they are short and no residual is followed.
+    mirrored: Option<MirroredKernels>,
     /// Degrees of the basis less one: the order whose residual is followed.
     top: usize,
     length: usize,
@@ -23,8 +26,12 @@ pub(crate) struct Coefficients {
 }
 
 /// Memory of one thread.
-#[derive(Debug)]
-pub(crate) struct CoefficientScratch(engine::EngineScratch);
+#[derive(Debug, Default)]
+pub(crate) struct CoefficientScratch {
+    /// Made when windows are stepped through first.
+    engine: Option<engine::EngineScratch>,
+    pub(crate) mirrored: MirroredScratch,
+}
 
 /// The results of some windows, one row per number.
 #[derive(Clone, Debug, Default)]
@@ -53,12 +60,16 @@ impl Coefficients {
         };
         let finish = Finish::new(&options, basis).bare(wanted);
         let engine = engine(basis, finish, residual, instructions);
-        Self { engine, top, length: basis.length(), wanted: wanted.len(), residual }
-    }
-
-    /// Memory for one thread.
-    pub(crate) fn scratch(&self) -> CoefficientScratch {
-        CoefficientScratch(self.engine.scratch())
+        let length = basis.length();
+        let short = !residual && length % 2 == 1 && length / 2 <= LONGEST;
+        let kernel = |&degree: &usize| MirroredKernel {
+            odd: degree % 2 == 1,
+            constant: 0.0,
+            outwards: basis.rows().skip(1).map(|row| row[degree]).collect(),
+        };
+        let kernels = || wanted.iter().map(kernel).collect::<Vec<_>>();
+        let mirrored = short.then(|| MirroredKernels::new(length / 2, &kernels(), instructions));
+        Self { engine, mirrored, top, length, wanted: wanted.len(), residual }
     }
 
     /// Windows that are worked on together.
@@ -86,6 +97,11 @@ impl Coefficients {
         if count == 0 {
             return;
         }
+        if let Some(mirrored) = self.mirrored.as_ref().filter(|mirrored| mirrored.serve(step, self.top + 1)) {
+            let mut rows: Vec<&mut [f64]> = coefficients.iter_mut().map(Vec::as_mut_slice).collect();
+            mirrored.apply(record, windows, step, (level, &mut rows), &mut scratch.mirrored);
+            return;
+        }
         let mut fields: Vec<&mut [f64]> = vec![level];
         fields.extend(coefficients.iter_mut().map(Vec::as_mut_slice));
         let mut estimates = Estimates {
@@ -95,7 +111,8 @@ impl Coefficients {
             status: &mut [],
             sigma: residual,
         };
-        self.engine.walk(record, windows, &mut estimates, &mut scratch.0);
+        let scratch = scratch.engine.get_or_insert_with(|| self.engine.scratch());
+        self.engine.walk(record, windows, &mut estimates, scratch);
         // What the engine gives is the noise.
         let freedom = (self.length - self.top - 1) as f64;
         for value in residual {

@@ -11,6 +11,7 @@ pub(crate) mod estimates;
 pub(crate) mod evaluate;
 pub(crate) mod incomplete;
 pub(crate) mod kernels;
+pub(crate) mod mirrored_kernels;
 pub(crate) mod neighbour_sums;
 pub(crate) mod off_centre;
 pub(crate) mod options;

@@ -84,7 +84,7 @@ impl Selector {
     pub(crate) fn scratch(&self) -> SelectionScratch {
         let rows = vec![Vec::new(); self.weights.len()];
         SelectionScratch {
-            coefficients: self.coefficients.scratch(),
+            coefficients: coefficients::CoefficientScratch::default(),
             projected: Projected::default(),
             pool: Pool::default(),
             residuals: rows.clone(),

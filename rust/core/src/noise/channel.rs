@@ -16,7 +16,7 @@
 
 use crate::error::Error;
 use crate::local_polynomials::basis::MOST_DEGREES;
-use crate::local_polynomials::coefficients::Projected;
+use crate::local_polynomials::coefficients::{CoefficientScratch, Projected};
 use crate::local_polynomials::tables::{TablesWanted, tables};
 use crate::noise::passed::{CHANCE, PassedNoise, Shown};
 use crate::noise::quantisation::{STRETCHES, quantisation_step};
@@ -165,7 +165,7 @@ fn variance(record: &dyn Samples, half: usize, weights: Option<&[f64]>, instruct
     // Windows are short, and little memory is not asked for.
     let Ok(tables) = tables(wanted) else { return f64::NAN };
     let plan = tables.coefficients();
-    let (mut scratch, mut projected) = (plan.scratch(), Projected::default());
+    let (mut scratch, mut projected) = (CoefficientScratch::default(), Projected::default());
     let (mut sum, mut count) = (0.0, 0);
     let ones = vec![1.0; length];
     for windows in stretches(record.len() + 1 - length, MOST_WINDOWS, STRETCHES) {

@@ -23,7 +23,7 @@ use faer::linalg::solvers::{Llt, Solve};
 use faer::{Mat, Side};
 
 use crate::local_polynomials::basis::Basis;
-use crate::local_polynomials::coefficients::Projected;
+use crate::local_polynomials::coefficients::{CoefficientScratch, Projected};
 use crate::local_polynomials::tables::{Kept, TablesWanted, tables};
 use crate::noise::correlated::CorrelatedNoise;
 use crate::record::samples::Samples;
@@ -189,7 +189,7 @@ fn look(record: &dyn Samples, half: usize, groups: &[Range<usize>], instructions
         return Vec::new();
     };
     let plan = tables.coefficients();
-    let (mut scratch, mut projected) = (plan.scratch(), Projected::default());
+    let (mut scratch, mut projected) = (CoefficientScratch::default(), Projected::default());
     let (mut squares, mut fourths) = (vec![0.0; HIGH.end - first], vec![0.0; HIGH.end - first]);
     let (mut windows, mut used) = (0_usize, 0);
     for places in stretches(record.len() + 1 - length, MOST_WINDOWS, STRETCHES) {
