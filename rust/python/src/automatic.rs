@@ -75,7 +75,8 @@ pub(crate) fn estimate_automatically<'py>(
                     let mut estimates = Slices {
                         values: &mut values[place..place + count],
                         errors: &mut errors[place..place + count],
-                        order: &mut order[own.clone()],
+                        // Those of the last derivative are what is returned.
+                        order: if row + 1 == derivatives.len() { &mut order[own.clone()] } else { &mut [] },
                         status: &mut flags,
                     };
                     let done = index * derivatives.len() + row;

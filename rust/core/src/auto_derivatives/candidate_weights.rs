@@ -4,11 +4,14 @@ use std::ops::Range;
 
 use crate::auto_derivatives::block_means::{BlockMeans, COARSER, Grid};
 use crate::auto_derivatives::candidates::{Bank, Target, correlated};
-use crate::auto_derivatives::global_choice::{OPTIMISM, Pair, rounded, squared_distance};
+use crate::auto_derivatives::differences::{SquaredDifferences, known_squared_distance};
+use crate::auto_derivatives::global_choice::{OPTIMISM, Pair, rounded};
 use crate::auto_derivatives::survey::CLOSELY;
 use crate::auto_derivatives::symmetric_grid::Blocks;
 use crate::error::Error;
 use crate::local_polynomials::coefficients::{CoefficientScratch, Projected};
+use crate::simd::instructions::Instructions;
+use crate::simd::vectors::dispatch;
 
 /// The windows over the record's best.
 const WINDOWS: [f64; 5] = [0.125, 0.25, 0.5, 1.0, 2.0];
@@ -28,8 +31,9 @@ const SHORTEST_BLOCK: usize = 7;
 const CHUNK: usize = 1 << 17;
 const REACHES: f64 = 16.0;
 
-/// Samples in a piece of work, at least, and in runs of the longest window: what a run computes before and after a piece is lost.
-const PIECE: usize = 1 << 14;
+/// Samples in a piece of work, at least, and in runs of the longest window: what a run computes before and after a piece is lost. Rows of some twenty
+/// candidates stay in the second nearest cache.
+const PIECE: usize = 1 << 13;
 const RUNS: usize = 2;
 
 /// A piece is longer by as many samples as a mean has, but not by more.
@@ -60,6 +64,7 @@ pub(crate) struct Refinement {
     temperatures: Vec<f64>,
     pub(crate) variances: Vec<f64>,
     pub(crate) orders: Vec<u8>,
+    pub(crate) instructions: Instructions,
 }
 
 /// The reference that candidates are compared with.
@@ -104,6 +109,9 @@ pub(crate) struct AverageScratch {
     /// The reference at its own places and at those of a bank.
     compare: Vec<f64>,
     compare_at: Vec<f64>,
+    /// The places of every block, and the sums over them.
+    parts: Vec<Range<usize>>,
+    squares: Vec<f64>,
     /// Candidates at all samples of a run, or at their own means.
     pub(crate) rows: Vec<Vec<f64>>,
     /// By bank, the first of these means.
@@ -156,6 +164,7 @@ impl Refinement {
             temperatures,
             variances,
             orders,
+            instructions: target.instructions,
         }))
     }
 
@@ -198,6 +207,8 @@ impl Refinement {
             projected: Projected::default(),
             compare: Vec::new(),
             compare_at: Vec::new(),
+            parts: Vec::new(),
+            squares: Vec::new(),
             rows: vec![Vec::new(); self.offsets.len()],
             firsts: vec![0; self.banks.len()],
         }
@@ -215,7 +226,7 @@ impl Refinement {
     ) {
         let (samples, own) = (self.samples(&blocks), &self.reference);
         let finest = self.banks.iter().map(|bank| self.step(bank)).min().unwrap_or(own.bank.step);
-        let AverageScratch { banks, reference, projected, compare, compare_at, .. } = scratch;
+        let AverageScratch { banks, reference, projected, compare, compare_at, parts, squares, .. } = scratch;
         let every = Grid::new(self.samples, finest);
         let (known, centres) = own.bank.places(self.samples, every, &every.means(&samples));
         compare.clear();
@@ -234,16 +245,28 @@ impl Refinement {
                 compare_at.clear();
                 compare_at.extend(compare[first..].iter().step_by(grid.step / finest).take(places.len()));
                 let rows = bank.estimates(means, centres, grid.step / bank.step, scratch, projected);
-                for block in self.blocks.of(grid.sample(places.start))..=self.blocks.of(grid.sample(places.end - 1)) {
+                let blocks_here =
+                    self.blocks.of(grid.sample(places.start))..self.blocks.of(grid.sample(places.end - 1)) + 1;
+                parts.clear();
+                parts.extend(blocks_here.clone().map(|block| {
                     let part = grid.means(&self.blocks.samples(block));
-                    let part = part.start.max(places.start) - places.start..part.end.min(places.end) - places.start;
-                    let (compare, from) = (&compare_at[part.clone()], block - blocks.start);
+                    part.start.max(places.start) - places.start..part.end.min(places.end) - places.start
+                }));
+                let differences = SquaredDifferences { rows, compare: compare_at, parts, sums: squares };
+                dispatch(self.instructions, differences);
+                for ((block, part), squares) in blocks_here.zip(&*parts).zip(squares.chunks_exact(rows.len())) {
+                    let from = block - blocks.start;
                     let sums = &mut sums[from * self.offsets.len() + column..];
-                    let mut count = 0.0;
-                    for (row, sum) in rows.iter().zip(sums) {
-                        let (squares, compared) = squared_differences(&row[part.clone()], compare);
-                        *sum += squares;
-                        count = compared;
+                    let mut count = part.len() as f64;
+                    for ((row, &square), sum) in rows.iter().zip(squares).zip(sums) {
+                        // NaN of a bank is NaN of all its rows.
+                        let known = if square.is_nan() {
+                            known_squared_distance(row, compare_at, part)
+                        } else {
+                            (square, count)
+                        };
+                        *sum += known.0;
+                        count = known.1;
                     }
                     counts[from * self.banks.len() + index] += count;
                 }
@@ -327,16 +350,6 @@ impl Refinement {
     }
 }
 
-/// The sum of the squared differences of two rows where both have a number, and how many these are. NaN of a bank is NaN of all its rows.
-fn squared_differences(row: &[f64], compare: &[f64]) -> (f64, f64) {
-    let sum = squared_distance(row, compare);
-    if !sum.is_nan() {
-        return (sum, row.len() as f64);
-    }
-    let squares = row.iter().zip(compare).map(|(a, b)| (a - b) * (a - b)).filter(|square| !square.is_nan());
-    squares.fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0))
-}
-
 /// Adds numbers with a weight.
 fn add(sums: &mut [f64], numbers: &[f64], weight: f64) {
     for (sum, number) in sums.iter_mut().zip(numbers) {
@@ -349,7 +362,6 @@ mod tests {
     use super::*;
     use crate::noise::correlated::CorrelatedNoise;
     use crate::noise::quantisation::tests::uniform;
-    use crate::simd::instructions::Instructions;
 
     #[test]
     fn a_few_places_tell_what_all_samples_do() {
@@ -389,7 +401,8 @@ mod tests {
                 let count: f64 = counts[index..].iter().step_by(of.banks.len()).sum();
                 assert!(count > (samples / 10) as f64);
                 for row in rows {
-                    let (all, of_all) = squared_differences(row, &compare[of.reference.candidate]);
+                    let compare = &compare[of.reference.candidate];
+                    let (all, of_all) = known_squared_distance(row, compare, &(0..row.len()));
                     let few: f64 = sums[column..].iter().step_by(of.offsets.len()).sum();
                     let ratio = few / count / (all / of_all);
                     // As much as a mean square over so many places scatters if no place tells of another.

@@ -22,6 +22,7 @@
 use std::ops::Range;
 
 use crate::auto_derivatives::candidates::{Bank, Target, correlated};
+use crate::auto_derivatives::differences::squared_distance;
 use crate::auto_derivatives::survey::{LONGEST, Survey, Surveyed};
 use crate::auto_derivatives::symmetric_grid::within;
 use crate::error::Error;
@@ -195,7 +196,7 @@ fn risks(
     }
     let distance = |row: &[f64]| {
         let sum = match &all {
-            Some(all) => squared_distance(&row[all.clone()], &compare[all.clone()]),
+            Some(all) => squared_distance(row, &compare, all),
             None => some.iter().map(|&place| (row[place] - compare[place]).powi(2)).sum(),
         };
         sum / count as f64
@@ -213,19 +214,6 @@ fn risks(
         if looked.bank.gains[candidate] >= least_gain { risk(looked, candidate, shared) + shift } else { f64::INFINITY }
     };
     shared.into_iter().enumerate().map(judged).collect()
-}
-
-/// `Σ (a - b)²`, in eight sums side by side.
-pub(crate) fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (a, b) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| (a - b) * (a - b)).sum();
-    for (a, b) in a.zip(b) {
-        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
-            *sum += (a - b) * (a - b);
-        }
-    }
-    sums.iter().sum::<f64>() + rest
 }
 
 /// The window nearest to one √2 times shorter, and the candidate of an order in it.

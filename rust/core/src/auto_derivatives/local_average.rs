@@ -27,24 +27,30 @@ use crate::auto_derivatives::block_means::{BlockMeans, Grid};
 use crate::auto_derivatives::candidate_weights::{AverageScratch, Refinement, Weighed};
 use crate::auto_derivatives::interpolated_average::{POINTS, fill_between};
 use crate::auto_derivatives::local_weights::{DerivativeOutputs, LocalWeights};
+use crate::auto_derivatives::mixture::Mixture;
 use crate::error::Error;
 use crate::exec::pool::{self, Piece, Watch};
 use crate::lanes::output::split_off;
+use crate::simd::vectors::dispatch;
 
 /// Candidates of less weight are left out, unless they add more than that to the variance: a window of an eighth has the weight of a millionth where
 /// its variance is as much larger.
 const NEGLIGIBLE: f64 = 1e-5;
 const NEGLIGIBLE_VARIANCE: f64 = 1e-3;
 
-/// The logarithm of a weight that adds nothing to one, in any number of candidates.
+/// The logarithm of a weight that is left out whatever it adds to the variance, and of one that is where its variance is at most so many times
+/// that of the best: most candidates need no exponential function.
 const NOTHING: f64 = -46.0;
+const LITTLE: f64 = -11.6;
+const MANY_TIMES: f64 = 100.0;
 
 /// Turns logarithms of weights, of which the largest is zero, into weights. Where all are left out there is nothing to average.
 fn normalise(weights: &mut [f64], variances: &[f64]) {
     let best = (0..weights.len()).max_by(|&a, &b| weights[a].total_cmp(&weights[b]));
     let variance = best.map_or(0.0, |best| variances[best]);
-    for weight in weights.iter_mut() {
-        *weight = if *weight > NOTHING { weight.exp() } else { 0.0 };
+    for (weight, own) in weights.iter_mut().zip(variances) {
+        let counts = *weight > LITTLE || (*weight > NOTHING && *own > MANY_TIMES * variance);
+        *weight = if counts { weight.exp() } else { 0.0 };
     }
     let total: f64 = weights.iter().sum();
     let mut kept = 0.0;
@@ -168,8 +174,14 @@ impl Refinement {
             order: &mut outputs.order[in_order],
         };
         self.fill(means, run, &local.used, scratch);
-        let mut missing = Vec::new();
+        let mut parts = Vec::new();
         self.between_centres(Grid::new(self.samples, 1), run.clone(), |part, place| {
+            parts.push((part.start - run.start..part.end - run.start, place));
+        });
+        let (rows, variances, orders) = (&*scratch.rows, &*self.variances, &*self.orders);
+        let left = dispatch(self.instructions, Mixture { rows, variances, orders, local, parts: &parts, outputs });
+        let mut missing = Vec::new();
+        for (part, place) in left.into_iter().map(|index| parts[index].clone()) {
             let shares = (0..candidates).filter(|&one| local.used[one]);
             let shares = shares.map(|one| Share {
                 candidate: one,
@@ -180,12 +192,12 @@ impl Refinement {
             // A few samples between the same centres.
             for first in part.clone().step_by(TOGETHER) {
                 let distance = |i: usize| place.advance * (first - part.start + i) as f64;
-                let places = first - run.start..part.end.min(first + TOGETHER) - run.start;
+                let places = first..part.end.min(first + TOGETHER);
                 for place in self.mix(&active, &std::array::from_fn(distance), places, outputs, scratch) {
                     missing.push((place, self.blocks.of(run.start + place)));
                 }
             }
-        });
+        }
         if missing.is_empty() {
             return;
         }

@@ -28,10 +28,10 @@ pub(crate) struct LocalWeights<'a> {
 /// A place between the centres of two blocks.
 #[derive(Clone, Copy)]
 pub(crate) struct Between {
-    low: usize,
-    high: usize,
+    pub(crate) low: usize,
+    pub(crate) high: usize,
     /// From the first centre, in blocks, and from one place to the next.
-    distance: f64,
+    pub(crate) distance: f64,
     pub(crate) advance: f64,
 }
 
@@ -44,6 +44,11 @@ impl LocalWeights<'_> {
     /// The same of its squared bias.
     pub(crate) fn bias(&self, candidate: usize, place: Between) -> (f64, f64) {
         self.line(self.biases, candidate, place)
+    }
+
+    /// The numbers of all candidates at the centres beside a place.
+    pub(crate) fn beside<'b>(&self, numbers: &'b [f64], place: &Between) -> [&'b [f64]; 2] {
+        [place.low, place.high].map(|block| &numbers[(block - self.first) * self.candidates..][..self.candidates])
     }
 
     fn line(&self, numbers: &[f64], candidate: usize, place: Between) -> (f64, f64) {

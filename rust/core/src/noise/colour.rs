@@ -197,10 +197,9 @@ fn look(record: &dyn Samples, half: usize, groups: &[Range<usize>], instructions
         plan.project(record, places, 1, &mut projected, &mut scratch);
         windows += projected.level.iter().filter(|level| !level.is_nan()).count();
         for ((row, square), fourth) in projected.coefficients.iter().zip(&mut squares).zip(&mut fourths) {
-            for c in row.iter().filter(|c| !c.is_nan()) {
-                *square += c * c;
-                *fourth += (c * c) * (c * c);
-            }
+            let (two, four) = moments(row);
+            *square += two;
+            *fourth += four;
         }
     }
     if windows == 0 {
@@ -220,6 +219,19 @@ fn look(record: &dyn Samples, half: usize, groups: &[Range<usize>], instructions
         }
     };
     groups.iter().map(group).collect()
+}
+
+/// The sums of the squares and of the fourth powers of all that are numbers, in eight sums side by side.
+fn moments(row: &[f64]) -> (f64, f64) {
+    let (mut squares, mut fourths) = ([0.0; 8], [0.0; 8]);
+    for some in row.chunks(8) {
+        for ((c, square), fourth) in some.iter().zip(&mut squares).zip(&mut fourths) {
+            let two = if c.is_nan() { 0.0 } else { c * c };
+            *square += two;
+            *fourth += two * two;
+        }
+    }
+    (squares.iter().sum(), fourths.iter().sum())
 }
 
 /// The mean square of some degrees' coefficients for every noise of variance one.
@@ -271,7 +283,6 @@ fn fit(seen: &[Seen], noises: &[usize]) -> (f64, Vec<f64>) {
             let part = Mat::from_fn(free.len(), free.len(), |i, j| normal[(free[i], free[j])]);
             let Ok(factor) = Llt::new(part.as_ref(), Side::Lower) else {
                 // Two noises that cannot be told apart here.
-                free.retain(|&one| one != next);
                 return (squared_misfit(seen, noises, &amounts), amounts);
             };
             let wanted = factor.solve(Mat::from_fn(free.len(), 1, |i, _| right[free[i]]));
