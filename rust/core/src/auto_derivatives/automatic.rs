@@ -178,9 +178,8 @@ pub fn estimate_automatically(
     };
     let mut outputs = DerivativeOutputs { values: estimates.values, errors: estimates.errors, order: estimates.order };
     refinement.estimate(survey.means(), &mut outputs, workers, watch)?;
-    for end in [End::First, End::Last] {
-        let mut check_cancelled = || check_cancelled(watch, total, total);
-        let at_end = boundary::estimate(survey, end, pair, &at_ends, &mut check_cancelled)?;
+    let both = boundary::estimate(survey, pair, &at_ends, &mut || check_cancelled(watch, total, total))?;
+    for (end, at_end) in both {
         for (place, (&value, &error)) in at_end.values.iter().zip(&at_end.errors).enumerate() {
             let sample = if end == End::First { place } else { samples - 1 - place };
             // Places that the windows at the end do not reach may still be reached by shorter ones inside.

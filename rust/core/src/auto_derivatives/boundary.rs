@@ -19,6 +19,7 @@
 //! windows of several lengths are averaged with weights that fall with the square of the measured risk.
 
 use std::ops::Range;
+use std::rc::Rc;
 
 use faer::linalg::solvers::{Llt, Qr};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
@@ -27,9 +28,9 @@ use faer::{Mat, Par, Side};
 use crate::auto_derivatives::block_means::{mean, step_at_end};
 use crate::auto_derivatives::candidate_weights::Reference;
 use crate::auto_derivatives::candidates::{Target, correlated};
-use crate::auto_derivatives::deconvolution::AtCentre;
 use crate::auto_derivatives::global_choice::{CheckCancelled, Pair, rounded};
-use crate::auto_derivatives::slopes::{slopes, slopes_between};
+use crate::auto_derivatives::reference_line::ReferenceLine;
+use crate::auto_derivatives::slopes::SampleSlopes;
 use crate::auto_derivatives::survey::{CLOSELY, Survey};
 use crate::error::Error;
 use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
@@ -80,46 +81,35 @@ struct Near<'a> {
     survey: &'a Survey<'a>,
     end: End,
     samples: Range<usize>,
-    /// The reference at every one of them, NaN where there is none.
-    compare: Vec<f64>,
-    kernel: Vec<f64>,
-    /// Variance of the reference.
-    gain: f64,
+    reference: Rc<ReferenceLine>,
 }
 
-/// Estimates the samples within half of a record's best window of one end; NaN where no window gives an estimate.
+/// Estimates the samples within half of a record's best window of both ends; NaN where no window gives an estimate.
 /// `check_cancelled` is called repeatedly.
 ///
 /// # Errors
 /// Those of `check_cancelled`, at once.
 pub(crate) fn estimate(
     survey: &Survey<'_>,
-    end: End,
     pair: Pair,
     target: &Target<'_>,
     check_cancelled: &mut CheckCancelled<'_>,
-) -> Result<AtEnd, Error> {
+) -> Result<Vec<(End, AtEnd)>, Error> {
     let samples = survey.record().len();
-    // Made of samples: near an end its places matter, and there are few of them.
-    let target = &Target { of_means: false, ..*target };
-    let Some(reference) = Reference::new(pair, REFERENCE, target)? else { return Ok(average(&[], pair.half)) };
+    let Some(reference) = Reference::new(pair, REFERENCE, target)? else { return Ok(Vec::new()) };
     let length = (NEAR * pair.half).max(LEAST_NEAR).min(samples);
-    let near = match end {
-        End::First => 0..length,
-        End::Last => samples - length..samples,
+    let first = Rc::new(ReferenceLine::new(survey, &(0..length), &reference));
+    let ends = [(End::First, 0..length), (End::Last, samples - length..samples)];
+    let at_end = |(end, samples): (End, Range<usize>)| {
+        let reference = if samples.start == 0 {
+            Rc::clone(&first)
+        } else {
+            Rc::new(ReferenceLine::new(survey, &samples, &reference))
+        };
+        let near = Near { survey, end, samples, reference };
+        Ok((end, near.estimate(pair, target, check_cancelled)?))
     };
-    let near = Near::new(survey, end, near, &reference);
-    let mut found = Vec::new();
-    let closely = samples <= CLOSELY;
-    for step in LADDER.step_by(if closely { 1 } else { EVERY }) {
-        let half = rounded(pair.half as f64 * (0.5 * f64::from(step)).exp2());
-        let half = if closely { half } else { survey.nearest_known(half) };
-        if (SHORTEST..samples.div_ceil(4)).contains(&half) && 2 * half < samples / 2 {
-            found.extend(near.shrink(half, pair.half, target, closely)?);
-        }
-        check_cancelled()?;
-    }
-    Ok(average(&found, pair.half))
+    ends.into_iter().map(at_end).collect()
 }
 
 /// Averages the estimates of windows of several lengths.
@@ -147,19 +137,26 @@ fn average(found: &[Shrunk], count: usize) -> AtEnd {
     at_end
 }
 
-impl<'a> Near<'a> {
-    fn new(survey: &'a Survey<'a>, end: End, samples: Range<usize>, reference: &Reference) -> Self {
-        let Reference { bank, candidate } = reference;
-        let record = survey.record();
-        let all = bank.centres(record.len());
-        let centres = samples.start.max(all.start)..samples.end.min(all.end);
-        let mut compare = vec![f64::NAN; samples.len()];
-        if !centres.is_empty() {
-            let (mut scratch, mut projected) = (bank.scratch(), Projected::default());
-            let estimates = bank.estimates(survey.means(), centres.clone(), 1, &mut scratch, &mut projected);
-            compare[centres.start - samples.start..centres.end - samples.start].copy_from_slice(&estimates[*candidate]);
+impl Near<'_> {
+    /// Averages the estimates of windows of several lengths at the first half of a record's best window.
+    fn estimate(
+        &self,
+        pair: Pair,
+        target: &Target<'_>,
+        check_cancelled: &mut CheckCancelled<'_>,
+    ) -> Result<AtEnd, Error> {
+        let (survey, samples) = (self.survey, self.survey.record().len());
+        let mut found = Vec::new();
+        let closely = samples <= CLOSELY;
+        for step in LADDER.step_by(if closely { 1 } else { EVERY }) {
+            let half = rounded(pair.half as f64 * (0.5 * f64::from(step)).exp2());
+            let half = if closely { half } else { survey.nearest_known(half) };
+            if (SHORTEST..samples.div_ceil(4)).contains(&half) && 2 * half < samples / 2 {
+                found.extend(self.shrink(half, pair.half, target, closely)?);
+            }
+            check_cancelled()?;
         }
-        Self { survey, end, samples, compare, kernel: bank.kernel(*candidate), gain: bank.gains[*candidate] }
+        Ok(average(&found, pair.half))
     }
 
     /// The estimates of windows of one length at the first `count` places, or `None` if the outermost window cannot be used.
@@ -188,42 +185,30 @@ impl<'a> Near<'a> {
         let windows = self.survey.windows(half, &self.samples, most, last)?;
         let (starts, projected) = (&windows.starts, &windows.projected);
         let correlations = correlations(basis, highest, step, target.noise);
-        let shrinkage = shrinkage(projected, highest, variance, &correlations);
+        let shrinkage = windows.shrinkage(highest, |all| shrinkage(all, highest, variance, &correlations));
         let power = i32::try_from(derivative).unwrap_or(i32::MAX);
         let scale = target.scale() / (step as f64).powi(power);
-        let polynomials = AtCentre::new(basis, step).polynomials(highest + 1);
-        let at_place = |place: usize| {
-            if step == 1 {
-                return slopes(basis, place, derivative);
-            }
-            let slopes = slopes_between(basis, (place as f64 - (length / 2) as f64) / step as f64, derivative);
-            let mut at_place = [0.0; MOST_DEGREES];
-            for (value, polynomial) in at_place.iter_mut().zip(&polynomials) {
-                *value = polynomial.iter().zip(slopes).map(|(factor, slope)| factor * slope).sum();
-            }
-            at_place
-        };
-        let shrunk_coefficients: Vec<f64> = (0..=highest)
-            .map(|j| shrinkage.iter().zip(&outermost.coefficients).map(|(row, c)| row[j] * c).sum::<f64>())
-            .collect();
+        let slopes = SampleSlopes::new(basis, step, derivative, highest + 1);
+        let shrunk = |j: usize| shrinkage.iter().zip(&outermost.coefficients).map(|(row, c)| row[j] * c).sum::<f64>();
+        let of_slopes = slopes.combined(&(0..=highest).map(shrunk).collect::<Vec<f64>>());
         let constant = f64::from(u8::from(derivative == 0));
         let value = |place: usize| {
-            let sum: f64 = at_place(place).iter().zip(&shrunk_coefficients).map(|(q, c)| q * c).sum();
+            let sum: f64 = slopes.of_basis(place).iter().zip(&of_slopes).map(|(slope, c)| slope * c).sum();
             sign * (scale * sum + constant * outermost.reference)
         };
         let values = (0..count).map(value).collect();
         let risk = |place: usize| {
-            let at_place = at_place(place);
+            let at_place = slopes.of_coefficients(place);
             let weights: Vec<f64> = shrinkage
                 .iter()
                 .map(|row| scale * row.iter().zip(&at_place).map(|(a, q)| a * q).sum::<f64>())
                 .collect();
             let estimates = BoundaryEstimates::new(projected, &weights, constant, derivative);
             let difference = |window: usize| {
-                let start = starts[window] - self.samples.start;
+                let start = starts[window];
                 [
-                    estimates.forwards[window] - self.compare[start + place],
-                    estimates.backwards[window] - self.compare[start + length - 1 - place],
+                    estimates.forwards[window] - self.reference.at(start + place),
+                    estimates.backwards[window] - self.reference.at(start + length - 1 - place),
                 ]
             };
             let differences = (0..starts.len()).flat_map(difference).filter(|difference| !difference.is_nan());
@@ -231,7 +216,7 @@ impl<'a> Near<'a> {
                 differences.fold((0.0, 0_usize), |(sum, count), difference| (sum + difference * difference, count + 1));
             let own = quadratic(&weights, &correlations);
             let shared = self.shared(basis, step, &weights, (place, target.noise));
-            let risk = sum / compared as f64 + variance * (2.0 * shared - self.gain);
+            let risk = sum / compared as f64 + variance * (2.0 * shared - self.reference.gain);
             if compared < FEWEST_WINDOWS { f64::INFINITY } else { risk.max(variance * own) }
         };
         Ok(Some(Shrunk {
@@ -244,7 +229,7 @@ impl<'a> Near<'a> {
     /// The product of the kernel at a place of a window, given by the weights of its coefficients, with that of the reference.
     fn shared(&self, basis: &Basis, step: usize, weights: &[f64], (place, noise): (usize, &CorrelatedNoise)) -> f64 {
         let length = basis.length() * step;
-        let reference = correlated(self.kernel.clone(), place.max(length - place), noise);
+        let reference = correlated(self.reference.kernel.clone(), place.max(length - place), noise);
         let reach = reference.len() / 2;
         let meeting = place.saturating_sub(reach)..length.min(place + reach + 1);
         let at = |index: usize| reference[reach + index - place];

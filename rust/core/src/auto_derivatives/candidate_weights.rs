@@ -70,8 +70,8 @@ pub(crate) struct Refinement {
 /// The reference that candidates are compared with.
 #[derive(Debug)]
 pub(crate) struct Reference {
+    /// Of one candidate.
     pub(crate) bank: Bank,
-    pub(crate) candidate: usize,
 }
 
 impl Reference {
@@ -83,7 +83,7 @@ impl Reference {
         for half in [rounded(pair.half as f64 / shorter).max(target.shortest), pair.half] {
             let Some(bank) = Bank::new(half, target)? else { continue };
             if let Some(candidate) = bank.orders.iter().position(|&order| order == pair.order) {
-                return Ok(Some(Self { bank, candidate }));
+                return Ok(Some(Self { bank: bank.only(candidate) }));
             }
         }
         Ok(None)
@@ -134,11 +134,11 @@ impl Refinement {
         for half in halves {
             banks.extend(Bank::new(half, target)?);
         }
-        let reference_gain = reference.bank.gains[reference.candidate];
+        let reference_gain = reference.bank.gains[0];
         let (mut offsets, mut differences, mut temperatures) = (Vec::new(), Vec::new(), Vec::new());
         let (mut variances, mut orders) = (Vec::new(), Vec::new());
         for bank in &banks {
-            let compared = correlated(reference.bank.kernel(reference.candidate), bank.half, target.noise);
+            let compared = correlated(reference.bank.kernel(0), bank.half, target.noise);
             let shared = bank.products(&compared);
             for ((gain, leverage), shared) in bank.gains.iter().zip(&bank.leverages).zip(shared) {
                 offsets.push(variance * (2.0 * shared + (OPTIMISM - 1.0) * gain));
@@ -234,7 +234,7 @@ impl Refinement {
             return;
         }
         let estimates = own.bank.estimates(means, centres, finest / own.bank.step, reference, projected);
-        compare.extend(&estimates[own.candidate]);
+        compare.extend(&estimates[0]);
         let mut column = 0;
         for (index, (bank, scratch)) in self.banks.iter().zip(banks).enumerate() {
             let grid = Grid::new(self.samples, self.step(bank));
@@ -401,7 +401,7 @@ mod tests {
                 let count: f64 = counts[index..].iter().step_by(of.banks.len()).sum();
                 assert!(count > (samples / 10) as f64);
                 for row in rows {
-                    let compare = &compare[of.reference.candidate];
+                    let compare = &compare[0];
                     let (all, of_all) = known_squared_distance(row, compare, &(0..row.len()));
                     let few: f64 = sums[column..].iter().step_by(of.offsets.len()).sum();
                     let ratio = few / count / (all / of_all);

@@ -134,8 +134,15 @@ impl Bank {
         Ok(Some(bank))
     }
 
-    pub(crate) fn scratch(&self) -> CoefficientScratch {
-        CoefficientScratch::default()
+    /// The same with one of the candidates.
+    pub(crate) fn only(mut self, candidate: usize) -> Self {
+        self.first += candidate;
+        self.weights.truncate(self.first + 1);
+        self.orders = vec![self.orders[candidate]];
+        self.gains = vec![self.gains[candidate]];
+        self.leverages = vec![self.leverages[candidate]];
+        self.mirrored = OnceLock::new();
+        self
     }
 
     /// Samples that are worked on together.

@@ -23,10 +23,10 @@ const MARGIN: usize = 7;
 const ERRORS: usize = 16;
 
 /// Numbers at consecutive means of a grid.
-struct Line {
-    grid: Grid,
-    first: usize,
-    values: Vec<f64>,
+pub(crate) struct Line {
+    pub(crate) grid: Grid,
+    pub(crate) first: usize,
+    pub(crate) values: Vec<f64>,
 }
 
 impl Line {
@@ -35,7 +35,7 @@ impl Line {
     }
 
     /// The same on the next finer grid, as far as there are means on both sides.
-    fn finer(&self, grid: Grid) -> Self {
+    pub(crate) fn finer(&self, grid: Grid) -> Self {
         let third = weights(1.0 / COARSER as f64 + (POINTS / 2 - 1) as f64);
         let from = self.first + POINTS / 2 - 1;
         let first = (self.grid.sample(from) - grid.first) / grid.step;
@@ -49,6 +49,20 @@ impl Line {
             three.copy_from_slice(&[around[POINTS / 2 - 1], after, before]);
         }
         Self { grid, first, values }
+    }
+
+    /// The number at a sample; NaN where there are no eight means around it, or one of them is NaN.
+    pub(crate) fn at(&self, sample: usize, stencil: &Stencil) -> f64 {
+        let (grid, count) = (self.grid, self.values.len());
+        let Some(place) = sample.checked_sub(grid.sample(self.first)) else { return f64::NAN };
+        if place % grid.step == 0 {
+            return self.values.get(place / grid.step).copied().unwrap_or(f64::NAN);
+        }
+        if count < POINTS || place > (count - 1) * grid.step {
+            return f64::NAN;
+        }
+        let (first, weights) = stencil.at(place, count);
+        self.values[first..first + POINTS].iter().zip(weights).map(|(value, weight)| value * weight).sum()
     }
 
     /// Numbers at some samples, linear in between.
@@ -70,6 +84,30 @@ fn weights(place: f64) -> [f64; POINTS] {
     })
 }
 
+/// The weights of eight means in what lies at the samples between them.
+pub(crate) struct Stencil {
+    step: usize,
+    /// By sample after the fourth of the eight.
+    in_the_middle: Vec<[f64; POINTS]>,
+}
+
+impl Stencil {
+    pub(crate) fn new(step: usize) -> Self {
+        let of = |rest: usize| weights((POINTS / 2 - 1) as f64 + rest as f64 / step as f64);
+        Self { step, in_the_middle: (0..step).map(of).collect() }
+    }
+
+    /// The first of the eight means, and their weights, at a sample counted from the first of so many means.
+    fn at(&self, sample: usize, count: usize) -> (usize, [f64; POINTS]) {
+        let (mean, rest) = (sample / self.step, sample % self.step);
+        let first = mean.saturating_sub(POINTS / 2 - 1).min(count - POINTS);
+        if first + POINTS / 2 - 1 == mean {
+            return (first, self.in_the_middle[rest]);
+        }
+        (first, weights((mean - first) as f64 + rest as f64 / self.step as f64))
+    }
+}
+
 /// Fills a row of samples from numbers at means, wherever there are eight beside each other. All of a bank are missing at the same places.
 pub(crate) fn fill_between(
     rows: &mut [Vec<f64>],
@@ -79,17 +117,16 @@ pub(crate) fn fill_between(
     known: &[Vec<f64>],
 ) {
     let Some(one) = known.first() else { return };
+    let stencil = Stencil::new(grid.step);
     let mut begin = 0;
     while begin < one.len() {
         let count = one[begin..].iter().take_while(|value| !value.is_nan()).count();
         if count >= POINTS {
             let (from, to) = (grid.sample(first + begin), grid.sample(first + begin + count - 1));
             for sample in within(samples, &(from..to + 1)) {
-                let stencil = ((sample - from) / grid.step).saturating_sub(POINTS / 2 - 1).min(count - POINTS);
-                let place = (sample - from) as f64 / grid.step as f64 - stencil as f64;
-                let weights = weights(place);
+                let (first, weights) = stencil.at(sample - from, count);
                 for (row, known) in rows.iter_mut().zip(known) {
-                    let around = &known[begin + stencil..begin + stencil + POINTS];
+                    let around = &known[begin + first..begin + first + POINTS];
                     row[sample - samples.start] =
                         around.iter().zip(&weights).map(|(value, weight)| value * weight).sum();
                 }

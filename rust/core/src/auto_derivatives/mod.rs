@@ -12,6 +12,7 @@ pub(crate) mod interpolated_average;
 pub(crate) mod local_average;
 pub(crate) mod local_weights;
 pub(crate) mod mixture;
+pub(crate) mod reference_line;
 pub(crate) mod slopes;
 pub(crate) mod survey;
 pub(crate) mod symmetric_grid;

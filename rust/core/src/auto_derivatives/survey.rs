@@ -26,8 +26,11 @@ pub(crate) const LONGEST: usize = 10_000;
 const WHOLE: usize = 1 << 16;
 const STRETCHES: usize = 16;
 
-/// Samples from one place to the next in stretches, and means of the longest windows that a stretch holds.
+/// Samples from one place to the next in stretches: of windows of any length at least, and at most.
 const STEP: usize = 9;
+const LONGEST_STEP: usize = 81;
+
+/// Means of the longest windows that a stretch holds.
 const MEANS: usize = 18;
 
 /// Places at which candidates are compared, at most.
@@ -62,18 +65,23 @@ pub(crate) struct PartOfWindows {
     begin: usize,
     pub(crate) starts: Vec<usize>,
     pub(crate) projected: Projected,
+    /// What shrinks their coefficients, by the highest degree.
+    shrinkages: RefCell<Vec<(usize, Rc<Shrinkage>)>>,
 }
 
-/// Means of a part of a record.
-struct Means<'a>(&'a [f64]);
+/// A matrix, row by row.
+pub(crate) type Shrinkage = Vec<Vec<f64>>;
 
-impl Samples for Means<'_> {
-    fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    fn read(&self, first: usize, into: &mut [f64]) {
-        self.0.read(first, into);
+impl PartOfWindows {
+    /// What shrinks the coefficients up to some degree, made once for all derivatives.
+    pub(crate) fn shrinkage(&self, highest: usize, make: impl FnOnce(&Projected) -> Shrinkage) -> Rc<Shrinkage> {
+        let mut known = self.shrinkages.borrow_mut();
+        if let Some((_, found)) = known.iter().find(|(one, _)| *one == highest) {
+            return Rc::clone(found);
+        }
+        let made = Rc::new(make(&self.projected));
+        known.push((highest, Rc::clone(&made)));
+        made
     }
 }
 
@@ -129,7 +137,11 @@ impl<'a> Survey<'a> {
         // Stretches of whole means of any window.
         let most = step_for(longest);
         let (grid, length) = (Grid::new(samples, most), MEANS.min(samples / most / STRETCHES));
-        let first = |index: usize| grid.sample((grid.count - length) * index / (STRETCHES - 1)) - most / 2;
+        // The same from both ends of the record.
+        let (last, spare) = (STRETCHES - 1, grid.count - length);
+        let from_begin = |index: usize| spare * index / last;
+        let mean = |index: usize| if 2 * index < last { from_begin(index) } else { spare - from_begin(last - index) };
+        let first = |index: usize| grid.sample(mean(index)) - most / 2;
         let stretches = (0..STRETCHES).map(|index| first(index)..first(index) + length * most).collect();
         Ok(Self { means, highest, instructions, stretches, step: STEP, closely, known, parts })
     }
@@ -218,21 +230,29 @@ impl<'a> Survey<'a> {
                 means.extend(samples[..count].chunks_exact(step).map(mean));
             }
         }
-        let (record, first): (&dyn Samples, usize) =
-            if step > 1 { (&Means(&means), beside) } else { (self.record(), begin) };
+        let means = means.as_slice();
+        let (record, first): (&dyn Samples, usize) = if step > 1 { (&means, beside) } else { (self.record(), begin) };
         let tables = self.tables(inner)?;
         let (mut scratch, mut projected) = (CoefficientScratch::default(), Projected::default());
         let windows = first..first + room.saturating_sub(beside);
         tables.coefficients().project(record, windows.clone(), every, &mut projected, &mut scratch);
         let starts = windows.step_by(every).map(|start| begin + (start - first) * step).collect();
-        let found = Rc::new(PartOfWindows { half, part: part.clone(), begin, starts, projected });
+        let found = Rc::new(PartOfWindows {
+            half,
+            part: part.clone(),
+            begin,
+            starts,
+            projected,
+            shrinkages: RefCell::default(),
+        });
         self.parts.borrow_mut().push(Rc::clone(&found));
         Ok(found)
     }
 
     /// Samples from one place of a window to the next.
     fn step_of(&self, bank: &Bank) -> usize {
-        let enough = if self.closely { 1 } else { COARSER.pow((bank.half / PLACES).clamp(1, STEP).ilog(COARSER)) };
+        let most = if self.stretches.len() > 1 { LONGEST_STEP } else { STEP };
+        let enough = if self.closely { 1 } else { COARSER.pow((bank.half / PLACES).clamp(1, most).ilog(COARSER)) };
         self.step.max(bank.step).max(enough)
     }
 
