@@ -1,5 +1,7 @@
 //! Cross-validation of window lengths: how well each predicts rows that it does not contain.
 
+use std::ops::Range;
+
 use crate::error::Error;
 use crate::exec::stages::Stages;
 use crate::regression::constants::Expected;
@@ -11,6 +13,10 @@ use crate::simd::instructions::Instructions;
 
 /// Squared errors over the noise variance are clipped to this, so that single rows do not dominate.
 const MOST: f64 = 9.0;
+
+/// Parts of the rows that must compare a length with the best, and standard errors beyond which it predicts worse.
+const FEWEST_PARTS: usize = 6;
+const WORSE: f64 = 3.0;
 
 /// A fit in windows of one length and its cross-validation error.
 #[derive(Clone, Debug)]
@@ -55,22 +61,62 @@ pub(crate) fn best(validated: &[Validated]) -> Option<&Validated> {
     validated.iter().filter(|one| one.error.is_finite()).min_by(|a, b| a.error.total_cmp(&b.error))
 }
 
-/// Mean squared error, over the noise's variance, of predicting rows from the windows on both sides of them.
-pub(crate) fn error(
+/// Which of some lengths parts of the rows do not rule out. Those are ruled out that predict worse than the best in every part, or on average by
+/// more than that differs between parts. A length that too few parts compare with the best is not ruled out.
+pub(crate) fn not_ruled_out(
     problem: &Problem<'_>,
-    scale: Scale,
-    fit: &Fit,
-    rows: std::ops::Range<usize>,
+    validated: &[Validated],
+    parts: &[Range<usize>],
     variance: f64,
-) -> f64 {
-    let Some(left) = left_of_rows(problem, scale, fit) else { return f64::NAN };
-    let (mut sum, mut count) = (0.0, 0.0);
-    for row in rows.filter(|&row| problem.usable[row]) {
-        let Some(error) = left(row) else { continue };
-        sum += (error * error / variance).min(MOST);
-        count += 1.0;
-    }
+) -> Vec<bool> {
+    let squares: Vec<Vec<f64>> = validated
+        .iter()
+        .map(|one| {
+            let squared = one.fit.scale.and_then(|scale| squared_errors(problem, scale, &one.fit, variance));
+            let of = |row| squared.as_ref().and_then(|squared| squared(row)).unwrap_or(f64::NAN);
+            (0..problem.rows()).map(of).collect()
+        })
+        .collect();
+    let place = best(validated).and_then(|best| validated.iter().position(|one| std::ptr::eq(one, best)));
+    let Some(best) = place.map(|place| &squares[place]) else { return vec![true; validated.len()] };
+    let is_worse = |squares: &Vec<f64>| {
+        let differences: Vec<f64> = parts
+            .iter()
+            .filter_map(|part| {
+                let differences = part.clone().map(|row| squares[row] - best[row]).filter(|one| one.is_finite());
+                let (sum, count) = differences.fold((0.0, 0.0), |(sum, count), one| (sum + one, count + 1.0));
+                (count > 0.0).then(|| sum / count)
+            })
+            .collect();
+        let count = differences.len() as f64;
+        let mean = differences.iter().sum::<f64>() / count;
+        let squared = differences.iter().map(|one| (one - mean).powi(2)).sum::<f64>();
+        let always = differences.iter().all(|one| *one > 0.0);
+        differences.len() >= FEWEST_PARTS && (always || mean > WORSE * (squared / (count * (count - 1.0))).sqrt())
+    };
+    squares.iter().map(|squares| !is_worse(squares)).collect()
+}
+
+/// Mean squared error, over the noise's variance, of predicting rows from the windows on both sides of them.
+pub(crate) fn error(problem: &Problem<'_>, scale: Scale, fit: &Fit, rows: Range<usize>, variance: f64) -> f64 {
+    let Some(squared) = squared_errors(problem, scale, fit, variance) else { return f64::NAN };
+    let (sum, count) =
+        rows.filter_map(squared).fold((0.0, 0.0_f64), |(sum, count), squared| (sum + squared, count + 1.0));
     if count > 0.0 { sum / count } else { f64::INFINITY }
+}
+
+/// The squared error of predicting a row from the windows on both sides of it, over the noise's variance and clipped.
+fn squared_errors<'a>(
+    problem: &'a Problem<'_>,
+    scale: Scale,
+    fit: &'a Fit,
+    variance: f64,
+) -> Option<impl Fn(usize) -> Option<f64> + 'a> {
+    let left = left_of_rows(problem, scale, fit)?;
+    Some(move |row: usize| {
+        let error = left(row).filter(|_| problem.usable[row])?;
+        Some((error * error / variance).min(MOST))
+    })
 }
 
 /// What predictions from the windows on both sides of a row leave of it; nothing where there are no such windows.
@@ -126,6 +172,26 @@ mod tests {
         assert!(spans.is_sorted_by(|long, short| long > short), "{spans:?}");
         // Of long windows chance decides which is best where nothing changes.
         assert!(spans[0] > 100 && spans[3] < 40, "{spans:?}");
+    }
+
+    #[test]
+    fn lengths_that_predict_worse_in_every_part_are_ruled_out_and_others_are_not() {
+        let mut rows = rows(ROWS, |time| [(0.06 * time).sin(), 0.06 * (0.06 * time).cos()], DEVIATION);
+        let parts: Vec<Range<usize>> = (0..8).map(|part| part * ROWS / 8..(part + 1) * ROWS / 8).collect();
+        let scales = &Scale::all(ROWS, 3)[..9];
+        let expected = white(DEVIATION * DEVIATION);
+        let mut stays = |excluded: Range<usize>| {
+            rows.exclude(excluded);
+            let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+            let found = staged(|stages| validate(&problem, scales, expected, Instructions::Scalar, stages));
+            not_ruled_out(&problem, &found, &parts, expected.variance)
+        };
+        let all = stays(0..0);
+        let left = all.iter().filter(|stays| **stays).count();
+        assert!(all.len() == scales.len() && (1..6).contains(&left) && !all[0] && !all[8], "{all:?}");
+        // Rows in five parts alone rule nothing out.
+        let few = stays(5 * ROWS / 8..ROWS);
+        assert!(few.iter().all(|stays| *stays), "{few:?}");
     }
 
     #[test]

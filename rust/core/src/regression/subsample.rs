@@ -49,12 +49,32 @@ pub(crate) fn thinned_rows(rows: &Rows, stretches: &[Range<usize>]) -> Rows {
 /// Records with more rows than this are subsampled to so many, in so many stretches, to choose hyperparameters.
 const LONG: usize = 1 << 15;
 const MOST_ROWS: usize = 1 << 14;
+const FEW_ROWS: usize = 1 << 12;
+const PART: usize = 4;
 const STRETCHES: usize = 8;
 const MORE: usize = 4;
 
 /// The stretches that represent so many rows, or `None` if the rows are few.
 pub(crate) fn stretches_of_rows(rows: usize) -> Option<Vec<Range<usize>>> {
     (rows > LONG).then(|| stretches_of_blocks(rows, MOST_ROWS, STRETCHES))
+}
+
+/// Stretches of few rows, and how many of some lengths, shortest first, they hold: enough to rule most of them out before more rows compare the
+/// others. `None` if the rows are so few that there is nothing to rule out.
+pub(crate) fn few_stretches(rows: usize, scales: &[Scale]) -> Option<(Vec<Range<usize>>, usize)> {
+    let few = FEW_ROWS.min(rows / PART);
+    let held = scales.partition_point(|scale| 2 * scale.span() <= few / STRETCHES);
+    (held > 1).then(|| (stretches_of_blocks(rows, few, STRETCHES), held))
+}
+
+/// Where stretches begin and end among the rows in them.
+pub(crate) fn places_of(stretches: &[Range<usize>]) -> Vec<Range<usize>> {
+    let lengths = stretches.iter().map(Range::len);
+    let places = lengths.scan(0, |end, length| {
+        let first = std::mem::replace(end, *end + length);
+        Some(first..*end)
+    });
+    places.collect()
 }
 
 /// More of them, for tests of constants beside which nothing is windowed: so much less is estimated from each row.
@@ -78,6 +98,12 @@ mod tests {
             assert_eq!(parts.iter().map(Range::len).sum::<usize>(), MOST_ROWS);
             assert!(parts.iter().all(|part| part.start % BLOCK == 0 && part.end <= rows));
             assert!(rows - parts[STRETCHES - 1].end < BLOCK);
+            let scales = Scale::all(rows, 6);
+            let (few, held) = few_stretches(rows, &scales).expect("lengths");
+            let places = places_of(&few);
+            assert_eq!((few.len(), places[0].start, places[STRETCHES - 1].end), (STRETCHES, 0, FEW_ROWS));
+            assert!(places.windows(2).all(|pair| pair[0].end == pair[1].start));
+            assert!(2 * scales[held - 1].span() <= few[0].len() && 2 * scales[held].span() > few[0].len());
         }
     }
 }

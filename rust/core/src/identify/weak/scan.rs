@@ -8,7 +8,7 @@ use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::session::Session;
 use crate::identify::widths::{MOST_SAMPLES, OfWidth, STRETCHES, Widths};
 use crate::regression::model::Model;
-use crate::regression::subsample::stretches_of_blocks;
+use crate::regression::subsample::{places_of, stretches_of_blocks};
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 use crate::weak_form::test_function_choice::spectrum_length;
 use crate::weak_form::weak_rows::WeakRows;
@@ -113,12 +113,7 @@ impl Session<'_, '_, '_> {
         let weak = self
             .stages
             .stage(|watch| WeakRows::build(record, function, delta, stretches.as_deref(), workers, watch))?;
-        let whole = std::slice::from_ref(&(0..count)).to_vec();
-        let ends = stretches.unwrap_or(whole).into_iter().scan(0, |end, stretch| {
-            let first = *end;
-            *end += stretch.len();
-            Some(first..*end)
-        });
-        Ok((weak, ends.collect()))
+        let places = places_of(stretches.as_deref().unwrap_or(std::slice::from_ref(&(0..count))));
+        Ok((weak, places))
     }
 }

@@ -37,13 +37,8 @@ impl Session<'_, '_, '_> {
     /// Chooses the test function, with the noise of the channels or with what the equations show of it.
     pub(crate) fn choose(&mut self, model: &Model) -> Result<Chosen, Error> {
         let mut scans = None;
-        self.noise = self.channel_noise;
-        if let Some(shown) = self.options.shown_noise {
-            self.noise[1] = shown;
-            return self.choose_once(model, &mut scans);
-        }
-        let mut chosen = self.choose_once(model, &mut scans)?;
-        if !self.show_noise(&mut chosen, model)? {
+        let mut chosen = self.choose_first(model, &mut scans)?;
+        if self.options.shown_noise.is_some() || !self.show_noise(&mut chosen, model)? {
             return Ok(chosen);
         }
         for _ in 0..ROUNDS {
@@ -65,6 +60,12 @@ impl Session<'_, '_, '_> {
             (self.noise, chosen.fitted) = (self.channel_noise, None);
         }
         Ok(chosen)
+    }
+
+    /// Chooses it with the noise of the channels, or with what was told of what the equations show.
+    pub(crate) fn choose_first(&mut self, model: &Model, scans: &mut Option<Scans>) -> Result<Chosen, Error> {
+        self.noise = [self.channel_noise[0], self.options.shown_noise.unwrap_or(self.channel_noise[1])];
+        self.choose_once(model, scans)
     }
 
     fn choose_once(&mut self, model: &Model, scans: &mut Option<Scans>) -> Result<Chosen, Error> {

@@ -5,10 +5,11 @@ use crate::error::Error;
 use crate::identify::kinds::Kind;
 use crate::identify::weak::decided::{Decided, rows_of};
 use crate::identify::weak::session::Session;
-use crate::inference::cross_validation::{Validated, best, validate};
+use crate::inference::cross_validation::{Validated, best, not_ruled_out, validate};
 use crate::regression::constants::misfits;
 use crate::regression::fit::Fit;
-use crate::regression::subsample::{holds, stretches_of_rows, thinned_rows};
+use crate::regression::problem::Problem;
+use crate::regression::subsample::{few_stretches, holds, places_of, stretches_of_rows, thinned_rows};
 use crate::regression::window_length::Scale;
 use crate::weak_form::weak_rows::WeakRows;
 
@@ -17,6 +18,15 @@ const OVERLAP: usize = 2;
 
 /// So many lengths on either side of the one that was best a step before are tried first.
 const NEAR: usize = 2;
+
+/// Lengths of windows that few rows ruled out, and their errors.
+type RuledOut = Vec<(Scale, f64)>;
+
+/// Lengths of windows that were compared by how well they predict, and the others.
+struct ComparedLengths {
+    validated: Vec<Validated>,
+    ruled_out: RuledOut,
+}
 
 impl Session<'_, '_, '_> {
     /// Fits everything that is not windowed as constant, in windows of the length that predicts best. What the noise makes of rows depends on
@@ -57,12 +67,13 @@ impl Session<'_, '_, '_> {
         if tried.is_empty() {
             return Err(self.too_short());
         }
-        let validated = match self.near_best_before(weak, decided, &tried)? {
-            Some(validated) => validated,
-            None => self.validate(rows, decided, &tried)?,
+        let ComparedLengths { validated, ruled_out } = match self.near_best_before(weak, decided, &tried)? {
+            Some(compared) => compared,
+            None => self.compare(rows, decided, &tried)?,
         };
-        let span = |one: &Validated| one.fit.scale.map_or(0, |scale| scale.span() * stride);
-        decided.lengths = validated.iter().map(|one| (span(one), one.error)).collect();
+        let compared = validated.iter().filter_map(|one| Some((one.fit.scale?, one.error)));
+        decided.lengths = compared.chain(ruled_out).map(|(scale, error)| (scale.span() * stride, error)).collect();
+        decided.lengths.sort_unstable_by_key(|(length, _)| *length);
         // Where no row can be predicted any length is as good, and the longest tells most.
         let Some(best) = best(&validated).or(validated.last()) else { return Ok(()) };
         decided.error = if best.error.is_finite() { best.error } else { 1.0 };
@@ -83,39 +94,70 @@ impl Session<'_, '_, '_> {
         weak: &WeakRows,
         decided: &Decided,
         scales: &[Scale],
-    ) -> Result<Option<Vec<Validated>>, Error> {
+    ) -> Result<Option<ComparedLengths>, Error> {
         let before = self.best_before.and_then(|samples| Scale::nearest(scales, rows_of(samples, weak.stride)));
         let Some(before) = before else { return Ok(None) };
         let near = before.saturating_sub(NEAR)..(before + NEAR + 1).min(scales.len());
-        let validated = self.validate(&weak.rows, decided, &scales[near.clone()])?;
-        let best = best(&validated).and_then(|best| best.fit.scale);
+        let compared = self.compare(&weak.rows, decided, &scales[near.clone()])?;
+        let best = best(&compared.validated).and_then(|best| best.fit.scale);
         let place = best.and_then(|best| scales.iter().position(|scale| *scale == best));
         let is_inside = |place: usize| {
             (place > near.start || near.start == 0) && (place + 1 < near.end || near.end == scales.len())
         };
-        Ok(place.is_some_and(is_inside).then_some(validated))
+        Ok(place.is_some_and(is_inside).then_some(compared))
     }
 
-    /// How well windows of some lengths predict what they have not seen: on stretches of a long record as far as they hold windows so
-    /// long, and on all of it beyond where the longest of those are best.
-    fn validate(&mut self, rows: &Rows, decided: &Decided, scales: &[Scale]) -> Result<Vec<Validated>, Error> {
-        let (instructions, expected) = (self.options.instructions, decided.expected);
-        let mut validated = |rows: &Rows, scales: &[Scale]| {
-            let correlated = decided.model.correlated(rows, &decided.covariance, &mut self.stages)?;
-            let problem = decided.model.problem(rows, &rows.rhs, self.noise[0], Some(&correlated));
-            validate(&problem, scales, expected, instructions, &mut self.stages)
-        };
+    /// How well windows of some lengths predict what they have not seen. A few rows rule out what they can; the others are compared on all
+    /// rows, or on stretches of a long record as far as they hold windows so long, and on all of it beyond where the longest of those are best.
+    fn compare(&mut self, rows: &Rows, decided: &Decided, lengths: &[Scale]) -> Result<ComparedLengths, Error> {
+        let (scales, ruled_out) = self.rule_out(rows, decided, lengths)?;
+        let all = |validated| Ok(ComparedLengths { validated, ruled_out });
         let Some(stretches) = stretches_of_rows(rows.len()).filter(|_| scales.len() > 1) else {
-            return validated(rows, scales);
+            return all(self.validate(rows, decided, &scales, |_, found| found)?);
         };
         let short = scales.partition_point(|scale| holds(*scale));
-        let found = validated(&thinned_rows(rows, &stretches), &scales[..short])?;
-        let long = short.saturating_sub(OVERLAP);
-        match best(&found).and_then(|best| best.fit.scale) {
-            Some(best) if !scales[long..].contains(&best) => Ok(found),
-            Some(_) => validated(rows, &scales[long..]),
+        let found = self.validate(&thinned_rows(rows, &stretches), decided, &scales[..short], |_, found| found)?;
+        let held = lengths.partition_point(|scale| holds(*scale)).saturating_sub(OVERLAP);
+        let long = scales.partition_point(|scale| lengths[..held].contains(scale));
+        all(match best(&found).and_then(|best| best.fit.scale) {
+            Some(best) if short == scales.len() || !scales[long..].contains(&best) => found,
+            Some(_) => self.validate(rows, decided, &scales[long..], |_, found| found)?,
             // The stretches miss the few rows that there are.
-            None => validated(rows, scales),
-        }
+            None => self.validate(rows, decided, &scales, |_, found| found)?,
+        })
+    }
+
+    /// Lengths of windows that a few rows do not rule out, and the errors of the others. Those that are too long for these rows are ruled out with the
+    /// longest that are not.
+    fn rule_out(&mut self, rows: &Rows, decided: &Decided, scales: &[Scale]) -> Result<(Vec<Scale>, RuledOut), Error> {
+        let Some((stretches, held)) = few_stretches(rows.len(), scales) else {
+            return Ok((scales.to_vec(), Vec::new()));
+        };
+        let parts = places_of(&stretches);
+        let variance = decided.expected.variance;
+        let ruled_out = |problem: &Problem<'_>, found: Vec<Validated>| -> RuledOut {
+            let stays = not_ruled_out(problem, &found, &parts, variance);
+            let out = found.iter().zip(stays).filter(|(_, stays)| !stays);
+            out.filter_map(|(one, _)| Some((one.fit.scale?, one.error))).collect()
+        };
+        let out = self.validate(&thinned_rows(rows, &stretches), decided, &scales[..held], ruled_out)?;
+        let is_out = |scale: &Scale| out.iter().any(|(one, _)| one == scale);
+        let longest = &scales[held.saturating_sub(OVERLAP)..held];
+        let left = if longest.iter().all(is_out) { &scales[..held] } else { scales };
+        Ok((left.iter().copied().filter(|scale| !is_out(scale)).collect(), out))
+    }
+
+    /// Fits in windows of some lengths, compared by how well they predict some rows.
+    fn validate<R>(
+        &mut self,
+        rows: &Rows,
+        decided: &Decided,
+        scales: &[Scale],
+        then: impl FnOnce(&Problem<'_>, Vec<Validated>) -> R,
+    ) -> Result<R, Error> {
+        let correlated = decided.model.correlated(rows, &decided.covariance, &mut self.stages)?;
+        let problem = decided.model.problem(rows, &rows.rhs, self.noise[0], Some(&correlated));
+        let found = validate(&problem, scales, decided.expected, self.options.instructions, &mut self.stages)?;
+        Ok(then(&problem, found))
     }
 }

@@ -29,7 +29,8 @@ impl Session<'_, '_, '_> {
     /// The angle that the spring's offset follows from, or `None` if the stiffness does not change by more than its noise.
     pub(crate) fn guess_angle_zero(&mut self, model: &Model, offset: usize) -> Result<Option<f64>, Error> {
         let free = with_free_offset(model, offset);
-        let mut chosen = self.choose(&free)?;
+        // If the zero alone is amiss, a free offset leaves no more than the noise of the channels.
+        let mut chosen = self.choose_first(&free, &mut None)?;
         let decided = self.take_fitted(&mut chosen, &free)?;
         Ok(decided.fit.as_ref().and_then(|fit| slope(&windows(&decided.model, fit)?)))
     }
