@@ -5,6 +5,8 @@ use std::ops::Range;
 use crate::error::Error;
 use crate::exec::stages::Stages;
 use crate::regression::problem::Correlated;
+use crate::simd::instructions::Instructions;
+use crate::simd::vectors::{Kernel, Lanes, dispatch};
 use crate::weak_form::test_function::Kernels;
 
 /// Correlations that exceed their standard deviation so many times are significant.
@@ -125,31 +127,67 @@ impl RowCovariance {
     /// Adds a column to some of its rows, each row's neighbours by their distance with one weight for those that come later and one for
     /// those that came before.
     fn add(&self, column: &[f64], rows: Range<usize>, weights: impl Fn(usize) -> [f64; 2], sums: &mut [f64]) {
-        for lag in 0..self.lags.len().min(column.len()) {
+        let lags = self.lags.len().min(column.len());
+        dispatch(Instructions::current(), AddNeighbours { lags, column, rows, weights, sums });
+    }
+}
+
+/// What [`RowCovariance::add`] does.
+struct AddNeighbours<'a, W> {
+    lags: usize,
+    column: &'a [f64],
+    rows: Range<usize>,
+    weights: W,
+    sums: &'a mut [f64],
+}
+
+impl<W: Fn(usize) -> [f64; 2]> Kernel for AddNeighbours<'_, W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _simd: S) {
+        let Self { lags, column, rows, weights, sums } = self;
+        for lag in 0..lags {
             let [later, before] = weights(lag);
             // The last rows have no neighbours so far behind them.
             let late = column.get(rows.start + lag..).unwrap_or_default();
-            sums.iter_mut().zip(late).for_each(|(sum, value)| *sum += later * value);
+            for (sum, value) in sums.iter_mut().zip(late) {
+                *sum += later * value;
+            }
             if lag > 0 && rows.end > lag {
                 let first = rows.start.max(lag);
                 let early = &column[first - lag..rows.end - lag];
-                sums[first - rows.start..].iter_mut().zip(early).for_each(|(sum, value)| *sum += before * value);
+                for (sum, value) in sums[first - rows.start..].iter_mut().zip(early) {
+                    *sum += before * value;
+                }
             }
         }
     }
 }
 
 /// The dot product of two columns, in eight sums side by side: a single one would wait for every addition.
-fn sum_of_products(one: &[f64], other: &[f64]) -> f64 {
-    let ((one, one_rest), (other, other_rest)) = (one.as_chunks::<8>(), other.as_chunks::<8>());
-    let mut sums = [0.0; 8];
-    for (one, other) in one.iter().zip(other) {
-        for lane in 0..8 {
-            sums[lane] += one[lane] * other[lane];
+pub(crate) fn sum_of_products(one: &[f64], other: &[f64]) -> f64 {
+    dispatch(Instructions::current(), DotProduct(one, other))
+}
+
+/// What [`sum_of_products`] computes.
+struct DotProduct<'a>(&'a [f64], &'a [f64]);
+
+impl Kernel for DotProduct<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _simd: S) -> f64 {
+        let ((one, one_rest), (other, other_rest)) = (self.0.as_chunks::<8>(), self.1.as_chunks::<8>());
+        let mut sums = [0.0; 8];
+        for (one, other) in one.iter().zip(other) {
+            for lane in 0..8 {
+                sums[lane] += one[lane] * other[lane];
+            }
         }
+        let rest: f64 = one_rest.iter().zip(other_rest).map(|(a, b)| a * b).sum();
+        sums.iter().sum::<f64>() + rest
     }
-    let rest: f64 = one_rest.iter().zip(other_rest).map(|(a, b)| a * b).sum();
-    sums.iter().sum::<f64>() + rest
 }
 
 /// `Σ_k a(k) b(k + lag)` for two kernels of one length.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::regression::problem::Problem;
-use crate::regression::row_covariance::RowCovariance;
+use crate::regression::row_covariance::{RowCovariance, sum_of_products};
 use crate::regression::solved::Solved;
 
 /// The influence of every row within some windows on a constant: a column of `X̃`, so that the constants are `N⁻¹ X̃ᵀ b`.
@@ -75,7 +75,7 @@ pub(crate) fn sandwich(influence: &[Vec<f64>], inverse: &[f64], covariance: &Row
 /// A row of `X̃ᵀ Γ X̃`, for one constant.
 pub(crate) fn products(influence: &[Vec<f64>], constant: usize, covariance: &RowCovariance) -> Vec<f64> {
     let noisy = covariance.times(&influence[constant]);
-    influence.iter().map(|other| other.iter().zip(&noisy).map(|(a, b)| a * b).sum()).collect()
+    influence.iter().map(|other| sum_of_products(other, &noisy)).collect()
 }
 
 /// The product `inverse · middle · inverse` of square matrices, made symmetric.

@@ -27,6 +27,9 @@ const TURNS: usize = 3;
 /// The largest part of the rows that may be over pulses: what happens more often is no event.
 const MOST: f64 = 0.3;
 
+/// More stretches of rows than this that stand out are compared with what stands out by chance in a long record, before anything is fitted again.
+const MANY: usize = 100;
+
 /// The least change of the stiffness that is a pulse, as a part of it: the bend of a ramp looks like a smaller one. And the largest part of a
 /// pulse by which the stiffness may differ before and after it: what does not come back is a jump.
 const LEAST: f64 = 0.1;
@@ -90,7 +93,11 @@ impl Session<'_, '_, '_> {
         if !known.is_empty() && !self.are_better(chosen, model, (torque, error), &mut left.rows)? {
             return Ok(Vec::new());
         }
-        let mut over = self.search(&chosen.weak, expected, &left).conspicuous();
+        let search = self.search(&chosen.weak, expected, &left);
+        let mut over = search.conspicuous();
+        if over.len() > MANY && search.is_chance(&over) {
+            return Ok(Vec::new());
+        }
         let turns = if known.is_empty() { TURNS } else { 0 };
         for _ in 0..turns {
             let rows: usize = over.iter().map(Range::len).sum();

@@ -16,6 +16,9 @@ use crate::weak_form::weak_rows::WeakRows;
 /// The exponent where none is given.
 const EXPONENT: usize = 9;
 
+/// Half-widths that the spectra of a long record suggest which the widest test functions of a scan are long, at least.
+const WIDER: usize = 8;
+
 impl Session<'_, '_, '_> {
     /// Scans the widths unless that was done, moves to the plateau where the test function that the spectra suggest is off it, and on to wider ones where
     /// windows follow noise.
@@ -33,7 +36,7 @@ impl Session<'_, '_, '_> {
         }
         let scans = match scans {
             Some(scans) => scans,
-            None => scans.insert(self.scan(model)?),
+            None => scans.insert(self.scan(model, chosen.weak.function.half_width())?),
         };
         let before = chosen.weak.function.half_width();
         let moved = if given { None } else { scans.believed(before) };
@@ -78,13 +81,15 @@ impl Session<'_, '_, '_> {
         }
     }
 
-    /// Estimates what is constant with test functions of all widths, and looks for widths that agree.
-    fn scan(&mut self, model: &Model) -> Result<Scans, Error> {
+    /// Estimates what is constant with test functions of all widths, and looks for widths that agree. Of a long record those are tried that the samples
+    /// that are scanned have room for, and some that are wider than what the spectra suggest.
+    fn scan(&mut self, model: &Model, suggested: usize) -> Result<Scans, Error> {
         let samples = self.record.angle.len();
         let noise = self.noise[0];
         let mut widths = Widths::new(model, noise, || Ok(self.evidence(spectrum_length(samples, 200))?.period()))?;
+        let widest = widths.widest(samples.min(MOST_SAMPLES)).max(WIDER * suggested).min(widths.widest(samples));
         let mut half = LEAST_HALF_WIDTH;
-        while 2 * half < widths.widest(samples) {
+        while 2 * half < widest {
             let function = TestFunction::new(half, self.options.exponent.unwrap_or(EXPONENT), self.options.delta)?;
             let (weak, stretches) = self.rows_to_scan(function)?;
             let one = OfWidth {

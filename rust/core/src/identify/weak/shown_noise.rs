@@ -82,6 +82,7 @@ impl Session<'_, '_, '_> {
             let fitted = self.take_fitted(chosen, model)?;
             let left = self.left_over_expected(&chosen.weak, &fitted)?;
             let expected = fitted.expected.variance;
+            let alone = fitted.model.windowed.is_empty();
             chosen.fitted = Some(fitted);
             let Some(left) = left.filter(|left| left.is_finite() && (raised || step > 0 || *left > MORE)) else {
                 return Ok(raised || step > 0);
@@ -92,6 +93,10 @@ impl Session<'_, '_, '_> {
             let shown = self.noise[1] + (left - 1.0) * expected / gain.variance();
             self.noise[1] = shown.max(self.channel_noise[1]);
             self.fit_near(chosen, model)?;
+            if alone {
+                // Constants leave the same whatever noise they are told of.
+                break;
+            }
         }
         Ok(true)
     }

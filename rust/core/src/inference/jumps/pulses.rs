@@ -25,6 +25,9 @@ const NEAR: usize = 2;
 const BELIEVED: f64 = 40.0;
 const LEFT: f64 = 0.25;
 
+/// What plainly stands out leaves at least so many times what is believed.
+const PLAIN: f64 = 2.0;
+
 /// A pulse that reduces the sum of squares by so much on average is believed in 19 of 20 cases: (√40 + 1.64)². And places for a length of it.
 const SEEN: f64 = 63.4;
 const STEPS_OF_PULSE: usize = 4;
@@ -138,7 +141,7 @@ impl Running {
 impl PulseSearch<'_> {
     /// Stretches of rows that leave more than noise, and those whose test function touches theirs.
     pub(crate) fn conspicuous(&self) -> Vec<Range<usize>> {
-        let reach = (self.function.len() / 2).div_ceil(self.stride);
+        let reach = self.reach();
         // A pulse that is believed leaves at least half of its squares in the rows around each of its samples.
         let least = BELIEVED / 2.0 * self.variance * self.inflation;
         let squares: Vec<f64> =
@@ -156,10 +159,28 @@ impl PulseSearch<'_> {
         found
     }
 
+    /// Whether most of what stands out in some stretches of rows is in those that hardly do: in a long record chance makes many of them.
+    pub(crate) fn is_chance(&self, over: &[Range<usize>]) -> bool {
+        let plain = PLAIN * BELIEVED * self.variance * self.inflation;
+        let reach = self.reach();
+        let (mut all, mut plainly) = (0.0, 0.0);
+        for rows in over {
+            let around = rows.start.saturating_sub(reach)..(rows.end + reach).min(self.left.len());
+            let squares: f64 = around.filter(|&row| self.usable[row]).map(|row| self.left[row].powi(2)).sum();
+            all += squares;
+            plainly += if squares > plain { squares } else { 0.0 };
+        }
+        plainly < 0.5 * all
+    }
+
+    /// Rows on either side whose test function touches that of a row.
+    fn reach(&self) -> usize {
+        (self.function.len() / 2).div_ceil(self.stride)
+    }
+
     /// The pulse in a stretch of rows, or `None` if no pulse explains what is left of them.
     pub(crate) fn within(&self, rows: &Range<usize>) -> Option<Pulse> {
-        let half = self.function.len() / 2;
-        let reach = half.div_ceil(self.stride);
+        let (half, reach) = (self.function.len() / 2, self.reach());
         let over = rows.start.saturating_sub(reach)..(rows.end + reach).min(self.left.len());
         let over: Vec<usize> = over.filter(|&row| self.usable[row]).collect();
         let begin = (self.first + rows.start * self.stride).saturating_sub(half);
@@ -330,5 +351,32 @@ mod tests {
     fn what_stays_changed_and_what_is_noise_is_no_pulse() {
         assert_eq!(found(|_| 0.0), []);
         assert_eq!(found(|n| 0.5 * (n as f64 * 0.05).sin()), []);
+    }
+
+    #[test]
+    fn what_hardly_stands_out_in_most_places_is_chance() {
+        let (ones, function) = (vec![1.0; 1000], vec![0.2; 9]);
+        let is_chance = |large: &[usize]| {
+            let mut left = vec![0.0; 1000];
+            (50..1000).step_by(50).for_each(|row| left[row] = (0.6 * BELIEVED).sqrt());
+            for &row in large {
+                left[row] = (20.0 * BELIEVED).sqrt();
+            }
+            let search = PulseSearch {
+                left: &left,
+                usable: &vec![true; 1000],
+                roots: &[],
+                signal: &ones.as_slice(),
+                function: &function,
+                first: 4,
+                stride: 1,
+                variance: 1.0,
+                inflation: 1.0,
+            };
+            let over = search.conspicuous();
+            assert_eq!(over.len(), 19);
+            search.is_chance(&over)
+        };
+        assert!(is_chance(&[]) && !is_chance(&[300]) && !is_chance(&[100, 500]));
     }
 }
