@@ -19,6 +19,8 @@ NOISE_FREE = 300.0
 """Decibels: only rounding is left."""
 CONSTANT_ERROR, STIFFNESS_ERROR = 1e-4, 1e-3
 """Of noise-free records, relative: what windows cannot follow of the stiffness is the only error."""
+LEAST_COVERAGE = 0.9
+"""Of nominal 95 % intervals of the stiffness."""
 
 
 def rounded(channel: Array) -> Array:
@@ -58,7 +60,7 @@ def coloured(kind: str, samples: int, seed: int) -> Array:
     return np.asarray(noise / noise.std())
 
 
-@pytest.mark.parametrize("kind", ["0.8", "pink"])
+@pytest.mark.parametrize("kind", ["0.8", "0.95", "pink"])
 def test_coloured_noise_of_the_torque_is_no_change_of_the_parameters(kind: str) -> None:
     within = []
     for seed in range(3):
@@ -72,8 +74,8 @@ def test_coloured_noise_of_the_torque_is_no_change_of_the_parameters(kind: str) 
             value, stderr = result.constants[name]
             assert abs(value - getattr(rig, name)[0]) < 3.5 * stderr
         within.append(np.abs(result.stiffness - rig.stiffness) < 1.96 * result.stderr["stiffness"])
-    # 95 % are meant: 85 to 97 % of twenty records, of which three scatter by some percent.
-    assert np.mean([one[INTERIOR] for one in within]) > 0.8
+    # Twelve records of each kind have 96 to 97 %, single ones 80 to 100 %.
+    assert np.mean([one[INTERIOR] for one in within]) > LEAST_COVERAGE
 
 
 @pytest.mark.parametrize(

@@ -80,6 +80,13 @@ impl RowCovariance {
         self.lags[0]
     }
 
+    /// The same correlations with another variance.
+    pub(crate) fn with_variance(mut self, variance: f64) -> Self {
+        let factor = variance / self.variance();
+        self.lags.iter_mut().for_each(|lag| *lag *= factor);
+        self
+    }
+
     /// The variance inflation, the number of rows that carry the information of one independent row: the sum of the squared correlations.
     pub(crate) fn variance_inflation(&self) -> f64 {
         let squared = |lag: &f64| (lag / self.lags[0]).powi(2);

@@ -30,8 +30,13 @@ const STEPS: usize = 4;
 const SETTLED: f64 = 0.1;
 /// The part of the torque's mean square that windows hardly longer than the test function may leave: they follow anything.
 const LEFT_BY_SHORT: f64 = 1e-5;
+/// Rows over which what is left is correlated, in reaches of a test function: where two share no sample noise of the channels may last.
+const REACHES: usize = 4;
 /// Parts of a record with constants of their own: what changes over the record is not noise.
 const PARTS: usize = 64;
+/// Windows in such a part, at least, and windows among which the part's constants take next to nothing of the noise.
+const FEW_WINDOWS: usize = 4;
+const MANY_WINDOWS: usize = 64;
 
 impl Session<'_, '_, '_> {
     /// Chooses the test function, with the noise of the channels or with what the equations show of it.
@@ -115,21 +120,45 @@ impl Session<'_, '_, '_> {
     /// What a fit leaves of rows that it did not see, over the variance that is expected: of the usual row, so that jumps, touches and spikes
     /// do not count. Nothing where it cannot be more than that.
     fn left_over_expected(&mut self, weak: &WeakRows, fitted: &Decided) -> Result<Option<f64>, Error> {
-        let Some(fit) = fitted.fit.as_ref().filter(|_| fitted.white.is_none()) else { return Ok(None) };
         if self.noise[1] == self.channel_noise[1] && !fitted.model.windowed.is_empty() && fitted.error <= MORE {
             return Ok(None);
         }
+        let (left, usable) = self.left_unseen(weak, fitted, FEW_WINDOWS)?;
+        Ok(usual_variance(&left, &usable).map(|variance| variance / fitted.expected.variance))
+    }
+
+    /// The covariance of what a fit leaves of rows that it did not see. Of those that it did see windows take a part for what they follow, most
+    /// of it where the motion is. Nothing where nothing is windowed, or no row can be told from others.
+    pub(crate) fn shown_unseen(&mut self, weak: &WeakRows, fitted: &Decided) -> Result<Option<RowCovariance>, Error> {
+        if fitted.model.windowed.is_empty() {
+            return Ok(None);
+        }
+        let (left, usable) = self.left_unseen(weak, fitted, MANY_WINDOWS)?;
+        let shown = RowCovariance::of_residuals(&left, &usable, REACHES * weak.reach());
+        Ok(Some(shown).filter(|shown| shown.variance() > 0.0))
+    }
+
+    /// What a fit leaves of every row where it did not see that row, and whether it says anything of it. Parts of the record that hold so many
+    /// windows have constants of their own.
+    fn left_unseen(
+        &mut self,
+        weak: &WeakRows,
+        fitted: &Decided,
+        windows: usize,
+    ) -> Result<(Vec<f64>, Vec<bool>), Error> {
+        let (mut left, mut usable) = (Vec::new(), Vec::new());
+        let Some(fit) = fitted.fit.as_ref().filter(|_| fitted.white.is_none()) else { return Ok((left, usable)) };
         let problem = fitted.problem(&weak.rows, self.noise[0]);
-        let longest = fit.scale.map_or(2 * weak.reach(), |scale| 2 * scale.span());
-        let parts = (problem.rows() / (2 * longest).max(1)).clamp(1, PARTS);
-        let mut left = Vec::new();
+        let span = fit.scale.map_or(weak.reach(), Scale::span);
+        let parts = (problem.rows() / (windows * span).max(1)).clamp(1, PARTS);
         for part in 0..parts {
             let rows = problem.rows() * part / parts..problem.rows() * (part + 1) / parts;
             let jumps = problem.jumps_of(&rows);
-            left.extend(self.left_of_part(&problem.part(&rows, &jumps), fit.scale, fitted.expected)?);
+            let found = self.left_of_part(&problem.part(&rows, &jumps), fit.scale, fitted.expected)?;
+            left.extend(found.0);
+            usable.extend(found.1);
         }
-        let usable = vec![true; left.len()];
-        Ok(usual_variance(&left, &usable).map(|variance| variance / fitted.expected.variance))
+        Ok((left, usable))
     }
 
     /// What is left of some rows with constants of their own.
@@ -138,19 +167,18 @@ impl Session<'_, '_, '_> {
         part: &Problem<'_>,
         scale: Option<Scale>,
         expected: Expected,
-    ) -> Result<Vec<f64>, Error> {
+    ) -> Result<(Vec<f64>, Vec<bool>), Error> {
         let instructions = self.options.instructions;
+        let nothing = || (vec![0.0; part.rows()], vec![false; part.rows()]);
         let Some(scale) = scale else {
-            let Some(fit) = Fit::new(part, None, expected, instructions, &mut self.stages)? else {
-                return Ok(Vec::new());
-            };
-            let (left, usable) = residuals(part, &fit, &mut self.stages)?;
-            return Ok(left.into_iter().zip(usable).filter(|(_, usable)| *usable).map(|(left, _)| left).collect());
+            let fit = Fit::new(part, None, expected, instructions, &mut self.stages)?;
+            return fit.map_or_else(|| Ok(nothing()), |fit| residuals(part, &fit, &mut self.stages));
         };
         let fit = Fit::with_leave_gap_out(part, scale, expected, instructions, &mut self.stages)?;
         let left = fit.as_ref().and_then(|fit| left_of_rows(part, scale, fit));
-        let Some(left) = left else { return Ok(Vec::new()) };
-        Ok((0..part.rows()).filter(|&row| part.usable[row]).filter_map(left).collect())
+        let Some(left) = left else { return Ok(nothing()) };
+        let rows = (0..part.rows()).map(|row| if part.usable[row] { left(row) } else { None });
+        Ok(rows.map(|left| (left.unwrap_or(0.0), left.is_some())).unzip())
     }
 
     /// By how much more noise the equations were chosen with than the channels show.

@@ -1,4 +1,4 @@
-//! Standard errors: from the noise of the channels, or from the residuals where that noise model fails.
+//! Standard errors: from the noise of the channels, or from the residuals where the equations show more than that.
 
 use crate::error::Error;
 use crate::identify::weak::decided::Decided;
@@ -9,6 +9,10 @@ use crate::regression::limits::{NEGLIGIBLE, NOISE_MODEL_FAILS, UNEXPLAINED};
 use crate::regression::row_covariance::RowCovariance;
 use crate::status::Status;
 use crate::weak_form::weak_rows::WeakRows;
+
+/// By how much more noise than that of the channels equations must have been chosen with: the noise of another part of a recording, whose
+/// settings are given, differs by less.
+const RAISED: f64 = 1.5;
 
 /// How errors are made.
 pub(crate) struct Errors {
@@ -55,10 +59,18 @@ impl Session<'_, '_, '_> {
         if fails || matters && errors.over_channels > NOISE_MODEL_FAILS {
             errors.status |= Status::NOISE_MODEL;
         }
+        if fails || raised > RAISED {
+            // Coloured noise is stronger where the motion is, of which windows take a part for what they follow: what they leave of rows that
+            // they do not hold has all of it.
+            let unseen = self.shown_unseen(weak, decided)?.filter(|unseen| unseen.variance() > 0.0);
+            let unseen = unseen.unwrap_or_else(|| shown.clone());
+            let least = if fails { 0.0 } else { errors.covariance.variance() };
+            let variance = unseen.variance().max(shown.variance()).max(least);
+            errors.covariance = unseen.with_variance(variance);
+        }
         if fails {
             errors.inflation = 1.0;
-            errors.expected = Expected::new(&shown, shown.variance());
-            errors.covariance = shown;
+            errors.expected = Expected::new(&errors.covariance, errors.covariance.variance());
         }
         Ok(errors)
     }
