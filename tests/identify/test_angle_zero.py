@@ -128,3 +128,16 @@ def test_an_offset_that_drifts_is_no_zero_and_is_named() -> None:
     assert "angle_zero" not in result.constants
     assert result.record_status & Status.KIND_CONTRADICTED
     assert any("('offset', 'windowed')" in line for line in result.advice)
+
+
+def test_where_nothing_is_determined_there_is_no_zero_and_settings_repeat_that() -> None:
+    # An angle for a torque: another angle at which the spring is relaxed predicts better, but no spring is known.
+    record = tvident.simulate_torsional_rig(duration=10.0, seed=6, angle_noise=1e-4)
+    result = tvident.identify(
+        record.torque, record.angle, sample_rate=1000, inertia="constant", damping="constant", lag=0.0
+    )
+    assert result.record_status & Status.RANK_DEFICIENT
+    assert "angle_zero" not in result.constants
+    again = tvident.identify(record.torque, record.angle, sample_rate=1000, settings=result.settings)
+    np.testing.assert_array_equal(again.stiffness, result.stiffness)
+    assert np.isnan(result.held_back().predicted).all()

@@ -236,13 +236,14 @@ impl Session<'_, '_, '_> {
         Ok(decided.fit.is_some())
     }
 
-    /// Takes the angle out of the constants of a record, as far as it was sought.
+    /// Takes the angle out of the constants of a record, as far as it was sought; `None` where the record does not determine it.
     pub(crate) fn take_angle_zero(&self, found: &mut WeakIdentified, decided: &Decided) -> Option<AngleZero> {
         decided.spring.as_ref()?;
         let regressor = *decided.model.constant.last()?;
         found.weakest.pop();
         let place = found.constants.iter().position(|one| one.unknown == regressor)?;
         let left = found.constants.remove(place);
-        Some(AngleZero { value: self.record.angle_zero + left.value, error: left.error })
+        let value = self.record.angle_zero + left.value;
+        value.is_finite().then_some(AngleZero { value, error: left.error })
     }
 }
