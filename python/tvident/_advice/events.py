@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import numpy.typing as npt
 
@@ -10,8 +12,6 @@ from tvident import _core
 _SHOWN = 6
 """Pulses that are listed at most."""
 
-_LONGEST = 3
-"""Samples of a spike of the angle at most; a torque can be there for two, and the machine feels it."""
 
 _TREATED = (
     ("angle", "what their neighbours say took their place"),
@@ -32,10 +32,11 @@ def lost_samples(found: _core.Identification) -> list[str]:
 
 def spikes(found: _core.Identification) -> list[str]:
     """Return how many samples of each channel stand far out of their neighbours, and what became of them."""
+    counts = Counter(channel for channel, _, _ in found.spikes)
     return [
-        f"{_out_of_neighbours(amount, _TREATED[channel][0])}: {_TREATED[channel][1]}"
-        for channel, defect, amount in found.defects
-        if defect == "spikes"
+        f"{_out_of_neighbours(counts[channel], name)}: {treated}"
+        for channel, (name, treated) in enumerate(_TREATED)
+        if counts[channel]
     ]
 
 
@@ -43,14 +44,14 @@ def spikes_that_stay(angles: npt.NDArray[np.number], torques: npt.NDArray[np.num
     """Return what to do about spikes, by record, where nothing took them out."""
     return [
         (record, f"{_out_of_neighbours(count, name)}: make them NaN, or use method='auto', which takes them out")
-        for channel, name, longest in ((angles, "angle", _LONGEST), (torques, "torque", 1))
-        for record, count in enumerate(_core.spike_counts(channel, longest))
+        for record, counts in enumerate(_core.spike_counts(angles, torques))
+        for (name, _), count in zip(_TREATED, counts, strict=True)
         if count
     ]
 
 
-def _out_of_neighbours(count: float, name: str) -> str:
-    many, stand = ("1 sample", "stands") if count == 1 else (f"{count:.0f} samples", "stand")
+def _out_of_neighbours(count: int, name: str) -> str:
+    many, stand = ("1 sample", "stands") if count == 1 else (f"{count} samples", "stand")
     return f"{many} of the {name} {stand} far out of the neighbours on both sides, as spikes of a disturbed line do"
 
 

@@ -183,7 +183,7 @@ class Explained:
     def _defects(self) -> list[str]:
         words = []
         for channel, defect, amount in self.found.defects:
-            if defect in {"broken", "spikes"}:
+            if defect == "broken":
                 continue
             name = ("angle", "torque", "velocity", "acceleration")[channel]
             if defect == "clipped":

@@ -17,6 +17,7 @@ from tvident._identify.methods import WeakForm
 from tvident._identify.remedies import Trial
 from tvident._identify.settings import Request, resolve
 from tvident._results import Identification, Words
+from tvident._identify.spikes import without_spikes
 from tvident._status import Status
 from tvident._units import ROTARY
 
@@ -124,7 +125,8 @@ class Improvement:
         """What may be missing: what the core suspects, friction and a lag, and anything where the equations of no scale can be believed."""
         suspects = [one.name for one in self._explained.suspects]
         others = ["lag", "coulomb"]
-        is_large = float(np.nanmax(np.abs(self.data.angles), initial=0.0)) > _LARGE
+        angles = without_spikes(self.data, [self.found]).angles
+        is_large = float(np.nanmax(np.abs(angles), initial=0.0)) > _LARGE
         if self.data.axis.system is ROTARY and ("cubic" in suspects or is_large):
             others.append("gravity")
         if self.found.record_status & Status.SCALES_DISAGREE:

@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use tvident::Error;
 use tvident::noise::{
     Beside, fuse as core_fuse, noise as core_noise, noise_coherence as core_coherence, quantisation_step as core_step,
-    searched, spike_count, variance_after,
+    searched, spike_counts as core_spike_counts, variance_after,
 };
 use tvident::record::Samples;
 use tvident::simd::Instructions;
@@ -136,13 +136,16 @@ pub(crate) fn noise_coherence(
     Ok(found)
 }
 
-/// How many samples of every record stand far out of calm neighbours, in runs of at most so many.
+/// How many samples of the angle and of the torque of every record stand far out of calm neighbours.
 #[pyfunction]
-pub(crate) fn spike_counts(channel: &Bound<'_, PyUntypedArray>, longest: usize) -> PyResult<Vec<usize>> {
-    let (records, mut counts) = (records(channel)?, Vec::new());
-    watched(channel.py(), None, |watch| {
-        for record in &records {
-            counts.push(spike_count(record, longest, watch)?);
+pub(crate) fn spike_counts(
+    angle: &Bound<'_, PyUntypedArray>,
+    torque: &Bound<'_, PyUntypedArray>,
+) -> PyResult<Vec<[usize; 2]>> {
+    let (angles, torques, mut counts) = (records(angle)?, records(torque)?, Vec::new());
+    watched(angle.py(), None, |watch| {
+        for (angle, torque) in angles.iter().zip(&torques) {
+            counts.push(core_spike_counts(angle, torque, watch)?);
         }
         Ok::<(), Error>(())
     })?;

@@ -47,8 +47,6 @@ pub enum Defect {
     Wrapped(f64),
     /// The angle jumps between two samples at so many places, where samples were lost.
     Broken(usize),
-    /// So many samples stand out of their neighbours.
-    Spikes(usize),
 }
 
 impl Defect {
@@ -61,7 +59,6 @@ impl Defect {
             Self::Held(_) => "held",
             Self::Wrapped(_) => "wrapped",
             Self::Broken(_) => "broken",
-            Self::Spikes(_) => "spikes",
         }
     }
 
@@ -72,11 +69,10 @@ impl Defect {
         }
     }
 
-    /// Whether the channel is doubtful: what is broken is left out of the equations, and so are spikes of the torque; those of the angle are
-    /// replaced by what their neighbours say.
+    /// Whether the channel is doubtful: what is broken is left out of the equations.
     #[must_use]
     pub fn is_doubtful(&self) -> bool {
-        !matches!(self, Self::Broken(_) | Self::Spikes(_))
+        !matches!(self, Self::Broken(_))
     }
 
     /// How much of it there is: a part of the samples, samples, the angle's unit or places.
@@ -85,7 +81,7 @@ impl Defect {
     pub fn amount(&self) -> f64 {
         match *self {
             Self::Clipped { part: amount, .. } | Self::LeftOut(amount) | Self::Wrapped(amount) => amount,
-            Self::Held(count) | Self::Broken(count) | Self::Spikes(count) => count as f64,
+            Self::Held(count) | Self::Broken(count) => count as f64,
         }
     }
 }

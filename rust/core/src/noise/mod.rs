@@ -21,4 +21,4 @@ pub use defects::Defect;
 pub use fused::{AngleNoise, Beside, fuse};
 pub use passed::PassedNoise;
 pub use quantisation::{quantisation_step, searched};
-pub use spikes::spike_count;
+pub use spikes::spike_counts;

@@ -13,8 +13,8 @@ use crate::record::samples::{Samples, all_usable, read_around};
 const SIDE: usize = 3;
 const DEGREE: usize = 3;
 
-/// Samples of a spike at most.
-pub(crate) const LONGEST: usize = 3;
+/// Samples of a spike at most, of the angle and of the torque: a torque can be there for two, and the machine feels it.
+pub(crate) const LONGEST: [usize; 2] = [3, 1];
 
 /// How far a spike stands out, in units of what is usual in the record and nearby: noise alone does so once in 10^15 samples.
 const STANDS_OUT: f64 = 8.0;
@@ -38,7 +38,7 @@ const TOGETHER: usize = 1 << 12;
 const PARTS: usize = 64;
 
 /// Samples around those that are looked at together.
-const AROUND: usize = NEARBY + 2 * SIDE + LONGEST;
+const AROUND: usize = NEARBY + 2 * SIDE + LONGEST[0];
 
 /// The part of the samples from which on they are no spikes but a noise with heavy tails, or what the machine does.
 const SELDOM: usize = 250;
@@ -68,12 +68,12 @@ impl Samples for Repaired<'_> {
     }
 }
 
-/// How many samples are spikes of at most so many samples. Costs some 2 ns a sample.
+/// How many samples of the angle and of the torque are spikes. Costs some 2 ns a sample.
 ///
 /// # Errors
 /// If the watch cancels.
-pub fn spike_count(channel: &dyn Samples, longest: usize, watch: &mut Watch<'_>) -> Result<usize, Error> {
-    spikes(channel, longest, watch).map(|found| found.len())
+pub fn spike_counts(angle: &dyn Samples, torque: &dyn Samples, watch: &mut Watch<'_>) -> Result<[usize; 2], Error> {
+    Ok([spikes(angle, LONGEST[0], watch)?.len(), spikes(torque, LONGEST[1], watch)?.len()])
 }
 
 /// The samples of all spikes of at most so many samples, in order; none where there are so many that they are no accident. Costs some 2 ns a sample.
@@ -86,8 +86,7 @@ pub(crate) fn spikes(channel: &dyn Samples, longest: usize, watch: &mut Watch<'_
     let Some(begins) = Size::usual(channel, 3, quantum, second).map(|usual| BEGINS * usual.size) else {
         return Ok(Vec::new());
     };
-    let widths: Option<Vec<Surrounded>> =
-        (1..=longest.min(LONGEST)).map(|width| Surrounded::new(width, channel, quantum)).collect();
+    let widths: Option<Vec<Surrounded>> = (1..=longest).map(|width| Surrounded::new(width, channel, quantum)).collect();
     let (Some(widths), mut found) = (widths, Vec::new()) else {
         return Ok(Vec::new());
     };
@@ -104,14 +103,19 @@ pub(crate) fn spikes(channel: &dyn Samples, longest: usize, watch: &mut Watch<'_
             if bend.abs() <= begins || found.last().is_some_and(|last: &Alone| last.end() > sample) {
                 continue;
             }
-            let distances = || widths.iter().map(|width| width.distance_at(&values, at));
-            if let Some((width, distance)) =
-                widths.iter().zip(distances()).find(|(width, distance)| width.is_alone(&values, at, *distance))
-            {
+            // The largest distance so far, NaN before any.
+            let mut furthest = f64::NAN;
+            let alone = widths.iter().find_map(|width| {
+                let distance = width.distance_at(&values, at);
+                furthest = furthest.max(distance);
+                let alone = || Alone { first: sample, distance, instead: width.instead(&values, at) };
+                width.is_alone(&values, at, distance).then(alone)
+            });
+            if let Some(alone) = alone {
                 others.forget(sample);
-                found.push(Alone { first: sample, distance, instead: width.instead(&values, at) });
-            } else if let Some(distance) = distances().filter(|distance| distance.is_finite()).reduce(f64::max) {
-                others.add(sample, distance, found.last());
+                found.push(alone);
+            } else if furthest.is_finite() {
+                others.add(sample, furthest, found.last());
             }
         }
     }
@@ -296,7 +300,7 @@ mod tests {
     use crate::noise::quantisation::tests::uniform;
 
     fn places(channel: &[f64]) -> Vec<usize> {
-        spikes(&channel, LONGEST, &mut |_, _| true).unwrap().iter().map(|spike| spike.place).collect()
+        spikes(&channel, LONGEST[0], &mut |_, _| true).unwrap().iter().map(|spike| spike.place).collect()
     }
 
     fn motion(time: f64) -> f64 {
@@ -315,7 +319,7 @@ mod tests {
         for (place, height) in all.into_iter().zip([0.05, -1.0, 20.0].into_iter().cycle()) {
             spoilt[place] += height;
         }
-        let found = spikes(&spoilt.as_slice(), LONGEST, &mut |_, _| true).unwrap();
+        let found = spikes(&spoilt.as_slice(), LONGEST[0], &mut |_, _| true).unwrap();
         let mut expected = all.to_vec();
         expected.insert(2, 4096); // between two spikes
         assert_eq!(found.iter().map(|spike| spike.place).collect::<Vec<_>>(), expected);

@@ -50,9 +50,9 @@ pub(crate) fn identify_weak(
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<WeakIdentified, Error> {
-    // A torque can be there for two samples, and the machine feels it.
-    let of_angle = if is_as_recorded(&motion.measured) { spikes(motion.angle, LONGEST, watch)? } else { Vec::new() };
-    let of_torque = if motion.measured.passed[1].is_none() { spikes(motion.torque, 1, watch)? } else { Vec::new() };
+    let of_angle = if is_as_recorded(&motion.measured) { spikes(motion.angle, LONGEST[0], watch)? } else { Vec::new() };
+    let of_torque =
+        if motion.measured.passed[1].is_none() { spikes(motion.torque, LONGEST[1], watch)? } else { Vec::new() };
     let angle = Repaired { channel: motion.angle, spikes: &of_angle };
     let repaired = if of_angle.is_empty() { None } else { Some(Motion { angle: &angle, ..motion.clone() }) };
     let motion = repaired.as_ref().unwrap_or(motion);
@@ -64,8 +64,6 @@ pub(crate) fn identify_weak(
         found = without(motion, &left_out, counted, options, workers, watch);
     }
     found.map(|mut found| {
-        found.defects[0].extend((!of_angle.is_empty()).then_some(Defect::Spikes(of_angle.len())));
-        found.defects[1].extend((!left_out.is_empty()).then_some(Defect::Spikes(left_out.len())));
         found.spikes = of_angle.iter().map(|spike| (0, spike.place, spike.instead)).collect();
         found.spikes.extend(left_out.iter().map(|&place| (1, place, f64::NAN)));
         found
