@@ -104,3 +104,19 @@ def test_records_without_events_have_none(pattern: Any, seed: int) -> None:
     for angle in (rig.angle, np.round(rig.angle / 1e-4) * 1e-4):
         result = tvident.identify(angle, rig.torque, sample_rate=RATE)
         assert not any("lost" in reason or "short while" in reason for reason in result.reasons)
+
+
+def test_touches_are_said_where_they_are() -> None:
+    rig = tvident.simulate_torsional_rig(20.0, seed=3, damping=0.041, angle_noise=1e-3, torque_snr_db=30.0)
+    generator = np.random.default_rng(3)
+    touched = np.zeros(rig.torque.size)
+    for first in generator.integers(500, rig.torque.size - 500, 6):
+        touched[first : first + generator.integers(20, 150)] += generator.uniform(0.5, 2.0) * rig.torque.std()
+    result = tvident.identify(rig.angle, rig.torque + touched, sample_rate=RATE)
+    off = np.abs(result.stiffness - rig.stiffness)
+    wrong = (off > 3 * result.stderr["stiffness"]) & (off > 0.03 * rig.stiffness)
+    assert not (wrong & result.trusted)[INSIDE].any()
+    assert result.trusted.mean() > 0.8
+    assert any("was the machine touched" in advice for advice in result.advice)
+    calm = tvident.identify(rig.angle, rig.torque, sample_rate=RATE)
+    assert calm.trusted[INSIDE].all()

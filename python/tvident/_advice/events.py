@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
+from tvident._status import Status, stretches_of
 
 _SHOWN = 6
 """Pulses that are listed at most."""
@@ -70,3 +71,20 @@ def jumps_beside_pulses(found: _core.Identification) -> list[int]:
     """Return the samples before which parameters jump, without the ends of pulses."""
     ends = {end for pulse in found.pulses for end in pulse}
     return [jump for jump in found.jumps if jump not in ends]
+
+
+def unexplained_here(found: _core.Identification, period: float, step: int) -> list[str]:
+    """Return where more is left than the noise of the rest explains, and what to do there."""
+    flagged = found.status & Status.NOISE_MODEL != 0
+    if found.outside_mask is not None or not flagged.any():
+        return []
+    begins, ends = stretches_of(flagged)
+    seconds = period * step
+    shown = ", ".join(f"{a * seconds:.4g}-{b * seconds:.4g}" for a, b in list(zip(begins, ends, strict=True))[:_SHOWN])
+    more = " …" if begins.size > _SHOWN else ""
+    words = (
+        f"in {flagged.mean():.1%} of the record (at {shown}{more} s) more is left than the noise explains: was the machine touched, "
+        "does something change there that no window follows, or is the noise larger? Errors are larger there, and values not trusted: "
+        "mask these samples, or give weights="
+    )
+    return [words]

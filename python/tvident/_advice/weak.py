@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 
 from tvident import _core
-from tvident._advice.events import jumps_beside_pulses, lost_samples, pulses, spikes
+from tvident._advice.events import (
+    jumps_beside_pulses,
+    lost_samples,
+    pulses,
+    spikes,
+    unexplained_here,
+)
 from tvident._advice.lists import listed
 from tvident._equation import BUILT_IN, COEFFICIENTS, UNITS
 from tvident._results import Words
@@ -109,10 +115,8 @@ class Explained:
             *self._feedback(),
             *self._disagreement(flags),
             *self._misfit(flags),
+            *unexplained_here(self.found, self.period, self.step),
             *self._outside(),
-        )
-        advice = (
-            *advice,
             *self._contradictions(),
             *self._free_offset(),
             *self._told_apart(flags),

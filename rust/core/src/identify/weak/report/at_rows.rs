@@ -8,12 +8,18 @@ use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::report::tracks::Tracks;
 use crate::identify::weak::report::window_sums::WindowSums;
 use crate::identify::weak::session::Session;
+use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::layout::symmetric;
+use crate::regression::limits::{NOISE_MODEL_FAILS, UNEXPLAINED};
 use crate::regression::predictor::without_constants;
 use crate::regression::problem::Problem;
 use crate::regression::sandwich::joint_covariance;
+use crate::status::Status;
 use crate::weak_form::weak_rows::WeakRows;
+
+/// The squares of independent rows of a window, over the noise's variance, add up to more than this by no chance.
+const BEYOND_CHANCE: f64 = 60.0;
 
 /// Standard errors and covariances by row, and the pairs of unknowns that the latter belong to.
 type ErrorsAtRows = (Vec<Vec<f64>>, Vec<Vec<f64>>, Vec<(usize, usize)>);
@@ -43,7 +49,8 @@ impl Session<'_, '_, '_> {
         // Residuals are those of the rows as they are, whose unit is the torque's.
         let (ordered, rows) = (decided.ordered(), &weak.rows);
         let plain = decided.white.as_ref().map(|_| ordered.problem(rows, &rows.rhs, self.noise[0], None));
-        let deviation = deviation(plain.as_ref().unwrap_or(problem), &tracks, constants, all.span, &mut self.stages)?;
+        let plain = plain.as_ref().unwrap_or(problem);
+        let left = LeftInWindows::new(plain, &tracks, constants, all.span, &mut self.stages)?;
         let mut slowly = vec![vec![0.0; tracks.status.len()]; 2 * slow];
         if let Some(found) = &decided.found {
             self.stages.fill(&mut slowly, |places, columns| {
@@ -56,8 +63,20 @@ impl Session<'_, '_, '_> {
             })?;
         }
         let slow_slopes = slowly.split_off(slow);
-        let (errors, covariances, pairs) = self.errors_at_rows(fitted, &tracks)?;
-        let Tracks { first, values, slopes, condition, status, .. } = tracks;
+        let (mut errors, mut covariances, pairs) = self.errors_at_rows(fitted, &tracks)?;
+        let Tracks { first, values, slopes, condition, mut status, .. } = tracks;
+        let least = UNEXPLAINED * rows.mean_square();
+        for (place, factor) in left.unexplained(least, &fitted.errors.expected) {
+            status[place] |= Status::NOISE_MODEL.bits();
+            for errors in &mut errors {
+                errors[place] *= factor;
+            }
+            // The second of a pair changes, too; the first may be a constant.
+            for (&(one, _), covariances) in pairs.iter().zip(&mut covariances) {
+                let constant = decided.model.constant.contains(&one);
+                covariances[place] *= if constant { factor } else { factor * factor };
+            }
+        }
         let results = RowResults {
             first: weak.first as f64 + first as f64 * weak.stride as f64,
             stride: weak.stride as f64,
@@ -65,7 +84,7 @@ impl Session<'_, '_, '_> {
             slopes: slopes.into_iter().chain(slow_slopes).collect(),
             errors,
             covariances,
-            deviation,
+            deviation: left.deviation,
             condition,
             status,
             jumps: decided.jumps.clone(),
@@ -124,40 +143,91 @@ impl Session<'_, '_, '_> {
     }
 }
 
-/// Standard deviation of what is left, over windows of so many rows.
-fn deviation(
-    problem: &Problem<'_>,
-    tracks: &Tracks,
-    constants: &[f64],
-    span: usize,
-    stages: &mut Stages<'_, '_>,
-) -> Result<Vec<f64>, Error> {
-    let mut errors = without_constants(problem, constants);
-    stages.fill([&mut errors], |rows, columns| {
-        for (row, error) in rows.zip(&mut *columns[0]) {
-            let place = (row.cast_signed() - tracks.first).unsigned_abs();
-            for unknown in 0..problem.layout.windowed {
-                *error -= tracks.values[unknown][place] * problem.windowed[unknown][row];
-                if problem.layout.linear {
-                    *error -= tracks.slopes[unknown][place] / problem.period * problem.companions[unknown][row];
+/// What is left in the window around each place.
+struct LeftInWindows {
+    /// Standard deviation, NaN where nothing is known.
+    deviation: Vec<f64>,
+    /// Rows that it is made of.
+    rows: Vec<f64>,
+}
+
+impl LeftInWindows {
+    fn new(
+        problem: &Problem<'_>,
+        tracks: &Tracks,
+        constants: &[f64],
+        span: usize,
+        stages: &mut Stages<'_, '_>,
+    ) -> Result<Self, Error> {
+        let mut errors = without_constants(problem, constants);
+        stages.fill([&mut errors], |rows, columns| {
+            for (row, error) in rows.zip(&mut *columns[0]) {
+                let place = (row.cast_signed() - tracks.first).unsigned_abs();
+                for unknown in 0..problem.layout.windowed {
+                    *error -= tracks.values[unknown][place] * problem.windowed[unknown][row];
+                    if problem.layout.linear {
+                        *error -= tracks.slopes[unknown][place] / problem.period * problem.companions[unknown][row];
+                    }
                 }
             }
-        }
-    })?;
-    let counted = errors
-        .iter()
-        .zip(problem.usable)
-        .map(|(error, &usable)| if usable && error.is_finite() { [error * error, 1.0] } else { [0.0, 0.0] });
-    let sums = WindowSums::new(&counted.collect::<Vec<_>>(), span);
-    let mut deviation = vec![f64::NAN; tracks.status.len()];
-    stages.fill([&mut deviation], |places, columns| {
-        for (place, deviation) in places.zip(&mut *columns[0]) {
-            let row = (tracks.first + place.cast_signed()).max(0).unsigned_abs();
-            let [sum, count] = sums.around(row);
-            if count > 0.0 {
-                *deviation = (sum / count).sqrt();
+        })?;
+        let counted = errors
+            .iter()
+            .zip(problem.usable)
+            .map(|(error, &usable)| if usable && error.is_finite() { [error * error, 1.0] } else { [0.0, 0.0] });
+        let sums = WindowSums::new(&counted.collect::<Vec<_>>(), span);
+        let samples = tracks.status.len();
+        let mut left = Self { deviation: vec![f64::NAN; samples], rows: vec![0.0; samples] };
+        stages.fill([&mut left.deviation, &mut left.rows], |places, columns| {
+            for (index, place) in places.enumerate() {
+                let row = (tracks.first + place.cast_signed()).max(0).unsigned_abs();
+                let [sum, count] = sums.around(row);
+                if count > 0.0 {
+                    columns[0][index] = (sum / count).sqrt();
+                    columns[1][index] = count;
+                }
             }
+        })?;
+        Ok(left)
+    }
+
+    /// Places whose windows leave so much more than the usual one, and than is expected, that neither the noise nor chance explains it, and how many
+    /// times the usual standard deviation: a touch, or a change that no window follows. What is next to nothing of the torque is not worth a word.
+    fn unexplained(&self, least: f64, expected: &Expected) -> Vec<(usize, f64)> {
+        let mut known: Vec<f64> = self.deviation.iter().copied().filter(|deviation| deviation.is_finite()).collect();
+        if known.is_empty() {
+            return Vec::new();
         }
-    })?;
-    Ok(deviation)
+        let middle = known.len() / 2;
+        let usual = *known.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let explained = expected.variance.max(usual * usual);
+        let places = self.deviation.iter().zip(&self.rows).enumerate();
+        let far = places.filter(|&(_, (deviation, rows))| {
+            let most = NOISE_MODEL_FAILS.max(BEYOND_CHANCE * expected.variance_inflation / rows) * explained;
+            deviation.powi(2) > most.max(least)
+        });
+        far.map(|(place, (deviation, _))| (place, deviation / usual)).filter(|(_, factor)| factor.is_finite()).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_chance_explains_or_is_next_to_nothing_is_explained() {
+        let expected = |variance: f64, variance_inflation: f64| Expected { variance, torque: 0.0, variance_inflation };
+        let deviation = vec![1.0, 1.0, 1.5, f64::NAN, 3.0, 1.0, 1.0];
+        let left = LeftInWindows { rows: vec![30.0; deviation.len()], deviation };
+        assert_eq!(left.unexplained(0.0, &expected(1.0, 1.0)), [(4, 3.0)]);
+        assert_eq!(left.unexplained(10.0, &expected(1.0, 1.0)), []);
+        // Two independent rows leave nine times as much by chance.
+        assert_eq!(left.unexplained(0.0, &expected(1.0, 15.0)), []);
+        // The noise of the channels explains all of it.
+        assert_eq!(left.unexplained(0.0, &expected(9.0, 1.0)), []);
+        let few = LeftInWindows { rows: vec![2.0; left.rows.len()], ..left };
+        assert_eq!(few.unexplained(0.0, &expected(1.0, 1.0)), []);
+        let unknown = LeftInWindows { deviation: vec![f64::NAN], rows: vec![0.0] };
+        assert_eq!(unknown.unexplained(0.0, &expected(1.0, 1.0)), []);
+    }
 }

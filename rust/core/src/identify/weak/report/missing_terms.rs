@@ -8,6 +8,7 @@ use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::{JudgedTerm, Missing, Suspect};
 use crate::record::derived::Interpolated;
 use crate::regression::fit::Fit;
+use crate::regression::limits::NEGLIGIBLE;
 use crate::regression::subsample::{holds, more_stretches_of_rows, stretches_of_rows, thinned_column, thinned_rows};
 use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows};
 
@@ -70,6 +71,12 @@ impl Session<'_, '_, '_> {
                 instructions: self.options.instructions,
             };
             if let Some((value, error)) = judged.factor(first + place, &mut self.stages)? {
+                // A term that is next to nothing of the torque need not be there; a lag is little of it, and much of the damping.
+                let squares = weak.rows.regressors[first + place].value.iter().map(|sample| (value * sample).powi(2));
+                let share = squares.sum::<f64>() / weak.rows.len() as f64;
+                if *missing != Missing::Lag && share < NEGLIGIBLE * weak.rows.mean_square() {
+                    continue;
+                }
                 let unit = if *missing == Missing::Lag { -1.0 / self.options.delta } else { 1.0 };
                 suspects.push(Suspect { missing: *missing, value: unit * value, error: unit.abs() * error });
             }
