@@ -17,6 +17,8 @@ from tvident import Status, recordings
 mpl.use("agg")
 Array = npt.NDArray[np.float64]
 RATE = 1000.0
+HELD = 0.01
+"""Relative error of the inertia where every fifth sample is kept, as the advice says."""
 CLIPPED = 0.01
 """What the inertia of an angle that was clipped may be wrong by."""
 DOUBT = Status.NOISE_MODEL | Status.COLOURED | Status.SCALES_DISAGREE | Status.WINDOW_LIMIT
@@ -170,6 +172,17 @@ def test_what_a_recorder_did_is_named_with_its_cure(spoil: Any, words: str) -> N
         assert abs(result.inertia[0] / recorded.inertia[0] - 1) < CLIPPED
         assert np.mean(result.status & Status.GAP != 0) > np.mean(np.diff(angle) == 0)
         assert not result.record_status & Status.SCALES_DISAGREE
+    if "holds" in words:
+        assert result.advice[0].endswith("keep every 5th sample of both channels")
+        kept = tvident.identify(angle[::5], recorded.torque[::5], sample_rate=RATE / 5)
+        assert abs(kept.inertia[0] / recorded.inertia[0] - 1) < HELD
+        assert kept.record_status == 0
+        # Steps of the torque are torque, and only late.
+        torque = np.repeat(recorded.torque[::5], 5)
+        of_torque = tvident.identify(recorded.angle, torque, sample_rate=RATE)
+        assert f"give lag={2 / RATE:.3g}" in of_torque.advice[0]
+        both = tvident.identify(angle, torque, sample_rate=RATE)
+        assert all("give lag=" not in advice for advice in both.advice[:2])
     assert not identified(recorded).record_status & Status.CHANNEL_SUSPECTED
 
 

@@ -3,16 +3,29 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
+from tvident._equation import COEFFICIENTS
 from tvident._status import Status, stretches_of
 
 _SHOWN = 6
 """Pulses that are listed at most."""
 
+_ONE_FACTOR = 0.2
+"""Inertia and stiffness change by one factor where they differ from it by less than this part of its change."""
+
+_CHANGES = 0.03
+"""A factor that changes by less is not worth a word: the root of its mean squared change."""
+
+_BEYOND_CHANCE = 4.0
+"""A change counts where it is larger than so many relative standard errors: errors of inertia and stiffness look like one factor, too."""
+
+_AGREES = 2.0
+"""Damping changes by the same factor where it differs from it by less than so many of its relative standard errors."""
 
 _TREATED = (
     ("angle", "what their neighbours say took their place"),
@@ -73,6 +86,19 @@ def jumps_beside_pulses(found: _core.Identification) -> list[int]:
     return [jump for jump in found.jumps if jump not in ends]
 
 
+def holds(found: _core.Identification, name: str, amount: float, period: float) -> str:
+    """Return what to do about a channel that holds every value for some samples."""
+    if name in {"velocity", "acceleration"}:
+        return f"holds every value for {amount:.0f} samples: keep every {amount:.0f}th sample of all channels"
+    cure = (
+        f"holds every value for {amount:.0f} samples, which makes it late by half of that: keep every {amount:.0f}th sample of "
+        "both channels"
+    )
+    # The steps of an angle are motion for the equation, whatever its lag; and channels that both hold are late alike.
+    alone = name == "torque" and not any(channel == 0 and defect == "held" for channel, defect, _ in found.defects)
+    return f"{cure}, or give lag={(amount - 1) / 2 * period:.3g} (seconds)" if alone else cure
+
+
 def unexplained_here(found: _core.Identification, period: float, step: int) -> list[str]:
     """Return where more is left than the noise of the rest explains, and what to do there."""
     flagged = found.status & Status.NOISE_MODEL != 0
@@ -88,3 +114,28 @@ def unexplained_here(found: _core.Identification, period: float, step: int) -> l
         "mask these samples, or give weights="
     )
     return [words]
+
+
+def one_factor(unknowns: Mapping[str, _core.Unknown]) -> list[str]:
+    """Return that the gain of a channel may drift, where inertia and stiffness change by one factor, and damping is not constant."""
+    changing = [unknowns[name] for name in COEFFICIENTS if name in unknowns and unknowns[name].kind != "constant"]
+    if len(changing) < len(COEFFICIENTS):
+        return []
+    inertia, damping, stiffness = [one.values / np.nanmean(one.values) - 1 for one in changing]
+    errors = [_root_mean_square(one.stderr * one.factor / np.nanmean(one.values)) for one in changing]
+    change = _root_mean_square(inertia)
+    is_one = _root_mean_square(inertia - stiffness) < _ONE_FACTOR * change
+    if not (is_one and change > max(_CHANGES, _BEYOND_CHANCE * errors[0])):
+        return []
+    # Damping is known worst, and says nothing where its errors are larger than what changes.
+    follows = _root_mean_square(damping - inertia) < _AGREES * errors[1] and errors[1] < change
+    what, rather = ("inertia, damping and stiffness", "all three") if follows else ("inertia and stiffness", "both")
+    words = (
+        f"{what} change by one factor ({np.nanmin(inertia):+.0%} to {np.nanmax(inertia):+.0%}): the gain of the torque or of the angle "
+        f"seems to drift, rather than {rather}: calibrate the channels; only ratios can be believed, such as the natural frequency"
+    )
+    return [words]
+
+
+def _root_mean_square(values: npt.NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.nanmean(values**2)))

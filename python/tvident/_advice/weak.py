@@ -11,8 +11,10 @@ import numpy as np
 
 from tvident import _core
 from tvident._advice.events import (
+    holds,
     jumps_beside_pulses,
     lost_samples,
+    one_factor,
     pulses,
     spikes,
     unexplained_here,
@@ -116,6 +118,7 @@ class Explained:
             *self._disagreement(flags),
             *self._misfit(flags),
             *unexplained_here(self.found, self.period, self.step),
+            *one_factor(dict(zip(self.names, self.found.unknowns, strict=True))),
             *self._outside(),
             *self._contradictions(),
             *self._free_offset(),
@@ -200,14 +203,8 @@ class Explained:
                     f"is clipped: {amount:.1%} of its samples lie at its largest or smallest value: they count as missing; record with a "
                     "larger range"
                 )
-            elif defect == "held" and name in {"velocity", "acceleration"}:
-                cure = f"holds every value for {amount:.0f} samples: keep every {amount:.0f}th sample of all channels"
             elif defect == "held":
-                late = (amount - 1) / 2 * (-1 if name == "angle" else 1) * self.period
-                cure = (
-                    f"holds every value for {amount:.0f} samples, which makes it late by half of that: keep every {amount:.0f}th sample of "
-                    f"both channels, or give lag={late:.3g} (seconds)"
-                )
+                cure = holds(self.found, name, amount, self.period)
             else:
                 cure = f"jumps by {amount:.4g} rad: it is wrapped, give period={_period(amount):.8g}, or the period that it has"
             words.append(f"the {name} {cure}")
