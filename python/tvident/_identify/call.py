@@ -3,33 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from functools import partial
 from typing import Any, Literal, Unpack, overload
 
-import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._clocks import Grid, grid_of
-from tvident._equation import LINEAR_UNITS, UNITS, GivenTerm
+from tvident._equation import GivenTerm
 from tvident._identify.aligned import Align
-from tvident._identify.channels import motion_channels
-from tvident._identify.data import Data
-from tvident._identify.expanded import ExpandedTask, expansions_of
-from tvident._identify.methods import Method, StrongForm
-from tvident._identify.own_clocks import lag_found, own_clocks
+from tvident._identify.methods import Method
+from tvident._identify.prepared import prepared
 from tvident._identify.records import calls_of_records, identify_records, names_shared
-from tvident._identify.robust import Loss, loss_of, with_clipped_torque
-from tvident._identify.settings import Request, resolve
-from tvident._identify.signals import Signals, channels_of_motion, even_times, instrument_of, with_own_step
-from tvident._identify.task import Task
-from tvident._identify.together import Options, identify_together, sampled
+from tvident._identify.robust import Loss
+from tvident._identify.together import Options, identify_together
 from tvident._identify.typed import Entries, OfMasses, OfOne
-from tvident._identify.weighted import usable_channels, weights_of
 from tvident._merged import Chain, Mechanism, MergedIdentification
 from tvident._results import Identification, IdentifiedRecords
-from tvident._units import ROTARY, Axis, axis_of, factor_between, scaled, unit_said
 
 
 @overload
@@ -310,137 +298,4 @@ def identify(
     records = calls_of_records(call, names := names_shared(share))
     if records is not None:
         return identify_records(identify, records, names, progress)
-    motion = {"angle": angle, "velocity": velocity, "acceleration": acceleration}
-    measured = channels_of_motion(motion)
-    first = next(iter(measured.values()))
-    axis = axis_of(
-        angle,
-        torque,
-        None if isinstance(t, tuple) else t,
-        angle_unit=angle_unit,
-        torque_unit=torque_unit,
-        time_unit=time_unit,
-    )
-    clocks = own_clocks(
-        {**motion, "torque": torque, "instrument": instrument, "mask": mask, "period": period},
-        {"sample_rate": sample_rate, "delta": delta, "t": t},
-        align,
-        time_unit=time_unit,
-        propagate=nan_policy == "propagate",
-    )
-    times: Any = t
-    if clocks is not None:
-        (measured["angle"], torque), times, delta = clocks.channels(), None, None
-        sample_rate = 1 / clocks.clocks.period
-    *arrays, torques = arguments.channels(**measured, torque=torque)
-    channels = dict(zip(measured, arrays, strict=True))
-    samples = torques.shape[-1]
-    channels = {name: scaled(values, axis.angle) if name == "angle" else values for name, values in channels.items()}
-    torques = scaled(torques, axis.torque)
-    seconds, grid, begin = _sampling(
-        {"sample_rate": sample_rate, "delta": delta, "t": times}, samples, axis, time_unit, first
-    )
-    given = {
-        "inertia": _known("inertia", inertia, axis),
-        "damping": _known("damping", damping, axis),
-        "stiffness": _known("stiffness", stiffness, axis),
-        "terms": terms,
-        "lag": lag,
-        "quantisation": _in_units_of_results("quantisation", quantisation, axis.angle),
-        "period": _in_units_of_results("period", period, axis.angle),
-    }
-    instruments = instrument_of(instrument, torques.shape)
-    request = resolve(method, given, settings, 1 / seconds, list(measured), has_instrument=instruments is not None)
-    asked = loss_of(loss, settings)
-    beside: dict[str, Any] = {
-        "velocity": velocity,
-        "acceleration": acceleration,
-        "instrument": instrument,
-        "align": align,
-    }
-    beside |= {"uneven times": grid, "a clock of the torque": clocks, "loss": asked != "squares" or None}
-    weighted = weights_of(weights, torques.shape, {**beside, "an Expansion": expansions_of(request) or None})
-    channels, torques = usable_channels(channels, torques, weighted, nan_policy)
-    doubts: list[tuple[int, str]] = []
-    turn = request.period
-    if turn is not None:
-        # Whole periods need not be multiples of the step that the angle was rounded to.
-        request = with_own_step(request, channels)
-        turned = arguments.unwrapped("angle", channels["angle"], turn)
-        channels["angle"], doubts = turned.longest("angle", split=request.counts_turns)
-    propagate = nan_policy == "propagate"
-    signals = Signals(
-        channels,
-        torques,
-        instruments,
-        arguments.mask("mask", mask, torques.shape),
-        even_times(samples, seconds, begin),
-        seconds,
-    )
-    if grid is not None:
-        signals, request = signals.on_grid(grid, request, settings, propagate=propagate, workers=workers)
-    moving = motion_channels(
-        signals.channels,
-        signals.period,
-        has_spring=request.has_spring,
-        quantisation=request.quantisation,
-        passed=signals.passed,
-    )
-    data = Data(
-        angles=moving.angles,
-        motion=moving,
-        torques=signals.torques,
-        time=signals.time,
-        period=signals.period,
-        instruments=signals.instruments,
-        mask=signals.mask,
-        propagate=propagate,
-        step=arguments.whole_number("step", step, least=1),
-        workers=arguments.worker_count(workers),
-        doubts=[*doubts, *signals.doubts, *moving.doubts],
-        labels=arguments.labels_of(first) if grid is None else None,
-        axis=axis,
-        clock=signals.clock,
-        passed=(signals.passed, signals.passed),
-        weights=weighted,
-    )
-    if clocks is not None:
-        data = clocks.finished(data, axis.torque, settings, partial(_lag_left, request))
-    task = ExpandedTask if expansions_of(request) else Task
-    data = with_clipped_torque(data, asked, lambda some: task(some, request).run(None))
-    return task(data, request).run(progress)
-
-
-def _lag_left(request: Request, data: Data) -> tuple[float, float]:
-    """Return the lag that is left in a record, and its standard error."""
-    if isinstance(request.form, StrongForm):
-        raise ValueError(  # noqa: TRY004 - a method, but not one that will do
-            "align needs the weak form; got the strong form; use WeakForm, or give the offset as a number"
-        )
-    looking = replace(request, lag="auto", lag_samples=None, by_record={})
-    return lag_found(Task(data, looking).run(None, diagnose=False).settings)
-
-
-def _sampling(
-    given: Mapping[str, Any], samples: int, axis: Axis, time_unit: str | None, first: npt.ArrayLike
-) -> tuple[float, Grid | None, float]:
-    """Return the sample period, the grid that samples are to be brought onto where their times are not uniform, and the first time."""
-    try:
-        seconds, times = sampled(given, samples, axis, time_unit, first)
-    except arguments.NotUniformError as error:
-        grid = grid_of(error.times)
-        return arguments.sample_period(samples, delta=grid.period), grid, grid.start
-    return seconds, None, arguments.begin_of(times)
-
-
-def _in_units_of_results(name: str, value: float | None, factor: float) -> float | None:
-    """Return what was given in the unit of the angle in that of results."""
-    return value if value is None or factor == 1 else arguments.finite_number(name, value) * factor
-
-
-def _known(name: str, value: Any, axis: Axis) -> Any:
-    """Return a parameter that says its unit in that of results; anything else as it is."""
-    said = unit_said(value)
-    units = UNITS if axis.system is ROTARY else LINEAR_UNITS
-    factor = factor_between(said, units[name], name=f"a known {name}") if said else 1.0
-    return value if factor == 1 else scaled(np.asarray(value), factor)
+    return prepared(call).run(progress)

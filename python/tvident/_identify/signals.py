@@ -91,7 +91,7 @@ def with_own_step(request: Request, channels: _Channels) -> Request:
 
 
 def channels_of_motion(motion: Mapping[str, npt.ArrayLike | None]) -> dict[str, npt.ArrayLike]:
-    """Return what was measured of a motion; refuse nothing."""
+    """Return what was measured of a motion, of which there must be something."""
     measured = {name: values for name, values in motion.items() if values is not None}
     if not measured:
         raise ValueError(

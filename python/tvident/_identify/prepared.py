@@ -1,0 +1,190 @@
+"""What a call of ``identify`` asks of one record or a batch: its arguments, checked and in the units of results, make one task."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident import _arguments as arguments
+from tvident._clocks import Grid, grid_of
+from tvident._equation import LINEAR_UNITS, UNITS
+from tvident._identify.channels import motion_channels
+from tvident._identify.data import Data
+from tvident._identify.expanded import ExpandedTask, expansions_of
+from tvident._identify.methods import StrongForm
+from tvident._identify.own_clocks import lag_found, own_clocks
+from tvident._identify.robust import loss_of, with_clipped_torque
+from tvident._identify.settings import Request, resolve
+from tvident._identify.signals import Signals, channels_of_motion, even_times, instrument_of, with_own_step
+from tvident._identify.task import Task
+from tvident._identify.together import sampled
+from tvident._identify.weighted import Weights, usable_channels, weights_of
+from tvident._units import ROTARY, Axis, axis_of, factor_between, scaled, unit_said
+
+
+# One step after the other, each with what all before it found.
+def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
+    """Return the task of a call.
+
+    Parameters
+    ----------
+    call : mapping of str to object
+        Arguments of :func:`identify` by name.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As :func:`identify` does.
+    """
+    motion = {"angle": call["angle"], "velocity": call["velocity"], "acceleration": call["acceleration"]}
+    measured = channels_of_motion(motion)
+    first = next(iter(measured.values()))
+    axis = axis_of(
+        call["angle"],
+        call["torque"],
+        None if isinstance(call["t"], tuple) else call["t"],
+        angle_unit=call["angle_unit"],
+        torque_unit=call["torque_unit"],
+        time_unit=call["time_unit"],
+    )
+    sampling = {name: call[name] for name in ("sample_rate", "delta", "t")}
+    beside_clocks = {name: call[name] for name in ("instrument", "mask", "period")}
+    clocks = own_clocks(
+        {**motion, "torque": call["torque"], **beside_clocks},
+        sampling,
+        call["align"],
+        time_unit=call["time_unit"],
+        propagate=call["nan_policy"] == "propagate",
+    )
+    torque = call["torque"]
+    if clocks is not None:
+        measured["angle"], torque = clocks.channels()
+        sampling = {"sample_rate": 1 / clocks.clocks.period, "delta": None, "t": None}
+    *arrays, torques = arguments.channels(**measured, torque=torque)
+    channels = dict(zip(measured, arrays, strict=True))
+    samples = torques.shape[-1]
+    channels = {name: scaled(values, axis.angle) if name == "angle" else values for name, values in channels.items()}
+    torques = scaled(torques, axis.torque)
+    seconds, grid, begin = _sampling(sampling, samples, axis, call["time_unit"], first)
+    instruments = instrument_of(call["instrument"], torques.shape)
+    request = resolve(
+        call["method"],
+        _equation(call, axis),
+        call["settings"],
+        1 / seconds,
+        list(measured),
+        has_instrument=instruments is not None,
+    )
+    asked = loss_of(call["loss"], call["settings"])
+    beside = {"uneven times": grid, "a clock of the torque": clocks, "loss": asked != "squares" or None}
+    weighted = _weights(call, torques.shape, {**beside, "an Expansion": expansions_of(request) or None})
+    channels, torques = usable_channels(channels, torques, weighted, call["nan_policy"])
+    doubts: list[tuple[int, str]] = []
+    turn = request.period
+    if turn is not None:
+        # Whole periods need not be multiples of the step that the angle was rounded to.
+        request = with_own_step(request, channels)
+        turned = arguments.unwrapped("angle", channels["angle"], turn)
+        channels["angle"], doubts = turned.longest("angle", split=request.counts_turns)
+    propagate = call["nan_policy"] == "propagate"
+    signals = Signals(
+        channels,
+        torques,
+        instruments,
+        arguments.mask("mask", call["mask"], torques.shape),
+        even_times(samples, seconds, begin),
+        seconds,
+    )
+    if grid is not None:
+        signals, request = signals.on_grid(
+            grid, request, call["settings"], propagate=propagate, workers=call["workers"]
+        )
+    moving = motion_channels(
+        signals.channels,
+        signals.period,
+        has_spring=request.has_spring,
+        quantisation=request.quantisation,
+        passed=signals.passed,
+    )
+    data = Data(
+        angles=moving.angles,
+        motion=moving,
+        torques=signals.torques,
+        time=signals.time,
+        period=signals.period,
+        instruments=signals.instruments,
+        mask=signals.mask,
+        propagate=propagate,
+        step=arguments.whole_number("step", call["step"], least=1),
+        workers=arguments.worker_count(call["workers"]),
+        doubts=[*doubts, *signals.doubts, *moving.doubts],
+        labels=arguments.labels_of(first) if grid is None else None,
+        axis=axis,
+        clock=signals.clock,
+        passed=(signals.passed, signals.passed),
+        weights=weighted,
+    )
+    if clocks is not None:
+        data = clocks.finished(data, axis.torque, call["settings"], partial(_lag_left, request))
+    task = ExpandedTask if expansions_of(request) else Task
+    data = with_clipped_torque(data, asked, lambda some: task(some, request).run(None))
+    return task(data, request)
+
+
+def _equation(call: Mapping[str, Any], axis: Axis) -> dict[str, Any]:
+    """Return what is asked of the equation, in the units of results."""
+    return {
+        "inertia": _known("inertia", call["inertia"], axis),
+        "damping": _known("damping", call["damping"], axis),
+        "stiffness": _known("stiffness", call["stiffness"], axis),
+        "terms": call["terms"],
+        "lag": call["lag"],
+        "quantisation": _in_units_of_results("quantisation", call["quantisation"], axis.angle),
+        "period": _in_units_of_results("period", call["period"], axis.angle),
+    }
+
+
+def _weights(call: Mapping[str, Any], shape: tuple[int, ...], beside: Mapping[str, Any]) -> Weights | None:
+    """Return the weights of samples, unless something is given that they do not go with."""
+    arguments_beside = {name: call[name] for name in ("velocity", "acceleration", "instrument", "align")}
+    return weights_of(call["weights"], shape, {**arguments_beside, **beside})
+
+
+def _lag_left(request: Request, data: Data) -> tuple[float, float]:
+    """Return the lag that is left in a record, and its standard error."""
+    if isinstance(request.form, StrongForm):
+        raise ValueError(  # noqa: TRY004 - a method, but not one that will do
+            "align needs the weak form; got the strong form; use WeakForm, or give the offset as a number"
+        )
+    looking = replace(request, lag="auto", lag_samples=None, by_record={})
+    return lag_found(Task(data, looking).run(None, diagnose=False).settings)
+
+
+def _sampling(
+    given: Mapping[str, Any], samples: int, axis: Axis, time_unit: str | None, first: npt.ArrayLike
+) -> tuple[float, Grid | None, float]:
+    """Return the sample period, the grid that samples are to be brought onto where their times are not uniform, and the first time."""
+    try:
+        seconds, times = sampled(given, samples, axis, time_unit, first)
+    except arguments.NotUniformError as error:
+        grid = grid_of(error.times)
+        return arguments.sample_period(samples, delta=grid.period), grid, grid.start
+    return seconds, None, arguments.begin_of(times)
+
+
+def _in_units_of_results(name: str, value: float | None, factor: float) -> float | None:
+    """Return what was given in the unit of the angle in that of results."""
+    return value if value is None or factor == 1 else arguments.finite_number(name, value) * factor
+
+
+def _known(name: str, value: Any, axis: Axis) -> Any:
+    """Return a parameter that says its unit in that of results; anything else as it is."""
+    said = unit_said(value)
+    units = UNITS if axis.system is ROTARY else LINEAR_UNITS
+    factor = factor_between(said, units[name], name=f"a known {name}") if said else 1.0
+    return value if factor == 1 else scaled(np.asarray(value), factor)
