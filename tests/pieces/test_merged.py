@@ -1,4 +1,4 @@
-"""What pieces say of a constant together is what all values say at once, however they come and whatever they count."""
+"""What pieces say of a constant together is what all values say at once, however they come; a part has the numbers wanted of it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tvident._pieces import NOTHING_SAID, Gathered
+import tvident
+from tvident._identify import Held
+from tvident._pieces import NOTHING_SAID, Gathered, Given
+from tvident._units import Axis
 
 # A sum of some tens of numbers, each rounded a few times.
 ROUNDING = 1e-12
@@ -59,3 +62,22 @@ def test_the_scatter_of_pieces_is_held_against_their_errors(counted: int, part: 
     assert np.mean(spreads) == pytest.approx(1.0, abs=0.16)
     assert all(steady)
     assert np.mean(drifting) < 0.5
+
+
+def test_a_part_has_its_numbers_where_they_are_wanted_with_what_was_chosen() -> None:
+    rig = tvident.simulate_torsional_rig(duration=6.0)
+    chosen = tvident.identify(rig.angle, rig.torque, sample_rate=1000).settings
+    held = Held(rig.angle, rig.torque, [(10_000, 16_000)])
+    given = Given("auto", {}, None, "omit", 1e-3, Axis(), 1)
+    whole = given.identified(held, chosen=chosen)
+    part = given.identified(held, chosen=chosen, wanted=(13_000, 13_900), diagnose=False)
+    # Running sums of squared errors begin elsewhere, which is rounding, amplified by exponents of some tens.
+    inside = slice(3000, 3900)
+    assert part.stiffness[inside] == pytest.approx(whole.stiffness[inside], rel=1e3 * ROUNDING)
+    for name in ("stiffness", "inertia"):
+        assert part.stderr[name][inside] == pytest.approx(whole.stderr[name][inside], rel=1e3 * ROUNDING)
+    assert part.constants == whole.constants
+    assert np.isnan(part.stiffness[:2000]).all()
+    assert np.isnan(part.stiffness[5000:]).all()
+    # Windows of the length that was chosen before, even where another predicts better here.
+    assert given.identified(held, chosen={**chosen, "regression_window": 1000}).settings["regression_window"] > 800

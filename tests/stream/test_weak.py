@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import tvident
 from tvident import IdentificationStream, Status
+from tvident._pieces import Given
 
 EARLIER = tvident.simulate_torsional_rig(duration=8.0, seed=1)
 RIG = tvident.simulate_torsional_rig(duration=12.0, seed=2)
@@ -181,3 +182,36 @@ def test_what_is_left_to_choose_and_too_few_samples_say_so() -> None:
     out = stream.finish()
     assert np.isnan(out.stiffness).all()
     assert (out.status == Status.INVALID | Status.EDGE).all()
+
+
+def test_what_may_be_missing_is_said_between_the_blocks_that_are_asked() -> None:
+    stream = IdentificationStream(sample_rate=1000, settings=SHORT)
+    late = np.roll(TORQUE, 2)
+    for first in range(0, 2796, 466):
+        stream.push(ANGLE[first : first + 466], late[first : first + 466])
+    assert Status.LAG_SUSPECTED in stream.record_status
+    # A stream that goes on from a pickle knows it, too, and the first of the next eight blocks asks again.
+    stream = pickle.loads(pickle.dumps(stream))  # noqa: S301 - our own
+    stream.push(ANGLE[2796:4000], late[2796:4000])
+    assert Status.LAG_SUSPECTED in stream.record_status
+
+
+def test_a_block_in_a_gap_leaves_the_question_to_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+    identified = Given.identified
+
+    def counted(*things: Any, wanted: tuple[int, int], diagnose: bool, **more: Any) -> tvident.Identification:
+        if diagnose:
+            asked.append(wanted[0] // 233)
+        return identified(*things, wanted=wanted, diagnose=diagnose, **more)
+
+    monkeypatch.setattr(Given, "identified", counted)
+    stream = IdentificationStream(sample_rate=1000, settings=SHORT)
+    angle = ANGLE.copy()
+    # A block has 233 samples: these are four whole ones.
+    angle[7 * 233 : 11 * 233] = np.nan
+    for first in range(0, 22 * 233, 466):
+        stream.push(angle[first : first + 466], TORQUE[first : first + 466])
+        stream = pickle.loads(pickle.dumps(stream))  # noqa: S301 - our own
+    # Every eighth, until one has an answer.
+    assert asked == [0, 8, 9, 10, 11, 19]

@@ -252,7 +252,9 @@ def _block_alone(
 ) -> tuple[Columns, dict[str, Any]]:
     span, block = places
     settings = None if choices is None else choices.settings
-    result = given.identified(_held(angle, torque, [span]), chosen=settings, step=step)
+    diagnose = settings is None or given.frozen is not None
+    held = _held(angle, torque, [span])
+    result = given.identified(held, chosen=settings, step=step, wanted=block, diagnose=diagnose)
     columns, note = part_alone(result, span, block, step)
     return columns, note if choices is not None else note | {"settings": result.settings}
 

@@ -3,7 +3,7 @@
 from tvident._identify.call import identify
 from tvident._identify.criterion import aicc, effective_observations
 from tvident._identify.methods import Method, StrongForm, WeakForm
-from tvident._identify.parts import Held, Long, Rows, Span, requested
+from tvident._identify.parts import Held, Long, Rows, Span, identify_part, requested
 from tvident._identify.settings import Request, resolve
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "aicc",
     "effective_observations",
     "identify",
+    "identify_part",
     "requested",
     "resolve",
 ]

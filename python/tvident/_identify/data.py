@@ -64,6 +64,8 @@ class Data:
         Those of samples, where they were given.
     moved : sequence of callable
         Give by how much the torque changes with each independent error of the alignment of its clock, one standard error of each.
+    wanted : (int, int), optional
+        The first sample at which numbers are wanted and the one after the last; None for all.
     """
 
     angles: npt.NDArray[np.number]
@@ -84,6 +86,7 @@ class Data:
     passed: tuple[_core.PassedNoise | None, _core.PassedNoise | None] = (None, None)
     weights: Weights | None = None
     moved: Sequence[Callable[[], npt.NDArray[np.float64]]] = ()
+    wanted: tuple[int, int] | None = None
 
     @property
     def batch(self) -> tuple[int, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from inspect import signature
 from typing import Any
 
 import numpy as np
@@ -15,13 +16,15 @@ from tvident import _core
 from tvident._derivatives import SHORTEST_WINDOW
 from tvident._equation import COEFFICIENTS, Term
 from tvident._identify.batch import estimates
+from tvident._identify.call import identify
 from tvident._identify.channels import MotionChannels
 from tvident._identify.data import Data
 from tvident._identify.methods import Method, StrongForm
+from tvident._identify.prepared import prepared
 from tvident._identify.searched import Searched
 from tvident._identify.settings import Request, plain, resolve
 from tvident._identify.task import Task
-from tvident._results import Estimates
+from tvident._results import Estimates, Identification
 from tvident._status import Status
 from tvident._units import Axis
 
@@ -94,6 +97,36 @@ def requested(
                 f"terms of a long record must be built-in; got {own.name!r}; identify parts of it in memory"
             )
     return resolve(method, given, settings, sample_rate)
+
+
+_CALL = signature(identify)
+
+
+def identify_part(
+    held: Held, options: Mapping[str, Any], wanted: Span | None, report: Any = None, *, diagnose: bool = True
+) -> Identification:
+    """Identify a part of a long record as a record of its own.
+
+    Parameters
+    ----------
+    held : Held
+        One part, with neighbours of the samples that are wanted.
+    options : mapping of str to object
+        As in :func:`identify`.
+    wanted : (int, int), optional
+        The samples of the record at which numbers are wanted; others may be NaN. All of the part if it is None.
+    report : callable, optional
+        Is told of the progress.
+    diagnose : bool
+        Look for what may be missing in the equation, and compare test functions of all widths.
+    """
+    call = _CALL.bind(held.angle, held.torque, **options)
+    call.apply_defaults()
+    first = held.spans[0][0]
+    own = None if wanted is None else (max(wanted[0] - first, 0), min(wanted[1] - first, held.angle.size))
+    task = prepared({**call.arguments, "wanted": own})
+    assert isinstance(task, Task)  # noqa: S101 - what is known of a long record is a number
+    return task.run(report, diagnose=diagnose)
 
 
 class Long(Task):

@@ -34,7 +34,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
     Parameters
     ----------
     call : mapping of str to object
-        Arguments of :func:`identify` by name.
+        Arguments of :func:`identify` by name, and `wanted`, the samples at which numbers are wanted, where these are not all.
 
     Raises
     ------
@@ -128,6 +128,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         clock=signals.clock,
         passed=(signals.passed, signals.passed),
         weights=weighted,
+        wanted=None if isinstance(request.form, StrongForm) else call.get("wanted"),
     )
     if clocks is not None:
         data = clocks.finished(data, axis.torque, call["settings"], partial(_lag_left, request))

@@ -115,6 +115,7 @@ class Task:
             weights=data.weights_of_core,
             propagate=data.propagate,
             step=data.step,
+            wanted=data.wanted,
             diagnose=diagnose,
             instrument=data.instruments,
             workers=data.workers,

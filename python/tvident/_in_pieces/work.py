@@ -14,6 +14,13 @@ from tvident._results import Identification
 Report = Callable[[int, int], object] | None
 
 
+class Identify(Protocol):
+    """Identifies some samples as a record of its own."""
+
+    def __call__(self, held: Held, report: Report, *, wanted: Span) -> Identification:
+        """Return what is known of the wanted samples, and of constants."""
+
+
 class Work(Protocol):
     """Finds the numbers of a piece."""
 
@@ -74,7 +81,7 @@ class Alone:
     ----------
     recording : Recording
     identified : callable
-        Identifies angle and torque with settings that do not depend on the piece.
+        Identifies some samples with settings that do not depend on the piece.
     reach : int
         Neighbours on each side.
     step : int
@@ -83,7 +90,7 @@ class Alone:
     is_final: ClassVar[bool] = False
 
     recording: Recording
-    identified: Callable[[Held, Report], Identification]
+    identified: Identify
     reach: int
     step: int
 
@@ -91,7 +98,7 @@ class Alone:
         """Return columns of the samples of a piece, and its constants with their covariance."""
         samples = self.recording.samples
         span = with_neighbours(wanted, self.reach, samples, self.step)
-        result = self.identified(self.recording.held([span]), report)
+        result = self.identified(self.recording.held([span]), report, wanted=wanted)
         columns, note = part_alone(result, span, wanted, self.step)
         if span[1] - span[0] == samples:
             note |= {"settings": result.settings, "advice": list(result.advice)}

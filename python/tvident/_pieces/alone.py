@@ -19,7 +19,7 @@ Columns = dict[str, npt.NDArray[Any]]
 SHARED = "_shared_"
 """How columns begin that are kept until the constants of all pieces are known."""
 
-_LEAST_REACH = 4096
+_LEAST_REACH = 2048
 """Neighbours of a piece that is a record of its own, at least."""
 
 _REACH = 4

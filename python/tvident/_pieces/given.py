@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tvident import _arguments as arguments
-from tvident._identify import Held, Method, WeakForm, identify
+from tvident._identify import Held, Method, Span, WeakForm, identify_part
 from tvident._results import Identification
 from tvident._units import ROTARY, Axis
 
@@ -44,27 +44,45 @@ class Given:
         return self.settings if arguments.is_word(self.method, "auto") else None
 
     def identified(
-        self, held: Held, report: Any = None, *, chosen: Mapping[str, Any] | None = None, step: int = 1
+        self,
+        held: Held,
+        report: Any = None,
+        *,
+        chosen: Mapping[str, Any] | None = None,
+        step: int = 1,
+        wanted: Span | None = None,
+        diagnose: bool = True,
     ) -> Identification:
-        """Identify a part, with what was chosen for the whole record if anything was."""
+        """Identify a part, with what was chosen for the whole record if anything was.
+
+        Parameters
+        ----------
+        held : Held
+        report : callable, optional
+        chosen : mapping, optional
+            Settings that all parts take as they are.
+        step : int
+        wanted : (int, int), optional
+            The samples of the record that the part is identified for; its others are neighbours.
+        diagnose : bool
+            Look for what may be missing in the equation.
+        """
         equation: dict[str, Any] = {name: value for name, value in self.equation.items() if value is not None}
         method, settings = self.method, self.settings
         if chosen is not None:
             # What was chosen is in the settings; what was given to choose from is not asked again.
             equation = {} if settings is None else equation
-            method, settings = "auto" if isinstance(method, WeakForm) else method, chosen
+            # Nor is the length of windows that predicts best, which a record of its own would choose anew.
+            method, settings = "auto" if isinstance(method, WeakForm) else method, {**chosen, "chosen": []}
         units: dict[str, Any] = {} if self.axis.system is ROTARY else {"angle_unit": "m", "torque_unit": "N"}
-        found: Identification = identify(
-            held.angle,
-            held.torque,
-            delta=self.period,
-            method=method,
-            settings=settings,
-            nan_policy=self.nan_policy,
-            step=step,
-            workers=self.workers,
-            progress=report,
+        options = {
+            "delta": self.period,
+            "method": method,
+            "settings": settings,
+            "nan_policy": self.nan_policy,
+            "step": step,
+            "workers": self.workers,
             **units,
             **equation,
-        )
-        return found
+        }
+        return identify_part(held, options, wanted, report, diagnose=diagnose)

@@ -129,7 +129,8 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
     hold : bool
         While it is true, equations that come are left out, and constants stay as they are.
     record_status : Status
-        In weak form flags of the latest block, and KIND_CONTRADICTED where constants of blocks differ by more than chance.
+        In weak form flags of the latest block, those of what may be missing of the latest that was asked, and KIND_CONTRADICTED where
+        constants of blocks differ by more than chance.
 
     Raises
     ------
@@ -153,8 +154,9 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
 
     In weak form a whole record knows what a block does not: its noise, constants from samples to come, and which lengths of windows
     predict best over all of it. With ``averaging=False`` and numbers for what is constant, windows differ by the noise alone, on the whole
-    a hundredth of their standard error; otherwise by some 0.4 of it, as their errors say, which are made from the block. A block is as
-    long as windows reach, and has at least 4096 samples before it, so that one sample costs some 70 µs, 50 ms a block.
+    a hundredth of their standard error; otherwise by some 0.6 of it, as their errors say, which are made from the block. A block is as
+    long as windows reach, and has at least 2048 samples before it; one sample costs some 8 µs, 10 ms a block. Every eighth block is
+    asked what may be missing in the equation, or the next that does not lie in a gap.
 
     ``half_life``, :attr:`hold` and :meth:`reset` are what MATLAB's ``recursiveLS`` has as ``ForgettingFactor`` (2 to the power
     of minus one over the half-life in samples), ``EnableAdaptation`` and ``reset``.

@@ -26,6 +26,11 @@ from tvident._status import Status
 
 Numbers = npt.NDArray[np.float64]
 
+_DIAGNOSED = 8
+"""Of so many blocks one is asked what may be missing in the equation, and whether test functions of all widths agree."""
+
+_OF_DIAGNOSIS = Status.TERM_SUSPECTED | Status.LAG_SUSPECTED | Status.SCALES_DISAGREE
+
 
 @dataclass(frozen=True)
 class BlockParameters:
@@ -74,6 +79,8 @@ class State:
         Flags of the latest block, and of constants over all blocks.
     counted_from : int
         The first sample whose equations tell of constants: those before were forgotten or left out.
+    asked_at : int, optional
+        Number of the latest block that said what may be missing; None before there is one.
     """
 
     first: int
@@ -87,6 +94,7 @@ class State:
     gathered: Gathered = field(default_factory=Gathered)
     record_status: int = 0
     counted_from: int = 0
+    asked_at: int | None = None
 
 
 class WeakStream:
@@ -201,8 +209,10 @@ class WeakStream:
         """Return the columns of the samples up to one that are not done yet."""
         state, wanted = self._state, (self._state.done, end)
         span = with_neighbours(wanted, self._reach, state.samples, self._step)
+        block = state.done // self._block
+        diagnose = state.asked_at is None or block - state.asked_at >= _DIAGNOSED
         try:
-            result = self._identified(span)
+            result = self._identified(span, wanted, diagnose=diagnose)
         except ValueError:
             # Samples in which test functions do not fit beside each other tell nothing.
             if state.samples >= self._after:
@@ -213,7 +223,13 @@ class WeakStream:
         if not self._hold and state.done >= state.counted_from:
             state.gathered.add(self._counted(note, span, wanted), 0.5 ** ((end - state.done) / self._half_life))
         means = dict.fromkeys(note["constants"], NOTHING_SAID) | state.gathered.means()
-        state.record_status = note["record_status"]
+        flags = note["record_status"]
+        if diagnose and not np.all(columns["status"] & Status.INVALID):
+            state.asked_at = block
+        else:
+            # What a block did not ask, or could not answer in a gap, is as the last one that did had it.
+            flags = flags & ~_OF_DIAGNOSIS | state.record_status & _OF_DIAGNOSIS
+        state.record_status = flags
         if not all(mean.agree for mean in means.values()):
             state.record_status |= Status.KIND_CONTRADICTED
         state.done = end
@@ -225,12 +241,13 @@ class WeakStream:
         if first <= span[0]:
             return note
         some = (-(-int(first) // self._step) * self._step, span[1])
-        return part_alone(self._identified(some), some, wanted, self._step)[1]
+        return part_alone(self._identified(some, wanted, diagnose=False), some, wanted, self._step)[1]
 
-    def _identified(self, span: Span) -> Identification:
+    def _identified(self, span: Span, wanted: Span, *, diagnose: bool) -> Identification:
         """Identify some of the samples that are held."""
         angle, torque = self._buffer[:, span[0] - self._begin : span[1] - self._begin]
-        return self._given.identified(Held(angle, torque, [span]), chosen=self._given.settings, step=self._step)
+        held, chosen = Held(angle, torque, [span]), self._given.settings
+        return self._given.identified(held, chosen=chosen, step=self._step, wanted=wanted, diagnose=diagnose)
 
     def _nothing(self, count: int) -> Columns:
         """Return columns without numbers."""

@@ -68,7 +68,7 @@ pub enum Error {
     },
     /// Numbers of a part of a record that only the whole gives.
     #[error(
-        "a part of a record gives what is windowed in strong form without lag, mask or filtered torque; got other unknowns or settings; identify the \
+        "a part of a record in strong form gives what is windowed without lag, mask or filtered torque; got other unknowns or settings; identify the \
          whole record"
     )]
     OnlyOfWholeRecord,

@@ -94,6 +94,7 @@ pub(crate) fn weak(
         angle_zero: task.angle_zero,
         quantisation: options.quantisation,
         step: options.step,
+        wanted: options.wanted.clone(),
         diagnose: options.diagnose,
         not_missing: not_missing(task),
         instructions: options.instructions,

@@ -95,8 +95,9 @@ pub struct Options {
     pub propagate: bool,
     /// Every how many samples numbers are wanted.
     pub step: usize,
-    /// The samples at which numbers are wanted; all if `None`. Windows of the strong form alone can be had for a part of a record: of the rest only
-    /// what [`around`](crate::identify::around()) says need be there, and standard errors are those of ordinary least squares.
+    /// The samples at which numbers are wanted; all if `None`. Of a record in strong form whose windows are wanted for a part only what
+    /// [`around`](crate::identify::around()) says need be there, and standard errors are those of ordinary least squares. The weak form looks at
+    /// all of the record, and may leave other samples without numbers.
     pub wanted: Option<Range<usize>>,
     /// Whether to look for terms that may have been left out.
     pub diagnose: bool,

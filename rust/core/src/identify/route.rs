@@ -40,7 +40,9 @@ pub fn identify_all(
     let mut found: Vec<Option<Identification>> = tasks.iter().map(|_| None).collect();
     // Asked once, since the answer may need every sample of the record.
     let routes: Vec<Pieces> = tasks.iter().map(|task| route(task, options, watch)).collect::<Result<_, Error>>()?;
-    if options.wanted.is_some() && routes.iter().any(|route| *route != Pieces::Windowed) {
+    let gives_a_part =
+        |(task, route): (&Task<'_>, &Pieces)| matches!(task.method, Method::Weak(_)) || *route == Pieces::Windowed;
+    if options.wanted.is_some() && !tasks.iter().zip(&routes).all(gives_a_part) {
         return Err(Error::OnlyOfWholeRecord);
     }
     for pieces in [Pieces::Windowed, Pieces::Constant] {

@@ -1,10 +1,8 @@
-//! Windowed coefficients at every row: windows of many lengths before, around and after it, averaged by their local
-//! cross-validation error.
+//! Windowed coefficients at every row: windows of many lengths before, around and after it, averaged by their local cross-validation error.
 //!
-//! A window predicts rows that it does not contain. Its weight at a row is `exp(-½ (n e + n₀ ē))`. Here `e` is its mean
-//! squared error around the row over the noise variance, `n` the number of independent rows in that mean, and `ē` and
-//! `n₀` the same over the record. So jumps are followed from both sides, and long windows dominate where nothing
-//! changes.
+//! A window predicts rows that it does not contain. Its weight at a row is `exp(-½ (n e + n₀ ē))`. Here `e` is its mean squared error around the row
+//! over the noise variance, `n` the number of independent rows in that mean, and `ē` and `n₀` the same over the record. So jumps are followed from
+//! both sides, and long windows dominate where nothing changes.
 
 use std::ops::Range;
 
@@ -122,14 +120,14 @@ impl ErrorSums {
     }
 }
 
-/// Averages windows of several lengths at every row of a problem without constants. `best` is the length of windows
-/// with the smallest error, in rows. If `thinned` is a subsample of a long record, errors over the record are estimated
-/// from it, for all lengths that it holds.
+/// Averages windows of several lengths at the rows that are `wanted` of a problem without constants; others are left NaN. `best` is the length of
+/// windows with the smallest error, in rows. If `thinned` is a subsample of a long record, errors over the record are estimated from it, for all
+/// lengths that it holds.
 pub(crate) fn average(
     problem: &Problem<'_>,
     thinned: Option<&Problem<'_>>,
     scales: &[Scale],
-    (expected, best): (Expected, usize),
+    (expected, best, wanted): (Expected, usize, Range<usize>),
     instructions: Instructions,
     stages: &mut Stages<'_, '_>,
 ) -> Result<Averages, Error> {
@@ -173,7 +171,12 @@ pub(crate) fn average(
     let mut averages = Averages::new(problem.layout.windowed, rows);
     let nearby = view.nearby(expected);
     stages.fill(averages.columns(), |rows, columns| {
-        view.average((&candidates, &ready), rows, nearby, record, &hopeless, columns);
+        let some = rows.start.max(wanted.start)..rows.end.min(wanted.end);
+        if !some.is_empty() {
+            let inside = some.start - rows.start..some.end - rows.start;
+            let mut columns: Vec<_> = columns.iter_mut().map(|column| &mut column[inside.clone()]).collect();
+            view.average((&candidates, &ready), some, nearby, record, &hopeless, &mut columns);
+        }
     })?;
     Ok(averages)
 }
@@ -298,11 +301,9 @@ impl View<'_, '_> {
         hopeless: &[(f64, f64)],
         columns: &mut [&mut [f64]],
     ) {
-        let windowed = self.problem.layout.windowed;
-        let total = self.problem.rows();
+        let (windowed, total) = (self.problem.layout.windowed, self.problem.rows());
         let wide = rows.start.saturating_sub(nearby.rows)..(rows.end + nearby.rows).min(total);
-        let width = rows.len();
-        let numbers = 3 * windowed;
+        let (width, numbers) = (rows.len(), 3 * windowed);
         // By row: sums of weights and of weighted numbers, and the least exponent so far, which all are relative to.
         let mut weights = vec![0.0; width];
         let mut least = vec![f64::INFINITY; width];
@@ -399,7 +400,7 @@ mod tests {
         let correlated = staged(|stages| model.correlated(rows, &covariance, stages));
         let problem = model.problem(rows, &rows.rhs, 0.0, Some(&correlated));
         let (scales, expected) = (Scale::all(ROWS, 3), white(DEVIATION * DEVIATION));
-        staged(|stages| average(&problem, None, &scales, (expected, best), Instructions::Scalar, stages))
+        staged(|stages| average(&problem, None, &scales, (expected, best, 0..rows.len()), Instructions::Scalar, stages))
     }
 
     /// Rows of one coefficient alone.

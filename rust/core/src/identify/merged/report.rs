@@ -112,7 +112,7 @@ impl MergedSession<'_, '_, '_> {
             .as_ref()
             .zip(of_thinned.as_ref())
             .map(|(rows, problem)| model.without_constants(rows, problem, &thinned_rhs, constants, 1.0));
-        let judged = (fitted.expected, fit.span);
+        let judged = (fitted.expected, fit.span, 0..rows.len());
         average(&rest, of_thinned.as_ref(), &fitted.scales, judged, self.options.instructions, &mut self.stages)
     }
 

@@ -1,5 +1,7 @@
 //! The options of the weak form for one record.
 
+use std::ops::Range;
+
 use crate::identify::kinds::Kind;
 use crate::inference::missing_terms::Missing;
 use crate::simd::instructions::Instructions;
@@ -35,6 +37,8 @@ pub(crate) struct WeakOptions {
     pub(crate) quantisation: Option<f64>,
     /// Every how many samples numbers are wanted.
     pub(crate) step: usize,
+    /// The samples at which numbers are wanted; all if `None`. Averages over windows are not made for others.
+    pub(crate) wanted: Option<Range<usize>>,
     /// Whether to look for what may have been left out, and for what not to look.
     pub(crate) diagnose: bool,
     /// What cannot be missing because it is there.

@@ -1,5 +1,7 @@
 //! Windowed coefficients at every row.
 
+use std::ops::Range;
+
 use crate::error::Error;
 use crate::exec::stages::Stages;
 use crate::identify::weak::decided::{Decided, rows_of};
@@ -63,6 +65,15 @@ impl Tracks {
 }
 
 impl Session<'_, '_, '_> {
+    /// The rows that numbers at the wanted samples are made of, with those within a window around them, of which residuals are.
+    fn wanted_rows(&self, weak: &WeakRows, span: usize) -> Range<usize> {
+        let rows = weak.rows.len();
+        let Some(wanted) = &self.options.wanted else { return 0..rows };
+        let row = |sample: usize| sample.saturating_sub(weak.first) / weak.stride;
+        let end = rows.min(row(wanted.end) + span + 2);
+        row(wanted.start).saturating_sub(span + 1).min(end)..end
+    }
+
     /// What changes, at every row.
     pub(crate) fn tracks(
         &mut self,
@@ -109,7 +120,7 @@ impl Session<'_, '_, '_> {
             .map(|(rows, problem)| ordered.without_constants(rows, problem, &thinned_rhs, constants, noise));
         let rhs = without_constants(problem, constants);
         let rest = ordered.without_constants(rows, problem, &rhs, constants, noise);
-        let (judged, stages) = ((expected, fit.span), &mut self.stages);
+        let (judged, stages) = ((expected, fit.span, self.wanted_rows(weak, fit.span)), &mut self.stages);
         let averages = average(&rest, thinned.as_ref(), &decided.scales, judged, instructions, stages)?;
         let names = fit.full.fields;
         let condition = fit.full.field(names.condition());
