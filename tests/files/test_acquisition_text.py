@@ -43,6 +43,17 @@ X_Value\tAngle\tTorque\tComment
 0.002000\t3.5\t4.0\t
 """
 
+LABCHART = """Interval=\t0.001 s
+ExcelDateTime=\t4.5e4
+ChannelTitle=\tAngle\tTorque
+Range=\t10.000 V\t5.000 mV
+UnitName=\tdeg\tN·m
+TopValue=\t10.000\t5.000
+BottomValue=\t-10.000\t-5.000
+0\t1\t2
+0.001\t2\t3
+"""
+
 OPENSIM = """Coordinates
 version=1
 nRows=2
@@ -121,6 +132,32 @@ NAN = float("nan")
         ("t;x\n0;1.234\n1;2,5\n", {"t": [0, 1], "x": [1234, 2.5]}, "^$"),
         ("a,b\n1,2\n1 000,1'000.5\n", {"a": [1, 1000], "b": [2, 1000.5]}, "^$"),
         ("t,x\n0,1\n1,3\nMean,0.5,2\n", {"t": [0, 1], "x": [1, 3]}, "line 4 below the numbers: not read"),
+        ("t;x\n0;1\n1;3\nMittelwert;0,5;2\nStd. Dev.:;1;1\n", {"t": [0, 1], "x": [1, 3]}, "lines 4 to 5 below"),
+        ("t,x,note\ns,deg,\n0,1,0\n1,2,0\n", {"t [s]": [0, 1], "x [deg]": [1, 2], "note": [0, 0]}, "^$"),
+        ("Run 7;;\nt;x;note\ns;deg;\n0;1;0\n1;2;0\n", {"t [s]": [0, 1], "x [deg]": [1, 2], "note": [0, 0]}, "^$"),
+        ("t,x [deg],x [deg]\n0,1,2\n1,2,3\n", {"t": [0, 1], "x [deg]": [1, 2], "x_2 [deg]": [2, 3]}, "called x_2 .deg"),
+        (
+            "Model Outputs\n100\n,,S:Ankle,,S:Moment,\nFrame,Sub Frame,X,Y,X,Y\n,,deg,deg,N.mm,N.mm\n1,0,2,3,4,5\n2,0,2,3,4,5\n",
+            {"Frame": [1, 2], "Sub Frame": [0, 0]}
+            | {
+                "S:Ankle.X [deg]": [2, 2],
+                "S:Ankle.Y [deg]": [3, 3],
+                "S:Moment.X [N.mm]": [4, 4],
+                "S:Moment.Y [N.mm]": [5, 5],
+            },
+            "^$",
+        ),
+        (
+            "angle,angle,torque,torque\nx,y,x,y\n1,2,3,4\n1,2,3,4\n",
+            {"angle.x": [1, 1], "angle.y": [2, 2], "torque.x": [3, 3], "torque.y": [4, 4]},
+            "^$",
+        ),
+        (LABCHART, {"time [s]": [0, 0.001], "Angle [deg]": [1, 2], "Torque [N·m]": [2, 3]}, "^$"),
+        (
+            LABCHART.replace("UnitName=\tdeg\tN·m\n", "").replace("0\t1", "1").replace("0.001\t", ""),
+            {"Angle [V]": [1, 2], "Torque [mV]": [2, 3]},
+            "^$",
+        ),
     ],
 )
 def test_nothing_is_lost_and_what_is_dropped_is_said(

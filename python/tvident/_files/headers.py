@@ -27,6 +27,12 @@ _TYPE = re.compile(r"(u?int|float|single|double|real|bool|byte|word|string|str|t
 """What a column holds, rather than what it is called."""
 
 
+_KEY = re.compile(r"[A-Za-z][A-Za-z ]*=")
+"""How LabChart begins a line that says one thing of every channel."""
+
+_RANGE = re.compile(r"[+-]?[\d.,]+\s+(\S.*)")
+
+
 class Line:
     """A line above the numbers."""
 
@@ -36,6 +42,8 @@ class Line:
         bare = text.lstrip("# ") if self.is_comment else text
         self.says_something = any(one.isalnum() for one in bare) and not _HINT.fullmatch(bare.strip())
         self.cells = split(bare, separator)
+        self.width = len(self.cells)
+        """With empty cells at its end."""
         while self.cells and not self.cells[-1]:
             self.cells.pop()
 
@@ -43,9 +51,19 @@ class Line:
         """Return its cells if they are as many as columns: with, or without empty ones."""
         every = self.cells
         present = [cell for cell in every if cell]
-        if least <= len(every) <= most:
-            return every
+        if least <= len(every) <= most or (self.width >= least and _are_units(every)):
+            return every  # the last columns may have no unit
         return present if least <= len(present) <= most else []
+
+    def groups(self, columns: int) -> list[str]:
+        """Return to which group each column belongs, where a name stands above the first of its columns alone, or above each."""
+        if not 1 < self.width <= columns + 1 or len(self.cells) > columns:
+            return []
+        cells = self.cells + [""] * (columns - len(self.cells))
+        groups = [""]
+        for cell in cells:
+            groups.append(cell or groups[-1])
+        return groups[1:]
 
 
 class Names:
@@ -54,10 +72,10 @@ class Names:
     def __init__(self, separator: Separator, cells: Sequence[str], above: Sequence[Line], say: Say) -> None:
         """Take the cells of the first line of numbers, and the lines above it that say something."""
         self.separator = separator
-        self.above = above
         self.say = say
         self.most = len(cells)
         self.least = max(index for index, cell in enumerate(cells) if cell) + 1
+        self.above = _without_keys(above, self.most)
 
     def found(self, numbers: Sequence[tuple[int, str]]) -> list[str] | None:
         """Return the names of columns, which differ, or None where the file has none; lines of numbers come with their place."""
@@ -94,10 +112,11 @@ class Names:
         units = next((one for one in block if _are_units(one[1])), None) if len(block) > 1 else None
         rest = [one for one in block if one is not units]
         named = [one for one in rest if not all(_TYPE.fullmatch(cell) for cell in one[1] if cell)] or rest
-        differing = [one for one in named if len({cell for cell in one[1] if cell}) == sum(map(bool, one[1]))]
+        differing = [one for one in named if _differ(one[1])]
         line, names = (differing or named)[0]
+        names, groups = self._grouped(line, names)
         for other, cells in rest:
-            if other is not line and abs(other.place - line.place) <= len(block):
+            if other not in {line, *groups} and abs(other.place - line.place) <= len(block):
                 why = "" if units else ", and it holds no known units"
                 self.say(
                     f"line {other.place} is not read as names: they are in line {line.place}{why}: '{printable(', '.join(cells), 60)}'"
@@ -105,6 +124,24 @@ class Names:
         if units is None:
             return names
         return [_with_unit(name, unit) for name, unit in zip(names, units[1], strict=True)]
+
+    def _grouped(self, line: Line, names: list[str]) -> tuple[list[str], list[Line]]:
+        """Return names with the groups of columns that lines above them name, and these lines.
+
+        Motion capture writes X, Y, Z below the name of an angle or a moment, which stands above the first of the three or above each.
+        """
+        used: list[Line] = []
+        place = self.above.index(line)
+        for above in reversed(self.above[:place]):
+            groups = above.groups(len(names))
+            is_above_some = len(above.cells) > 1 and not above.cells[0]
+            if not groups or (_differ(names) and (used or not is_above_some)) or _are_units(above.cells):
+                break
+            if any(is_present(one, comma=True) for one in groups):
+                break
+            names = [f"{group}.{name}" if group and name else name for group, name in zip(groups, names, strict=True)]
+            used.append(above)
+        return names, used
 
     def _check_nearest(self, last: int, names: list[str]) -> None:
         """Refuse a line of numbers in which something is wrong."""
@@ -156,13 +193,42 @@ class Names:
             unique, count = bare, 1
             while unique in found or (count > 1 and unique in given):
                 count += 1
-                unique = f"{bare}_{count}"
+                unique = _numbered(bare, count)
             if count > 1:
                 again.append(f"column {index} is called {printable(unique, 40)}")
             found[unique] = None
         if again:
             self.say(f"several columns have one name: {listed(again)}")
         return list(found)
+
+
+def _without_keys(above: Sequence[Line], most: int) -> list[Line]:
+    """Return lines above the numbers, of those that begin with a key the names and the units alone, without their key."""
+    keyed = {
+        line.cells[0].rstrip("= ").casefold(): line for line in above if line.cells and _KEY.fullmatch(line.cells[0])
+    }
+    titles = keyed.get("channeltitle")
+    if titles is None:
+        return list(above)
+    # Times stand before the channels, and have no title.
+    has_times = len(titles.cells) == most
+    units = keyed.get("unitname", keyed.get("range"))
+    for line, of_times in ((titles, "time"), (units, "s")):
+        if line is not None:
+            of_channels = [_RANGE.sub(r"\1", cell) if line is units else cell for cell in line.cells[1:]]
+            line.cells = [of_times, *of_channels] if has_times else of_channels
+    return [line for line in above if line not in keyed.values() or line in {titles, units}]
+
+
+def _differ(cells: Sequence[str]) -> bool:
+    """Return whether no two of the cells that hold something are equal."""
+    return len({cell for cell in cells if cell}) == sum(map(bool, cells))
+
+
+def _numbered(name: str, count: int) -> str:
+    """Return a name with a number, in front of its unit."""
+    bare, unit = named_unit(name)
+    return with_unit(f"{bare}_{count}", unit) if unit else f"{name}_{count}"
 
 
 def _are_units(cells: Sequence[str]) -> bool:

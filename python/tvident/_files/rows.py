@@ -30,9 +30,12 @@ _MOST_WORDS = 20
 """Lines of words that may stand below the numbers."""
 
 _STATISTICS = re.compile(
-    r"(min|max|mean|average|avg|median|std|stddev|sd|rms|sum|total|count|n)[. ]*[:=]?", re.IGNORECASE
+    r"(min|max|mean|average|avg|median|std|std[. ]*dev|sd|rms|sum|total|count|n"
+    r"|minimum|maximum|mittelwert|mittel|summe|anzahl|standardabweichung|stabw|moyenne|m[ée]diane|[ée]cart[ -]type|somme|media|promedio"
+    r"|mediana|suma|somma|m[ée]dia|gemiddelde|som)[. ]*[:=]?",
+    re.IGNORECASE,
 )
-"""What spreadsheets write before numbers below the others."""
+"""What spreadsheets and recorders write before numbers below the others."""
 
 _TIMES = re.compile(r"\d+[-./:]\d+[-./:][\d.,:]+")
 
