@@ -198,6 +198,8 @@ def test_measurements_of_labview(tmp_path: Path) -> None:
     numbers = LABVIEW.partition("Comment\n")[2]
     path.write_text(LABVIEW.replace(numbers, "\t1.5\t2\t\n\t2.5\t3\t\n\t3.5\t4\t\n"))
     assert read(path)[0] == expected
+    path.write_text(path.read_text().replace("X_Value", ""))
+    assert read(path)[0] == expected
     path.write_text(LABVIEW + "\nChannels" + LABVIEW.partition("Channels")[2].replace("X0\t0.0", "X0\t0.003"))
     found, said = read(path)
     assert found["Angle [deg]"] == [1.5, 2.5, 3.5] * 2

@@ -40,6 +40,8 @@ OTHER_NAMES = {
     "milliseconds": "ms",
     "msecs": "ms",
     "%": "percent",
+    "mdeg": "millidegree",
+    "millidegrees": "millidegree",
     "sec": "second",
     "msec": "ms",
     "usec": "us",

@@ -60,13 +60,15 @@ def _segment(text: str, places: tuple[int, int, int], say: Say) -> Channels:
     units = keys.get("Y_Unit_Label", [])
     channels: Channels = {}
     of_channels = 0
-    for name, values in found.items():
-        if name.startswith(_X):
+    for column, (name, values) in enumerate(found.items()):
+        is_empty = not np.isfinite(values).any()
+        # Without times the first column is empty, and some leave out its name.
+        if name.startswith(_X) or (column == 0 and is_empty):
             is_time = keys.get("X_Dimension", ["Time"])[:1] == ["Time"]
-            channels[with_unit(name, "s" if is_time else "")] = (
-                values if np.isfinite(values).any() else _times(keys, values.size)
+            channels[with_unit(name if name.startswith(_X) else _X, "s" if is_time else "")] = (
+                _times(keys, values.size) if is_empty else values
             )
-        elif name != "Comment" or np.isfinite(values).any():
+        elif name != "Comment" or not is_empty:
             channels[with_unit(name, units[of_channels] if of_channels < len(units) else "")] = values
             of_channels += 1
     return channels

@@ -40,6 +40,7 @@ _WITH_PREFIX: dict[str, tuple[float, Dimension]] = {
 _ALONE: dict[tuple[str, ...], tuple[float, Dimension]] = {
     ("radian", "radians"): (1.0, _ANGLE),
     ("deg", "degree", "degrees", "°"): (math.pi / 180, _ANGLE),
+    ("mdeg", "millidegree", "millidegrees"): (math.pi / 180_000, _ANGLE),
     ("Nms",): (1.0, (1, 2, -1, *NONE[3:])),
     ("gon",): (math.pi / 200, _ANGLE),
     ("arcmin",): (math.pi / 10_800, _ANGLE),
