@@ -155,3 +155,16 @@ def test_tables_of_matlab_are_channels(tmp_path: Path) -> None:
     assert skipped == ["run.note (no numbers)"]
     assert found.sample_rate == pytest.approx(250)
     np.testing.assert_array_equal(found["angle"], examples.ANGLE)
+
+
+def test_the_sheet_that_is_read_is_the_recording(tmp_path: Path) -> None:
+    path = tmp_path / "x.xlsx"
+    with pd.ExcelWriter(path) as book:
+        pd.DataFrame({"Setting": ["rate", "mass"], "Value": [1000, 3.2]}).to_excel(book, sheet_name="Info", index=False)
+        for name, factor in (("Run 1", 1), ("Run 2", 2)):
+            pd.DataFrame({"t [s]": examples.T, "angle [deg]": factor * examples.ANGLE}).to_excel(
+                book, sheet_name=name, index=False
+            )
+    with pytest.warns(recordings.FileWarning, match="not read: sheet Info, sheet Run 2"):
+        found = read(path)
+    np.testing.assert_allclose(found["angle [deg]"], examples.ANGLE, rtol=1e-15)
