@@ -60,13 +60,21 @@ def test_a_stiffness_that_changes_has_the_bound_of_its_windows() -> None:
 
 
 def test_duration_and_amplitude_reach_what_is_wanted() -> None:
-    long = tvident.plan_experiment(**GUESS, torque_noise=0.02, torque_rms=0.01)
+    long = tvident.plan_experiment(**GUESS, torque_noise=0.02, torque_rms=0.005)
     assert long.reached
     assert long.errors["stiffness"] == pytest.approx(0.02, rel=1e-3)
     strong = tvident.plan_experiment(**GUESS, torque_noise=0.02, duration=long.duration)
-    assert strong.torque_rms == pytest.approx(0.01, rel=1e-3)
+    assert strong.torque_rms == pytest.approx(0.005, rel=1e-3)
     torque = strong.excitation(sample_rate=100)
     assert torque.std() == pytest.approx(strong.torque_rms, rel=0.3)
+    # Milliseconds would do if a period of the torque fitted in.
+    short = tvident.plan_experiment(**GUESS, torque_noise=0.02, torque_rms=0.5)
+    assert short.duration == pytest.approx(10 / 0.5)
+    assert short.errors["stiffness"] < 0.002
+    assert "record 20 s, ten periods of 0.5 Hz: less torque would do" in short.summary()
+    hasty = tvident.plan_experiment(**GUESS, torque_noise=0.02, torque_rms=0.5, duration=3)
+    assert "these hold 1.5 periods of 0.5 Hz: errors will be larger" in hasty.summary()
+    assert "errors will be larger" not in short.summary()
     never = tvident.plan_experiment(**GUESS, torque_noise=0.02, torque_rms=1e-4, resolution=0.2)
     assert not never.reached
     assert "cannot be reached" in never.summary()
@@ -101,7 +109,12 @@ def test_the_command(tmp_path: Any) -> None:
     assert "stiffness within 2 %: record" in ran.stdout
     assert (tmp_path / "torque.csv").exists()
     rig = tvident.simulate_torsional_rig(duration=4.0)
+    tvident.identify(rig.angle, rig.torque, sample_rate=1000, stiffness=13.0).save(tmp_path / "given.npz")
+    given = run("plan", str(tmp_path / "given.npz"))
+    assert "stiffness within 2 %: no error of it is known" in given.stdout
     tvident.identify(rig.angle, rig.torque, sample_rate=1000).save(tmp_path / "one.npz")
     more = run("plan", str(tmp_path / "one.npz"), "--more", "60")
     assert more.returncode == 0, more.stderr
-    assert "now" in more.stdout
+    assert "stiffness within 2 %: reached already; expected of 64 s in all:" in more.stdout
+    known = run("plan", str(tmp_path / "one.npz"), "--wanted", "0.00001")
+    assert "cannot be reached by recording longer" in known.stdout

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident._equation import COEFFICIENTS
 from tvident._plan.information import Guess, best_powers, variances
-from tvident._plan.plan import ExperimentPlan
+from tvident._plan.plan import PERIODS, ExperimentPlan
 from tvident._results import Identification
 
 _GRID = 60
@@ -66,9 +66,10 @@ def plan_experiment(
     wanted : float, optional
         Relative standard error of the stiffness that is wanted.
     duration : float, optional
-        Seconds. With a duration and without `torque_rms` the amplitude is planned.
+        Seconds. With a duration and without `torque_rms` the amplitude is planned. Less than ten periods of the lowest frequency are said
+        in the summary: the bound is for many.
     torque_rms : float, optional
-        Root mean square of the torque, N m. Without a duration that is planned.
+        Root mean square of the torque, N m. Without a duration that is planned, ten periods of the lowest frequency at least.
     resolution : float, optional
         The stiffness changes, and this is the time in seconds over which it may be averaged: the length of a regression window, or the
         record over the number of functions of an :class:`Expansion`. By default it is constant.
@@ -140,7 +141,7 @@ def plan_experiment(
     else:
         rms = arguments.positive_number("torque_rms", torque_rms)
         seconds = (
-            _duration(each * rms**2, rate, window, wanted * numbers["stiffness"])
+            max(_duration(each * rms**2, rate, window, wanted * numbers["stiffness"]), PERIODS / low)
             if duration is None
             else arguments.positive_number("duration", duration)
         )
@@ -217,7 +218,8 @@ def _longer(result: Identification, wanted: float, more: float) -> ExperimentPla
         lasts = kind in {"constant", "expanded"}
         then[name] = now[name] * (math.sqrt(seconds / longest) if lasts else 1.0)
     error, kind = now.get("stiffness", math.nan), result.settings["kinds"]["stiffness"]
-    if then.get("stiffness", math.nan) > wanted and kind in {"constant", "expanded"}:
+    time_helps = math.isfinite(error) and kind in {"constant", "expanded"}
+    if time_helps and then["stiffness"] > wanted:
         longest = seconds * (error / wanted) ** 2
     return ExperimentPlan(
         duration=longest,
@@ -228,5 +230,5 @@ def _longer(result: Identification, wanted: float, more: float) -> ExperimentPla
         errors=then,
         before=now,
         wanted=wanted,
-        reached=not then.get("stiffness", math.nan) > wanted or kind in {"constant", "expanded"},
+        reached=bool(time_helps or then.get("stiffness", math.inf) <= wanted),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -13,6 +14,11 @@ from tvident import _arguments as arguments
 from tvident._files import aligned
 
 Array: TypeAlias = npt.NDArray[np.float64]
+
+PERIODS = 10
+"""Of the lowest frequency: from so many on the bound is that of a long record."""
+
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -96,10 +102,13 @@ class ExperimentPlan:
         str
         """
         name = f"stiffness within {100 * self.wanted:.3g} %"
-        if self.reached:
-            lines = [
-                f"{name}: {self.duration:.4g} s in all" if self.before else f"{name}: record {self.duration:.4g} s"
-            ]
+        periods = self.duration * self.frequencies[0] if self.frequencies.size else math.inf
+        if self.before and (self.reached or not math.isfinite(self.before.get("stiffness", math.inf))):
+            lines = [f"{name}: {self._of_more()}"]
+        elif self.reached:
+            is_least = abs(periods / PERIODS - 1) <= _ROUNDING and self.errors["stiffness"] < self.wanted
+            why = f", ten periods of {self.frequencies[0]:.4g} Hz: less torque would do" if is_least else ""
+            lines = [f"{name}: record {self.duration:.4g} s{why}"]
         else:
             cure = "it belongs to windows, which more time does not lengthen: excite more, or let windows be longer"
             lines = [f"{name} cannot be reached by recording longer: {cure}"]
@@ -107,6 +116,11 @@ class ExperimentPlan:
             lines.append(
                 f"torque of {self.torque_rms:.3g} N m rms, which moves the angle by about {self.angle_rms:.3g} rad rms:"
             )
+            if periods < PERIODS * (1 - _ROUNDING):
+                lines.append(
+                    f"these hold {periods:.2g} periods of {self.frequencies[0]:.4g} Hz: errors will be larger than said here, "
+                    f"which holds for {PERIODS} or more; record longer, or begin with a higher frequency"
+                )
             each = zip(self.frequencies, self.amplitudes, strict=True)
             lines += aligned([("Hz", "N m"), *((f"{one:.4g}", f"{other:.3g}") for one, other in each)])
         heads = ("parameter", *(["now"] if self.before else []), "expected error")
@@ -115,3 +129,13 @@ class ExperimentPlan:
             for one, error in self.errors.items()
         ]
         return "\n".join([*lines, "", *aligned([heads, *rows])])
+
+    def _of_more(self) -> str:
+        """Return what more of a recording at hand is worth for the stiffness."""
+        now = self.before.get("stiffness", math.inf)
+        longer = f"{self.duration:.4g} s in all"
+        if not math.isfinite(now):
+            return f"no error of it is known, as where the stiffness was given; expected of {longer}:"
+        if now <= self.wanted:
+            return f"reached already; expected of {longer}:"
+        return f"{'reached with' if self.errors['stiffness'] <= self.wanted else 'needs'} {longer}"
