@@ -95,8 +95,8 @@ def test_derivatives_of_a_channel(recording: Path, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     expected = tvident.fit_local_polynomials(recordings.read(recording)["angle [rad]"], 101, sample_rate=1000, step=5)
     found = recordings.read(output)
-    np.testing.assert_array_equal(found["derivative_2"], expected.derivatives[2])
-    np.testing.assert_array_equal(found["derivative_1_stderr"], expected.stderr[1])
+    np.testing.assert_array_equal(found["derivative_2 [rad/s^2]"], expected.derivatives[2])
+    np.testing.assert_array_equal(found["derivative_1_stderr [rad/s]"], expected.stderr[1])
     np.testing.assert_array_equal(found["order"], expected.order)
     np.testing.assert_allclose(found["time [s]"], np.arange(0, 5, 0.005))
     assert "<svg" in picture.read_text()

@@ -143,7 +143,7 @@ def test_derivatives_behave_as_identify_does(folder: Path) -> None:
     assert run(*call, "--sample-rate", "1000", "-o", "found.npz").returncode == 0
     angle = np.load(folder / "rig.npz")["angle [rad]"]
     expected = tvident.fit_local_polynomials(angle, "auto", sample_rate=1000).derivatives[2]
-    np.testing.assert_array_equal(np.load(folder / "found.npz")["derivative_2"], expected)
+    np.testing.assert_array_equal(np.load(folder / "found.npz")["derivative_2 [rad/s^2]"], expected)
 
 
 @pytest.mark.usefixtures("folder")

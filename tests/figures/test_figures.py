@@ -182,6 +182,20 @@ def test_every_picture_draws_on_axes_of_ones_own(
         result.plot("torque", ax=three)
 
 
+def test_derivatives_have_units_and_constants_stay_within_the_picture(rig: tvident.Recording) -> None:
+    fit = tvident.fit_local_polynomials(rig.angle, 201, sample_rate=1000)
+    drawn = figures.plot_derivatives(rig.time, fit, "angle", samples=tvident.Channel(rig.angle, "deg"))
+    assert [ax.get_ylabel() for ax in drawn.axes] == ["deg", "deg/s", "deg/s²", ""]
+    quiet = tvident.simulate_torsional_rig(4.0, angle_noise=1e-6, torque_snr_db=55, damping=0.15, inertia=0.02)
+    found = tvident.identify(quiet.angle, quiet.torque, sample_rate=1000)
+    drawn = found.plot()
+    drawn.canvas.draw()
+    parts: list[Any] = drawn.axes[0].get_children()
+    (above,) = [one for one in parts if "Offset" in getattr(one, "get_text", str)()]
+    assert above.get_window_extent().x1 <= drawn.axes[0].get_window_extent().x1 + 1
+    assert above.get_text().count("\n") < len(found.constants) - 1
+
+
 def test_the_predicted_torque_leaves_the_noise(rig: tvident.Recording, result: tvident.Identification) -> None:
     time, recorded, predicted = result.predicted_torque()
     np.testing.assert_allclose(time, rig.time, atol=1e-12)

@@ -13,7 +13,7 @@ from tvident._commands.channels import channel_of, channels_in, check_has_times
 from tvident._commands.given import check_time, given, length, period_of, wanted_progress
 from tvident._commands.output import PICTURE, RECORDING, RESULTS, check_outputs, figures_on_file, give, save_figure
 from tvident._status import describe
-from tvident._units import times_in_seconds
+from tvident._units import derivative_units, times_in_seconds, unit_said
 
 
 # Options that need work before they are passed on are parameters of their own.
@@ -52,8 +52,12 @@ def derivatives(
     )
     names = ["value", *(f"derivative_{d}" for d in range(1, fit.derivatives.shape[0]))]
     columns: dict[str, npt.NDArray[Any]] = {"time": fit.time}
-    for name, values, errors in zip(names, fit.derivatives, fit.stderr, strict=True):
+    unit = unit_said(samples)
+    units = {"time": "s", "sigma": unit}
+    each = derivative_units(unit, len(names))
+    for name, of_name, values, errors in zip(names, each, fit.derivatives, fit.stderr, strict=True):
         columns |= {name: values, f"{name}_stderr": errors}
+        units |= {name: of_name, f"{name}_stderr": of_name}
     columns |= {"sigma": fit.sigma, "order": fit.order, "status": fit.status}
     counts = np.bincount(fit.order.ravel())
     orders = ", ".join(f"{order}: {count / fit.order.size:.0%}" for order, count in enumerate(counts) if count)
@@ -64,6 +68,9 @@ def derivatives(
             f"{len(splits)} gaps do not say how often the angle went round in them, the first before sample {splits[0]}: from there on "
             "the value may be wrong by whole periods"
         )
-    give(columns, {"time": "s"}, "\n".join(words), output)
+    give(columns, units, "\n".join(words), output)
     if plot is not None:
-        save_figure(figures_on_file().plot_derivatives(columns["time"], fit, channel), Path(plot))
+        raw = samples[:: options["step"]]
+        is_raw = period is None and raw.shape == fit.time.shape
+        drawn = figures_on_file().plot_derivatives(fit.time, fit, channel, samples=raw if is_raw else None, unit=unit)
+        save_figure(drawn, Path(plot))

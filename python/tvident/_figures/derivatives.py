@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from tvident._derivatives import LocalPolynomialFit
 from tvident._figures.style import INK, MUTED, Place, draw_parameter, legend, panels, plain, scale, style
+from tvident._units import derivative_units, unit_said
 
 _MOST_DOTS = 20_000
 
@@ -21,6 +22,7 @@ def plot_derivatives(
     name: str = "y",
     *,
     samples: npt.ArrayLike | None = None,
+    unit: str = "",
     ax: Place = None,
 ) -> Figure:
     """Draw a channel and its derivatives over time, with bands of two standard errors, and the order chosen.
@@ -35,6 +37,8 @@ def plot_derivatives(
         What the channel is called.
     samples : array_like, shape (n,), optional
         The raw samples, which are drawn as dots below the smoothed channel.
+    unit : str, optional
+        Of the samples, for the axes: that of derivatives has seconds, too. By default that of `samples`, if they know it.
     ax : Axes or sequence of Axes, optional
         Where to draw; one Axes is divided into panels. By default a new figure.
 
@@ -72,6 +76,7 @@ def plot_derivatives(
         raise ValueError(
             f"samples must be as many as times; got shape {raw.shape} for {time.size} times; take every step-th"
         )
+    units = derivative_units(unit or unit_said(samples), count)
     name = plain(name)
     with style():
         figure, axes = panels(ax, [1.7] * count + [1.2], width=8.0)
@@ -82,6 +87,7 @@ def plot_derivatives(
                 panel.plot(time[::every], raw[::every], ".", **dots)
             draw_parameter(panel, time, fit.derivatives[d], fit.stderr[d], label="fitted")
             panel.set_title(name if d == 0 else f"{name}: derivative {d}")
+            panel.set_ylabel(plain(units[d].replace("^2", "²").replace("^3", "³")))
         if raw is not None:
             scale(axes[0], raw, fit.derivatives[0])
         legend(axes[0], ax)

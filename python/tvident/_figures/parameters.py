@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.textpath import TextPath
 from matplotlib.ticker import MaxNLocator
 
 from tvident import _arguments as arguments
@@ -35,8 +36,11 @@ Array: TypeAlias = npt.NDArray[np.float64]
 
 _SYMBOLS = {"inertia": "Inertia $I$", "damping": "Damping $C$", "stiffness": "Stiffness $K$"}
 
-_LETTER = 0.064
-"""Inches of a letter of constants, on average and a little more."""
+_CONSTANTS_SIZE = 9.5
+"""Points of the letters of constants."""
+
+_POINTS = 72.0
+"""Of an inch."""
 
 
 class Identified(Protocol):
@@ -141,8 +145,8 @@ def draw_parameters(result: Identified, shown: list[str], truth: Recording | Non
                 _draw_error(next(rest), result, name, values - true)
         if constants:
             first = axes[0].get_title(loc="left")
-            lines = _packed(constants, _letters(figure, axes[0] if ax is not None else None))
-            axes[0].set_title("\n".join(lines), color=MUTED, fontsize=9.5, fontweight="normal", pad=28)
+            lines = _packed(constants, _width(figure, axes[0] if ax is not None else None))
+            axes[0].set_title("\n".join(lines), color=MUTED, fontsize=_CONSTANTS_SIZE, fontweight="normal", pad=28)
             axes[0].text(0, 1.03, first, transform=axes[0].transAxes, fontsize=10.5, fontweight="bold", va="bottom")
         legend(axes[0], ax)
         everywhere = ", ".join(flag.name or "" for flag in flagged_everywhere(result))
@@ -173,21 +177,21 @@ def _constants(result: Identified, truth: Recording | None) -> list[str]:
     return words
 
 
-def _letters(figure: Any, ax: Axes | None) -> int:
-    """Return how many letters fit on a line above axes of the user's own, or in a new figure."""
-    inches = figure.get_figure(root=True).get_size_inches()[0] - 0.9 if ax is None else 0.0
-    if ax is not None:
-        root = ax.get_figure(root=True)
-        inches = ax.get_window_extent().width / root.dpi if root is not None else 4.0
-    return int(inches / _LETTER)
+def _width(figure: Any, ax: Axes | None) -> float:
+    """Return how many inches a line may have above axes of the user's own, or in a new figure."""
+    if ax is None:
+        return float(figure.get_figure(root=True).get_size_inches()[0]) - 0.9
+    root = ax.get_figure(root=True)
+    return ax.get_window_extent().width / root.dpi if root is not None else 4.0
 
 
-def _packed(words: list[str], letters: int) -> list[str]:
+def _packed(words: list[str], inches: float) -> list[str]:
     """Return words on as few lines as they fit on."""
     lines: list[str] = []
     for one in words:
-        if lines and len(lines[-1]) + len(one) + 3 <= letters:
-            lines[-1] += f"   {one}"
+        longer = f"{lines[-1]}   {one}" if lines else one
+        if lines and TextPath((0, 0), longer, size=_CONSTANTS_SIZE).get_extents().width <= inches * _POINTS:
+            lines[-1] = longer
         else:
             lines.append(one)
     return lines

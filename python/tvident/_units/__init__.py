@@ -2,7 +2,7 @@
 
 from tvident._units.axis import Axis, axis_of, scaled, times_in_seconds
 from tvident._units.channel import Channel, unit_said
-from tvident._units.names import named_unit, with_unit
+from tvident._units.names import derivative_units, named_unit, with_unit
 from tvident._units.parse import Unit, is_unit, unit_of
 from tvident._units.quantities import LINEAR, ROTARY, System, UnitError, factor_between, factor_to, system_of
 
@@ -15,6 +15,7 @@ __all__ = [
     "Unit",
     "UnitError",
     "axis_of",
+    "derivative_units",
     "factor_between",
     "factor_to",
     "is_unit",

@@ -31,6 +31,13 @@ def named_unit(name: str) -> tuple[str, str]:
     return name, ""
 
 
+def derivative_units(unit: str, count: int) -> list[str]:
+    """Return the units of a channel and its derivatives by time in seconds; nothing where the channel has none."""
+    base = f"({unit})" if "/" in unit else unit
+    powers = ["", "/s", *(f"/s^{order}" for order in range(2, count))]
+    return [base + power if unit and power else unit for power in powers[:count]]
+
+
 def with_unit(name: str, unit: str) -> str:
     """Return a name with a unit in brackets behind it, where there is one."""
     return f"{name} [{unit}]" if unit else name
