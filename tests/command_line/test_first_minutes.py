@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 from scipy.io import savemat
 
 import tvident
 from commands import run
+from tvident._command_line.identify import identify
+from tvident._commands import in_options
 
 RIG = tvident.simulate_torsional_rig(duration=3.0, sample_rate=500, seed=4, pattern="constant")
 MILLISECONDS, DEGREES, NEWTON_MILLIMETRES = 1e3 * RIG.time, np.rad2deg(RIG.angle), 1e3 * RIG.torque
@@ -44,6 +47,42 @@ def test_the_channel_of_times_is_named_where_none_was_given(command: str) -> Non
     assert "give --sample-rate, --delta or --time; it may be --time Zeit" in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("words", "typed"),
+    [
+        ("the angle reaches 160: degrees? If so, give angle_unit='deg'", "give --angle-unit deg"),
+        ("give terms=['offset', ('coulomb', 'windowed')].", "give --term offset --term coulomb:windowed."),
+        ("Is the torque late (lag='auto')? A controller (instrument=)?", "(--lag auto)? A controller (--instrument)?"),
+        (
+            "try stiffness=0, lag=-0.0021; or torque_unit='N mm'",
+            "try --stiffness 0, --lag -0.0021; or --torque-unit 'N mm'",
+        ),
+        ("if it is the reaction, pass -torque", "give --torque-scale -1"),
+        ("method=tvident.WeakForm(window_length=9), share=('inertia',)", "tvident.WeakForm(window_length=9), share=("),
+        ("noise (p = 0.19), K=4 and C=3", "(p = 0.19), K=4 and C=3"),
+        ("there is no 'delta=5'; give delta=0.001", "there is no 'delta=5'; give --delta 0.001"),
+    ],
+)
+def test_the_cure_can_be_typed(words: str, typed: str) -> None:
+    with click.Context(identify):
+        assert typed in in_options(words)
+    assert in_options(words) == words  # in Python
+
+
+@pytest.mark.usefixtures("folder")
+def test_what_python_refuses_is_said_with_options() -> None:
+    call = "identify volts.npz --angle angle --torque torque --sample-rate 500"
+    tvident.FileRecording({"angle [rad]": RIG.angle, "torque [V]": RIG.torque}).write("volts.npz")
+    done = run(*call.split())
+    assert done.returncode == 2
+    assert "or give --torque-unit 'N m' if the numbers are in N m" in done.stderr
+    np.savez("reaction.npz", angle=RIG.angle, torque=-RIG.torque)
+    call = call.replace("volts", "reaction")
+    assert "if it is the reaction to it, give --torque-scale -1" in run(*call.split()).stdout
+    done = run(*call.split(), "--torque-scale", "-1")
+    assert done.stdout.startswith("K(t) known"), done.stdout
+
+
 @pytest.mark.usefixtures("folder")
 def test_capitals_do_not_matter_where_they_tell_nothing_apart() -> None:
     call = "identify messung.csv --angle winkel --torque DREHMOMENT --time zeit --stiffness constant"
@@ -64,7 +103,4 @@ def test_a_member_of_a_structure_is_found_by_the_name_that_it_is_listed_with() -
     assert done.returncode == 0, done.stderr
     assert "degrees?" not in done.stdout + done.stderr
     wrong = run(*call.split())
-    assert (
-        "is the time in milliseconds? Then give time_unit='ms' with t or delta, --time-unit ms on the command"
-        in wrong.stdout
-    )
+    assert "is the time in milliseconds? Then give --time-unit ms with --time or --delta" in wrong.stdout

@@ -76,8 +76,8 @@ class Plausible:
             return []
         return [
             (
-                f"there is one sample in {self.period:.4g} s: is the time in milliseconds? Then give time_unit='ms' with t or delta, "
-                "--time-unit ms on the command line"
+                f"there is one sample in {self.period:.4g} s: is the time in milliseconds? Then give time_unit='ms' with t= "
+                "or delta="
             )
         ]
 

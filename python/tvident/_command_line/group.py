@@ -96,8 +96,20 @@ COMMANDS = {
 """Every command, a file each, and the first sentence of what it says of itself."""
 
 
+class _Worker(click.Command):
+    """Says what the library refuses with options, where it names arguments."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except (ValueError, TypeError) as error:
+            raise click.UsageError(_line(commands().in_options(str(error)))) from None
+
+
 class _Command(click.Group):
     """Says what is wrong in one line, and never in a terminal's own language."""
+
+    command_class = _Worker
 
     def make_context(self, *arguments: Any, **options: Any) -> click.Context:
         with _in_plain_words():

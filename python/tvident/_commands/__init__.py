@@ -10,12 +10,14 @@ from tvident._commands.plan import plan
 from tvident._commands.report import report
 from tvident._commands.settings import options_from_toml
 from tvident._commands.simulate import simulate
+from tvident._commands.words import in_options
 
 __all__ = [
     "compare",
     "demo",
     "derivatives",
     "identify",
+    "in_options",
     "info",
     "live",
     "options_from_toml",

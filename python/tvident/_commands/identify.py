@@ -14,7 +14,8 @@ from tvident._commands.channels import channels_in
 from tvident._commands.identification import identified, inputs
 from tvident._commands.in_pieces import identify_in_pieces
 from tvident._commands.named import named, with_velocity
-from tvident._commands.output import PICTURE, RESULTS, SETTINGS, check_outputs, give, save_figure
+from tvident._commands.output import PICTURE, RESULTS, SETTINGS, check_outputs, give, save_figure, say
+from tvident._commands.words import in_options
 from tvident._files import RESULT_ENDINGS, place_beside, replaced
 from tvident._results import explained_steps
 from tvident._status import Status
@@ -55,7 +56,7 @@ def identify(
         give(result.columns(), result.units, words, output)
     else:
         result.save(output)  # with what repeats it
-        click.echo(words)
+        say(words)
     if plot is not None:
         save_figure(result.plot(), Path(plot))
     if not np.isfinite(result.inertia).any():
@@ -74,14 +75,14 @@ def _plain(result: Any) -> dict[str, Any]:
     held_back = result.held_back()
     summary = result.summary().splitlines()
     return {
-        "verdict": summary[0],
+        "verdict": in_options(summary[0]),
         "parameters": {
             name: {key: number(one) if isinstance(one, float) else one for key, one in value.items()}
             for name, value in values.items()
         },
         "held_back": {name: number(float(getattr(held_back, name))) for name in ("simulated", "predicted")},
-        "advice": list(result.advice),
-        "reasons": list(result.reasons),
+        "advice": list(map(in_options, result.advice)),
+        "reasons": list(map(in_options, result.reasons)),
         "jumps": list(result.jumps),
         "record_flags": [flag.name for flag in Status if result.record_status & flag],
         "trusted": float(np.mean(result.trusted)) if result.trusted.size else 0.0,

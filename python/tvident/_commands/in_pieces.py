@@ -13,7 +13,7 @@ import tvident
 from tvident._commands.equation import lag_of, terms_of
 from tvident._commands.given import given, wanted_progress
 from tvident._commands.method import NAMES, method_of
-from tvident._commands.output import SETTINGS, check_outputs
+from tvident._commands.output import SETTINGS, check_outputs, say
 from tvident._commands.settings import read_settings
 from tvident._equation import COEFFICIENTS
 from tvident._files import replaced
@@ -94,7 +94,7 @@ def identify_in_pieces(
     if settings_output is not None:
         with replaced(Path(settings_output)) as written:
             written.write((json.dumps(found.settings, indent=1) + "\n").encode())
-    click.echo(found.summary())
+    say(found.summary())
 
 
 def _number(value: str) -> str | float:

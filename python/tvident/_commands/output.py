@@ -11,11 +11,17 @@ from typing import Any
 import click
 import numpy.typing as npt
 
+from tvident._commands.words import in_options
 from tvident._files import check_apart, check_folder, check_place, printable, replaced, write_csv, write_table
 
 RESULTS, PICTURE, SETTINGS, RECORDING = "results", "the picture", "the settings of this run", "the recording"
 REPORT = "the report"
 """What messages call files."""
+
+
+def say(words: str, *, err: bool = False) -> None:
+    """Print what a result says, with options where it advises arguments."""
+    click.echo(in_options(words), err=err)
 
 
 def give(columns: dict[str, npt.NDArray[Any]], units: Mapping[str, str], words: str, output: str | None) -> None:
@@ -24,7 +30,7 @@ def give(columns: dict[str, npt.NDArray[Any]], units: Mapping[str, str], words: 
         write_csv(sys.stdout.buffer, columns, units)
     elif output is not None:
         write_table(output, columns, units)
-    click.echo(words, err=output == "-")
+    say(words, err=output == "-")
 
 
 def figures_on_file() -> Any:

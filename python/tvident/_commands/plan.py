@@ -10,7 +10,7 @@ import numpy as np
 
 import tvident
 from tvident._commands.given import given
-from tvident._commands.output import RECORDING, RESULTS, check_outputs
+from tvident._commands.output import RECORDING, RESULTS, check_outputs, say
 from tvident._files import write_table
 
 
@@ -22,10 +22,10 @@ def plan(file: str | None, output: str | None, **options: Any) -> None:
         if output is not None:
             raise click.UsageError("a plan to go on has no torque to write; got -o; leave it out")
         kept = {name: asked[name] for name in ("wanted", "more") if name in asked}
-        click.echo(tvident.plan_experiment(result=tvident.load(file), **kept).summary())
+        say(tvident.plan_experiment(result=tvident.load(file), **kept).summary())
         return
     found = tvident.plan_experiment(**asked)
-    click.echo(found.summary())
+    say(found.summary())
     if output is not None:
         rate = asked.get("sample_rate", 1000.0)
         torque = found.excitation(sample_rate=rate)

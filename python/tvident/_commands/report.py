@@ -11,7 +11,7 @@ from tvident import _report, recordings
 from tvident._commands.channels import channels_in, source_of
 from tvident._commands.identification import identified, inputs
 from tvident._commands.named import named, with_velocity
-from tvident._commands.output import REPORT, check_outputs
+from tvident._commands.output import REPORT, check_outputs, say
 from tvident._files import full_name, printable
 
 _MOST_CHANNELS = 40
@@ -38,7 +38,7 @@ def report(file: str | None, output: str, **options: Any) -> None:
     for name in list(others)[_MOST_CHANNELS:]:
         del others[name]
     result.report(output, channels=others, title=None if file is None else Path(file).name)
-    click.echo(result.summary())
+    say(result.summary())
     click.echo(f"\nWritten: {printable(output)}")
 
 

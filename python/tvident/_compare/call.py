@@ -104,7 +104,8 @@ def compare_models(
     candidates = _CANDIDATES if models is None else models
     if not isinstance(candidates, Mapping) or not all(isinstance(one, Mapping) for one in candidates.values()):
         raise TypeError(
-            f"models must be a mapping of names to arguments; got {arguments.shown(models)}; write {{'damped': {{}}}}"
+            f"models must be a mapping of names to arguments; got {arguments.shown(models)}; write "
+            "{'damped': {}, 'friction': {'terms': ['offset', 'coulomb']}}, say"
         )
     if len(candidates) < 2:  # noqa: PLR2004 - a comparison
         raise ValueError(f"a comparison needs two models or more; got {len(candidates)}; add another")

@@ -1,0 +1,63 @@
+"""Says with options what messages say with arguments of Python: whoever typed a command can type the cure."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shlex
+
+import click
+
+_OTHER_NAMES = {"terms": "--term", "models": "--model", "t": "--time"}
+
+_ARGUMENT = re.compile(
+    r"(?<![\w.'\"-])(?<!\w\()(?P<name>[a-z_]+)=(?P<value>'[^']*'|\"[^\"]*\"|\[[^\[\]]*\]|[+-]?\d[\w.+-]*(?<!\.)|[a-z]+\b(?![.(]))?(?![=\w(\[]|\.\w)"
+)
+"""An argument with its value; without one where whoever calls is to find it. Behind a quote it is a name that somebody gave."""
+
+_REACTION = re.compile(r"pass -torque\b")
+
+
+def in_options(text: str) -> str:
+    """Return text in which arguments that the command at work has an option for are written as the option.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``give angle_unit='deg', or terms=['offset', ('coulomb', 'windowed')]``.
+
+    Returns
+    -------
+    str
+        ``give --angle-unit deg, or --term offset --term coulomb:windowed``.
+    """
+    context = click.get_current_context(silent=True)
+    if context is None:
+        return text
+    options = {option for one in context.command.params for option in one.opts}
+
+    def option(found: re.Match[str]) -> str:
+        name = _OTHER_NAMES.get(found["name"], f"--{found['name'].replace('_', '-')}")
+        if name not in options:
+            return found[0]
+        if found["value"] is None:
+            return name
+        values = _values(found["value"])
+        return found[0] if values is None else " ".join(f"{name} {shlex.quote(one)}" for one in values)
+
+    text = _ARGUMENT.sub(option, text)
+    if "--torque-time" in options:
+        text = text.replace("t=(t, t)", "--torque-time with the channel of --time")
+    return _REACTION.sub("give --torque-scale -1", text) if "--torque-scale" in options else text
+
+
+def _values(text: str) -> list[str] | None:
+    """Return what the options say for the value of an argument; None where they cannot say it."""
+    try:
+        value = ast.literal_eval(text)
+    except (ValueError, SyntaxError):
+        return [text] if text.isidentifier() else None
+    if not isinstance(value, list):
+        return [str(value)]
+    each = [":".join(map(str, one)) if isinstance(one, tuple) else str(one) for one in value]
+    return each or ["none"]
