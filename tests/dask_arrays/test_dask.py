@@ -143,6 +143,21 @@ def test_the_weak_form_finds_what_one_call_finds(rig: tvident.Recording, client:
     assert found.record_status == whole.record_status
 
 
+def test_weights_count_in_every_block(rig: tvident.Recording) -> None:
+    samples = 20_000
+    weights = np.where(np.arange(samples) < 8000, 1.0, 0.01)
+    noise = np.std(rig.torque) * 0.1 * np.random.default_rng(3).standard_normal(samples)
+    angle, torque = np.asarray(rig.angle[:samples]), np.where(weights < 1, noise, 0.0) + rig.torque[:samples]
+    more: dict[str, Any] = {"sample_rate": 1000, "method": "paper", "step": 50}
+    whole = tvident.identify(angle, torque, weights=weights, **more)
+    both = (chunked(np.stack([one, one]), (1, 9000)) for one in (angle, torque))
+    found = tvident.dask.identify(*both, weights=chunked(weights, 3000), **more)
+    assert found.settings["weights"]
+    # Both make the same rows: rounding, times the condition of a window.
+    away = (found.stiffness.compute() - whole.stiffness) / whole.stderr["stiffness"]
+    assert np.nanmax(np.abs(away)) < 1e-6
+
+
 def test_a_batch_is_many_records(rig: tvident.Recording) -> None:
     angle = np.stack([rig.angle[:9_000], 2 * rig.angle[:9_000]])
     torque = np.stack([rig.torque[:9_000], rig.torque[:9_000]])
@@ -184,6 +199,7 @@ def test_a_killed_worker_costs_time_and_no_results(rig: tvident.Recording, clien
         ({"torque": da.ones(8000)}, ValueError, "one shape"),
         ({"sample_rate": None}, TypeError, "sample period"),
         ({"inertia": np.ones(9000)}, TypeError, "give a number"),
+        ({"weights": da.ones(800)}, ValueError, "one value for every sample"),
     ],
 )
 def test_a_wrong_call_says_what_would_be_right(change: dict[str, Any], error: type[Exception], words: str) -> None:

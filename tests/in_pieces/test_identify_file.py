@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -151,6 +152,36 @@ def test_the_weak_form_finds_what_one_call_in_memory_finds(rig: tvident.Recordin
     assert found.record_status == whole.record_status
 
 
+def test_weights_are_a_channel_of_the_file(rig: tvident.Recording) -> None:
+    # Noise is ten times as large from 20 s on, and from 50 s on, in all of the last piece, nothing counts.
+    weights = np.repeat([1.0, 0.01, 0.0], [20_000, 30_000, SAMPLES - 50_000])
+    more = np.where(weights < 1, 10.0, 1.0)
+    angle = np.asarray(rig.true_angle + more * (rig.angle - rig.true_angle))
+    torque = np.asarray(rig.true_torque + more * (rig.torque - rig.true_torque))
+    kind = [(name, float) for name in ("angle", "torque", "weights")]
+    np.save("in.npy", np.rec.fromarrays([angle, torque, weights], dtype=kind))
+    whole = tvident.identify(angle, torque, sample_rate=1000, weights=weights)
+    (Path("s.json")).write_text(json.dumps(whole.settings), "utf-8")
+    options = ["--angle", "angle", "--torque", "torque", "--sample-rate", "1000", "--settings", "s.json", "--in-pieces"]
+    done = CliRunner().invoke(main, ["identify", "in.npy", *options, "--weights", "weights", "-o", "out.npy"])
+    assert done.exit_code == 0, done.output
+    found = columns_of("out.npy")
+    for name, (value, error) in whole.constants.items():
+        assert abs(found[name][0] - value) < 3 * MOST_DIFFERENCE * error, name
+        # Three pieces of which each tells its noise by itself, and counts some of its neighbours.
+        assert 0.7 < found[f"{name}_stderr"][0] / error < 1.4, name
+    there = weights > 0
+    difference = ((found["stiffness"] - whole.stiffness) / whole.stderr["stiffness"])[there]
+    assert np.sqrt(np.nanmean(difference**2)) < MOST_DIFFERENCE
+    assert (found["status"][53_000:] & Status.INVALID != 0).all()
+    # In strong form windows of pieces are those of the whole record to rounding.
+    paper: dict[str, Any] = {"sample_rate": 1000, "method": "paper", "step": 50}
+    tvident.identify_file("in.npy", "paper.npy", angle="angle", torque="torque", weights="weights", **paper)
+    of_pieces, of_whole = columns_of("paper.npy"), tvident.identify(angle, torque, weights=weights, **paper)
+    away = (of_pieces["stiffness"] - of_whole.stiffness) / of_whole.stderr["stiffness"]
+    assert np.nanmax(np.abs(away)) < 1e-6
+
+
 def test_a_constant_that_drifts_from_piece_to_piece_is_contradicted(rig: tvident.Recording) -> None:
     torque = np.array(rig.torque)
     acceleration = tvident.fit_local_polynomials(rig.angle, 101, sample_rate=1000).derivatives[2]
@@ -257,6 +288,7 @@ def test_units_and_times_of_the_file_are_used(rig: tvident.Recording) -> None:
         ({"sample_rate": None}, TypeError, "no channel of times"),
         ({"inertia": np.ones(SAMPLES)}, TypeError, "give a number"),
         ({"step": 0}, ValueError, "step"),
+        ({"weights": "heavy"}, KeyError, "has no channel 'heavy'"),
     ],
 )
 def test_a_wrong_call_says_what_would_be_right(

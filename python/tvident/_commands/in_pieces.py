@@ -25,6 +25,7 @@ _TAKEN = frozenset(
         *(
             "angle",
             "torque",
+            "weights",
             "sample_rate",
             "delta",
             "time_channel",
@@ -70,6 +71,7 @@ def identify_in_pieces(
         angle=str(options["angle"]),
         torque=str(options["torque"]),
         t=asked.get("time_channel"),
+        weights=asked.get("weights"),
         method=method_of(method, of_method, has_settings=settings is not None),
         settings=None if settings is None else read_settings(settings),
         lag=None if lag is None else lag_of(lag),

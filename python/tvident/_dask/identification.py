@@ -33,6 +33,7 @@ def identify(
     terms: Sequence[GivenTerm] | None = None,
     lag: float | None = None,
     quantisation: float | None = None,
+    weights: Any = None,
     nan_policy: arguments.RowPolicy = "omit",
     step: int = 1,
     settings: Mapping[str, Any] | None = None,
@@ -46,6 +47,8 @@ def identify(
         worked on together.
     sample_rate, delta : float
         Samples per second, or seconds from one to the next.
+    weights : dask.array.Array, shape (\*, n) or (n,), optional
+        One over the variance of the noise at every sample, relative to the others, and 0 where it is not to be used.
     angle_unit, torque_unit, method, inertia, damping, stiffness, terms, lag, quantisation, nan_policy, step, settings
         As in :func:`tvident.identify`; parameters are kinds or numbers, terms are built-in ones.
 
@@ -66,9 +69,9 @@ def identify(
     Notes
     -----
     With everything windowed in strong form, as with ``method="paper"``, the numbers are those of one call in memory, bit for bit, as long
-    as no sample is missing. With everything constant in strong form, the triangular factors of the equations of all blocks are merged
-    in a tree, and the constants are those of one call to 1e-12 of themselves, times the condition of the equations. In weak form blocks
-    are records of their own, whose constants are put together, as in :func:`tvident.identify_file`.
+    as no sample is missing and none has a weight. With everything constant in strong form, the triangular factors of the equations of all
+    blocks are merged in a tree, and the constants are those of one call to 1e-12 of themselves, times the condition of the equations. In
+    weak form, and with weights, blocks are records of their own, whose constants are put together, as in :func:`tvident.identify_file`.
 
     Every block is one task on one thread: dask has as many threads as there is to do. A task has no state, so where a worker is lost its
     blocks are computed again elsewhere.
@@ -116,11 +119,11 @@ def identify(
         "lag": lag,
         "quantisation": quantisation,
     }
-    given = Given(method, equation, settings, nan_policy, period, axis, 1)
-    each = [
-        record_of(_scaled(angle[place], axis.angle), _scaled(torque[place], axis.torque), given, every)
-        for place in np.ndindex(*batch)
-    ]
+    given = Given(method, equation, settings, nan_policy, period, axis, 1, weights is not None)
+    channels = [_scaled(angle, axis.angle), _scaled(torque, axis.torque)]
+    if weights is not None:
+        channels.append(_weights(weights, angle.shape))
+    each = [record_of([one[place] for one in channels], given, every) for place in np.ndindex(*batch)]
     columns = {name: stacked([one.columns[name] for one in each], batch) for name in each[0].columns}
     time = array.arange(0, samples, every, chunks=max(samples // every, 1), dtype=float) * period
     units = UNITS if axis.system is ROTARY else LINEAR_UNITS
@@ -131,6 +134,16 @@ def identify(
         units,
         dask.delayed(_of_batch)([one.told for one in each], batch),
     )
+
+
+def _weights(weights: Any, shape: tuple[int, ...]) -> Any:
+    """Return weights of samples of some shape."""
+    found = samples_of("weights", weights)
+    if found.shape not in {shape, shape[-1:]}:
+        raise ValueError(
+            f"weights must have one value for every sample, shape {shape} or {shape[-1:]}; got {found.shape}; check what was read"
+        )
+    return imported()[1].broadcast_to(found, shape)
 
 
 def _scaled(samples: Any, factor: float) -> Any:

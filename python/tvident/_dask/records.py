@@ -67,27 +67,33 @@ class _Asked:
         given = self.given
         propagate = given.nan_policy == "propagate"
         request = replace(self.request, quantisation=quantisation)
-        return Long(request, self.samples, given.period, given.axis, propagate=propagate, step=self.step)
+        return Long(
+            request,
+            self.samples,
+            given.period,
+            given.axis,
+            propagate=propagate,
+            step=self.step,
+            weighted=given.weighted,
+        )
 
 
 class _Record:
-    """Angle and torque of one record, and what is asked for."""
+    """Angle, torque and maybe weights of one record, and what is asked for."""
 
-    def __init__(self, angle: Any, torque: Any, asked: _Asked) -> None:
+    def __init__(self, channels: Sequence[Any], asked: _Asked) -> None:
         self.dask, _ = imported()
-        self.angle, self.torque, self.asked = angle, torque, asked
+        self.channels, self.angle, self.asked = channels, channels[0], asked
         self.quantisation = asked.request.quantisation
         # What names, kinds and windows are does not depend on the step that samples were rounded to.
         self.plain = asked.long(0.0)
         if self.quantisation is None:
-            self.quantisation = rounding(angle)
+            self.quantisation = rounding(self.angle)
 
-    def held(self, spans: Sequence[Span]) -> tuple[Any, Any]:
-        """Return some samples of both channels."""
+    def held(self, spans: Sequence[Span]) -> list[Any]:
+        """Return some samples of all channels."""
         _, array = imported()
-        both = (array.concatenate([one[slice(*span)] for span in spans]) for one in (self.angle, self.torque))
-        angle, torque = both
-        return angle, torque
+        return [array.concatenate([one[slice(*span)] for span in spans]) for one in self.channels]
 
     def blocks(self, least: int) -> list[Span]:
         """Return the blocks that are worked on."""
@@ -104,10 +110,10 @@ class _Record:
         return {name: joined([part[name] for part in parts], counts, kind) for name, kind in kinds.items()}
 
 
-def record_of(angle: Any, torque: Any, given: Given, step: int) -> Identified:
+def record_of(channels: Sequence[Any], given: Given, step: int) -> Identified:
     """Return what is to be computed of one record."""
     request = requested(given.method, given.equation, given.settings, 1 / given.period)
-    record = _Record(angle, torque, _Asked(request, angle.shape[-1], given, step))
+    record = _Record(channels, _Asked(request, channels[0].shape[-1], given, step))
     if not isinstance(request.form, WeakForm) and record.plain.is_windowed:
         return _windowed(record)
     if not isinstance(request.form, WeakForm) and record.plain.is_constant:
@@ -119,13 +125,13 @@ def _windowed(record: _Record) -> Identified:
     """Windows of the strong form: blocks have the bits of the whole record."""
     dask, plain, asked = record.dask, record.plain, record.asked
     spans = plain.spans_of_scatter()
-    factors = dask.delayed(_factors, pure=True)(*record.held(spans), spans, asked, record.quantisation)
+    factors = dask.delayed(_factors, pure=True)(record.held(spans), spans, asked, record.quantisation)
     work = dask.delayed(_windows, pure=True)
     found = record.blocks(_reach(plain, asked.samples))
     parts = []
     for block in found:
         span = plain.around(block)
-        parts.append(work(*record.held([span]), (span, block), factors, asked, record.quantisation))
+        parts.append(work(record.held([span]), (span, block), factors, asked, record.quantisation))
     settings = dask.delayed(_with_factors, pure=True)(factors, asked, record.quantisation)
     return Identified(record.columns(parts, found), settings, dask.delayed(({}, 0)))
 
@@ -135,24 +141,25 @@ def _reach(plain: Long, samples: int) -> int:
     return end - first
 
 
-def _factors(angle: Any, torque: Any, spans: Sequence[Span], asked: _Asked, quantisation: float) -> list[float]:
-    return asked.long(quantisation).factors(_held(angle, torque, spans), 1)
+def _factors(channels: Sequence[Any], spans: Sequence[Span], asked: _Asked, quantisation: float) -> list[float]:
+    return asked.long(quantisation).factors(_held(channels, spans), 1)
 
 
 def _with_factors(factors: Sequence[float], asked: _Asked, quantisation: float) -> dict[str, Any]:
     return asked.long(quantisation).settings(factors)
 
 
-def _held(angle: Any, torque: Any, spans: Sequence[Span]) -> Held:
-    return Held(np.ascontiguousarray(angle), np.ascontiguousarray(torque), spans)
+def _held(channels: Sequence[Any], spans: Sequence[Span]) -> Held:
+    angle, torque, *weights = (np.ascontiguousarray(one) for one in channels)
+    return Held(angle, torque, spans, *weights)
 
 
 def _windows(
-    angle: Any, torque: Any, places: tuple[Span, Span], factors: Sequence[float], asked: _Asked, quantisation: float
+    channels: Sequence[Any], places: tuple[Span, Span], factors: Sequence[float], asked: _Asked, quantisation: float
 ) -> Columns:
     """Return the columns of one block, on one thread: dask has others."""
     span, block = places
-    long, held = asked.long(quantisation), _held(angle, torque, [span])
+    long, held = asked.long(quantisation), _held(channels, [span])
     if asked.given.nan_policy == "raise" and not held.is_whole:
         raise ValueError(f"samples {block[0]} to {block[1]} must be finite; some are not; use nan_policy='omit'")
     if asked.given.nan_policy == "omit" and not held.is_whole:
@@ -171,36 +178,36 @@ def _constant(record: _Record) -> Identified:
     parts = []
     for block in found:
         span = plain.around(block)
-        parts.append((*record.held([span]), (span, block), asked, record.quantisation))
+        parts.append((record.held([span]), (span, block), asked, record.quantisation))
     total = tree([rows_of(*part) for part in parts], merged)
     spans = plain.spans_of_scatter()
-    told = dask.delayed(_constants, pure=True)(*record.held(spans), spans, total, asked, record.quantisation)
+    told = dask.delayed(_constants, pure=True)(record.held(spans), spans, total, asked, record.quantisation)
     everywhere = dask.delayed(_everywhere, pure=True)
     columns = record.columns([everywhere(*part, told) for part in parts], found)
     return Identified(columns, plain.settings(), told[:2])
 
 
-def _rows(angle: Any, torque: Any, places: tuple[Span, Span], asked: _Asked, quantisation: float) -> Any:
+def _rows(channels: Sequence[Any], places: tuple[Span, Span], asked: _Asked, quantisation: float) -> Any:
     span, block = places
-    return asked.long(quantisation).rows(_held(angle, torque, [span]), block, 1)
+    return asked.long(quantisation).rows(_held(channels, [span]), block, 1)
 
 
 def _constants(
-    angle: Any, torque: Any, spans: Sequence[Span], total: Any, asked: _Asked, quantisation: float
+    channels: Sequence[Any], spans: Sequence[Span], total: Any, asked: _Asked, quantisation: float
 ) -> tuple[dict[str, tuple[float, float]], int, float, float]:
     """Return the constants of the record, its flags, the condition number and the standard deviation of the residuals."""
     long = asked.long(quantisation)
-    return long.constants(_held(angle, torque, spans), total, 1)
+    return long.constants(_held(channels, spans), total, 1)
 
 
 def _everywhere(
-    angle: Any, torque: Any, places: tuple[Span, Span], asked: _Asked, quantisation: float, told: Any
+    channels: Sequence[Any], places: tuple[Span, Span], asked: _Asked, quantisation: float, told: Any
 ) -> Columns:
     """Return the columns of a block whose parameters are those of the record."""
     span, block = places
     constants, flags, condition, residual = told
     long = asked.long(quantisation)
-    polynomials = long.polynomials(_held(angle, torque, [span]), block)
+    polynomials = long.polynomials(_held(channels, [span]), block)
     count = polynomials.status.size
     status = polynomials.status & ~np.uint16(Status.INVALID)
     if flags & Status.RANK_DEFICIENT:
@@ -232,7 +239,7 @@ def _alone(record: _Record) -> Identified:
     parts = []
     for block in found:
         span = with_neighbours(block, reach, asked.samples, asked.step)
-        parts.append(work(*record.held([span]), (span, block), choices, given, asked.step))
+        parts.append(work(record.held([span]), (span, block), choices, given, asked.step))
     notes = tree([dask.delayed(_listed, pure=True)(part) for part in parts], dask.delayed(_together, pure=True))
     means = dask.delayed(means_of, pure=True)(notes)
     columns = record.columns([finish(part, means) for part in parts], found)
@@ -241,19 +248,19 @@ def _alone(record: _Record) -> Identified:
     return Identified(columns, settings, told)
 
 
-def _choices(each: Sequence[tuple[Any, Any]], spans: Sequence[Span], given: Given) -> Choices:
+def _choices(each: Sequence[Sequence[Any]], spans: Sequence[Span], given: Given) -> Choices:
     """Return what stretches choose."""
     read = dict(zip(spans, each, strict=True))
-    return chosen(spans, lambda some: _held(*read[some[0]], some), given.identified, given.period)
+    return chosen(spans, lambda some: _held(read[some[0]], some), given.identified, given.period)
 
 
 def _block_alone(
-    angle: Any, torque: Any, places: tuple[Span, Span], choices: Choices | None, given: Given, step: int
+    channels: Sequence[Any], places: tuple[Span, Span], choices: Choices | None, given: Given, step: int
 ) -> tuple[Columns, dict[str, Any]]:
     span, block = places
     settings = None if choices is None else choices.settings
     diagnose = settings is None or given.frozen is not None
-    held = _held(angle, torque, [span])
+    held = _held(channels, [span])
     result = given.identified(held, chosen=settings, step=step, wanted=block, diagnose=diagnose)
     columns, note = part_alone(result, span, block, step)
     return columns, note if choices is not None else note | {"settings": result.settings}

@@ -24,6 +24,7 @@ from tvident._identify.prepared import prepared
 from tvident._identify.searched import Searched
 from tvident._identify.settings import Request, plain, resolve
 from tvident._identify.task import Task
+from tvident._identify.weighted import Weights
 from tvident._results import Estimates, Identification
 from tvident._status import Status
 from tvident._units import Axis
@@ -45,11 +46,19 @@ class Held:
         In the units of results.
     spans : sequence of (int, int)
         Where each part lies in the record.
+    weights : ndarray, optional
+        Of the samples, where they were given.
     """
 
     angle: npt.NDArray[np.number]
     torque: npt.NDArray[np.number]
     spans: Sequence[Span]
+    weights: npt.NDArray[np.number] | None = None
+
+    @property
+    def counts(self) -> bool:
+        """Whether a sample has a weight."""
+        return self.weights is None or bool(np.any(self.weights))
 
     @property
     def is_whole(self) -> bool:
@@ -120,7 +129,17 @@ def identify_part(
     diagnose : bool
         Look for what may be missing in the equation, and compare test functions of all widths.
     """
-    call = _CALL.bind(held.angle, held.torque, **options)
+    if not held.counts:
+        # What has no weight is missing, here all of it.
+        nothing = np.full(held.angle.size, np.nan)
+        return identify_part(
+            replace(held, angle=nothing, weights=None),
+            {**options, "nan_policy": "omit"},
+            wanted,
+            report,
+            diagnose=False,
+        )
+    call = _CALL.bind(held.angle, held.torque, weights=held.weights, **options)
     call.apply_defaults()
     first = held.spans[0][0]
     own = None if wanted is None else (max(wanted[0] - first, 0), min(wanted[1] - first, held.angle.size))
@@ -145,16 +164,27 @@ class Long(Task):
         Windows with a missing sample have no number.
     step : int
         Every how many samples numbers are wanted.
+    weighted : bool
+        Samples have weights.
     """
 
     def __init__(
-        self, request: Request, samples: int, period: float, axis: Axis, *, propagate: bool = False, step: int = 1
+        self,
+        request: Request,
+        samples: int,
+        period: float,
+        axis: Axis,
+        *,
+        propagate: bool = False,
+        step: int = 1,
+        weighted: bool = False,
     ) -> None:
         empty = np.zeros(1)
         # As many times as the record has samples, at none of which anybody looks.
         time = np.broadcast_to(np.float64(0), (samples,))
         motion = MotionChannels(empty)
-        data = Data(empty, empty, motion, None, time, period, None, propagate, step, None, axis=axis)
+        weights = Weights(np.ones(1)) if weighted else None
+        data = Data(empty, empty, motion, None, time, period, None, propagate, step, None, axis=axis, weights=weights)
         super().__init__(data, request)
         self._propagate, self._step, self._samples = propagate, step, samples
 
@@ -174,6 +204,7 @@ class Long(Task):
         form, request = self._request.form, self._request
         return (
             isinstance(form, StrongForm)
+            and self._data.weights is None
             and not form.filter_torque
             and form.variation == "constant"
             and request.lag == 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from tvident._in_pieces.kept import Kept, mark_of
 from tvident._in_pieces.outputs import check_output
 from tvident._in_pieces.recorded import Recording, uniform, units_of
 from tvident._in_pieces.run import Asked, Run
-from tvident._in_pieces.sources import TEXT, Source, opened
+from tvident._in_pieces.sources import TEXT, Channel, Source, opened
 from tvident._pieces import Given
 from tvident._units import Channel as Said
 from tvident._units import named_unit, times_in_seconds
@@ -29,7 +30,7 @@ from tvident._units import named_unit, times_in_seconds
 PIECE, LONG_PIECE = 1 << 18, 3 << 18
 """Samples of a piece, about, and of one in weak form in which one unknown changes: what is computed of it fits into 150 MiB.
 
-Every piece in weak form decides for itself what is constant, and at which lengths windows are averaged: 0.6 s, however long it is.
+Every piece in weak form judges for itself at which lengths windows are averaged, however long it is.
 """
 
 
@@ -43,6 +44,7 @@ def identify_file(
     sample_rate: float | None = None,
     delta: float | None = None,
     t: str | None = None,
+    weights: str | None = None,
     angle_unit: str | None = None,
     torque_unit: str | None = None,
     method: Method = "auto",
@@ -77,6 +79,8 @@ def identify_file(
         Samples per second, or seconds from one to the next; by default from a channel of times.
     t : str, optional
         The channel of times, which must be uniform to a thousandth of their step; by default one that is called ``time``.
+    weights : str, optional
+        The channel of weights: one over the variance of the noise at every sample, relative to the others, 0 where it is not to be used.
     angle_unit, torque_unit : str, optional
         Units of the channels, where the file says none or others.
     method, inertia, damping, stiffness, terms, lag, quantisation, nan_policy, step, settings, workers : optional
@@ -103,14 +107,14 @@ def identify_file(
     Notes
     -----
     With everything windowed in strong form, as with ``method="paper"``, the numbers are those of one call in memory, bit for bit, as long
-    as no sample is missing. A piece with missing samples is identified on its own: its numbers agree to rounding, its standard errors to
-    chance.
+    as no sample is missing and none has a weight. A piece with missing samples is identified on its own: its numbers agree to rounding,
+    its standard errors to chance.
 
-    In weak form, and with constants in strong form, every piece is identified as a record of its own with neighbours on both sides. What
-    is left to be chosen is chosen once, from at most eight stretches of 65 536 samples spread over the recording; flags and advice of
-    these stretches are those of the record. The constants of all pieces are put together, each weighted by the inverse of its variance,
-    and the numbers of every piece are corrected for the difference of its own constants. Where pieces differ by more than chance, constants
-    stay those of the pieces, and the record has the flag KIND_CONTRADICTED.
+    In weak form, and with constants or weights in strong form, every piece is identified as a record of its own with neighbours on both
+    sides. What is left to be chosen is chosen once, from at most eight stretches of 65 536 samples spread over the recording; flags and
+    advice of these stretches are those of the record. The constants of all pieces are put together, each weighted by the inverse of its
+    variance, and the numbers of every piece are corrected for the difference of its own constants. Where pieces differ by more than
+    chance, constants stay those of the pieces, and the record has the flag KIND_CONTRADICTED.
 
     Equations (2) to (4), (8) and (9) of the paper. The cost is that of :func:`identify`, in strong form about 60 ns a sample and thread,
     and that of writing and reading the results once more.
@@ -154,7 +158,15 @@ def identify_file(
     told = {
         "version": version("tvident"),
         "instructions": _core.instructions(),
-        "recording": [mark_of(source_path) if source_path.exists() else "", angle, torque, sample_rate, delta, t],
+        "recording": [
+            mark_of(source_path) if source_path.exists() else "",
+            angle,
+            torque,
+            sample_rate,
+            delta,
+            t,
+            weights,
+        ],
         "units": [angle_unit, torque_unit],
         "asked": [repr(method), repr(given), nan_policy, every, repr(dict(settings or {}))],
     }
@@ -163,7 +175,10 @@ def identify_file(
         stack.callback(source.close)
         try:
             recording = _recording(source, (angle, torque, t), (angle_unit, torque_unit), (delta, sample_rate))
-            call = Given(method, given, settings, nan_policy, recording.period, recording.axis, threads)
+            weighted = weights is not None
+            if weights is not None:
+                recording = replace(recording, weights=_of_length(source, "weights", weights, recording.samples)[0])
+            call = Given(method, given, settings, nan_policy, recording.period, recording.axis, threads, weighted)
             asked = Asked(recording, call, every)
             return Run(asked, kept, LONG_PIECE if asked.is_narrow else PIECE, place, report).all()
         except BaseException:
@@ -212,11 +227,17 @@ def _recording(
                 f"an identification needs the sample period; {source.place} has no channel of times; give sample_rate=, delta= or t="
             )
         name = known[0]
-    times, count, unit = source.channel(name)
-    if count != samples:
-        raise ValueError(
-            f"times must have one value for every sample; {name!r} has {count} for {samples}; give sample_rate="
-        )
+    times, unit = _of_length(source, "times", name, samples)
     factor = float(times_in_seconds(Said(np.ones(1), unit))[0])
     begin, period = uniform(times, samples, factor, full_name(source.channels, name, source.place))
     return Recording(angle, torque, samples, begin, period, axis)
+
+
+def _of_length(source: Source, what: str, name: str, samples: int) -> tuple[Channel, str]:
+    """Return a channel beside angle and torque, and its unit."""
+    channel, count, unit = source.channel(name)
+    if count != samples:
+        raise ValueError(
+            f"{what} must have one value for every sample; {name!r} has {count} for {samples}; leave it out, or take another channel"
+        )
+    return channel, unit

@@ -1,4 +1,4 @@
-"""The two channels of a long recording, read piece by piece in the units of results."""
+"""The channels of a long recording, read piece by piece in the units of results."""
 
 from __future__ import annotations
 
@@ -33,6 +33,8 @@ class Recording:
         Seconds: of the first sample, and from one to the next.
     axis : Axis
         What the channels are multiplied by.
+    weights : Channel, optional
+        Of the samples.
     """
 
     angle: Channel
@@ -41,17 +43,19 @@ class Recording:
     begin: float
     period: float
     axis: Axis
+    weights: Channel | None = None
 
     def held(self, spans: Sequence[Span]) -> Held:
         """Read some parts."""
-        both: list[list[npt.NDArray[Any]]] = [[], []]
+        channels = [(self.angle, self.axis.angle), (self.torque, self.axis.torque)]
+        if self.weights is not None:
+            channels.append((self.weights, 1.0))
+        each: list[list[npt.NDArray[Any]]] = [[] for _ in channels]
         for span in spans:
-            for channel, factor, parts in zip(
-                (self.angle, self.torque), (self.axis.angle, self.axis.torque), both, strict=True
-            ):
+            for (channel, factor), parts in zip(channels, each, strict=True):
                 parts.append(self._scaled(channel.read(*span), factor))
-        angle, torque = (parts[0] if len(parts) == 1 else np.concatenate(parts) for parts in both)
-        return Held(angle, torque, spans)
+        angle, torque, *weights = (parts[0] if len(parts) == 1 else np.concatenate(parts) for parts in each)
+        return Held(angle, torque, spans, *weights)
 
     @staticmethod
     def _scaled(samples: npt.NDArray[Any], factor: float) -> npt.NDArray[Any]:

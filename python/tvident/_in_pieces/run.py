@@ -66,6 +66,7 @@ class Asked:
             recording.axis,
             propagate=given.nan_policy == "propagate",
             step=step,
+            weighted=given.weighted,
         )
 
     @property

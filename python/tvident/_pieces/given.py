@@ -28,6 +28,8 @@ class Given:
         Seconds from one sample to the next.
     axis : Axis
     workers : int, optional
+    weighted : bool
+        Samples have weights.
     """
 
     method: Method
@@ -37,6 +39,7 @@ class Given:
     period: float
     axis: Axis
     workers: int | None
+    weighted: bool = False
 
     @property
     def frozen(self) -> Mapping[str, Any] | None:
