@@ -141,3 +141,40 @@ def test_advice_is_on_what_the_mask_leaves(step: int) -> None:
     angle[10_000:30_000], torque[10_000:30_000], mask[9800:30_200] = angle[10_000], 0, False
     result = tvident.identify(angle, torque, sample_rate=1000, method="paper", mask=mask, step=step)
     assert not any("mask=" in one for one in result.advice)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"lag": 4}, ["the torque is late by", "try lag=0.00"]),
+        ({"friction": 0.1}, ["dry friction of", "'coulomb']"]),
+        ({"stiffness": 0.0, "friction": 0.1}, ["stiffness is none", "try stiffness=0, terms=["]),
+    ],
+)
+def test_what_the_weak_form_finds_missing_is_tried_there_and_said_here(
+    change: dict[str, float], words: list[str]
+) -> None:
+    late = int(change.get("lag", 0))
+    clean = tvident.simulate_torsional_rig(8.0, pattern="constant", angle_noise=1e-6, torque_snr_db=40)
+    velocity = np.gradient(clean.angle, 1e-3)
+    torque = clean.torque + change.get("friction", 0.0) * np.sign(velocity)
+    if "stiffness" in change:
+        torque = torque - clean.stiffness * clean.angle
+    angle, torque = clean.angle[late:], torque[: torque.size - late]
+    for result in (paper(angle, torque), paper(angle, torque, inertia="constant", damping="constant")):
+        first = result.advice[0]
+        assert first.startswith("in weak form: ")
+        assert all(one in first for one in words), first
+        assert advice(result).count("dry friction") == ("friction" in change)
+        assert result.summary().splitlines()[0].endswith("see what to do")
+
+
+@pytest.mark.parametrize("lacks", ["length", "angle"])
+def test_a_record_that_the_weak_form_cannot_take_has_a_summary(lacks: str) -> None:
+    # The middle 16384 samples are tried.
+    angle, torque = (np.tile(channel, 3)[: 40 if lacks == "length" else 18_000] for channel in (RIG.angle, RIG.torque))
+    if lacks == "angle":
+        angle[500:-500] = np.nan
+    result = paper(angle, torque, window_length=9, max_order=5, regression_window=9)
+    assert np.isfinite(result.stiffness).any()
+    assert result.summary()

@@ -13,11 +13,11 @@ from tvident import _core
 from tvident._advice import Explained
 from tvident._equation import BUILT_IN, Unknown
 from tvident._identify.data import Data
-from tvident._identify.methods import WeakForm
+from tvident._identify.methods import StrongForm, WeakForm
 from tvident._identify.remedies import Trial
 from tvident._identify.settings import Request, resolve
-from tvident._results import Identification, Words
 from tvident._identify.spikes import without_spikes
+from tvident._results import TRIED, Identification, Words
 from tvident._status import Status
 from tvident._units import ROTARY
 
@@ -26,6 +26,12 @@ _LENGTHS = ("window_length", "exponent", "regression_window")
 
 _LARGE = 0.4
 """Radians beyond which a pendulum is no spring: the sine is 2.6 % smaller than its angle."""
+
+_TESTED = {"inertia": "auto", "damping": "auto", "stiffness": "windowed"}
+"""Kinds that the weak form tests, and the one that it takes, in place of windows that the strong form has."""
+
+_MOST = 1 << 14
+"""Samples in the middle of a record that are tried in weak form."""
 
 _DOUBTED = (
     Status.TERM_SUSPECTED | Status.LAG_SUSPECTED | Status.NOISE_MODEL | Status.WINDOW_LIMIT | Status.SCALES_DISAGREE
@@ -48,6 +54,12 @@ def is_to_be_tried(data: Data, request: Request, found: Sequence[_core.Identific
     # Inertia and damping that change take the place of what is missing.
     changing = any(one.kind == "varying" for one in found[0].unknowns)
     return bool(flags & _DOUBTED) or changing
+
+
+def is_told_by_weak_form(data: Data, request: Request) -> bool:
+    """Return whether a record is a single one in strong form, of which the weak form takes any part as well."""
+    is_plain = not (data.motion.recorded or data.batch or data.weights or data.clock) and data.instruments is None
+    return isinstance(request.form, StrongForm) and is_plain and data.time.size > 0
 
 
 def is_doubted(flags: int) -> bool:
@@ -73,14 +85,13 @@ def of_one(
 
 
 @dataclass(frozen=True)
-class Improvement:
-    """A single record, and how to identify it with another equation.
+class _Asked:
+    """A single record, and what was asked of it.
 
     Parameters
     ----------
     data : Data
     request : Request
-    found : _core.Identification
     given : mapping of str to object
         Inertia, damping and stiffness as they were asked for.
     terms : sequence of Unknown
@@ -90,15 +101,85 @@ class Improvement:
 
     data: Data
     request: Request
-    found: _core.Identification
     given: Mapping[str, Any]
     terms: Sequence[Unknown]
     run: Callable[..., Identification]
 
+    @property
+    def asked_terms(self) -> list[Any]:
+        """Terms as users give them: by name, or their own."""
+        return [term.own or term.name for term in self.terms]
+
+
+@dataclass(frozen=True)
+class InWeakForm(_Asked):
+    """A single record in strong form, of which the weak form tells what to change: its windows follow whatever is missing."""
+
+    def words(self, _: Identification, words: Words) -> Words:
+        """Return words that begin with what explains more in weak form, if anything does."""
+        try:
+            advice = self._in_weak_form(self._part()).advice
+        except ValueError:
+            # The part is too short for the weak form, or nothing of it is there.
+            return words
+        remedy = next((line for line in advice if TRIED in line), None)
+        if remedy is None:
+            return words
+        starts = tuple(one.suspicion.partition("{")[0] for one in BUILT_IN.values() if one.suspicion)
+        rest = [line for line in words.advice if not (line.startswith(starts) and ": give terms=" in line)]
+        return replace(words, advice=(f"in weak form: {remedy}", *rest))
+
+    def _part(self) -> slice:
+        """Return the part of the record that is tried: its middle, or where the mask leaves most."""
+        count, mask = self.data.time.size, self.data.mask
+        first = max(0, count - _MOST) // 2
+        if mask is not None and count > _MOST:
+            left = np.concatenate([[0], np.cumsum(mask)])
+            first = int(np.argmax(left[_MOST:] - left[:-_MOST]))
+        return slice(first, first + _MOST)
+
+    def _in_weak_form(self, some: slice) -> Identification:
+        data = self.data
+        kinds = {
+            name: ("constant" if kind == "constant" else _TESTED[name]) if isinstance(kind, str) else _some(kind, some)
+            for name, kind in self.given.items()
+        }
+        asked = {**kinds, "terms": self.asked_terms, "lag": self.request.lag}
+        request = resolve(WeakForm(), asked, None, 1 / data.period)
+        part = replace(
+            data,
+            angles=data.angles[..., some],
+            torques=data.torques[..., some],
+            time=data.time[some],
+            mask=None if data.mask is None else data.mask[..., some],
+            step=1,
+            labels=None,
+            doubts=(),
+            moved=(),
+        )
+        return self.run(replace(request, period=self.request.period), part, diagnose=True)
+
+
+def _some(value: Any, some: slice) -> Any:
+    """Return a part of a known parameter, which may be one number."""
+    return value if isinstance(value, float) else value[..., some]
+
+
+@dataclass(frozen=True)
+class Improvement(_Asked):
+    """A single record, and how to identify it with another equation.
+
+    Parameters
+    ----------
+    found : _core.Identification
+        With the equation that was asked for.
+    """
+
+    found: _core.Identification
+
     def words(self, result: Identification, words: Words) -> Words:
         """Return words that begin with what to change, without what was tried in vain."""
-        terms = [term.own or term.name for term in self.terms]
-        trial = Trial(self._identify, result, self.given, terms, self._suspects)
+        trial = Trial(self._identify, result, self.given, self.asked_terms, self._suspects)
         advice = trial.advice()
         useless, given_well = ([], []) if advice is not None else trial.useless()
         dropped = self._explained.suspicions(self._suspects if advice is not None else useless)

@@ -10,7 +10,7 @@ import numpy as np
 
 from tvident._arguments import percent, with_error
 from tvident._equation import BUILT_IN, COEFFICIENTS
-from tvident._results import Identification
+from tvident._results import TRIED, Identification
 from tvident._status import DOUBTFUL_RECORD, Status
 
 _WORTH = 0.9
@@ -201,7 +201,7 @@ class Trial:
 
 def _gain(least: float, now: float) -> str:
     before = f", not {percent(1 - now)}" if now < 1 else ""
-    return f"then {percent(1 - least)} of what is held back are predicted{before}"
+    return f"then {percent(1 - least)} {TRIED}{before}"
 
 
 def _is_there(name: str, found: Identification) -> bool:

@@ -20,7 +20,7 @@ from tvident._identify.channels import constants_of
 from tvident._identify.columns import Columns, Range, fixed, secant
 from tvident._identify.criterion import criterion_of
 from tvident._identify.data import Data
-from tvident._identify.improved import Improvement, is_to_be_tried, of_one
+from tvident._identify.improved import Improvement, InWeakForm, is_to_be_tried, is_told_by_weak_form, of_one
 from tvident._identify.lacking import lacking_terms
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm, exponent_of
 from tvident._identify.polynomials import Polynomials, odd_window
@@ -226,14 +226,17 @@ class Task:
 
     def _improve(self, found: Sequence[_core.Identification]) -> Callable[[Any, Words], Words] | None:
         """Return what puts first into words which change of the equation leads to the answer; None where nothing is to be tried."""
-        if self.inner or not is_to_be_tried(self._data, self._request, found):
+        is_strong = is_told_by_weak_form(self._data, self._request)
+        if self.inner or not (is_strong or is_to_be_tried(self._data, self._request, found)):
             return None
         given = {name: self._known.get(name, value) for name, value in self._request.parameters.items()}
 
         def run(request: Request, data: Data, *, diagnose: bool) -> Identification:
             return Task(data, request).run(progress=None, diagnose=diagnose)
 
-        return Improvement(replace(self._data, moved=()), self._request, found[0], given, self._terms, run).words
+        if is_strong:
+            return InWeakForm(self._data, self._request, given, self._terms, run).words
+        return Improvement(replace(self._data, moved=()), self._request, given, self._terms, run, found[0]).words
 
     def _recorded(self, settings: dict[str, Any], found: Estimates, used: Data) -> Recorded:
         """Return the records as they were used, which can be identified once more, all or some of them."""

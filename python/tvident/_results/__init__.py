@@ -28,12 +28,13 @@ from tvident._results.verdict import (
     two_digits,
     why_not,
 )
-from tvident._results.words import Words, of_batch
+from tvident._results.words import TRIED, Words, of_batch
 
 __all__ = [
     "CHANGING",
     "COLUMNS",
     "POOR",
+    "TRIED",
     "Estimates",
     "ExpandedParameter",
     "Identification",

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tvident._arguments import percent, to_digits_of
+from tvident._results.words import TRIED
 from tvident._status import Status
 
 _SYMBOLS = {"stiffness": "K", "inertia": "I", "damping": "C"}
@@ -84,7 +85,8 @@ def believed(result: Any, known: str, share: float | None) -> str:
     if share is not None:
         parts.append(f"model explains {percent(share)} of the torque")
     words = ", ".join(parts) or "nothing was unknown"
-    if result.record_status & _DOUBTS and result.advice:
+    is_doubtful = result.record_status & _DOUBTS and result.advice
+    if is_doubtful or any(TRIED in line for line in result.advice):
         return f"{words}; errors hold if the model does: see what to do"
     return words
 

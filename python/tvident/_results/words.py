@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+TRIED = "of what is held back are predicted"
+"""What advice says that was tried on the record."""
+
 
 @dataclass(frozen=True)
 class Words:
