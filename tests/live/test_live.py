@@ -55,6 +55,32 @@ def test_csv_and_json_lines_become_json_lines_with_the_batchs_numbers() -> None:
         assert "lost samples: 0" in words
 
 
+@pytest.mark.parametrize(
+    ("header", "separator", "decimal", "factors"),
+    [
+        ("Zeit;Winkel;Moment\nms;°;Nmm\n", ";", ",", (1e3, 180 / np.pi, 1e3)),
+        ('"Zeit/ms","Winkel [mrad]","Moment (mNm)"\n', ",", ".", (1e3, 1e3, 1e3)),
+        ("Zeit\tWinkel [mm]\tMoment [N]\n", "\t", ".", (1, 1e3, 1)),
+        ('"Zeit","Winkel [mrad]","Moment"\n', ",", ",", (1, 1e3, 1)),
+    ],
+)
+def test_units_of_a_header_are_converted(
+    header: str, separator: str, decimal: str, factors: tuple[float, float, float]
+) -> None:
+    columns = [each * factor for each, factor in zip((RIG.time, RIG.angle, RIG.torque), factors, strict=True)]
+    quoted = '"{}"' if '"' in header else "{}"
+    numbers = np.array(columns).T[:900].tolist()
+    text = "\n".join(separator.join(quoted.format(repr(one).replace(".", decimal)) for one in row) for row in numbers)
+    options = ("--angle", "Winkel", "--torque", "Moment", "--time", "Zeit", "--sample-rate", "1000")
+    found, words = run(header + text, *options)
+    expected = tvident.identify(RIG.angle[:900], RIG.torque[:900], sample_rate=1000, method="paper").stiffness
+    stiffness = np.array([row["stiffness"] for row in found], dtype=float)
+    # Rounding of what was converted there and back, by the condition of windows.
+    np.testing.assert_allclose(stiffness, expected, rtol=1e-7)
+    np.testing.assert_allclose([row["timestamp"] for row in found], RIG.time[:900], atol=1e-9)
+    assert "could not be read" not in words
+
+
 def test_settings_of_a_result_in_weak_form_give_its_stream(tmp_path: Path) -> None:
     earlier = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000)
     (tmp_path / "chosen.json").write_text(json.dumps(earlier.settings))
@@ -122,10 +148,12 @@ def test_a_rate_that_is_not_the_nominal_one_is_said() -> None:
 def test_what_cannot_be_read_is_missing_and_said() -> None:
     rows = [f"{a!r},{b!r}\n" for a, b in zip(RIG.angle[:900].tolist(), RIG.torque[:900].tolist(), strict=True)]
     rows[300] = "1.0;oops\n"
+    rows[302] = "0,001,0,002\n"
+    rows[304] = rows[304].replace("\n", ",\n")
     found, words = run("".join(rows), "--angle", "0", "--torque", "1", "--sample-rate", "1000")
     assert len(found) == 900
     assert found[300]["stiffness"] is None
-    assert "1 lines could not be read" in words
+    assert "2 lines could not be read" in words
 
 
 @pytest.mark.parametrize(

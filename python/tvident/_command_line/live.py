@@ -14,7 +14,7 @@ from tvident._command_line.method import METHOD
 @main.command(
     epilog="Example: a-driver | tvident live - --angle position --torque effort --time t --sample-rate 1000 --method paper"
 )
-@click.argument("source", metavar="[-]", default="-", type=click.Choice(["-"]))
+@click.argument("file", metavar="[-]", default="-", type=click.Choice(["-"]))
 @click.option(
     "--lsl", metavar="NAME", help="Take a stream of the Lab Streaming Layer instead: its name, type=… or source_id=…."
 )
@@ -26,8 +26,12 @@ from tvident._command_line.method import METHOD
     "--time", "time_channel", metavar="NAME", help="The same for stamps in seconds, by which losses are found."
 )
 @click.option("--counter", metavar="NAME", help="The same for a number that each sample counts up.")
-@click.option("--angle-unit", metavar="UNIT", help="Unit of the angle, as deg; by default rad.")
-@click.option("--torque-unit", metavar="UNIT", help="Unit of the torque, as 'N mm'; by default N m.")
+@click.option(
+    "--angle-unit", metavar="UNIT", help="Unit of the angle, as deg; by default its header's or label's, or rad."
+)
+@click.option(
+    "--torque-unit", metavar="UNIT", help="Unit of the torque, as 'N mm'; by default its header's or label's, or N m."
+)
 @click.option("--sample-rate", type=float, help="Nominal samples per second; by default that of the LSL stream.")
 @METHOD
 @click.option("--inertia", metavar="KIND", help="constant, windowed, or a known number.")

@@ -18,6 +18,7 @@ from tvident._commands.method import NAMES, method_of
 from tvident._commands.settings import read_settings
 from tvident._equation import COEFFICIENTS
 from tvident._live import Inlet, JsonLines, Lines, Outlet, Session, Table, Udp
+from tvident._units import ROTARY, factor_to
 
 _WAIT = 0.05
 """Seconds between two looks at the clock while nothing comes."""
@@ -25,7 +26,7 @@ _WAIT = 0.05
 
 # Options that need work before they are passed on are parameters of their own.
 def live(
-    source: str,
+    file: str,
     lsl: str | None,
     angle: str,
     torque: str,
@@ -45,14 +46,19 @@ def live(
     **options: Any,
 ) -> None:
     """Identify what comes, and give parameters to who watches."""
-    del source
+    del file
     names = [name for name in (time_channel, angle, torque, counter) if name is not None]
-    inlet = None if lsl is None else Inlet(lsl, names if time_channel is None else names[1:])
-    if inlet is not None and time_channel is not None:
+    if lsl is not None and time_channel is not None:
         raise click.UsageError("--time is for lines; got it with --lsl, whose samples have stamps; leave it out")
+    inlet = None if lsl is None else Inlet(lsl, names)
     rate = sample_rate or (inlet.nominal_rate if inlet is not None else 0.0)
     if not rate > 0:
         raise click.UsageError("a live recording needs its sample rate; got none; give --sample-rate")
+    source = inlet or _begun(names, duration)
+    units = dict(zip(names, source.units, strict=True))
+    for name, key in ((angle, "angle_unit"), (torque, "torque_unit")):
+        options[key] = options[key] or units[name] or None
+    seconds = factor_to(ROTARY, "time", units.get(time_channel or ""), name="the time")
     of_method = {name: value for name, value in given(options).items() if name in NAMES}
     has_settings = settings is not None
     chosen = "paper" if method is None and not of_method and not has_settings else method
@@ -84,18 +90,24 @@ def live(
         send = outlet.show
         shows.append(lambda stamps, columns: send(stamps, [columns[name] for name, _ in [*channels, ("status", "")]]))
     session = Session(stream, 1 / rate, shows)
-    lines = Lines(sys.stdin.fileno(), names) if inlet is None else None
-    pieces = inlet.pieces(_WAIT) if inlet is not None else _with_stamps(lines, has_time=time_channel is not None)
+    pieces = _with_stamps(source, seconds, has_time=time_channel is not None)
     _run(session, pieces, duration, has_counter=counter is not None)
     if outlet is not None:
         outlet.close()
     for words in session.words():
         click.echo(words, err=True)
-    if lines is not None and lines.unreadable:
+    if isinstance(source, Lines) and source.unreadable:
         click.echo(
-            f"{lines.unreadable} lines could not be read and count as missing; the first is {lines.first_unreadable!r}",
+            f"{source.unreadable} lines could not be read and count as missing; the first is {source.first_unreadable!r}",
             err=True,
         )
+
+
+def _begun(names: Sequence[str], duration: float | None) -> Lines:
+    """Return the lines of standard input, of which the units are known."""
+    lines = Lines(sys.stdin.fileno(), names)
+    lines.begin(_WAIT, math.inf if duration is None else time.monotonic() + duration)
+    return lines
 
 
 def _parameter(value: str) -> str | float:
@@ -106,10 +118,13 @@ def _parameter(value: str) -> str | float:
         return value
 
 
-def _with_stamps(lines: Lines | None, *, has_time: bool) -> Iterator[list[list[float]]]:
-    """Give rows that begin with a stamp, NaN where lines have none."""
-    for piece in lines.pieces(_WAIT) if lines is not None else ():
-        yield piece if has_time else [[math.nan, *row] for row in piece]
+def _with_stamps(source: Inlet | Lines, seconds: float, *, has_time: bool) -> Iterator[list[list[float]]]:
+    """Give rows that begin with a stamp in seconds: lines have times so many seconds long, or none, which is NaN."""
+    for piece in source.pieces(_WAIT):
+        if isinstance(source, Inlet):
+            yield piece
+        else:
+            yield [[seconds * row[0], *row[1:]] if has_time else [math.nan, *row] for row in piece]
 
 
 def _run(

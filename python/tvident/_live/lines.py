@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 import os
+import re
 import select
+import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
+
+from tvident._units import is_unit, named_unit
 
 _BLOCK = 1 << 16
 _LONGEST = 1 << 20
@@ -33,42 +38,87 @@ class Lines:
         self._descriptor = descriptor
         self._names = list(names)
         self._cells: Cells | None = None
+        self._rest = b""
+        self._early: list[str] = []
+        """Lines that came before anybody asked for pieces."""
+        self._is_begun = self._has_ended = False
+        self.units = [""] * len(self._names)
+        """Of the channels, as a header or a line below it says them."""
         self.unreadable = 0
         self.first_unreadable = ""
 
+    def begin(self, wait: float, until: float) -> None:
+        """Wait for the lines that say units: the first, and the one below a header; no longer than until a time of the monotonic clock."""
+        while not self._has_begun() and not self._has_ended and time.monotonic() < until:
+            self._early += self._come(wait)
+
     def pieces(self, wait: float) -> Iterator[list[list[float]]]:
         """Give what has come, every time that something has, or an empty piece after waiting so many seconds; end where the pipe does."""
-        rest = b""
         while True:
-            ready, _, _ = select.select([self._descriptor], [], [], wait)
-            if not ready:
-                yield []
-                continue
-            block = os.read(self._descriptor, _BLOCK)
-            *lines, rest = (rest + block).split(b"\n")
-            if not block and rest:
-                lines, rest = [rest], b""
-            if len(rest) > _LONGEST:
-                raise ValueError(
-                    f"a line must hold at most {_LONGEST} bytes; got more without an end; separate samples by newlines"
-                )
-            yield [row for line in lines if (row := self._row(line.decode("utf-8", "replace").strip())) is not None]
-            if not block:
+            if not self._early:
+                self._early = self._come(wait)
+            lines: list[str] = []
+            if self._has_begun() or self._has_ended:
+                lines, self._early = self._early, lines
+            else:
+                self._early += self._come(wait)
+            yield [row for line in lines if (row := self._row(line)) is not None]
+            if self._has_ended and not self._early:
                 return
+
+    def _come(self, wait: float) -> list[str]:
+        """Return the lines that have come, none after waiting so many seconds."""
+        ready, _, _ = select.select([self._descriptor], [], [], wait)
+        if not ready:
+            return []
+        block = os.read(self._descriptor, _BLOCK)
+        self._has_ended = not block
+        *lines, self._rest = (self._rest + block).split(b"\n")
+        if self._has_ended and self._rest:
+            lines, self._rest = [self._rest], b""
+        if len(self._rest) > _LONGEST:
+            raise ValueError(
+                f"a line must hold at most {_LONGEST} bytes; got more without an end; separate samples by newlines"
+            )
+        return [line.decode("utf-8", "replace").strip() for line in lines]
+
+    def _has_begun(self) -> bool:
+        """Take the first lines, if they have come: how lines are read, and units in a header or below it; the rest are numbers."""
+        if self._is_begun:
+            return True
+        first = self._first(0)
+        if first is None:
+            return False
+        line = self._early[first]
+        if line[0] in "{[":
+            self._cells, self._is_begun = _json(self._names), True
+            return True
+        separator = _separator(line)
+        header = _split(line, separator)
+        has_header = not all(map(_is_number, header))
+        places = _places(self._names, header if has_header else None, len(header))
+        self._cells = _csv(separator, places, len(header))
+        if has_header:
+            below = self._first(first + 1)
+            if below is None and not self._has_ended:
+                return False
+            self.units = [named_unit(header[place])[1] for place in places]
+            cells = [] if below is None else _split(self._early[below], separator)
+            if len(cells) == len(header) and all(map(is_unit, cells)) and not all(map(_is_number, cells)):
+                self.units = [cells[place].strip("[]()") for place in places]
+                first = below or first
+            del self._early[: first + 1]
+        self._is_begun = True
+        return True
+
+    def _first(self, begin: int) -> int | None:
+        """Return the first waiting line that says something."""
+        return next((place for place in range(begin, len(self._early)) if _says_something(self._early[place])), None)
 
     def _row(self, line: str) -> list[float] | None:
         """Return the numbers of a line; nothing where it has none."""
-        if not line or line.startswith("#"):
+        if not _says_something(line) or self._cells is None:
             return None
-        if self._cells is None:
-            self._cells = _json(self._names) if line[0] in "{[" else None
-            if self._cells is None:
-                separator = next((sign for sign in ",;\t" if sign in line), None)
-                cells = [cell.strip().strip('"') for cell in line.split(separator)]
-                has_header = not all(_is_number(cell) for cell in cells)
-                self._cells = _csv(separator, _places(self._names, cells if has_header else None, len(cells)))
-                if has_header:
-                    return None
         try:
             return self._cells(line)
         except (ValueError, IndexError, KeyError, TypeError, RecursionError):
@@ -77,17 +127,44 @@ class Lines:
             return [math.nan] * len(self._names)
 
 
+def _says_something(line: str) -> bool:
+    return bool(line) and not line.startswith("#")
+
+
+def _separator(line: str) -> str | None:
+    """Return what separates the cells of a line outside quotes; None where blanks do."""
+    bare = re.sub('"[^"]*"', "", line)
+    return next((sign for sign in ";\t," if sign in bare), None)
+
+
+def _split(line: str, separator: str | None) -> list[str]:
+    if '"' not in line:
+        return [cell.strip() for cell in line.split(separator)]
+    try:
+        cells = next(csv.reader([line], delimiter=separator or " ", skipinitialspace=True))
+    except csv.Error as error:
+        raise ValueError(
+            f"quotes must close within a line of CSV; got {line[:80]!r} ({error}); write numbers without quotes"
+        ) from None
+    return [cell.strip() for cell in cells]
+
+
+def _number(cell: str) -> float:
+    """Return the number in a cell, NaN where it is empty; a comma is a decimal sign, since it separated nothing."""
+    return float(cell.replace(",", ".")) if cell else math.nan
+
+
 def _is_number(cell: str) -> bool:
     try:
-        float(cell)
+        _number(cell)
     except ValueError:
-        return not cell
+        return False
     return True
 
 
 def _places(names: Sequence[str], header: Sequence[str] | None, count: int) -> list[int]:
     """Return the columns of channels."""
-    plain = [cell.split("[")[0].split("(")[0].strip() for cell in header or ()]
+    plain = [named_unit(cell)[0] for cell in header or ()]
     places = []
     for name in names:
         if header is not None and name in header:
@@ -102,10 +179,14 @@ def _places(names: Sequence[str], header: Sequence[str] | None, count: int) -> l
     return places
 
 
-def _csv(separator: str | None, places: Sequence[int]) -> Cells:
+def _csv(separator: str | None, places: Sequence[int], count: int) -> Cells:
+    """Return what reads lines of so many cells; those with more were cut at other places, unless the last one is empty."""
+
     def cells(line: str) -> list[float]:
-        parts = line.split(separator)
-        return [float(parts[place]) if parts[place].strip() else math.nan for place in places]
+        parts = _split(line, separator)
+        if any(parts[count:]) or len(parts) > count + 1:
+            raise ValueError
+        return [_number(parts[place]) for place in places]
 
     return cells
 

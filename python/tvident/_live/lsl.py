@@ -6,6 +6,8 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from tvident._units import unit_of
+
 _MOST = 4096
 """Samples of a piece."""
 
@@ -55,6 +57,9 @@ class Inlet:
         info = self._inlet.info(timeout=timeout)
         self.nominal_rate: float = info.nominal_srate()
         self._places = _places(info, names)
+        of_channels = [_unit(one) for one in info.get_channel_units() or ()]
+        self.units = [of_channels[place] if place < len(of_channels) else "" for place in self._places]
+        """Of the channels, as the stream says them."""
         self._inlet.open_stream(timeout=timeout)
 
     def pieces(self, wait: float) -> Iterator[list[list[float]]]:
@@ -68,6 +73,12 @@ class Inlet:
                 [stamp, *(float(sample[place]) for place in self._places)]
                 for sample, stamp in zip(samples, stamps, strict=True)
             ]
+
+
+def _unit(said: Any) -> str:
+    """Return a unit that is known; drivers write many things there."""
+    text = str(said or "").strip()
+    return text if unit_of(text) is not None else ""
 
 
 def _places(info: Any, names: Sequence[str]) -> list[int]:
