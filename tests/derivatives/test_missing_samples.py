@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import tvident
 from tvident import Status
+from tvident._huber import pseudo_values
 
 Array = npt.NDArray[np.float64]
 
@@ -195,15 +196,57 @@ def test_windows_are_chosen_as_if_nothing_were_missing(seed: int, missing: tuple
         assert np.mean(away < 1.96) > COVERED
 
 
+@pytest.mark.parametrize("selection", ["pooled", "average"])
+def test_windows_that_lack_samples_have_orders_of_their_own_beside_others(selection: Any) -> None:
+    generator = np.random.default_rng(5)
+    y = np.sin(np.arange(400) / 15) + 0.05 * generator.standard_normal(400)
+    y[[150, 151, 240]] = np.nan
+    found = tvident.fit_local_polynomials(y, 41, nan_policy="omit", selection=selection)
+    others = tvident.fit_local_polynomials(y, 41, selection=selection)
+    lack = np.isnan(others.derivatives[0])
+    assert lack.sum() == 42 + 41
+    assert np.array_equal(found.derivatives[:, ~lack], others.derivatives[:, ~lack])
+    own = tvident.fit_local_polynomials(y, 41, nan_policy="omit")
+    for name in ("derivatives", "order", "sigma", "stderr"):
+        assert np.array_equal(getattr(found, name)[..., lack], getattr(own, name)[..., lack]), name
+
+
+def test_hubers_loss_leaves_out_what_is_missing() -> None:
+    generator = np.random.default_rng(6)
+    y = np.sin(np.arange(120) / 9) + 0.05 * generator.standard_normal(120)
+    y[generator.integers(0, 120, 6)] += 3
+    y[[30, 31, 77]] = np.nan
+    length, order = 21, 3
+
+    def values(sides: Array, derivative: int = 0) -> Array:
+        each = [fitted(sides, np.ones(120), place, length, order, order)[0][derivative] for place in range(120)]
+        return np.array(each)
+
+    clipped = pseudo_values(lambda sides: values(sides[:, 0])[:, None], y[:, None], np.isfinite(y), length, 5)[:, 0]
+    assert np.nanmax(np.abs(clipped - y)) > 2
+    found = tvident.fit_local_polynomials(
+        np.stack([y, np.arange(120.0)]), length, order=order, nan_policy="omit", loss="huber"
+    )
+    for derivative in range(3):
+        expected = values(clipped, derivative)
+        np.testing.assert_allclose(found.derivatives[derivative, 0], expected, rtol=0, atol=ROUNDING)
+    automatic = tvident.fit_local_polynomials(y, "auto", nan_policy="omit", loss="huber")
+    # Some standard deviations of the noise, and a tenth of a spike.
+    assert np.nanmax(np.abs(automatic.derivatives[0] - np.sin(np.arange(120) / 9))) < 0.3
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
         (
             {"window_length": "auto", "weights": np.ones(100)},
-            "window_length must be a length where samples .* have weights .*; got 'auto'",
+            "window_length must be a length where samples have weights .*; got 'auto'",
         ),
-        ({"selection": "pooled"}, "selection must be 'window' where .*; got 'pooled'"),
-        ({"loss": "huber"}, "loss must be 'squares' where .*; got 'huber'"),
+        (
+            {"selection": "pooled", "weights": np.ones(100)},
+            "selection must be 'window' where .* weights .*; got 'pooled'",
+        ),
+        ({"loss": "huber", "weights": np.ones(100)}, "loss must be 'squares' where .* weights .*; got 'huber'"),
         (
             {"nan_policy": "propagate", "max_gap": 3},
             "max_gap must go with nan_policy='omit' or weights; got 3 with 'prop",

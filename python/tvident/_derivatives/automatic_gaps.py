@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
-from tvident._derivatives.found import Found
-from tvident._derivatives.incomplete import Incomplete, filled
+from tvident._derivatives.found import CHOSEN, Found, together
+from tvident._derivatives.incomplete import Incomplete, filled, left_out
 from tvident._status import Status
 
 Numbers = npt.NDArray[np.float64]
@@ -52,7 +51,7 @@ def choose_beside_gaps(
         each.append(_of_record(choose_one, plan_of, longest_gap, record, workers))
         if progress is not None:
             progress(done + 1, len(records))
-    return _together(each, samples.shape[:-1], step)
+    return together(each, samples.shape[:-1], step, by_record=CHOSEN)
 
 
 def _of_record(
@@ -64,7 +63,7 @@ def _of_record(
         return choose(record)
     length, found = _FIRST, choose(record)
     for _ in range(_ROUNDS):
-        bridged = _bridged(record, plan_of(length, derivative=0), _left_out(length, longest_gap), workers)
+        bridged = _bridged(record, plan_of(length, derivative=0), left_out(length, longest_gap), workers)
         found = choose(bridged)
         longer = int(np.ravel(found.window_length)[0])
         if longer <= length:
@@ -75,7 +74,7 @@ def _of_record(
     for derivative, (own, order) in enumerate(zip(lengths, found.settings["order"], strict=True)):
         plan = plan_of(own, highest=order, derivative=derivative)
         beside = filled(
-            plan, plan.estimate(record, workers=workers), record, _left_out(own, longest_gap), step=1, workers=workers
+            plan, plan.estimate(record, workers=workers), record, left_out(own, longest_gap), step=1, workers=workers
         )
         # Windows are averaged with others of up to twice the length.
         near = _near(~there, own)
@@ -87,18 +86,12 @@ def _of_record(
     return replace(found, errors=lambda: errors)
 
 
-def _left_out(length: int, longest_gap: int | None) -> Incomplete:
-    """Return what is left out of windows of a length."""
-    longest = length // 2 if longest_gap is None else longest_gap
-    return Incomplete(omit=True, weights=None, longest_gap=longest, least=(length + 1) // 2)
-
-
-def _bridged(record: Numbers, plan: _core.LocalPolynomials, left_out: Incomplete, workers: int | None) -> Numbers:
+def _bridged(record: Numbers, plan: _core.LocalPolynomials, without: Incomplete, workers: int | None) -> Numbers:
     """Return a record with what windows say of missing samples as well as the samples would, and noise such as theirs.
 
     The noise of the record is estimated from it, too.
     """
-    found = filled(plan, plan.estimate(record, workers=workers), record, left_out, step=1, workers=workers)
+    found = filled(plan, plan.estimate(record, workers=workers), record, without, step=1, workers=workers)
     missing = np.flatnonzero(~np.isfinite(record))
     noise = np.random.default_rng(missing.size).standard_normal(missing.size)
     bridged = record.copy()
@@ -112,28 +105,3 @@ def _near(missing: npt.NDArray[np.bool_], reach: int) -> npt.NDArray[np.bool_]:
     """Return which samples have a missing one at most so many away."""
     before = np.concatenate([np.zeros(reach + 1, np.intp), np.cumsum(missing), np.full(reach, missing.sum())])
     return np.asarray(before[2 * reach + 1 :] > before[: missing.size])
-
-
-def _together(each: Sequence[Found], leading: tuple[int, ...], step: int) -> Found:
-    """Return what was found of records one after the other, for the wanted samples."""
-
-    def stacked(arrays: Sequence[npt.NDArray[Any]], axis: int) -> npt.NDArray[Any]:
-        together = np.stack([array[..., ::step] for array in arrays], axis=axis)
-        shape = (*together.shape[:axis], *leading, together.shape[-1])
-        return together.reshape(shape)
-
-    def listed(name: str) -> object:
-        values = np.array([one.settings[name] for one in each]).T
-        return values.reshape((*values.shape[:-1], *leading)).tolist()
-
-    by_record = {name: listed(name) for name in ("window_length", "order", "noise", "quantisation")}
-    return Found(
-        derivatives=stacked([one.derivatives for one in each], 1),
-        order=stacked([one.order for one in each], 0),
-        status=stacked([one.status for one in each], 0),
-        sigma=stacked([one.sigma for one in each], 0),
-        window_length=np.array(by_record["window_length"], np.intp),
-        settings={**each[0].settings, **by_record},
-        errors=lambda: stacked([one.errors() for one in each], 1),
-        plan_of=lambda index: each[int(np.ravel_multi_index(index, leading)) if leading else 0].plan_of(()),
-    )

@@ -95,18 +95,24 @@ def longest_gap(max_gap: int | str | None, period: float) -> int | None:
     return None if max_gap is None else arguments.window_length("max_gap", max_gap, period, odd=False)
 
 
-def check_whole_windows(*, automatic: bool, selection: str, loss: str) -> None:
-    """Check what does not go with missing samples."""
+def left_out(length: int, longest_gap: int | None) -> Incomplete:
+    """Return what is left out of windows of a length where nothing was asked for but the gaps that they may reach across."""
+    longest = length // 2 if longest_gap is None else longest_gap
+    return Incomplete(omit=True, weights=None, longest_gap=longest, least=(length + 1) // 2)
+
+
+def check_weighted(*, automatic: bool, weighted: bool, selection: str, loss: str) -> None:
+    """Check what does not go with weights, of which every window is decomposed on its own, or with a least number of samples."""
     wrong = [
         ("window_length", "a length", "'auto'", automatic),
-        ("selection", "'window'", repr(selection), selection != "window"),
-        ("loss", "'squares'", repr(loss), loss != "squares"),
+        ("selection", "'window'", repr(selection), weighted and selection != "window"),
+        ("loss", "'squares'", repr(loss), weighted and loss != "squares"),
     ]
     for name, right, got, is_wrong in wrong:
         if is_wrong:
             raise ValueError(
-                f"{name} must be {right} where samples are left out or have weights (nan_policy='omit', weights=); got {got}; "
-                f"give {right}, or repair the samples first"
+                f"{name} must be {right} where samples have weights or windows a least number of them (weights=, min_observations=); got "
+                f"{got}; give {right}, or repair the samples first"
             )
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from typing import Any, get_args
 
-import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
@@ -16,17 +14,11 @@ from tvident._derivatives.automatic import choose
 from tvident._derivatives.automatic_gaps import choose_beside_gaps
 from tvident._derivatives.fit import LocalPolynomialFit, Sampled
 from tvident._derivatives.found import Found
-from tvident._derivatives.incomplete import check_whole_windows, filled, incomplete_given, longest_gap
+from tvident._derivatives.incomplete import check_weighted, filled, incomplete_given, left_out, longest_gap
 from tvident._derivatives.own_times import at_own_times, check_plain, period_or_times
 from tvident._derivatives.plans import HIGHEST_ORDER, SHORTEST_WINDOW, plan, quantisation_step
-from tvident._huber import pseudo_values
+from tvident._derivatives.robust import robust, value_in
 from tvident._tables import shaped
-
-_CHOICES = 2
-"""Times that windows are chosen before residuals are clipped: spikes make the first choice too short."""
-
-_USUAL_PARAMETERS = 5
-"""Coefficients of a polynomial of order 4, for the correction of standard errors, which hardly depends on it."""
 
 
 # All but the data are options, as users call it.
@@ -225,8 +217,7 @@ def fit_local_polynomials(
     # Derivatives above the highest order are zero.
     max_deriv = arguments.whole_number("max_deriv", max_deriv, least=0, most=HIGHEST_ORDER)
     arguments.check_power("max_deriv", max_deriv, seconds)
-    every = arguments.whole_number("step", step, least=1)
-    threads = arguments.worker_count(workers)
+    every, threads = arguments.whole_number("step", step, least=1), arguments.worker_count(workers)
     # Whole periods need not be multiples of the step.
     step_of_rounding = quantisation_step(samples, quantisation)
     turned = None if period is None else arguments.unwrapped("y", samples, period)
@@ -288,10 +279,17 @@ def fit_local_polynomials(
             nan_policy, weights, max_gap, min_observations, shape=array.shape, length=length, period=seconds, axis=axis
         )
     )
-    if beside_gaps or incomplete is not None:
-        check_whole_windows(automatic=automatic and not beside_gaps, selection=selection, loss=loss)
+    if incomplete is not None:
+        check_weighted(automatic=automatic, weighted=weights is not None, selection=selection, loss=loss)
     if arguments.one_of("loss", loss, get_args(Loss)) == "huber":
-        samples = _robust(samples, choose_automatically if automatic else None, plan_of_window, length, threads)
+        without = partial(left_out, longest_gap=longest_gap(max_gap, seconds)) if beside_gaps else lambda _: incomplete
+        samples = robust(
+            samples,
+            choose_automatically if automatic else None,
+            value_in(plan_of_window, without, threads),
+            length,
+            omit=nan_policy == "omit",
+        )
     with arguments.reporter(progress, "local polynomials") as report:
         if automatic:
             found = choose_automatically(samples, max_deriv=max_deriv, step=every, progress=report)
@@ -333,35 +331,6 @@ def _window(window_length: int | str, seconds: float, count: int) -> int:
     length = arguments.window_length("window_length", window_length, seconds, odd=True)
     arguments.check_window("window_length", length, count, least=SHORTEST_WINDOW)
     return length
-
-
-def _robust(
-    samples: npt.NDArray[Any],
-    choose: Callable[..., Found] | None,
-    plan_of_window: Callable[[int], _core.LocalPolynomials],
-    length: int,
-    workers: int | None,
-) -> npt.NDArray[Any]:
-    """Return samples with clipped residuals, in windows of a length or in those that are chosen."""
-    for _ in range(_CHOICES if choose else 1):
-        if choose is not None:
-            value = choose(samples, max_deriv=0, step=samples.shape[-1], progress=None)
-            length = int(np.median(np.asarray(value.window_length)))
-        samples = _with_clipped_residuals(samples, plan_of_window(max(length, SHORTEST_WINDOW)), length, workers)
-    return samples
-
-
-def _with_clipped_residuals(
-    samples: npt.NDArray[Any], core_plan: _core.LocalPolynomials, length: int, workers: int | None
-) -> npt.NDArray[np.float64]:
-    """Return samples whose least squares in windows are those of Huber's loss."""
-    sides = samples.reshape(-1, samples.shape[-1]).T.astype(np.float64)
-
-    def value(sides: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        return np.asarray(core_plan.estimate(np.ascontiguousarray(sides.T), step=1, workers=workers).derivatives[0].T)
-
-    clipped = pseudo_values(value, sides, np.ones(sides.shape[0], bool), length, _USUAL_PARAMETERS)
-    return np.asarray(clipped.T.reshape(samples.shape))
 
 
 def _of_wrapped(turned: arguments.Unwrapped | None, period: float | None) -> dict[str, Any]:
