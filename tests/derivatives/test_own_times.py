@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import tvident
 from reference.own_times import fit, window_of
 from tvident import Status
+from tvident._huber import pseudo_values
 
 Array = npt.NDArray[np.float64]
 
@@ -130,6 +131,48 @@ def test_windows_are_chosen_at_irregular_times(seed: int, scatter: float, gap: b
     assert np.array_equal(every.stderr[:, 0], found.stderr[:, ::7])
 
 
+@pytest.mark.parametrize("window_length", [21, "0.12 s", "auto"])
+def test_what_is_missing_is_as_if_it_had_not_been_recorded(window_length: int | str) -> None:
+    times, y = record(4, 400)
+    y[[20, 21, 22, 250, 399]] = np.nan
+    there = np.isfinite(y)
+    found = tvident.fit_local_polynomials(np.stack([y, 0 * y]), window_length, t=times, nan_policy="omit", step=3)
+    without = tvident.fit_local_polynomials(y[there], window_length, t=times[there])
+    inside = there[::3]
+    places = (np.cumsum(there) - 1)[::3][inside]
+    for name in ("derivatives", "stderr"):
+        assert np.array_equal(getattr(found, name)[:, 0, inside], getattr(without, name)[:, places], equal_nan=True)
+        assert np.isnan(getattr(found, name)[:, 0, ~inside]).all()
+    for name in ("order", "status"):
+        assert np.array_equal(getattr(found, name)[0, inside], getattr(without, name)[places])
+    assert (found.status[0, ~inside] == Status.INVALID | Status.GAP).all()
+    assert np.array_equal(found.scores(100)[:, 0], without.scores(97))
+    assert np.isnan(found.scores(250)[:, 0]).any()
+    # Where too few samples are there for a window nothing is known, and nothing is raised.
+    y[10:] = np.nan
+    nothing = tvident.fit_local_polynomials(y, window_length, t=times, nan_policy="omit")
+    assert np.isnan(nothing.derivatives).all()
+
+
+def test_hubers_loss_is_that_of_windows_at_true_times() -> None:
+    times, y = record(3, 60)
+    y[[17, 40, 41]] += 4
+    order, length = 2, 15
+
+    def values(sides: Array, derivative: int = 0) -> Array:
+        windows = [window_of(times, sample, length) for sample in range(times.size)]
+        fits = [fit(times[one], sides[one], times[at], 2, order)[0] for at, one in enumerate(windows)]
+        return np.array([each[order, derivative] for each in fits])
+
+    used = np.ones(times.size, bool)
+    clipped = pseudo_values(lambda sides: values(sides[:, 0])[:, None], y[:, None], used, length, 5)[:, 0]
+    assert np.abs(clipped - y).max() > 3
+    found = tvident.fit_local_polynomials(y, length, t=times, order=order, loss="huber")
+    for derivative in range(3):
+        expected = values(clipped, derivative)
+        np.testing.assert_allclose(found.derivatives[derivative], expected, rtol=0, atol=SAME * np.abs(expected).max())
+
+
 def test_times_too_irregular_for_a_choice_say_so() -> None:
     times = np.sort(np.random.default_rng(0).uniform(0, 5, 1000))
     with pytest.raises(ValueError, match=r"scatter by no more than 1\.5 of a step; .* give a duration"):
@@ -141,7 +184,11 @@ def test_times_too_irregular_for_a_choice_say_so() -> None:
     [
         ({"window_length": "auto", "selection": "pooled"}, "selection chooses the order in a window that is given"),
         ({"window_length": 21, "selection": "pooled"}, "selection must be 'window' where t is not uniform"),
-        ({"window_length": 21, "loss": "huber"}, "loss must be 'squares' where t is not uniform"),
+        (
+            {"window_length": "auto", "loss": "huber"},
+            "loss must be 'squares' where t is not uniform and windows are chosen",
+        ),
+        ({"window_length": 21, "nan_policy": "omit", "max_gap": 3}, "max_gap and min_observations need uniform times"),
         ({"window_length": "9 s"}, "less than or equal to the length of the record; got 9 s for a record of"),
         ({"window_length": 20}, "window_length must be odd"),
         ({"window_length": 5, "order": 7}, "order must be less than window_length"),

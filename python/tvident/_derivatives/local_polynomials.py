@@ -101,7 +101,9 @@ def fit_local_polynomials(
         wrong by whole periods.
     nan_policy : {"propagate", "omit", "raise"}, optional
         ``"propagate"``: windows that contain a value that is not finite are NaN, and no others. ``"omit"``: they are fitted on what is
-        there (status GAP), and estimates go on across short gaps; all other windows keep their bits. ``"raise"``: raise an error.
+        there (status GAP), each with an order of its own, and estimates go on across short gaps; all other windows keep their bits.
+        Where `t` is not uniform windows are made of the samples that are there, and at missing ones there is no estimate. ``"raise"``:
+        raise an error.
     max_gap : int or str, optional
         With ``"omit"`` or weights: samples, or a duration. Longer gaps split the record: nothing is estimated in them, and windows end
         there as at the ends of a record. By default half a window.
@@ -126,8 +128,10 @@ def fit_local_polynomials(
     ValueError
         If the window is even, shorter than 5 samples or longer than the record, if an order is too high, if `t` does not increase, if
         `y` spans more than one and a half of `period`, or if a name is unknown. With ``"auto"``, if the record has fewer than 64
-        samples, if no order reaches `max_deriv`, or if `criterion` or `selection` is given. With ``nan_policy="omit"`` or `weights`, if
-        orders are pooled or averaged, or the loss is Huber's, and with `weights` or `min_observations`, if the window is ``"auto"``.
+        samples, if no order reaches `max_deriv`, or if `criterion` or `selection` is given. With `weights`, if orders are pooled or
+        averaged, or the loss is Huber's; with `weights` or `min_observations`, and with Huber's loss where `t` is not uniform, if the
+        window is ``"auto"``. Where `t` is not uniform, if orders are pooled or averaged, or with `weights`, `max_gap` or
+        `min_observations`.
     TypeError
         If `y` is complex or holds no numbers, or a number is not whole.
 
@@ -244,7 +248,7 @@ def fit_local_polynomials(
         choose, plan_of_window=plan_of_window, max_order=max_order, order=order, workers=threads
     )
     if times is not None:
-        check_plain(nan_policy, weights, max_gap, min_observations, selection=selection, loss=loss)
+        check_plain(weights, max_gap, min_observations, selection=selection)
         found = at_own_times(
             samples,
             times,
@@ -254,6 +258,8 @@ def fit_local_polynomials(
             max_order=max_order,
             criterion=criterion,
             max_deriv=max_deriv,
+            loss=arguments.one_of("loss", loss, get_args(Loss)),
+            omit=nan_policy == "omit",
             quantisation=step_of_rounding,
             step=every,
             workers=threads,
