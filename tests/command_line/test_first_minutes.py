@@ -84,6 +84,26 @@ def test_what_python_refuses_is_said_with_options() -> None:
 
 
 @pytest.mark.usefixtures("folder")
+def test_a_channel_that_was_recorded_more_slowly_than_its_rows_gets_times_of_its_own() -> None:
+    torque = RIG.torque.copy()
+    torque[np.arange(torque.size) % 2 == 0] = np.nan
+    tvident.FileRecording({"t [s]": RIG.time, "angle [rad]": RIG.angle, "torque [N m]": torque}).write("slow.csv")
+    call = "identify slow.csv --angle angle --torque torque --time t --stiffness constant"
+    refused = run(*call.split())
+    assert refused.returncode == 2
+    assert (
+        "it has one in every 2 only, as if recorded at 250 Hz; give it times of its own: --torque-time"
+        in refused.stderr
+    )
+    done = run(*call.split(), "--torque-time", "t")
+    assert done.returncode == 0, done.stderr
+    expected = tvident.identify(RIG.angle, RIG.torque, sample_rate=500, stiffness="constant").value("stiffness")
+    found = float(done.stdout.rsplit("stiffness = ", 1)[1].split()[0])
+    # Half of the torque has 1.4 times its error.
+    assert found == pytest.approx(expected.value, abs=4 * np.sqrt(2) * expected.stderr)
+
+
+@pytest.mark.usefixtures("folder")
 def test_capitals_do_not_matter_where_they_tell_nothing_apart() -> None:
     call = "identify messung.csv --angle winkel --torque DREHMOMENT --time zeit --stiffness constant"
     done = run(*call.split())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import Any
 
@@ -122,5 +123,16 @@ def test_what_cannot_be_aligned_is_said() -> None:
         tvident.identify(angle, torque, t=(t, t + 100.0))
     with pytest.raises(ValueError, match=r"angle and torque alone; got velocity"):
         tvident.identify(angle, torque, velocity=angle, t=(t, t))
+    sparse = np.where(np.arange(t.size) % 2, torque, np.nan)
+    refused: list[tuple[dict[str, Any], str]] = [
+        ({}, "t=(t, t), which"),
+        ({"velocity": angle}, "resample it"),
+        ({"weights": t}, "resample it"),
+    ]
+    for others, cure in refused:
+        with pytest.raises(ValueError, match=rf"one in every 2 only, .*; .*{re.escape(cure)}"):
+            tvident.identify(angle, sparse, sample_rate=1000, **others)
+    with pytest.raises(ValueError, match=r"one in every 2 only, .* resample it"):
+        tvident.identify(np.stack([angle] * 2), np.stack([sparse] * 2), sample_rate=1000)
     with pytest.raises(ValueError, match="align needs the weak form"):
         tvident.identify(angle, torque, sample_rate=1000, align="offset", method="paper")

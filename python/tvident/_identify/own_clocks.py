@@ -18,6 +18,12 @@ from tvident._identify.aligned import Align, Aligned, Late, aligned
 from tvident._identify.data import Data
 from tvident._units import scaled
 
+_LOOKED_AT = 1 << 10
+"""Samples at the beginning in which a channel that was recorded more slowly shows it."""
+
+_FEWEST = 16
+"""Samples that are no chance if they are evenly spread."""
+
 
 @dataclass(frozen=True)
 class Alignment:
@@ -171,10 +177,60 @@ def own_clocks(
                 f"clocks are aligned for a single record; got {one} of shape {array.shape}; take one at a time"
             )
     of_angle, of_torque = value if name in pairs else (value, value)
+    if name == "t" and name in pairs:
+        angle, of_angle = _without_empty_rows(angle, of_angle)
+        torque, of_torque = _without_empty_rows(torque, of_torque)
     if name == "delta":
         of_angle, of_torque = (1 / arguments.positive_number("delta", each) for each in (of_angle, of_torque))
     clocks = two_clocks(of_angle, of_torque, (angle.size, torque.size), time_unit)
     return OwnClocks(clocks, (angle, torque), align, propagate)
+
+
+def _without_empty_rows(samples: npt.NDArray[np.number], times: Any) -> tuple[npt.NDArray[np.number], Any]:
+    """Return samples and their times without the rows of a faster channel, in which this one has none."""
+    sparse = every_kth(samples)
+    if sparse is None or np.shape(times) != samples.shape:
+        return samples, times
+    first, step = sparse
+    return samples[first::step], times[first::step]
+
+
+def every_kth(samples: npt.NDArray[np.number]) -> tuple[int, int] | None:
+    """Return the first sample and every how many there is one, of a channel that was recorded more slowly than its rows; None of others."""
+    if samples.dtype.kind != "f" or np.isfinite(samples[..., :_LOOKED_AT]).all():
+        return None
+    count = samples.shape[-1]
+    places = np.flatnonzero(np.isfinite(samples).reshape(-1, count).any(axis=0))
+    step = int(np.gcd.reduce(np.diff(places))) if places.size >= _FEWEST else 1
+    return (int(places[0]), step) if step > 1 else None
+
+
+def check_every_sample(channels: Mapping[str, npt.NDArray[np.number]], period: float, *, others: bool) -> None:
+    """Refuse a channel of which no two neighbouring samples are there: no equation could be made of it.
+
+    Parameters
+    ----------
+    channels : mapping of str to ndarray
+        By name, the torque among them.
+    period : float
+        Seconds.
+    others : bool
+        Whether the call gives something that clocks of their own do not go with.
+    """
+    has_clocks = not others and all(samples.ndim == 1 for samples in channels.values())
+    cure = (
+        "give it times of its own: t=(t, t), which leaves out the rows between"
+        if has_clocks and channels.keys() == {"angle", "torque"}
+        else "resample it, or leave it out"
+    )
+    for name, samples in channels.items():
+        sparse = every_kth(samples)
+        if sparse is not None:
+            step = sparse[1]
+            raise ValueError(
+                f"the {name} must have a value in neighbouring samples; it has one in every {step} only, as if recorded at "
+                f"{1 / (period * step):.6g} Hz; {cure}"
+            )
 
 
 def _is_pair(name: str, value: Any) -> bool:

@@ -17,7 +17,7 @@ from tvident._identify.channels import motion_channels
 from tvident._identify.data import Data
 from tvident._identify.expanded import ExpandedTask, expansions_of
 from tvident._identify.methods import StrongForm
-from tvident._identify.own_clocks import lag_found, own_clocks
+from tvident._identify.own_clocks import check_every_sample, lag_found, own_clocks
 from tvident._identify.robust import loss_of, with_clipped_torque
 from tvident._identify.settings import Request, resolve
 from tvident._identify.signals import Signals, channels_of_motion, even_times, instrument_of, with_own_step
@@ -71,6 +71,9 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
     channels = {name: scaled(values, axis.angle) if name == "angle" else values for name, values in channels.items()}
     torques = scaled(torques, axis.torque)
     seconds, grid, begin = _sampling(sampling, samples, axis, call["time_unit"], first)
+    if clocks is None:
+        others = any(one is not None for one in (*beside_clocks.values(), call["weights"]))
+        check_every_sample({**channels, "torque": torques}, seconds, others=others)
     instruments = instrument_of(call["instrument"], torques.shape)
     request = resolve(
         call["method"],
