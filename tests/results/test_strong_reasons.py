@@ -178,3 +178,15 @@ def test_a_record_that_the_weak_form_cannot_take_has_a_summary(lacks: str) -> No
     result = paper(angle, torque, window_length=9, max_order=5, regression_window=9)
     assert np.isfinite(result.stiffness).any()
     assert result.summary()
+
+
+@pytest.mark.parametrize("pattern", ["constant", "slider"])
+def test_swapped_channels_are_asked_about_where_exchanging_them_explains_the_record(pattern: Any) -> None:
+    rig = tvident.simulate_torsional_rig(4.0, pattern=pattern)
+    cases: list[tuple[Any, str]] = [("auto", ""), ("paper", "in weak form: ")]
+    for method, start in cases:
+        swapped = tvident.identify(rig.torque, rig.angle, sample_rate=1000, method=method)
+        assert swapped.summary().startswith("do not trust")
+        assert swapped.advice[0].startswith(f"{start}are the channels of angle and torque swapped?")
+        right = tvident.identify(rig.angle, rig.torque, sample_rate=1000, method=method)
+        assert "swapped" not in advice(right)

@@ -11,10 +11,11 @@ import numpy as np
 
 from tvident import _core
 from tvident._advice import Explained
-from tvident._equation import BUILT_IN, Unknown
+from tvident._arguments import percent
+from tvident._equation import BUILT_IN, COEFFICIENTS, Unknown
 from tvident._identify.data import Data
 from tvident._identify.methods import StrongForm, WeakForm
-from tvident._identify.remedies import Trial
+from tvident._identify.remedies import BEYOND_CHANCE, NEXT_TO_NOTHING, Trial, unexplained
 from tvident._identify.settings import Request, resolve
 from tvident._identify.spikes import without_spikes
 from tvident._results import TRIED, Identification, Words
@@ -32,6 +33,9 @@ _TESTED = {"inertia": "auto", "damping": "auto", "stiffness": "windowed"}
 
 _MOST = 1 << 14
 """Samples in the middle of a record that are tried in weak form."""
+
+_MUCH_BETTER = 0.1
+"""Swapped channels leave at most this part of what is unpredicted."""
 
 _DOUBTED = (
     Status.TERM_SUSPECTED | Status.LAG_SUSPECTED | Status.NOISE_MODEL | Status.WINDOW_LIMIT | Status.SCALES_DISAGREE
@@ -180,7 +184,7 @@ class Improvement(_Asked):
     def words(self, result: Identification, words: Words) -> Words:
         """Return words that begin with what to change, without what was tried in vain."""
         trial = Trial(self._identify, result, self.given, self.asked_terms, self._suspects)
-        advice = trial.advice()
+        advice = trial.advice() or self._exchanged(result)
         useless, given_well = ([], []) if advice is not None else trial.useless()
         dropped = self._explained.suspicions(self._suspects if advice is not None else useless)
         starts = tuple(f"{name} was given as constant" for name in given_well)
@@ -192,6 +196,33 @@ class Improvement(_Asked):
         dropped += hidden[-1:]  # that nothing is explained, which it is with what is advised
         rest = [line for line in words.advice if line not in dropped and not line.startswith(starts)]
         return replace(words, advice=tuple(rest if advice is None else (advice, *rest)))
+
+    def _exchanged(self, result: Identification) -> str | None:
+        """Return the question whether channels are swapped, where that explains next to everything with positive parameters.
+
+        Of channels in their places exchanging gives a negative damping, however slow the motion is.
+        """
+        data = self.data
+        if data.motion.recorded or not all(isinstance(kind, str) for kind in self.given.values()):
+            return None
+        asked = {"inertia": "constant", "damping": "constant", "stiffness": "windowed", "terms": ["offset"], "lag": 0.0}
+        exchanged = replace(
+            data, angles=data.torques, torques=data.angles, passed=data.passed[::-1], labels=None, doubts=()
+        )
+        try:
+            found = self.run(
+                resolve(WeakForm(), asked, None, 1 / data.period), replace(exchanged, step=1), diagnose=False
+            )
+        except ValueError:
+            return None
+        left = unexplained(found)
+        is_right = all(one.value > BEYOND_CHANCE * one.stderr for one in map(found.value, COEFFICIENTS))
+        if not (is_right and left <= NEXT_TO_NOTHING and left <= _MUCH_BETTER * unexplained(result)):
+            return None
+        return (
+            f"are the channels of angle and torque swapped? With one in the other's place inertia, damping and stiffness are positive, "
+            f"and {percent(1 - left)} {TRIED}: exchange them"
+        )
 
     @cached_property
     def _explained(self) -> Explained:

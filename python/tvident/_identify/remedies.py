@@ -25,10 +25,10 @@ _BETTER = 0.8
 _AS_GOOD = 1.25
 """Constants are advised where they leave at most so many times what changing parameters leave."""
 
-_NEXT_TO_NOTHING = 0.01
+NEXT_TO_NOTHING = 0.01
 """A share of the angle's variance that may stay unexplained whatever else is said."""
 
-_BEYOND_CHANCE = 4.0
+BEYOND_CHANCE = 4.0
 """Standard errors that a term must be away from nothing."""
 
 Call = dict[str, Any]
@@ -94,13 +94,13 @@ class Trial:
             changed_by[one] = {"terms": changed["terms"], "lag": changed["lag"]}
             # Which one is found with the lengths that were chosen, what it is worth with its own: choosing takes most of the time.
             result = self.identify(**kinds, **changed_by[one], **self._lengths)
-            found[one] = _unexplained(result) if _is_there(one, result) else np.inf
+            found[one] = unexplained(result) if _is_there(one, result) else np.inf
         best = min(found, key=found.__getitem__)
-        now = _unexplained(self.result)
+        now = unexplained(self.result)
         if not found[best] <= _WORTH * now:
             return None
         result = self.identify(**kinds, **changed_by[best], diagnose=True)
-        least = _unexplained(result)
+        least = unexplained(result)
         if not (_is_there(best, result) and least <= _BETTER * now and _holds(least, lambda: result)):
             return None
         terms = [term if isinstance(term, str) else term.name for term in self._with(call, best)["terms"]]
@@ -122,7 +122,7 @@ class Trial:
         given = [name for name in COEFFICIENTS if isinstance(self.given[name], str) and self.given[name] == "constant"]
         if given and self.result.record_status & Status.KIND_CONTRADICTED:
             free = self.identify(**(call | dict.fromkeys(given, "auto")))
-            if not _unexplained(free) <= _BETTER * _unexplained(self.result):
+            if not unexplained(free) <= _BETTER * unexplained(self.result):
                 return suspects, given
         return suspects, []
 
@@ -158,14 +158,14 @@ class Trial:
 
     def _compared(self, before: Call, call: Call, chosen: Sequence[str]) -> str | None:
         """Return the advice in words, if it explains more of what is held back than the model at hand."""
-        found, now = self._identified(call), _unexplained(self.result)
+        found, now = self._identified(call), unexplained(self.result)
         if call["lag"] == "auto":
             call = call | {"lag": float(f"{found.settings['lag']:.4g}")}
         kept = {
             name: call[name] if name == "stiffness" and call[name] == 0 else kind for name, kind in self.given.items()
         }
         free = self.identify(**kept, terms=call["terms"], lag=call["lag"])
-        left, left_free = _unexplained(found), _unexplained(free)
+        left, left_free = unexplained(found), unexplained(free)
         changing = [name for name in COEFFICIENTS if free.settings["kinds"][name] in {"windowed", "varying"}]
         is_simple = bool(changing) and left <= _AS_GOOD * left_free
         least = left if is_simple else left_free
@@ -210,18 +210,18 @@ def _is_there(name: str, found: Identification) -> bool:
         value, error = found.settings["lag"], found.settings.get("lag_stderr") or 0.0
     else:
         value, error, *_ = found.value(name)
-    return bool(abs(value) > _BEYOND_CHANCE * error and (value > 0 or name != "coulomb"))
+    return bool(abs(value) > BEYOND_CHANCE * error and (value > 0 or name != "coulomb"))
 
 
-def _holds(unexplained: float, again: Callable[[], Identification]) -> bool:
+def _holds(share: float, again: Callable[[], Identification]) -> bool:
     """Return whether what is to be advised predicts next to everything, or nothing says that it cannot be trusted either."""
     flags = again().record_status
     if flags & Status.RANK_DEFICIENT:
         return False
-    return unexplained <= _NEXT_TO_NOTHING or not flags & DOUBTFUL_RECORD
+    return share <= NEXT_TO_NOTHING or not flags & DOUBTFUL_RECORD
 
 
-def _unexplained(result: Identification) -> float:
+def unexplained(result: Identification) -> float:
     """Return the share of the angle's variance that is not predicted one test function ahead; infinite where that is not known."""
     predicted = float(np.max(result.held_back().predicted))
     return 1 - predicted / 100 if np.isfinite(predicted) else np.inf
