@@ -13,7 +13,8 @@ INTRODUCTION = """\
 Every argument of the Python functions has an option of the same name. Results go to files or to standard output, messages and
 progress to standard error, so `-o -` can be piped. The exit status is 0, 2 for a wrong call, 1 where there is no usable result or a
 file cannot be used. Ctrl-C stops at once; files appear whole or not at all, keep the mode of those that they replace, and never
-replace what is read. The command comes with `pip install 'tvident[cli]'`. `--settings` takes a TOML file of options, such as
+replace what is read. The command comes with `pip install 'tvident[cli]'`; where the program is not on the path,
+`python -m tvident` runs it. `--settings` takes a TOML file of options, such as
 `inertia = 0.0123` and `term = ["coulomb"]`, what `--settings-output` wrote, or a result: NPZ and Parquet files hold
 their settings, beside others stands a file with `.settings.json` behind the name of the result. So a run can be repeated from what
 it wrote, to the last digit. This page is written by `make docs` from what the commands say themselves."""

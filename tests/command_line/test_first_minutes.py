@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import click
@@ -124,3 +126,8 @@ def test_a_member_of_a_structure_is_found_by_the_name_that_it_is_listed_with() -
     assert "degrees?" not in done.stdout + done.stderr
     wrong = run(*call.split())
     assert "is the time in milliseconds? Then give --time-unit ms with --time or --delta" in wrong.stdout
+
+
+def test_python_runs_the_command_where_the_program_is_not_on_the_path() -> None:
+    command = [sys.executable, "-m", "tvident", "--version"]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.split() == [tvident.__version__]

@@ -50,6 +50,7 @@ ROOMS = (
     "tvident",  # the front door
     "_commands",
     "_command_line",
+    "__main__",
 )
 """Every room may import from those above it."""
 
@@ -112,4 +113,4 @@ def test_every_room_begins_with_its_purpose(name: str) -> None:
 def test_the_design_names_every_room_in_this_order() -> None:
     design = (HOUSE.parents[1] / "DESIGN.md").read_text(encoding="utf-8")
     named = [name for line in design.splitlines() for name in re.findall(r"^\| `(_\w+)/` \|", line)]
-    assert named == [name for name in ROOMS if name.startswith("_")]
+    assert named == [name for name in ROOMS if name.startswith("_") and name != "__main__"]
