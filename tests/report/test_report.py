@@ -126,6 +126,17 @@ def titles(content: Any, group: str) -> list[str]:
     return [one["title"] for one in content["charts"] if one["group"] == group]
 
 
+def test_numbers_of_a_page_have_the_digits_of_their_errors_and_stand_alone(tmp_path: Path) -> None:
+    quiet = tvident.simulate_torsional_rig(4.0, pattern="constant", angle_noise=1e-6, torque_snr_db=55)
+    tvident.identify(quiet.angle, quiet.torque, sample_rate=1000).report(tmp_path / "page.html")
+    named = {line["name"]: line for line in content_of(tmp_path / "page.html")["numbers"]}
+    low, high = re.findall(r"\d+\.\d+", named["Stiffness K"]["more"])
+    assert low < high
+    value, error = named["Offset"]["value"].split(" ± ")
+    assert float(error) < 1e-4
+    assert abs(float(value)) < 5 * float(error)
+
+
 def test_masses_have_a_page_with_every_element_and_torque(tmp_path: Path) -> None:
     one = chain([constant(12.0), lambda t: 18 + 2 * np.sin(3 * t)], 2500, seed=1, base=True)
     structure = tvident.Chain(2, [("base", 0), (0, 1)], base=one.base)

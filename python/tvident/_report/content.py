@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeAlias
@@ -25,6 +26,8 @@ _FEW = 0.0005
 
 _SYMBOL = 2
 """Letters of a symbol at most."""
+
+_COMMON_POWER = re.compile(r"\((.+) ± (.+)\)(e.+)")
 
 _SYMBOLS = {"inertia": "Inertia I", "damping": "Damping C", "stiffness": "Stiffness K"}
 
@@ -268,7 +271,7 @@ def _numbers(shown: Shown) -> list[dict[str, str]]:
             "more": shown.remarks.get(name, ""),
         }
         if name in result.constants:
-            line["value"] = arguments.with_error(*map(float, result.constants[name]))
+            line["value"] = _apart(*map(float, result.constants[name]))
             line["kind"] = "constant over the record"
         elif not finite.size:
             line["value"] = "no value"
@@ -276,16 +279,23 @@ def _numbers(shown: Shown) -> list[dict[str, str]]:
             line |= {"value": f"{finite[0]:.5g}", "kind": "known: as given"}
         else:
             low, middle, high = np.percentile(finite, [5, 50, 95])
-            line["value"] = arguments.with_error(float(middle), float(np.median(error)) if error.size else math.nan)
-            line["more"] = "; ".join(filter(None, (f"90 % lie between {low:.4g} and {high:.4g}", line["more"])))
+            typical = float(np.median(error)) if error.size else math.nan
+            line["value"] = _apart(float(middle), typical)
+            ends = " and ".join(arguments.to_digits_of(float(one), typical) for one in (low, high))
+            line["more"] = "; ".join(filter(None, (f"90 % lie between {ends}", line["more"])))
             line["kind"] = "known: as given" if kind == "known" else f"{kind}: the median of its values"
         lines.append(line)
     for name in [one for one in result.constants if one not in values]:
         # The angle zero, and what was searched inside of terms.
-        value = arguments.with_error(*map(float, result.constants[name]))
+        value = _apart(*map(float, result.constants[name]))
         words = {"name": title_of(name.replace(".", " ")), "unit": unit_of(name, result.units), "more": ""}
         lines.append(words | {"value": value, "kind": "constant over the record"})
     return lines
+
+
+def _apart(value: float, error: float) -> str:
+    """Return a value and its error, each of which can stand alone: the page shows one larger than the other."""
+    return _COMMON_POWER.sub(r"\1\3 ± \2\3", arguments.with_error(value, error))
 
 
 def _everywhere(result: Reported) -> Status:
