@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -124,6 +125,13 @@ def test_a_member_of_a_structure_is_found_by_the_name_that_it_is_listed_with() -
     done = run(*call.split(), "--time-unit", "ms")
     assert done.returncode == 0, done.stderr
     assert "degrees?" not in done.stdout + done.stderr
+    savemat("bare.mat", {"Fs": 500.0, "angle": RIG.angle, "torque": RIG.torque})
+    asked = run("identify", "bare.mat", "--angle", "angle", "--torque", "torque")
+    assert "give --sample-rate, --delta or --time; it may be --sample-rate 500, as Fs says" in asked.stderr
+    channels: dict[str, Any] = {"Fs [deg]": 3.0, "fs [kHz]": 0.5, "angle": RIG.angle, "torque": RIG.torque}
+    np.savez("bare.npz", **channels)
+    asked = run("identify", "bare.npz", "--angle", "angle", "--torque", "torque")
+    assert "it may be --sample-rate 500, as fs [kHz] says" in asked.stderr
     wrong = run(*call.split())
     assert "is the time in milliseconds? Then give --time-unit ms with --time or --delta" in wrong.stdout
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 import shutil
 import sys
@@ -16,7 +17,10 @@ import numpy.typing as npt
 
 from tvident import recordings
 from tvident._files import full_name, listed, printable, time_channels
-from tvident._units import Channel, named_unit
+from tvident._units import Channel, UnitError, factor_between, named_unit
+
+_RATES = {"fs", "fsamp", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency"}
+"""What a sample rate is called beside channels, without blanks and lines."""
 
 _MOST_START = 4096
 _BEGINNINGS = {
@@ -65,8 +69,24 @@ def check_has_times(who: str, given: bool, channels: recordings.Channels) -> Non
     if given:
         return
     found = time_channels(channels)
-    known = f"; it may be --time {shlex.quote(printable(found[0]))}" if found else ""
+    known = f"; it may be --time {shlex.quote(printable(found[0]))}" if found else _rate_in(channels)
     raise click.UsageError(f"{who} the sample period; got none; give --sample-rate, --delta or --time{known}")
+
+
+def _rate_in(channels: recordings.Channels) -> str:
+    """Return what to type where a single number of a file is called as a sample rate is; nothing elsewhere."""
+    for name, value in channels.items():
+        plain, unit = named_unit(name)
+        bare = re.sub(r"[\s_.-]", "", plain.rpartition(".")[2]).casefold()
+        if bare not in _RATES or value.size != 1:
+            continue
+        try:
+            rate = float(value.item()) * (factor_between(unit, "Hz", name=name) if unit else 1.0)
+        except UnitError:  # such as degrees: no sample rate
+            continue
+        if 0 < rate < np.inf:
+            return f"; it may be --sample-rate {rate:.10g}, as {printable(name)} says"
+    return ""
 
 
 def channels_in(file: str | None) -> recordings.Channels:
