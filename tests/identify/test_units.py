@@ -93,6 +93,8 @@ def test_numbers_that_are_not_plausible_are_asked_about() -> None:
     assert "160: degrees?" in advice(degrees, RIG.torque)
     assert "degrees?" not in advice(degrees, RIG.torque, angle_unit="deg")
     assert "time in milliseconds?" in advice(RIG.angle, RIG.torque, sample_rate=None, t=1e3 * RIG.time)
+    assert "time in milliseconds?" in advice(RIG.angle, RIG.torque, sample_rate=None, t=1e2 * RIG.time)  # of 10 kHz
+    assert "milliseconds" not in advice(RIG.angle, RIG.torque, sample_rate=None, t=10 * RIG.time)
     reversed_sign = advice(RIG.angle, -RIG.torque)
     assert "negative: is the torque's sign reversed, are the channels swapped?" in reversed_sign
     assert "inertia" in reversed_sign

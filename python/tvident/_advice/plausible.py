@@ -15,8 +15,9 @@ from tvident._units import ROTARY, Axis
 _ONE_TURN = 2 * math.pi
 """An angle in rad that moves by more, to both sides, may be in degrees."""
 
-_SLOW = 0.5
-"""A sample period in seconds from which on it may be in milliseconds: nobody who identifies a vibration samples so slowly."""
+_SLOW = 0.09
+"""A sample period in seconds from which on it may be in milliseconds: a step of 0.1 ms, at 10 kHz, looks like 0.1 s, and hardly a vibration
+is sampled so slowly."""
 
 _CERTAIN = 4.0
 """Standard errors by which a number differs from zero: one of 16 000 does so by chance."""
