@@ -190,3 +190,23 @@ def test_swapped_channels_are_asked_about_where_exchanging_them_explains_the_rec
         assert swapped.advice[0].startswith(f"{start}are the channels of angle and torque swapped?")
         right = tvident.identify(rig.angle, rig.torque, sample_rate=1000, method=method)
         assert "swapped" not in advice(right)
+
+
+@pytest.mark.parametrize("form", [calls.paper, calls.strong])
+@pytest.mark.parametrize("end", [3010, 6000])
+def test_nothing_is_said_of_a_model_where_samples_are_missing(form: Any, end: int) -> None:
+    holed = RIG.angle.copy()
+    holed[3000:end] = np.nan
+    result = tvident.identify(holed, RIG.torque, sample_rate=1000, **form())
+    _, recorded, predicted = result.predicted_torque()
+    half = result.settings["window_length"] // 2
+    whole = np.ones(holed.size, bool)
+    for first, last in ((0, half), (3000 - half, end + half), (holed.size - half, holed.size)):
+        whole[first:last] = False
+    there = np.isfinite(predicted)
+    assert not there[~whole].any()
+    assert np.mean(there[whole]) > 0.98
+    explained = 1 - np.var((recorded - predicted)[there]) / np.var(recorded[there])
+    assert 0.97 < explained < 0.999
+    assert re.search(r"model explains 9[789]\.\d+ % of the torque", result.summary().splitlines()[0])
+    assert "nothing moves there" not in advice(result)

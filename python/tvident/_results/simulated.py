@@ -284,8 +284,6 @@ def predicted_at_samples(result: Simulated) -> Array:
     length = max(_SHORTEST, length // 2 | 1)
     settings = {"form": "strong", "window_length": length, **_POLYNOMIALS}
     _, predicted = compared(model, recorded.angles, recorded.torques, settings)
-    # Off the centres of windows the noise of an acceleration is many times larger.
-    predicted[: length // 2] = predicted[predicted.size - length // 2 :] = np.nan
     late = float(model.lags[0])
     if late == 0:
         return predicted

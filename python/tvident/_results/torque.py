@@ -52,8 +52,9 @@ def compared(
             **{name: settings[name] for name in names},
         )
         smooth, velocity, acceleration = np.asarray(fit.derivatives, np.float64)
-        missing = ~np.isfinite(angle)
-        return on_time, np.where(missing, np.nan, _sum(model, (smooth, velocity, acceleration), lambda values: values))
+        # Rows of the strong form need whole windows: off their centres, and across what is missing, derivatives are no measurement.
+        touched = touched_by(~np.isfinite(angle), settings["window_length"] // 2)
+        return on_time, np.where(touched, np.nan, _sum(model, (smooth, velocity, acceleration), lambda values: values))
     half = settings["window_length"] // 2
     kernels = kernels_of(half, settings["exponent"], model.period)
     missing = ~(np.isfinite(angle) & np.isfinite(on_time))
@@ -96,7 +97,7 @@ def _where_known(values: npt.NDArray[np.number], averaged: Callable[[Array], Arr
 
 
 def touched_by(missing: npt.NDArray[np.bool_], half: int) -> npt.NDArray[np.bool_]:
-    """Return around which samples a test function does not fit, or touches a sample that is missing."""
+    """Return around which samples a window does not fit, or touches a sample that is missing."""
     touched = np.ones(missing.size, bool)
     if missing.size > 2 * half:
         count = np.concatenate([[0], np.cumsum(missing)])
