@@ -14,6 +14,7 @@ from scipy.io import savemat
 
 import tvident
 from commands import run
+from tvident._command_line.compare import compare
 from tvident._command_line.identify import identify
 from tvident._commands import in_options
 
@@ -64,12 +65,24 @@ def test_the_channel_of_times_is_named_where_none_was_given(command: str) -> Non
         ("method=tvident.WeakForm(window_length=9), share=('inertia',)", "tvident.WeakForm(window_length=9), share=("),
         ("noise (p = 0.19), K=4 and C=3", "(p = 0.19), K=4 and C=3"),
         ("there is no 'delta=5'; give delta=0.001", "there is no 'delta=5'; give --delta 0.001"),
+        ("there is no 'my lag=5'; give lag=0.1", "there is no 'my lag=5'; give --lag 0.1"),
+        (
+            "masses' names: 'the driver's step=3', \"it's lag='auto'\" or 'pass -torque t=(t, t)'; give step=2",
+            "masses' names: 'the driver's step=3', \"it's lag='auto'\" or 'pass -torque t=(t, t)'; give --step 2",
+        ),
+        ("a body's lag='auto' and a rod's step=2", "a body's --lag auto and a rod's --step 2"),
+        ("times of its own: t=(t, t), which", "times of its own: --torque-time with the channel of --time, which"),
     ],
 )
 def test_the_cure_can_be_typed(words: str, typed: str) -> None:
     with click.Context(identify):
         assert typed in in_options(words)
     assert in_options(words) == words  # in Python
+
+
+def test_clocks_of_channels_are_given_to_a_command_that_takes_them() -> None:
+    with click.Context(compare):
+        assert in_options("give t=(t, t)") == "give --torque-time of tvident identify with the channel of --time"
 
 
 @pytest.mark.usefixtures("folder")
@@ -98,6 +111,8 @@ def test_a_channel_that_was_recorded_more_slowly_than_its_rows_gets_times_of_its
         "it has one in every 2 only, as if recorded at 250 Hz; give it times of its own: --torque-time"
         in refused.stderr
     )
+    in_pieces = run(*call.split(), "--in-pieces", "-o", "slow.npy")
+    assert "in every 2 only, as if recorded at 250 Hz; resample it, or identify a part" in in_pieces.stderr
     done = run(*call.split(), "--torque-time", "t")
     assert done.returncode == 0, done.stderr
     expected = tvident.identify(RIG.angle, RIG.torque, sample_rate=500, stiffness="constant").value("stiffness")

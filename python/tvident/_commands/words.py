@@ -10,12 +10,15 @@ import click
 
 _OTHER_NAMES = {"terms": "--term", "models": "--model", "t": "--time"}
 
-_ARGUMENT = re.compile(
-    r"(?<![\w.'\"-])(?<!\w\()(?P<name>[a-z_]+)=(?P<value>'[^']*'|\"[^\"]*\"|\[[^\[\]]*\]|[+-]?\d[\w.+-]*(?<!\.)|[a-z]+\b(?![.(]))?(?![=\w(\[]|\.\w)"
+_CURE = re.compile(
+    r"(?P<quoted>(?<!\w)(?:'(?:[^'\n]|(?<=\w)'(?=\w))*'|\"[^\"\n]*\")(?!\w))"
+    r"|(?P<clocks>\bt=\(t, t\))"
+    r"|(?P<reaction>\bpass -torque\b)"
+    r"|(?<![\w.-])(?<!\w\()(?P<name>[a-z_]+)="
+    r"(?P<value>'[^']*'|\"[^\"]*\"|\[[^\[\]]*\]|[+-]?\d[\w.+-]*(?<!\.)|[a-z]+\b(?![.(]))?(?![=\w(\[]|\.\w)"
 )
-"""An argument with its value; without one where whoever calls is to find it. Behind a quote it is a name that somebody gave."""
-
-_REACTION = re.compile(r"pass -torque\b")
+"""What is said otherwise with options: an argument, without its value where whoever calls is to find it. What stands in quotes, and is
+no value, is a name that somebody gave, whatever it looks like."""
 
 
 def in_options(text: str) -> str:
@@ -36,19 +39,28 @@ def in_options(text: str) -> str:
         return text
     options = {option for one in context.command.params for option in one.opts}
 
-    def option(found: re.Match[str]) -> str:
-        name = _OTHER_NAMES.get(found["name"], f"--{found['name'].replace('_', '-')}")
-        if name not in options:
+    def said(found: re.Match[str]) -> str:
+        if found["quoted"]:
             return found[0]
-        if found["value"] is None:
-            return name
-        values = _values(found["value"])
-        return found[0] if values is None else " ".join(f"{name} {shlex.quote(one)}" for one in values)
+        if found["clocks"]:
+            of_which = "" if "--torque-time" in options else " of tvident identify"
+            return f"--torque-time{of_which} with the channel of --time"
+        if found["reaction"]:
+            return "give --torque-scale -1" if "--torque-scale" in options else found[0]
+        return _option(found, options)
 
-    text = _ARGUMENT.sub(option, text)
-    if "--torque-time" in options:
-        text = text.replace("t=(t, t)", "--torque-time with the channel of --time")
-    return _REACTION.sub("give --torque-scale -1", text) if "--torque-scale" in options else text
+    return _CURE.sub(said, text)
+
+
+def _option(found: re.Match[str], options: set[str]) -> str:
+    """Return the option that stands for an argument; the argument where there is none."""
+    name = _OTHER_NAMES.get(found["name"], f"--{found['name'].replace('_', '-')}")
+    if name not in options:
+        return found[0]
+    if found["value"] is None:
+        return name
+    values = _values(found["value"])
+    return found[0] if values is None else " ".join(f"{name} {shlex.quote(one)}" for one in values)
 
 
 def _values(text: str) -> list[str] | None:
