@@ -205,7 +205,9 @@ def every_kth(samples: npt.NDArray[np.number]) -> tuple[int, int] | None:
     return (int(places[0]), step) if step > 1 else None
 
 
-def check_every_sample(channels: Mapping[str, npt.NDArray[np.number]], period: float, *, others: bool) -> None:
+def check_every_sample(
+    channels: Mapping[str, npt.NDArray[np.number]], period: float, *, others: bool, in_parts: bool
+) -> None:
     """Refuse a channel of which no two neighbouring samples are there: no equation could be made of it.
 
     Parameters
@@ -216,6 +218,8 @@ def check_every_sample(channels: Mapping[str, npt.NDArray[np.number]], period: f
         Seconds.
     others : bool
         Whether the call gives something that clocks of their own do not go with.
+    in_parts : bool
+        Whether the record is longer than memory: its channels have one clock.
     """
     has_clocks = not others and all(samples.ndim == 1 for samples in channels.values())
     cure = (
@@ -223,6 +227,8 @@ def check_every_sample(channels: Mapping[str, npt.NDArray[np.number]], period: f
         if has_clocks and channels.keys() == {"angle", "torque"}
         else "resample it, or leave it out"
     )
+    if in_parts:
+        cure = "resample it, or identify a part of the recording in memory, where it can have times of its own"
     for name, samples in channels.items():
         sparse = every_kth(samples)
         if sparse is not None:

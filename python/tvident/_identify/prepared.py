@@ -73,7 +73,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
     seconds, grid, begin = _sampling(sampling, samples, axis, call["time_unit"], first)
     if clocks is None:
         others = any(one is not None for one in (*beside_clocks.values(), call["weights"]))
-        check_every_sample({**channels, "torque": torques}, seconds, others=others)
+        check_every_sample({**channels, "torque": torques}, seconds, others=others, in_parts="wanted" in call)
     instruments = instrument_of(call["instrument"], torques.shape)
     request = resolve(
         call["method"],
