@@ -247,3 +247,20 @@ def test_without_plotly_it_is_said_what_to_install(
     assert refused.exit_code == 2
     assert "pip install 'tvident[report]'" in refused.output
     assert not (tmp_path / "page.html").exists()
+
+
+def test_a_page_speaks_as_whoever_asked_for_it(tmp_path: Path) -> None:
+    rig = tvident.simulate_torsional_rig(duration=4.0)
+    degrees = np.rad2deg(rig.angle)
+    tvident.FileRecording({"angle": degrees, "torque": rig.torque}).write(tmp_path / "run.csv")
+    tvident.identify(degrees, rig.torque, sample_rate=1000).report(tmp_path / "python.html")
+    call = ["report", "run.csv", "--angle", "angle", "--torque", "torque", "--sample-rate", "1000", "-o", "typed.html"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path)
+        done = CliRunner().invoke(main, call)
+    assert done.exit_code == 0, done.output
+    python, typed = ((tmp_path / f"{name}.html").read_text(encoding="utf-8") for name in ("python", "typed"))
+    assert python.count("give angle_unit=") > 1
+    assert "give angle_unit=" not in typed
+    # Beside the advice in the summary, of which the page has two copies.
+    assert typed.count("give --angle-unit deg") == python.count("give angle_unit=")

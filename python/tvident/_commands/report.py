@@ -12,6 +12,7 @@ from tvident._commands.channels import channels_in, source_of
 from tvident._commands.identification import identified, inputs
 from tvident._commands.named import named, with_velocity
 from tvident._commands.output import REPORT, check_outputs, say
+from tvident._commands.words import in_options
 from tvident._files import full_name, printable
 
 _MOST_CHANNELS = 40
@@ -37,7 +38,8 @@ def report(file: str | None, output: str, **options: Any) -> None:
     others = {name: values for name, values in channels.items() if values.shape == samples and name not in used}
     for name in list(others)[_MOST_CHANNELS:]:
         del others[name]
-    result.report(output, channels=others, title=None if file is None else Path(file).name)
+    title = None if file is None else Path(file).name
+    result._report(output, others, title, said=in_options)  # noqa: SLF001 - as report does, in words of the command line
     say(result.summary())
     click.echo(f"\nWritten: {printable(output)}")
 

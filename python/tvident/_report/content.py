@@ -115,6 +115,8 @@ class Shown:
         What is said beside a parameter.
     repeats : bool
         Whether the settings repeat the identification.
+    said : callable
+        Takes words and returns them as whoever asked for the page speaks: of options, where that was the command line.
     """
 
     result: Reported
@@ -125,6 +127,7 @@ class Shown:
     compared: Sequence[Compared] = ()
     remarks: Mapping[str, str] = field(default_factory=dict)
     repeats: bool = True
+    said: Callable[[str], str] = str
 
 
 def unit_of(name: str, units: Mapping[str, str]) -> str:
@@ -144,7 +147,7 @@ def content_of(shown: Shown, recorded: list[Series], title: str) -> tuple[dict[s
     drawn.quality()
     marks = _flags_over_time(result)
     drawn.status(marks)
-    series, words = drawn.series, result.summary()
+    series, words = drawn.series, shown.said(result.summary())
     end = max([one.start + max(0, one.values.size - 1) * one.period for one in series], default=0.0)
     content = {
         "title": title,
@@ -152,10 +155,10 @@ def content_of(shown: Shown, recorded: list[Series], title: str) -> tuple[dict[s
         "tone": _tone(result, words.splitlines()[0]),
         "span": [min([one.start for one in series], default=0.0), end],
         "numbers": _numbers(shown),
-        "advice": list(result.advice),
-        "warnings": _warnings(result, marks),
+        "advice": list(map(shown.said, result.advice)),
+        "warnings": [one | {"words": shown.said(one["words"])} for one in _warnings(result, marks)],
         "jumps": [round(float(time), 6) for time in result.jumps],
-        "reasons": list(result.reasons),
+        "reasons": list(map(shown.said, result.reasons)),
         "settings": [list(row) for row in shown.settings],
         "repeat": json.dumps(result.settings, indent=1) if shown.repeats else "",
         "summary": words,

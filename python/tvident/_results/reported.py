@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -23,8 +23,9 @@ def report(
     recorded: Recorded | None,
     channels: Mapping[str, npt.ArrayLike] | None,
     title: str | None,
+    said: Callable[[str], str],
 ) -> None:
-    """Write the report of the result of one record, with the channels that are there."""
+    """Write the report of the result of one record, with the channels that are there, in words that `said` passes on."""
     _report.check_page(path)
     if result.inertia.ndim != 1:
         raise ValueError(
@@ -52,6 +53,7 @@ def report(
         quality={name: getattr(result, name) for name in ("residual_std", "condition", "order")},
         settings=_settings(result.settings),
         compared=compared,
+        said=said,
     )
     _report.write_page(path, page, shown, channels, title)
 

@@ -429,9 +429,19 @@ class Identification(Simulated, Telling, Valued):
         OSError
             If there is no such folder, or the file cannot be written.
         """
+        self._report(path, channels, title)
+
+    def _report(
+        self,
+        path: str | Path,
+        channels: Mapping[str, npt.ArrayLike] | None,
+        title: str | None,
+        said: Callable[[str], str] = str,
+    ) -> None:
+        """Write a report in words that `said` passes on."""
         from tvident._results.reported import report  # noqa: PLC0415 - pages are rarely asked for, and take long to load
 
-        report(self, path, recorded=self._recorded, channels=channels, title=title)
+        report(self, path, recorded=self._recorded, channels=channels, title=title, said=said)
 
     def __repr__(self) -> str:
         return short(self)
