@@ -4,6 +4,7 @@
 use std::num::NonZeroUsize;
 
 use crate::columns::{Columns, kinds_of_regression, regressions};
+use crate::random::uniform_apart;
 use proptest::prelude::*;
 use tvident::lanes::Elements;
 use tvident::least_squares::HALF_OF_THE_DIGITS;
@@ -95,13 +96,7 @@ fn solve(problem: &Problem, cuts: &[usize], instructions: Instructions) -> Colum
 
 /// Two waves and noise, with some bad samples.
 fn record(seed: u64, n: usize, bad: &[(usize, f64)]) -> Vec<f64> {
-    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    let mut noise = || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-    };
+    let mut noise = uniform_apart(seed);
     let mut samples: Vec<f64> =
         (0..n).map(|i| (i as f64 * 0.05).sin() + 0.5 * (i as f64 * 0.17).cos() + 0.01 * noise()).collect();
     for (place, value) in bad {

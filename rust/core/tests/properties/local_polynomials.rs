@@ -1,5 +1,6 @@
 //! Properties of the walk: it agrees with every window projected on its own, however the record is cut and whatever the instructions.
 
+use crate::random::uniform;
 use proptest::prelude::*;
 use tvident::Status;
 use tvident::lanes::Elements;
@@ -88,13 +89,7 @@ fn by_hand(window: &[f64], highest: usize) -> (Vec<[f64; 3]>, Vec<f64>) {
 }
 
 fn noise(seed: u64, n: usize) -> Vec<f64> {
-    let mut state = seed | 1;
-    let mut uniform = || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-    };
+    let mut uniform = uniform(seed);
     (0..n).map(|_| uniform() + uniform() + uniform()).collect()
 }
 

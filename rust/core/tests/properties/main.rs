@@ -5,6 +5,7 @@ mod columns;
 mod cutting;
 mod local_polynomials;
 mod noise;
+mod random;
 mod rolling;
 mod streams;
 mod test_function;

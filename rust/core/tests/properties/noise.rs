@@ -1,17 +1,12 @@
 //! The noise of a channel is found whatever its signal, and never below quantisation and rounding.
 
+use crate::random::uniform;
 use tvident::noise::{CorrelatedNoise, FEWEST_SAMPLES, coloured_noise, noise};
 use tvident::simd::Instructions;
 
 /// Sums of twelve uniform numbers: nearly normal, of variance one.
 fn normal(seed: u64, count: usize) -> Vec<f64> {
-    let mut state = seed | 1;
-    let mut uniform = || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-    };
+    let mut uniform = uniform(seed);
     (0..count).map(|_| (0..12).map(|_| uniform()).sum()).collect()
 }
 

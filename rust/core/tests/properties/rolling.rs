@@ -1,5 +1,6 @@
 //! Properties of rolling least squares: it agrees with a QR decomposition of every window on its own, however the rows are cut.
 
+use crate::random::uniform_apart;
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
 use proptest::prelude::*;
@@ -69,15 +70,8 @@ fn solve(problem: &Problem) -> Everything {
 }
 
 fn noise(seed: u64, n: usize) -> Vec<f64> {
-    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    (0..n)
-        .map(|_| {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        })
-        .collect()
+    let mut uniform = uniform_apart(seed);
+    (0..n).map(|_| uniform()).collect()
 }
 
 fn problem(seed: u64, n: usize, p: usize, q: usize, window: usize) -> Problem {
