@@ -8,6 +8,7 @@ use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::report::tracks::Tracks;
 use crate::identify::weak::report::window_sums::WindowSums;
 use crate::identify::weak::session::Session;
+use crate::noise::breaks::windows::median;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::layout::symmetric;
@@ -195,11 +196,7 @@ impl LeftInWindows {
     /// times the usual standard deviation: a touch, or a change that no window follows. What is next to nothing of the torque is not worth a word.
     fn unexplained(&self, least: f64, expected: &Expected) -> Vec<(usize, f64)> {
         let mut known: Vec<f64> = self.deviation.iter().copied().filter(|deviation| deviation.is_finite()).collect();
-        if known.is_empty() {
-            return Vec::new();
-        }
-        let middle = known.len() / 2;
-        let usual = *known.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let Some(usual) = median(&mut known) else { return Vec::new() };
         let explained = expected.variance.max(usual * usual);
         let places = self.deviation.iter().zip(&self.rows).enumerate();
         let far = places.filter(|&(_, (deviation, rows))| {
