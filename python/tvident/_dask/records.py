@@ -259,9 +259,8 @@ def _block_alone(
 ) -> tuple[Columns, dict[str, Any]]:
     span, block = places
     settings = None if choices is None else choices.settings
-    diagnose = settings is None or given.frozen is not None
     held = _held(channels, [span])
-    result = given.identified(held, chosen=settings, step=step, wanted=block, diagnose=diagnose)
+    result = given.identified(held, chosen=settings, step=step, wanted=block)
     columns, note = part_alone(result, span, block, step)
     return columns, note if choices is not None else note | {"settings": result.settings}
 

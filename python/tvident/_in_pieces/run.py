@@ -87,9 +87,7 @@ class Asked:
         """Return the work on pieces that are records of their own, with what was chosen for all of them."""
         settings = choices if choices is not None else self.long.settings() if self.long is not None else None
         reach = 0 if settings is None else reach_of(settings)
-        # What stretches say of the equation is what is said of the recording.
-        diagnose = choices is None or self.given.frozen is not None
-        identified = partial(self.given.identified, chosen=choices, step=self.step, diagnose=diagnose)
+        identified = partial(self.given.identified, chosen=choices, step=self.step)
         return Alone(self.recording, identified, reach, self.step)
 
 

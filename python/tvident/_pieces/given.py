@@ -54,7 +54,7 @@ class Given:
         chosen: Mapping[str, Any] | None = None,
         step: int = 1,
         wanted: Span | None = None,
-        diagnose: bool = True,
+        diagnose: bool | None = None,
     ) -> Identification:
         """Identify a part, with what was chosen for the whole record if anything was.
 
@@ -67,9 +67,12 @@ class Given:
         step : int
         wanted : (int, int), optional
             The samples of the record that the part is identified for; its others are neighbours.
-        diagnose : bool
-            Look for what may be missing in the equation.
+        diagnose : bool, optional
+            Look for what may be missing in the equation. Without it, where nothing was chosen for the whole record: what is said of
+            stretches from which that was chosen is said of the recording.
         """
+        if diagnose is None:
+            diagnose = chosen is None or self.frozen is not None
         equation: dict[str, Any] = {name: value for name, value in self.equation.items() if value is not None}
         method, settings = self.method, self.settings
         if chosen is not None:
