@@ -14,6 +14,8 @@ from typing import Any
 
 import click
 
+from tvident._command_line.interrupts import every_interrupt_heard
+
 _LONGEST_LINE = 1500
 """Characters of a message."""
 
@@ -134,7 +136,7 @@ class _Command(click.Group):
             # Where a terminal has no letter for a sign, its number is better than nothing.
             if isinstance(stream, TextIOWrapper):
                 stream.reconfigure(errors="backslashreplace")
-        with _in_plain_words(), warnings.catch_warnings():
+        with every_interrupt_heard(), _in_plain_words(), warnings.catch_warnings():
             warnings.showwarning = _show_warning
             return super().invoke(ctx)
 
