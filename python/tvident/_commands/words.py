@@ -8,10 +8,12 @@ import shlex
 
 import click
 
+from tvident._units import QUOTED
+
 _OTHER_NAMES = {"terms": "--term", "models": "--model", "t": "--time"}
 
 _CURE = re.compile(
-    r"(?P<quoted>(?<!\w)(?:'(?:[^'\n]|(?<=\w)'(?=\w))*'|\"[^\"\n]*\")(?!\w))"
+    rf"(?P<quoted>{QUOTED})"
     r"|(?P<clocks>\bt=\(t, t\))"
     r"|(?P<reaction>\bpass -torque\b)"
     r"|(?<![\w.-])(?<!\w\()(?P<name>[a-z_]+)="

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
@@ -9,6 +10,7 @@ from matplotlib.figure import Figure
 
 from tvident._figures.parameters import Array, Identified, check_single, draw_flags
 from tvident._figures.style import ACCENT, FOUND, MUTED, Place, draw_line, legend, panels, scale, style, unit_of
+from tvident._units import in_words_of
 
 
 class Predicting(Identified, Protocol):
@@ -64,11 +66,18 @@ def plot_torque(result: Predicting, ax: Place = None) -> Figure:
         figure, (above, below) = panels(ax, [2.6, 1.3])
         draw_flags(above, result)
         draw_line(above, time, recorded, color=MUTED, linewidth=1.6, alpha=0.55, label="recorded")
-        draw_line(above, time, predicted, color=FOUND, linewidth=0.9, label="predicted from the angle")
+        draw_line(
+            above,
+            time,
+            predicted,
+            color=FOUND,
+            linewidth=0.9,
+            label=in_words_of(result.units, "predicted from the angle"),
+        )
         draw_line(below, time, left, color=ACCENT, linewidth=0.8)
-        name = "Force" if unit == "N" else "Torque"
+        name = in_words_of(result.units, "Torque")
         above.set_title(f"{name}, averaged over the test function" if result.settings["form"] == "weak" else name)
-        below.set_title(_left_in_words(left, recorded, unit))
+        below.set_title(_left_in_words(left, recorded, result.units))
         scale(above, recorded, predicted)
         scale(below, left)
         for panel in (above, below):
@@ -81,11 +90,11 @@ def plot_torque(result: Predicting, ax: Place = None) -> Figure:
     return figure
 
 
-def _left_in_words(left: Array, recorded: Array, unit: str) -> str:
+def _left_in_words(left: Array, recorded: Array, units: Mapping[str, str]) -> str:
     """Return how much is left, in its unit and as a share."""
     there = np.isfinite(left)
     if not there.any():
         return "Nothing is predicted: there are no parameters"
     rms, of = (float(np.sqrt(np.mean(one[there] ** 2))) for one in (left, recorded))
-    share = f", {rms / of:.2g} of the {'force' if unit == 'N' else 'torque'}" if of > 0 else ""
-    return f"What is left: {rms:.3g} {unit} rms{share}"
+    share = in_words_of(units, f", {rms / of:.2g} of the torque") if of > 0 else ""
+    return f"What is left: {rms:.3g} {unit_of('torque', units)} rms{share}"

@@ -12,6 +12,7 @@ import numpy as np
 from tvident._identify import Held, Span
 from tvident._results import Identification, Words
 from tvident._status import Status
+from tvident._units import in_words_of
 
 STRETCH, MOST = 1 << 16, 8
 """Samples of a stretch, and how many there are at most: choices from minutes of data are as good as those from hours."""
@@ -74,7 +75,7 @@ def chosen(
         # What the advice is worth is not tried out: that costs more than all choices.
         words = result._words  # noqa: SLF001 - without what is tried
         for line in (words if isinstance(words, Words) else words()).advice:
-            lines.setdefault(line, []).append(first * period)
+            lines.setdefault(in_words_of(result.units, line), []).append(first * period)
     advice = [f"{line} (stretches at {', '.join(f'{time:.0f}' for time in times)} s)" for line, times in lines.items()]
     return Choices(settings, int(flags), advice)
 

@@ -12,6 +12,7 @@ from tvident._files import aligned
 from tvident._merged.sampling import Sampling
 from tvident._results import COLUMNS, Words, row_of, sentences_of
 from tvident._status import Status, describe
+from tvident._units import in_words_of
 
 _DOUBTS = {
     Status.SCALES_DISAGREE: "test functions of different widths disagree: the equations do not hold at all frequencies, so do not trust "
@@ -94,12 +95,13 @@ def summary_of(result: Any, verdict: str) -> str:
     s = result.settings
     seconds = float(result.time[-1]) if result.time.size else 0.0
     lines = [
-        verdict,
-        result.held_back().words(),
+        in_words_of(result.units, verdict),
+        in_words_of(result.units, result.held_back().words()),
         "",
         f"{whose(s['trials'], s['masses'])}, {result.time.size} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz",
         "",
         *aligned(rows),
         *sentences_of(result),
     ]
-    return "\n".join([*lines, "", *describe(result.status, result.record_status)])
+    flags = (in_words_of(result.units, line) for line in describe(result.status, result.record_status))
+    return "\n".join([*lines, "", *flags])

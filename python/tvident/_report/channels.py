@@ -13,7 +13,7 @@ from tvident._files import listed
 from tvident._report.content import Reported, Shown, unit_of
 from tvident._report.packed import Series
 from tvident._report.written import write_report
-from tvident._units import named_unit, unit_said
+from tvident._units import in_words_of, named_unit, unit_said
 
 
 def check_page(path: str | Path) -> None:
@@ -24,7 +24,7 @@ def check_page(path: str | Path) -> None:
 
 def names_of_channels(units: Mapping[str, str]) -> tuple[str, str]:
     """Return what moves and what drives, by the units of results."""
-    return "Position" if units["angle"] == "m" else "Angle", "Force" if units["torque"] == "N" else "Torque"
+    return in_words_of(units, "Angle"), in_words_of(units, "Torque")
 
 
 def series_of(result: Reported, name: str, of: str, values: npt.ArrayLike, *, unit: str | None = None) -> Series:

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident._report.packed import Series
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status, stretches_of
+from tvident._units import in_words_of
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -156,7 +157,9 @@ def content_of(shown: Shown, recorded: list[Series], title: str) -> tuple[dict[s
         "span": [min([one.start for one in series], default=0.0), end],
         "numbers": _numbers(shown),
         "advice": list(map(shown.said, result.advice)),
-        "warnings": [one | {"words": shown.said(one["words"])} for one in _warnings(result, marks)],
+        "warnings": [
+            one | {"words": shown.said(in_words_of(result.units, one["words"]))} for one in _warnings(result, marks)
+        ],
         "jumps": [round(float(time), 6) for time in result.jumps],
         "reasons": list(map(shown.said, result.reasons)),
         "settings": [list(row) for row in shown.settings],

@@ -9,6 +9,7 @@ import numpy as np
 
 from tvident._results.verdict import verdict
 from tvident._status import Status
+from tvident._units import in_words_of
 
 
 def explained_steps(result: Any) -> str:
@@ -38,7 +39,7 @@ def _steps(result: Any) -> Iterator[tuple[str, list[str]]]:
             "Do slow and fast motion agree? Estimates by the width of the test function, or by the length of windows (* agree)",
             [scan],
         )
-    yield "Does the model hold where it was not fitted?", [result.held_back().words()]
+    yield "Does the model hold where it was not fitted?", [in_words_of(result.units, result.held_back().words())]
     yield "How much can be trusted", [_flags(result), verdict(result)]
     yield "What to do next, most useful first", list(result.advice) or ["nothing: no test speaks against these numbers"]
 
@@ -69,7 +70,7 @@ def _flags(result: Any) -> str:
     for flag in Status:
         here = float(np.mean(result.status & flag != 0)) if result.status.size else 0.0
         if here > 0:
-            lines.append(f"{flag.name} at {here:.1%} of the samples: {flag.advice}")
+            lines.append(f"{flag.name} at {here:.1%} of the samples: {in_words_of(result.units, flag.advice)}")
         if result.record_status & flag:
-            lines.append(f"{flag.name} for the whole record: {flag.advice}")
+            lines.append(f"{flag.name} for the whole record: {in_words_of(result.units, flag.advice)}")
     return "\n".join(lines)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from tvident import _report
 from tvident._equation import COEFFICIENTS
 from tvident._results.recorded import Recorded
+from tvident._units import in_words_of
 
 Row: TypeAlias = tuple[str, str]
 """A setting as a table shows it."""
@@ -51,14 +52,14 @@ def report(
             for name in ("natural_frequency", "damping_ratio")
         ],
         quality={name: getattr(result, name) for name in ("residual_std", "condition", "order")},
-        settings=_settings(result.settings),
+        settings=_settings(result.settings, result.units),
         compared=compared,
         said=said,
     )
     _report.write_page(path, page, shown, channels, title)
 
 
-def _settings(s: Mapping[str, Any]) -> list[Row]:
+def _settings(s: Mapping[str, Any], units: Mapping[str, str]) -> list[Row]:
     """Return settings as an engineer reads them; all of them are in the JSON below."""
     rate = float(s["sample_rate"])
     weak = s["form"] == "weak"
@@ -72,7 +73,10 @@ def _settings(s: Mapping[str, Any]) -> list[Row]:
         ),
         ("Regression windows", _report.samples_shown(s["regression_window"], rate)),
         *((_report.title_of(name), str(kind)) for name, kind in s["kinds"].items()),
-        ("Delay of the torque", f"{s['lag']} s" if isinstance(s["lag"], int | float) else str(s["lag"])),
+        (
+            in_words_of(units, "Delay of the torque"),
+            f"{s['lag']} s" if isinstance(s["lag"], int | float) else str(s["lag"]),
+        ),
     ]
     if s["step"] != 1:
         rows.append(("A result for every", f"{s['step']} samples"))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tvident._status import describe
+from tvident._units import in_words_of
 
 _RECORDS = 3
 """Of a batch that are shown."""
@@ -48,5 +49,6 @@ def as_html(result: Any) -> str:
         parts.append(f"<p>and {records - _RECORDS} more records: result[{_RECORDS}]</p>")
     if result.advice:
         parts.append(f"<p>what to do</p><ul>{''.join(f'<li>{escape(line)}</li>' for line in result.advice)}</ul>")
-    flags = "".join(f"<li>{escape(line.strip())}</li>" for line in describe(result.status, result.record_status))
+    described = (in_words_of(result.units, line.strip()) for line in describe(result.status, result.record_status))
+    flags = "".join(f"<li>{escape(line)}</li>" for line in described)
     return f"{''.join(parts)}<ul>{flags}</ul>"

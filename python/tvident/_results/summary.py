@@ -12,6 +12,7 @@ from tvident._arguments import own_digits, to_digits_of
 from tvident._files import aligned
 from tvident._results.verdict import CHANGING, verdict
 from tvident._status import describe
+from tvident._units import in_words_of
 
 COLUMNS = ("kind", "median", "5 %", "95 %", "std. error", "unit")
 """Of the table, beside the name."""
@@ -43,14 +44,15 @@ def summary_of(result: Any) -> str:
         form = f"weak form: test functions of {length} samples, exponent {_range(s['exponent'])}"
     lines = [
         verdict(result),
-        result.held_back().words(),
+        in_words_of(result.units, result.held_back().words()),
         "",
         *aligned([("parameter", *COLUMNS), *_rows(result)]),
     ]
     lines += sentences_of(result)
     lines += ["", f"{n} samples, {seconds:.4g} s at {s['sample_rate']:.6g} Hz, method {s['method']}"]
     lines.append(f"{form}; regression windows of {rows} samples")
-    return "\n".join([*lines, "", *describe(result.status, result.record_status)])
+    flags = (in_words_of(result.units, line) for line in describe(result.status, result.record_status))
+    return "\n".join([*lines, "", *flags])
 
 
 def _rows(result: Any) -> Iterator[tuple[str, ...]]:

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 
 from tvident._results.words import Words
+from tvident._units import in_words_of
 
 
 class Telling:
-    """The part of a result that says why and what to do; what there is to say is found when it is asked for."""
+    """The part of a result that says why and what to do; what there is to say is found when it is asked for.
+
+    Attributes
+    ----------
+    units : mapping of str to str
+        Of results.
+    """
+
+    units: Mapping[str, str]
 
     @cached_property
     def _told(self) -> Words:
@@ -17,9 +27,12 @@ class Telling:
     @property
     def reasons(self) -> tuple[str, ...]:
         """What was chosen, and why."""
-        return self._told.reasons
+        return self._in_own_words(self._told.reasons)
 
     @property
     def advice(self) -> tuple[str, ...]:
         """What to do about what looks wrong."""
-        return self._told.advice
+        return self._in_own_words(self._told.advice)
+
+    def _in_own_words(self, sentences: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(in_words_of(self.units, one) for one in sentences)

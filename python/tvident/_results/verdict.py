@@ -11,6 +11,7 @@ import numpy as np
 from tvident._arguments import percent, to_digits_of
 from tvident._results.words import TRIED
 from tvident._status import Status
+from tvident._units import in_words_of
 
 _SYMBOLS = {"stiffness": "K", "inertia": "I", "damping": "C"}
 """In the order in which they are told."""
@@ -48,6 +49,10 @@ _RECORDS = 100
 
 def verdict(result: Any) -> str:
     """Return the verdict on a result of one record or of several."""
+    return in_words_of(result.units, _verdict(result))
+
+
+def _verdict(result: Any) -> str:
     if not result.status.size:
         return "no verdict: there are no samples"
     if result.inertia.ndim == 1:

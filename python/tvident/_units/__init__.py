@@ -5,9 +5,11 @@ from tvident._units.channel import Channel, unit_said
 from tvident._units.names import derivative_units, named_unit, with_unit
 from tvident._units.parse import Unit, is_unit, unit_of
 from tvident._units.quantities import LINEAR, ROTARY, System, UnitError, factor_between, factor_to, system_of
+from tvident._units.words import QUOTED, in_words_of
 
 __all__ = [
     "LINEAR",
+    "QUOTED",
     "ROTARY",
     "Axis",
     "Channel",
@@ -18,6 +20,7 @@ __all__ = [
     "derivative_units",
     "factor_between",
     "factor_to",
+    "in_words_of",
     "is_unit",
     "named_unit",
     "scaled",
