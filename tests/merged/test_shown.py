@@ -34,9 +34,9 @@ def trials() -> Any:
     return identify(several.angle, several.torque, sample_rate=1000, ensemble_axis=0)
 
 
-def mechanism() -> Any:
+def mechanism(step: int = 2) -> Any:
     one = double_pendulum(2000, seed=1)
-    return identify(one.angle, one.torque, t=one.time, structure=pendulum(), **FRICTION)
+    return identify(one.angle, one.torque, t=one.time, structure=pendulum(), step=step, **FRICTION)
 
 
 @pytest.mark.parametrize("made", [masses, trials, mechanism])
@@ -86,3 +86,35 @@ def test_results_are_drawn() -> None:
     with pytest.raises(ValueError, match="what must be"):
         result.plot("poles")
     plt.close("all")
+
+
+@pytest.mark.parametrize("made", [masses, trials, mechanism])
+def test_a_part_is_that_of_the_whole(made: Any, tmp_path: Path) -> None:
+    result = made()
+    part = result.between(0.3, 0.8)
+    samples = (result.time >= 0.3) & (result.time <= 0.8)
+    assert 0 < np.count_nonzero(samples) < samples.size
+    part.save(tmp_path / "part.npz")
+    again = tvident.load(tmp_path / "part.npz")
+    again.save(tmp_path / "again.npz")
+    for one in (part, part.between(), again, tvident.load(tmp_path / "again.npz")):
+        for name in ("time", "inertia", "damping", "stiffness", "status", "residual_std", "trusted"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(result, name)[..., samples], err_msg=name)
+        for name, values in result.stderr.items():
+            np.testing.assert_array_equal(one.stderr[name], values[..., samples], err_msg=name)
+        assert one.constants == result.constants
+        assert one.record_status == result.record_status
+        assert one.advice == result.advice
+        assert one.jumps == tuple(jump for jump in result.jumps if 0.3 <= jump <= 0.8)
+    assert np.shares_memory(part.residual_std, result.residual_std)
+    if made is not mechanism:
+        np.testing.assert_allclose(part.natural_frequency, result.natural_frequency[..., samples], rtol=1e-3)
+    assert "this is a part of a result" in part.summary()
+    assert f"samples, {np.ptp(part.time):.4g} s at" in part.summary()
+    part.report(tmp_path / "part.html")
+    plt.close(part.plot())
+    for name in ("predicted_torque", "vaf"):
+        with pytest.raises(ValueError, match="record must be there"):
+            getattr(part, name)()
+    with pytest.raises(ValueError, match=r"a part must hold samples; got 9\.0 to None s"):
+        result.between(9.0)

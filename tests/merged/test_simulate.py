@@ -118,6 +118,8 @@ def test_trials_along_a_phase_respond_along_it() -> None:
     found = identify(angles, torques, phase=phases, sample_rate=1000, ensemble_axis=0)
     assert (found.vaf() > 99).all()
     assert found.vaf(angles[3], torques[3], phase=phases[3]) == pytest.approx(found.vaf()[3])
+    with pytest.raises(ValueError, match="got a part of one; simulate with the whole"):
+        found.between(0.1, 0.2).vaf(angles[3], torques[3], phase=phases[3])
     with pytest.raises(ValueError, match="give phase="):
         found.vaf(angles[3], torques[3])
 

@@ -104,7 +104,7 @@ def _restored(arrays: Mapping[str, Any], facts: Mapping[str, Any]) -> MergedIden
             covariances[one, other] = arrays[f"{one}_stderr"] ** 2
         else:
             covariances[one, other] = arrays[f"covariance {number}"] if value is None else np.broadcast_to(value, size)
-    return MergedIdentification.of_file(
+    return MergedIdentification.of_known(
         merging,
         {
             "time": arrays["time"],

@@ -64,6 +64,8 @@ class Merging:
         By how much factors of a mechanism enter the matrix of inertia along the motion.
     recorded : Recorded, optional
         Not kept with what is stored.
+    is_part : bool
+        Whether it is from one time to another of what was recorded.
     """
 
     elements: Sequence[Element]
@@ -78,6 +80,7 @@ class Merging:
     unknowable: Mapping[str, str] = field(default_factory=dict)
     inertia: Mapping[str, Array] = field(default_factory=dict)
     recorded: Recorded | None = None
+    is_part: bool = False
 
     @property
     def factors(self) -> frozenset[str]:

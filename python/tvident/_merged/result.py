@@ -15,12 +15,13 @@ from tvident._equation import COEFFICIENTS
 from tvident._files import RESULT_ENDINGS, write_settings, write_table
 from tvident._merged import modal
 from tvident._merged.elements import matrix_of
+from tvident._merged.held_back import HeldBackTorque
 from tvident._merged.heterogeneity import differences_of, excess
 from tvident._merged.merging import Identifiable, Merging, Part
 from tvident._merged.reported import Reported
 from tvident._merged.stored import store
 from tvident._merged.words import whose
-from tvident._results import scan_of
+from tvident._results import samples_between, scan_of
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -141,12 +142,61 @@ class MergedIdentification(Reported):
         self.derive()
 
     @classmethod
-    def of_file(cls, merging: Merging, known: Mapping[str, Any]) -> MergedIdentification:
-        """Return the result that a file held: what it is made of, without its recording, and attributes."""
+    def of_known(cls, merging: Merging, known: Mapping[str, Any]) -> MergedIdentification:
+        """Return a result that was found before: what it is made of, without its recording, and attributes."""
         found = cls.__new__(cls)
         found.__dict__.update({"_merging": merging, **known})
         found.derive()
         return found
+
+    def between(self, begin: float | None = None, end: float | None = None) -> MergedIdentification:
+        """Return the part of the result from one time to another.
+
+        Parameters
+        ----------
+        begin, end : float, optional
+            Seconds, as in ``time``; both belong to the part. By default the first and the last.
+
+        Returns
+        -------
+        MergedIdentification
+            Views, no copies. Constants, settings, words and flags of the record are those of the whole; of the recording nothing is kept.
+
+        Raises
+        ------
+        ValueError
+            If nothing lies in between.
+        """
+        samples, first, last = samples_between(self.time, begin, end)
+        merging, time = self._merging, self.time[samples]
+        count = (time.size - 1) * merging.step + 1
+        part = replace(
+            merging,
+            parts=(),
+            sampling=replace(merging.sampling, start=float(time[0]), clock=None, passed=None),
+            samples=count,
+            phase=None if self.phase is None else self.phase[samples],
+            inertia={name: self._wanted(pattern)[:, :, samples] for name, pattern in merging.inertia.items()},
+            recorded=None,
+            is_part=True,
+        )
+        whole = ("kinds", "constants", "tests", "trial_spread", "identifiable", "settings", "scans", "record_status")
+        along = ("residual_std", "status")
+        known: dict[str, Any] = {name: getattr(self, name) for name in (*whole, "_told")}
+        known |= {name: getattr(self, name)[samples] for name in along}
+        return MergedIdentification.of_known(
+            part,
+            {
+                **known,
+                "time": time,
+                "phase": part.phase,
+                "elements": {name: values[samples] for name, values in self.elements.items()},
+                "stderr": {name: self.stderr[name][samples] for name in self.elements},
+                "jumps": tuple(jump for jump in self.jumps if first <= jump <= last),
+                "_covariances": {pair: values[samples] for pair, values in self._covariances.items()},
+                "_held_back": HeldBackTorque(why_not="this is a part of a result; ask the whole"),
+            },
+        )
 
     def __getstate__(self) -> dict[str, Any]:
         # A record may be long, and functions cannot be stored; what was found of it stays.
@@ -239,10 +289,12 @@ class MergedIdentification(Reported):
         fixed = matrix_of(merging.elements, coefficient, max(merging.masses, 1))
         moving = merging.inertia if coefficient == 0 else {}
         return {name: pattern[:, :, np.newaxis] for name, pattern in fixed.items()} | {
-            # What comes from a file has only the samples that were wanted.
-            name: pattern if pattern.shape[2] == self.time.size else pattern[:, :, :: merging.step]
-            for name, pattern in moving.items()
+            name: self._wanted(pattern) for name, pattern in moving.items()
         }
+
+    def _wanted(self, pattern: Array) -> Array:
+        """Return a matrix at the samples that are wanted: what comes from a file, or is a part, has no others."""
+        return pattern if pattern.shape[2] == self.time.size else pattern[:, :, :: self._merging.step]
 
     def _coefficient(self, coefficient: int) -> Array:
         """Return inertia, damping or stiffness: an array, or matrices made of the elements."""

@@ -197,6 +197,8 @@ class Simulated:
             if phase is not None:
                 raise ValueError("phase= must go with trials that were aligned on one; got it for others; leave it out")
             return None
+        if merging.is_part:
+            raise ValueError("a phase runs over a whole result; got a part of one; simulate with the whole")
         if phase is None:
             known = self._record("phase=").positions or ()
             if [one.size for one in known] != [one.shape[1] for one in torques]:

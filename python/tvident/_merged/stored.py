@@ -35,14 +35,14 @@ def store(path: Path, result: Any) -> None:
         if between[-1][2] is None:
             arrays[f"covariance {len(between)}"] = values
     for name, pattern in merging.inertia.items():
-        for (row, column), values in entries_of(pattern[:, :, :: merging.step]):
+        for (row, column), values in entries_of(result._wanted(pattern)):  # noqa: SLF001 - of this room
             arrays[f"{name} in the inertia {row} {column}"] = values
     facts = {
         "kind": KIND,
         "format": FORMAT,
         "settings": result.settings,
         "elements": [asdict(element) for element in merging.elements],
-        "merging": {name: getattr(merging, name) for name in ("step", "samples", "trials", "masses")},
+        "merging": {name: getattr(merging, name) for name in ("step", "samples", "trials", "masses", "is_part")},
         "sampling": [merging.sampling.period, merging.sampling.start],
         "inertia": list(merging.inertia),
         "units": result.units,

@@ -93,7 +93,7 @@ def summary_of(result: Any, verdict: str) -> str:
     for name, values in result.elements.items():
         rows.append(row_of(name, result.kinds[name], values, result.stderr[name], result.units))
     s = result.settings
-    seconds = float(result.time[-1]) if result.time.size else 0.0
+    seconds = float(result.time[-1] - result.time[0]) if result.time.size else 0.0
     lines = [
         in_words_of(result.units, verdict),
         in_words_of(result.units, result.held_back().words()),

@@ -6,7 +6,7 @@ from tvident._results.explained import explained_steps
 from tvident._results.held_back import parts_of, percent, where_held_back
 from tvident._results.loaded import from_file
 from tvident._results.measured import Measured, known_name, number_of
-from tvident._results.parts import chosen, of_records, settings_of
+from tvident._results.parts import chosen, of_records, samples_between, settings_of
 from tvident._results.recorded import Recorded, begins_once, both_or_none, mark_of, still_there
 from tvident._results.records import IdentifiedRecords, Shared, covariance_between, with_shared
 from tvident._results.response import Model, accounted_for, every_sample, without_gaps
@@ -74,6 +74,7 @@ __all__ = [
     "predicted_at_samples",
     "relative_error",
     "row_of",
+    "samples_between",
     "scan_from",
     "scan_of",
     "sentences_of",

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _arguments as arguments
 from tvident._results.estimates import Estimates
 from tvident._status import Status
 
@@ -16,6 +17,27 @@ _LISTS = ("lag_samples", "shown_noise")
 _ONE_EACH = ("window_length", "exponent", "regression_window", "lag", "lag_stderr", "angle_zero")
 _BY_RECORD = (*_ONE_EACH, *_LISTS)
 """Settings that are a list where there are several records."""
+
+
+def samples_between(
+    time: npt.NDArray[np.float64], begin: float | None, end: float | None
+) -> tuple[slice, float, float]:
+    """Return the samples from one time to another, both included, and these times; infinite where none was given.
+
+    Raises
+    ------
+    ValueError
+        If nothing lies in between.
+    """
+    first, last = (
+        fallback if at is None else arguments.finite_number(name, at)
+        for name, at, fallback in (("begin", begin, -np.inf), ("end", end, np.inf))
+    )
+    samples = slice(int(np.searchsorted(time, first)), int(np.searchsorted(time, last, side="right")))
+    if samples.start >= samples.stop:
+        ends = f"{time[0]:g} to {time[-1]:g} s" if time.size else "no samples"
+        raise ValueError(f"a part must hold samples; got {begin} to {end} s; the result has {ends}")
+    return samples, first, last
 
 
 def of_samples(found: Estimates, samples: slice) -> Estimates:

@@ -17,7 +17,7 @@ from tvident._results.curve import ExpandedParameter
 from tvident._results.estimates import Estimates
 from tvident._results.held_back import HeldBack
 from tvident._results.oscillator import Oscillator
-from tvident._results.parts import chosen, of_records, of_samples, settings_of
+from tvident._results.parts import chosen, of_records, of_samples, samples_between, settings_of
 from tvident._results.recorded import Recorded
 from tvident._results.scan import Scan
 from tvident._results.short import as_html, short
@@ -300,14 +300,7 @@ class Identification(Simulated, Telling, Valued):
         ValueError
             If nothing lies in between.
         """
-        first, last = (
-            fallback if at is None else arguments.finite_number(name, at)
-            for name, at, fallback in (("begin", begin, -np.inf), ("end", end, np.inf))
-        )
-        samples = slice(int(np.searchsorted(self.time, first)), int(np.searchsorted(self.time, last, side="right")))
-        if samples.start >= samples.stop:
-            ends = f"{self.time[0]:g} to {self.time[-1]:g} s" if self.time.size else "no samples"
-            raise ValueError(f"a part must hold samples; got {begin} to {end} s; the result has {ends}")
+        samples, first, last = samples_between(self.time, begin, end)
         jumps = [
             tuple(jump for jump in one if first <= jump <= last)
             for one in (self.jumps if self.inertia.ndim > 1 else [self.jumps])
