@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -65,7 +66,8 @@ def room(module: str) -> str:
     return module.split(".")[1] if "." in module else module
 
 
-def imported(module: str) -> set[str]:
+@cache
+def imported(module: str) -> frozenset[str]:
     """Give the modules of the package that a module imports, wherever in the file, under TYPE_CHECKING too."""
     found = set()
     for node in ast.walk(ast.parse(FILES[module].read_text(encoding="utf-8"))):
@@ -75,7 +77,7 @@ def imported(module: str) -> set[str]:
             found |= {name if name in FILES else str(node.module) for name in names}
         elif isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
-    return {name for name in found if name in FILES}
+    return frozenset(name for name in found if name in FILES)
 
 
 def test_every_file_is_in_a_room() -> None:
