@@ -5,12 +5,15 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 import tvident
 from tvident import Expansion, Status
 
 mpl.use("agg")
+
+Array = npt.NDArray[np.float64]
 
 CONSTANT: dict[str, Any] = {"inertia": "constant", "damping": "constant"}
 
@@ -205,3 +208,40 @@ def test_errors_are_as_large_as_is_said() -> None:
     # 24 numbers with variance 2 each around one, at four standard deviations; a curve of 6 factors is not one number either.
     assert abs(np.mean(squares) - 1) < 4 * np.sqrt(2 / 24)
     assert 0.3 < np.mean(of_curves) < 2.2
+
+
+def delayed_stretch(time: Array, angle: Array, velocity: Array, delay: float) -> Array:
+    """Answer a joint that flexes, late, and not one that extends."""
+    del angle
+    return np.maximum(np.interp(time - delay, time, velocity), 0.0)
+
+
+def test_a_rectified_reflex_has_a_gain_that_is_scheduled_and_a_delay_that_is_searched() -> None:
+    generator, t = np.random.default_rng(5), np.arange(6000) * 1e-3
+    waves = [(0.3, w, phase) for phase, w in enumerate((5.0, 9.0, 23.0, 41.0, 60.0))]
+    angle, velocity, acceleration = (
+        sum(size * w**order * np.sin(w * t + phase + order * np.pi / 2) for size, w, phase in waves)
+        for order in range(3)
+    )
+    late = sum(size * w * np.cos(w * (t - 0.045) + phase) for size, w, phase in waves)
+    gain = 0.3 + 0.1 * t
+    torque = 0.0123 * acceleration + 0.1 * velocity + 13.0 * angle + gain * np.maximum(late, 0.0)
+    result = tvident.identify(
+        angle + 1e-4 * generator.standard_normal(t.size),
+        torque + 0.05 * generator.standard_normal(t.size),
+        sample_rate=1000,
+        stiffness="constant",
+        terms=[
+            (
+                tvident.Term("reflex", delayed_stretch, search={"delay": (0.02, 0.08)}),
+                tvident.Expansion("legendre", size=2),
+            )
+        ],
+    )
+    delay, error = result.constants["reflex.delay"]
+    assert abs(delay - 0.045) < 5e-4
+    assert 0 < error < 5e-4
+    assert np.abs(result.terms["reflex"] / gain - 1).max() < 0.01
+    for name, truth in (("inertia", 0.0123), ("damping", 0.1), ("stiffness", 13.0)):
+        assert abs(result.constants[name][0] / truth - 1) < 0.01
+    assert "reflex.delay  searched" in result.summary()

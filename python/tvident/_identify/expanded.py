@@ -53,7 +53,8 @@ class ExpandedTask:
         """Identify windows, then the factors of the expansions."""
         whole = replace(self._data, step=1, labels=None)
         task = Task(whole, self._pilot_request())
-        pilot = task.run(progress, diagnose=False)
+        # Errors of inner parameters come with what may be missing.
+        pilot = task.run(progress, diagnose=bool(task.inner))
         if not isinstance(pilot.settings["window_length"], int) or not isinstance(pilot.settings["exponent"], int):
             return pilot  # nothing could be determined, and its status says so
         given = ExpandedInputs(self._data, self._request, self._expansions, task, pilot)

@@ -127,6 +127,11 @@ class ExpandedOutcome:
             del values["angle_zero"], errors["angle_zero"]
         for name, value in given.known_values.items():
             values[name], errors[name] = np.array(value[step]), np.zeros(count)
+        kinds = {name: np.array(kind) for name, kind in self._kinds().items()}
+        # Inner parameters of terms were found beside windows, and hold here.
+        for name in given.pilot.settings["inner"]:
+            constants[name], kinds[name] = given.pilot.constants[name], np.array("constant")
+            values[name], errors[name] = (np.full(count, number) for number in constants[name])
         left = self.around.residuals
         return replace(
             given.pilot._found,  # noqa: SLF001 - parts of this package
@@ -141,7 +146,7 @@ class ExpandedOutcome:
             status=self._status(values, errors, step),
             record_status=self._record_status(),
             expansions=self.curves,
-            kinds={name: np.array(kind) for name, kind in self._kinds().items()},
+            kinds=kinds,
         )
 
     def settings(self, name: str) -> dict[str, Any]:
