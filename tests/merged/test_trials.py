@@ -98,6 +98,16 @@ def test_errors_shrink_with_the_root_of_the_number_of_trials() -> None:
     assert (actual[0] / np.mean(actual[1:])) ** 0.5 < 0.6
 
 
+@pytest.mark.parametrize(("given", "bound"), [(1, "at least"), (20_000, "at most")])
+def test_a_window_that_there_is_not_is_refused(given: int, bound: str) -> None:
+    rig = tvident.simulate_torsional_rig(duration=1.0, seed=1, angle_noise=1e-3)
+    angles, torques = np.stack([rig.angle] * 3), np.stack([rig.torque] * 3)
+    with pytest.raises(ValueError, match=f"regression_window must be {bound} about .* got {given}; use"):
+        tvident.identify(
+            angles, torques, sample_rate=1000, ensemble_axis=0, method=tvident.WeakForm(regression_window=given)
+        )
+
+
 def test_trials_that_differ_are_said_to() -> None:
     alike = simulated(6, 1500, lambda t: 15 + 0 * t, seed=6)
     found = identify(alike.angle, alike.torque, **OPTIONS)

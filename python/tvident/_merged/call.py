@@ -86,9 +86,21 @@ class Asked:
             workers=self.workers,
             progress=self.report,
         )
+        self._check_window(found.regression_window)
         form = {name: getattr(found, name) for name in self.form}
         again = replace(self, form=form, report=None)
         return Part(found, equations, lambda others: again.part(others, samples, noise or found.noise))
+
+    def _check_window(self, nearest: int) -> None:
+        """Refuse a regression window that is far from the nearest that there is, in samples; 0 where nothing is windowed."""
+        wanted = self.form["regression_window"]
+        if wanted is None or nearest == 0 or wanted / 2 <= nearest <= 2 * wanted:
+            return
+        bound, cure = ("at least", "more") if nearest > wanted else ("at most", "fewer")
+        raise ValueError(
+            f"regression_window must be {bound} about {nearest} samples here, since windows are compared with equations that share no "
+            f"samples with them; got {wanted}; use {nearest} or {cure}, or leave it out"
+        )
 
     def units_of(self, elements: Sequence[Element]) -> dict[str, str]:
         """Return the units of everything by name."""
