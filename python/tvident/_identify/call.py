@@ -95,6 +95,12 @@ def identify(
     The torque is that which acts *on* the system, positive in the direction of a positive angle: a spring that pulls back has K > 0. The
     torque with which the system acts on a sensor or a motor has the other sign: pass ``-torque``.
 
+    ::
+
+        frame ──/\/\/── K ──┐
+                            ├── I ──→ θ, T    both positive in one direction
+        frame ───[ ]──── C ─┘
+
     In weak form, the default, the equation is multiplied by a test function φ = (1 - x²)^p, which is zero with its slope at both ends of
     a window, and integrated by parts: I⟨φ″θ⟩ - C⟨φ′θ⟩ + K⟨φθ⟩ = ⟨φT⟩. No derivative is estimated, the bias from the angle's noise is
     corrected, and every setting that is not given is chosen from the record: ``summary()`` says what was chosen and why.
