@@ -154,3 +154,28 @@ def test_a_member_of_a_structure_is_found_by_the_name_that_it_is_listed_with() -
 def test_python_runs_the_command_where_the_program_is_not_on_the_path() -> None:
     command = [sys.executable, "-m", "tvident", "--version"]
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.split() == [tvident.__version__]
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize("command", ["identify", "compare", "report"])
+def test_channels_of_the_file_are_listed_where_none_was_named(command: str) -> None:
+    done = run(command, "messung.csv", "--time", "Zeit")
+    assert done.returncode == 2
+    assert (
+        "'--angle'; messung.csv has Zeit [ms], Winkel [°], Drehmoment [Nmm], Bemerkung; name the channel" in done.stderr
+    )
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_plan_says_which_file_it_goes_on_from() -> None:
+    refused = run("plan", "messung.csv")
+    assert refused.returncode == 2
+    assert (
+        "a plan goes on from a result; got 'messung.csv'; identify a recording with tvident identify" in refused.stderr
+    )
+    nothing = run("plan")
+    assert nothing.returncode == 2
+    assert "got neither; give --inertia, --damping" in nothing.stderr
+    call = "identify messung.csv --angle Winkel --torque Drehmoment --time Zeit --stiffness constant -o result.npz"
+    assert run(*call.split()).returncode == 0
+    assert "stiffness within 2 %" in run("plan", "result.npz").stdout

@@ -42,7 +42,7 @@ def compare(
     **options: Any,
 ) -> None:
     """Compare candidates for the equation of motion of the angle and torque in FILE."""
-    options = named(options)
+    options = named(options, file)
     angle, torque, time_channel = (options.pop(name) for name in ("angle", "torque", "time_channel"))
     del options["joint"]
     check_outputs(

@@ -32,7 +32,7 @@ def identify(
     **options: Any,
 ) -> None:
     """Identify inertia, damping and stiffness from the angle and torque in FILE."""
-    options = named(options)
+    options = named(options, file)
     if in_pieces:
         others = {"plot": plot, "json": as_json, "explain": explain}
         identify_in_pieces(file, output, settings_output, others, options)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
 
 from tvident import recordings
-from tvident._commands.channels import source_of
+from tvident._commands.channels import channels_in, source_of
+from tvident._files import listed, printable
 
 
-def named(options: Mapping[str, Any]) -> dict[str, Any]:
+def named(options: Mapping[str, Any], file: str | None) -> dict[str, Any]:
     """Return options with what a joint's angle, torque and stamps are called; refuse options that name no channels."""
     missing = [name for name in ("angle", "torque") if options[name] is None]
     joint = options["joint"]
@@ -20,7 +22,12 @@ def named(options: Mapping[str, Any]) -> dict[str, Any]:
         if options.get("velocity") or options.get("acceleration"):
             missing = [name for name in missing if name != "angle"]
         if missing:
-            raise click.UsageError(f"Missing option '--{missing[0]}'; name the channel, or a --joint of a ROS bag")
+            # Names are all that is missing, so they are listed.
+            there = file is not None and Path(file).exists()
+            held = f"; {printable(file)} has {listed(channels_in(file))}" if there else ""
+            raise click.UsageError(
+                f"Missing option '--{missing[0]}'{held}; name the channel, or a --joint of a ROS bag"
+            )
         return dict(options)
     if len(missing) < 2:  # noqa: PLR2004 - angle and torque
         raise click.UsageError("--joint stands for --angle and --torque; got one of these too; drop it")

@@ -11,7 +11,8 @@ import numpy as np
 import tvident
 from tvident._commands.given import given
 from tvident._commands.output import RECORDING, RESULTS, check_outputs, say
-from tvident._files import write_table
+from tvident._equation import COEFFICIENTS
+from tvident._files import RESULT_ENDINGS, printable, write_table
 
 
 def plan(file: str | None, output: str | None, **options: Any) -> None:
@@ -19,11 +20,21 @@ def plan(file: str | None, output: str | None, **options: Any) -> None:
     check_outputs({RESULTS: output}, {RECORDING: file})
     asked = given(options)
     if file is not None:
+        if Path(file).suffix not in RESULT_ENDINGS:
+            raise click.UsageError(
+                f"a plan goes on from a result; got '{printable(file)}'; identify a recording with tvident identify … -o result.npz, "
+                "and give that file"
+            )
         if output is not None:
             raise click.UsageError("a plan to go on has no torque to write; got -o; leave it out")
         kept = {name: asked[name] for name in ("wanted", "more") if name in asked}
         say(tvident.plan_experiment(result=tvident.load(file), **kept).summary())
         return
+    if not asked.keys() & COEFFICIENTS:
+        raise click.UsageError(
+            "a plan needs a guess of the system, or a result; got neither; give --inertia, --damping, --stiffness, --band and "
+            "--torque-noise, or a FILE that identify saved as .npz or .parquet"
+        )
     found = tvident.plan_experiment(**asked)
     say(found.summary())
     if output is not None:

@@ -24,7 +24,7 @@ def report(file: str | None, output: str, **options: Any) -> None:
     if Path(output).suffix.lower() not in {".html", ".htm"}:
         raise click.UsageError(f"-o must end in .html; got '{printable(output)}'; rename it")
     _report.check_plotly()
-    options = named(options)
+    options = named(options, file)
     check_outputs({REPORT: output}, inputs(file, options))
     channels = channels_in(file)
     options = with_velocity(options, channels, file)
