@@ -13,6 +13,7 @@ import pytest
 import tvident
 from tvident import recordings
 from tvident._arguments import percent
+from tvident._results.held_back import HeldBack
 
 RATE = 1000.0
 TIME = np.arange(4000) / RATE
@@ -162,3 +163,14 @@ def test_records_of_a_batch_are_judged_each() -> None:
 @pytest.mark.parametrize(("share", "words"), [(0.9991, "99.910 %"), (0.5, "50 %"), (0.00123, "0.12 %"), (1.0, "100 %")])
 def test_percents_have_two_digits_of_what_is_left(share: float, words: str) -> None:
     assert percent(share) == words
+
+
+def test_a_model_that_predicts_worse_than_a_constant_explains_nothing() -> None:
+    rig = tvident.simulate_torsional_rig(duration=5.0, seed=4)
+    result = tvident.identify(rig.angle, -np.roll(rig.torque, 5), sample_rate=1000)
+    _, recorded, predicted = result.predicted_torque()
+    there = np.isfinite(predicted)
+    assert np.var((recorded - predicted)[there]) > np.var(recorded[there])
+    assert result.summary().startswith("do not trust: the model explains nothing of the torque; see what to do")
+    assert "explains nothing of the angle simulated and 61 % predicted" in HeldBack(-16.0, 61.0).words()
+    assert "explains 0 % of the angle simulated" in HeldBack(0.0, 61.0).words()

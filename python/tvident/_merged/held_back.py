@@ -14,7 +14,7 @@ from tvident._merged.models import model_of
 from tvident._merged.not_linear import NotLinear
 from tvident._merged.predicted import Equations, predicted
 from tvident._merged.simulated import bridged, rows_of
-from tvident._results import POOR, every_sample, parts_of, percent, where_held_back, without_gaps
+from tvident._results import POOR, every_sample, parts_of, share_in_words, where_held_back, without_gaps
 from tvident._status import Status
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -56,7 +56,7 @@ class HeldBackTorque:
 
 def _range(shares: Array) -> str:
     """Return the least and the greatest of some shares."""
-    return " to ".join(dict.fromkeys(percent(float(share)) for share in (shares.min(), shares.max())))
+    return " to ".join(dict.fromkeys(share_in_words(float(share)) for share in (shares.min(), shares.max())))
 
 
 def held_back(merging: Merging) -> HeldBackTorque:

@@ -48,7 +48,9 @@ class HeldBack:
         if self.why_not:
             return f"how much of a held-back part the model explains is not known: {self.why_not}"
         several = np.ndim(self.simulated) > 0
-        simulated, predicted = (percent(float(np.nanmedian(value))) for value in (self.simulated, self.predicted))
+        simulated, predicted = (
+            share_in_words(float(np.nanmedian(value))) for value in (self.simulated, self.predicted)
+        )
         whose = " (median of all records)" if several else ""
         return (
             f"explains {simulated} of the angle simulated and {predicted} predicted one test function ahead in "
@@ -61,6 +63,11 @@ def where_held_back(parts: int) -> str:
     """Return what was held back of so many parts."""
     few = {PARTS: "the last tenth of every tenth", 1: "the last tenth"}
     return few.get(parts, f"the last tenth of each of {parts} parts")
+
+
+def share_in_words(value: float) -> str:
+    """Return a share as a sentence has it: what predicts worse than a constant explains nothing, by however much."""
+    return "nothing" if value < 0 else percent(value)
 
 
 def percent(value: float) -> str:
