@@ -25,8 +25,8 @@ def info(file: str) -> None:
         values = recorded.astype(np.float64)
         finite = values[np.isfinite(values)]
         with np.errstate(over="ignore", invalid="ignore"):
-            numbers = (finite.mean(), finite.std(), finite.min(), finite.max()) if finite.size else (np.nan,) * 4
-        shown = [f"{float(number):.5g}" for number in numbers]
+            numbers = (finite.mean(), finite.std(), finite.min(), finite.max()) if finite.size else ()
+        shown = [f"{float(number):.5g}" for number in numbers] or [""] * 4
         rows.append(
             (
                 printable(name, 60),
@@ -41,9 +41,11 @@ def info(file: str) -> None:
 
 
 def _remark(name: str, values: npt.NDArray[Any]) -> str:
-    """Return what a channel looks like: uniform time, a single number, a constant."""
+    """Return what a channel looks like: uniform time, a single number, a constant, nothing at all."""
     if values.ndim == 0:
         return "a number"
+    if not np.isfinite(values).any():
+        return "holds no numbers"
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         steps = np.diff(values)
         if steps.size and (steps > 0).all():
