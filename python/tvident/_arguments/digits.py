@@ -46,6 +46,11 @@ def percent(share: float) -> str:
     return f"{value:.{digits}f} %"
 
 
+def explained_in_words(share: float) -> str:
+    """Return how much of 1 is explained, as a sentence has it: what predicts worse than a constant explains nothing, by however much."""
+    return "nothing" if share < 0 else percent(share)
+
+
 def own_digits(error: float) -> str:
     """Return an error with two digits."""
     if not math.isfinite(error):

@@ -9,12 +9,13 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from tvident._arguments import explained_in_words
 from tvident._merged.merging import Merging, Part
 from tvident._merged.models import model_of
 from tvident._merged.not_linear import NotLinear
 from tvident._merged.predicted import Equations, predicted
 from tvident._merged.simulated import bridged, rows_of
-from tvident._results import POOR, every_sample, parts_of, share_in_words, where_held_back, without_gaps
+from tvident._results import POOR, every_sample, parts_of, where_held_back, without_gaps
 from tvident._status import Status
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -56,7 +57,7 @@ class HeldBackTorque:
 
 def _range(shares: Array) -> str:
     """Return the least and the greatest of some shares."""
-    return " to ".join(dict.fromkeys(share_in_words(float(share)) for share in (shares.min(), shares.max())))
+    return " to ".join(dict.fromkeys(explained_in_words(float(share) / 100) for share in (shares.min(), shares.max())))
 
 
 def held_back(merging: Merging) -> HeldBackTorque:

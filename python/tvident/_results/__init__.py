@@ -3,7 +3,7 @@
 from tvident._results.curve import ExpandedParameter, of_powers
 from tvident._results.estimates import Estimates
 from tvident._results.explained import explained_steps
-from tvident._results.held_back import parts_of, share_in_words, where_held_back
+from tvident._results.held_back import parts_of, where_held_back
 from tvident._results.loaded import from_file
 from tvident._results.measured import Measured, known_name, number_of
 from tvident._results.parts import chosen, of_records, samples_between, settings_of
@@ -78,7 +78,6 @@ __all__ = [
     "scan_of",
     "sentences_of",
     "settings_of",
-    "share_in_words",
     "share_of",
     "still_there",
     "touched_by",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tvident._arguments import explained_in_words
 from tvident._equation import COEFFICIENTS
 from tvident._results.response import Model, accounted_for, without_gaps
 
@@ -49,7 +49,7 @@ class HeldBack:
             return f"how much of a held-back part the model explains is not known: {self.why_not}"
         several = np.ndim(self.simulated) > 0
         simulated, predicted = (
-            share_in_words(float(np.nanmedian(value))) for value in (self.simulated, self.predicted)
+            explained_in_words(float(np.nanmedian(one)) / 100) for one in (self.simulated, self.predicted)
         )
         whose = " (median of all records)" if several else ""
         return (
@@ -63,18 +63,6 @@ def where_held_back(parts: int) -> str:
     """Return what was held back of so many parts."""
     few = {PARTS: "the last tenth of every tenth", 1: "the last tenth"}
     return few.get(parts, f"the last tenth of each of {parts} parts")
-
-
-def share_in_words(value: float) -> str:
-    """Return a share as a sentence has it: what predicts worse than a constant explains nothing, by however much."""
-    return "nothing" if value < 0 else percent(value)
-
-
-def percent(value: float) -> str:
-    """Return a share with two digits of what it leaves: 99.9964 is far from 100."""
-    left = abs(100 - value)
-    digits = min(6, max(0, 1 - math.floor(math.log10(left)))) if 0 < left < np.inf else 0
-    return f"{value:.{digits}f} %"
 
 
 def parts_of(samples: int, window_length: int) -> list[tuple[int, int, int]]:

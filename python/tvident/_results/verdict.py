@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tvident._arguments import percent, to_digits_of
+from tvident._arguments import explained_in_words, percent, to_digits_of
 from tvident._results.words import TRIED
 from tvident._status import Status
 from tvident._units import in_words_of
@@ -136,7 +136,7 @@ def why_not(result: Any, sign: Callable[[], str | None], share: Callable[[], flo
         return "slow and fast motion give different parameters"
     explains = share()
     if explains is not None and explains < _LITTLE:
-        return f"the model explains {'nothing' if explains < 0 else percent(explains)} of the torque"
+        return f"the model explains {explained_in_words(explains)} of the torque"
     trusted = float(np.mean(result.trusted))
     return f"{1 - trusted:.0%} of the samples are flagged" if trusted < _LITTLE else None
 
