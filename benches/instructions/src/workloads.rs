@@ -93,7 +93,7 @@ fn polynomials(window_length: usize, order: Order, derivatives: &[usize], length
         status: &mut status,
         sigma: &mut sigma,
     };
-    plan.run(vec![(&record, estimates)], false, NonZeroUsize::MIN, &mut |_, _| true)?;
+    plan.run(&[&record], estimates, false, NonZeroUsize::MIN, &mut |_, _| true)?;
     Ok(windows)
 }
 

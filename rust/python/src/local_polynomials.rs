@@ -20,9 +20,6 @@ use crate::arrays::zeros;
 use crate::records::{placed, records};
 use crate::watch::watched;
 
-/// Records and where what is known of them goes.
-type Work<'a, 'b> = Vec<(&'a dyn Samples, Estimates<'b>)>;
-
 /// A part of longer records: the samples that are wanted, those that are held, and all that there are.
 #[derive(Clone, Copy, FromPyObject)]
 pub(crate) struct Part {
@@ -141,8 +138,8 @@ impl LocalPolynomials {
     ) -> PyResult<LocalEstimates> {
         let plan = &self.plan;
         let wanted = part.map(Part::wanted);
-        let fill = |work: Work<'_, '_>, watch: &mut Watch<'_>| {
-            plan.run_part(work, ends, wanted.as_ref(), threads(workers), watch)
+        let fill = |records: &[&dyn Samples], estimates: Estimates<'_>, watch: &mut Watch<'_>| {
+            plan.run_part(records, estimates, ends, wanted.as_ref(), threads(workers), watch)
         };
         self.outputs(samples, (ends, step, part), progress, fill)
     }
@@ -158,8 +155,8 @@ impl LocalPolynomials {
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let plan = &self.plan;
         let wanted = part.map(Part::wanted);
-        let fill = |work: Work<'_, '_>, watch: &mut Watch<'_>| {
-            plan.errors_of_part(work, wanted.as_ref(), threads(workers), watch)
+        let fill = |records: &[&dyn Samples], estimates: Estimates<'_>, watch: &mut Watch<'_>| {
+            plan.errors_of_part(records, estimates, wanted.as_ref(), threads(workers), watch)
         };
         let outputs = self.outputs(samples, (true, step, part), None, fill)?;
         Ok(outputs.derivatives.into_bound(samples.py()))
@@ -226,7 +223,7 @@ impl LocalPolynomials {
         samples: &Bound<'_, PyUntypedArray>,
         (ends, step, part): (bool, usize, Option<Part>),
         progress: Option<&Bound<'_, PyAny>>,
-        fill: impl FnOnce(Work<'_, '_>, &mut Watch<'_>) -> Result<(), Error> + Send,
+        fill: impl FnOnce(&[&dyn Samples], Estimates<'_>, &mut Watch<'_>) -> Result<(), Error> + Send,
     ) -> PyResult<LocalEstimates> {
         let py = samples.py();
         let options = self.plan.options();
@@ -256,25 +253,17 @@ impl LocalPolynomials {
         {
             let (mut derivatives, mut order) = (derivatives.readwrite(), order.readwrite());
             let (mut status, mut sigma) = (status.readwrite(), sigma.readwrite());
-            // Row d · records + r of the derivatives belongs to derivative d of record r.
-            let mut rows: Vec<Option<&mut [f64]>> =
-                derivatives.as_slice_mut()?.chunks_exact_mut(count.max(1)).map(Some).collect();
-            let mut orders = order.as_slice_mut()?.chunks_exact_mut(count.max(1));
-            let mut statuses = status.as_slice_mut()?.chunks_exact_mut(count.max(1));
-            let mut sigmas = sigma.as_slice_mut()?.chunks_exact_mut(count.max(1));
-            let mut work: Work<'_, '_> = Vec::with_capacity(records.len());
-            for (index, record) in records.iter().enumerate() {
-                let own = rows.iter_mut().skip(index).step_by(records.len());
-                let estimates = Estimates {
-                    elements: Elements { first, step },
-                    derivatives: own.filter_map(Option::take).collect(),
-                    order: orders.next().unwrap_or_default(),
-                    status: statuses.next().unwrap_or_default(),
-                    sigma: sigmas.next().unwrap_or_default(),
-                };
-                work.push((record, estimates));
-            }
-            watched(py, progress, |watch| fill(work, watch))?;
+            // The records lie end to end, in every derivative anew.
+            let all = (records.len() * count).max(1);
+            let estimates = Estimates {
+                elements: Elements { first, step },
+                derivatives: derivatives.as_slice_mut()?.chunks_exact_mut(all).collect(),
+                order: order.as_slice_mut()?,
+                status: status.as_slice_mut()?,
+                sigma: sigma.as_slice_mut()?,
+            };
+            let records: Vec<&dyn Samples> = records.iter().map(|record| record as &dyn Samples).collect();
+            watched(py, progress, |watch| fill(&records, estimates, watch))?;
         }
         Ok(LocalEstimates {
             derivatives: derivatives.unbind(),

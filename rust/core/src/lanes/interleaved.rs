@@ -70,6 +70,16 @@ impl Strips {
         self.at(simd, Cursor { row, column: block })
     }
 
+    /// What is held from sample `row` of every lane's block on.
+    pub(crate) fn rows_on_from(&self, row: usize) -> &[f64] {
+        &self.values[row * self.columns..]
+    }
+
+    /// Numbers from one sample of a block to the next.
+    pub(crate) fn columns(&self) -> usize {
+        self.columns
+    }
+
     /// The place of sample `index` of every lane's block.
     #[inline(always)]
     pub(crate) fn cursor(&self, index: usize) -> Cursor {

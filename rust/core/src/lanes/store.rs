@@ -11,9 +11,11 @@ pub(crate) struct Write<'a, 'b> {
     pub(crate) tile: &'a Tile,
     /// The windows of each lane's block.
     pub(crate) rows: Range<usize>,
-    /// The window in row 0 of lane 0, and the windows from one lane to the next.
+    /// The window in row 0 of lane 0, and the windows from one lane to the next: none where each lane has a record of its own.
     pub(crate) base: isize,
     pub(crate) block: usize,
+    /// The records of the first lanes, where each has its own.
+    pub(crate) records: Option<Records>,
     /// Windows that are wanted.
     pub(crate) windows: Range<usize>,
     /// The sample of window `w` is `w + ahead`.
@@ -21,6 +23,14 @@ pub(crate) struct Write<'a, 'b> {
     /// The order of every window, where the tile holds no codes.
     pub(crate) fixed_order: Option<u8>,
     pub(crate) outputs: &'a mut Outputs<'b>,
+}
+
+/// Records side by side, one in each of the first lanes. Their elements lie end to end.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Records {
+    pub(crate) count: usize,
+    /// Elements of each.
+    pub(crate) elements: usize,
 }
 
 impl Kernel for Write<'_, '_> {
@@ -32,7 +42,8 @@ impl Kernel for Write<'_, '_> {
         let first = self.base + self.rows.start.cast_signed();
         let end = self.base + (self.rows.end + (lanes - 1) * self.block).cast_signed();
         let wanted = self.windows.start.cast_signed() <= first && end <= self.windows.end.cast_signed();
-        if wanted && self.rows.len() >= lanes && self.outputs.elements.step == 1 {
+        let full = self.records.is_none_or(|records| records.count == lanes);
+        if wanted && full && self.rows.len() >= lanes && self.outputs.elements.step == 1 {
             self.write_squares(simd);
         } else if let (true, Some(rows)) = (wanted, self.same_rows()) {
             self.write_rows(lanes, rows);
@@ -46,23 +57,25 @@ impl Write<'_, '_> {
     /// Writes out all windows to neighbouring elements. The last square overlaps the one before it where need be.
     #[inline(always)]
     fn write_squares<S: Lanes>(&mut self, simd: S) {
-        let Self { tile, rows, block, outputs, .. } = self;
         let lanes = S::F64_LANES;
+        let apart = self.block + self.records.map_or(0, |records| records.elements);
+        let Self { tile, rows, outputs, .. } = self;
         let zero = self.base + self.ahead - outputs.elements.first.cast_signed();
-        for row in rows.clone().step_by(lanes).map(|row| row.min(rows.end - lanes)) {
-            let first = (zero + row.cast_signed()).unsigned_abs();
-            for (field, values) in outputs.values.iter_mut().enumerate() {
-                if values.is_empty() {
-                    continue;
-                }
+        let squares = || rows.clone().step_by(lanes).map(|row| row.min(rows.end - lanes));
+        let place = |row: usize| (zero + row.cast_signed()).unsigned_abs();
+        // Field by field: fewer places in memory are written to at a time.
+        for (field, values) in outputs.values.iter_mut().enumerate().filter(|(_, values)| !values.is_empty()) {
+            for row in squares() {
                 let square = tile.square(simd, field, row);
                 for (lane, &vector) in square[..lanes].iter().enumerate() {
-                    simd.store(values, first + lane * *block, vector);
+                    simd.store(values, place(row) + lane * apart, vector);
                 }
             }
-            if outputs.status.is_empty() && outputs.order.is_empty() {
-                continue;
-            }
+        }
+        if outputs.status.is_empty() && outputs.order.is_empty() {
+            return;
+        }
+        for row in squares() {
             let (mut orders, mut statuses) = ([self.fixed_order.unwrap_or(0); MOST_LANES], [0; MOST_LANES]);
             let codes = match self.fixed_order {
                 Some(_) => [simd.splat_f64s(0.0); MOST_LANES],
@@ -72,7 +85,7 @@ impl Write<'_, '_> {
                 if self.fixed_order.is_none() {
                     simd.split(codes, &mut orders, &mut statuses);
                 }
-                let elements = first + lane * *block..first + lane * *block + lanes;
+                let elements = place(row) + lane * apart..place(row) + lane * apart + lanes;
                 if !outputs.order.is_empty() {
                     outputs.order[elements.clone()].copy_from_slice(&orders[..lanes]);
                 }
@@ -124,9 +137,11 @@ impl Write<'_, '_> {
     /// Writes out what is wanted of every lane to whatever elements there are.
     #[inline(always)]
     fn write_lanes<S: Lanes>(&mut self) {
-        let Self { tile, rows, outputs, .. } = self;
         let lanes = S::F64_LANES;
-        for lane in 0..lanes {
+        // Lanes that are written, and elements from one to the next beside those of the windows between them.
+        let (used, apart) = self.records.map_or((lanes, 0), |records| (records.count, records.elements));
+        let Self { tile, rows, outputs, .. } = self;
+        for lane in 0..used {
             let zero = self.base + (lane * self.block).cast_signed();
             let row =
                 |window: usize| (window.cast_signed() - zero).clamp(rows.start.cast_signed(), rows.end.cast_signed());
@@ -139,7 +154,7 @@ impl Write<'_, '_> {
                     for (value, row) in column.iter_mut().zip(part.clone()) {
                         *value = tile.one(field, row, lane, lanes);
                     }
-                    outputs.elements.put(values, sample, &column[..part.len()]);
+                    outputs.elements.put(&mut values[lane * apart..], sample, &column[..part.len()]);
                 }
                 let (mut orders, mut statuses) = ([self.fixed_order.unwrap_or(0); TILE], [0; TILE]);
                 if self.fixed_order.is_none() {
@@ -147,8 +162,10 @@ impl Write<'_, '_> {
                         (*order, *status) = parts(tile.one(outputs.values.len(), row, lane, lanes));
                     }
                 }
-                outputs.elements.put(outputs.order, sample, &orders[..part.len()]);
-                outputs.elements.put(outputs.status, sample, &statuses[..part.len()]);
+                let (own_order, own_status) =
+                    (outputs.order.get_mut(lane * apart..), outputs.status.get_mut(lane * apart..));
+                outputs.elements.put(own_order.unwrap_or_default(), sample, &orders[..part.len()]);
+                outputs.elements.put(own_status.unwrap_or_default(), sample, &statuses[..part.len()]);
             }
         }
     }

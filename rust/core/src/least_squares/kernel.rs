@@ -223,6 +223,7 @@ impl<H: Dimensions> RollingKernel<'_, '_, '_, H> {
             rows,
             base: self.run.base.cast_signed(),
             block: plan.window,
+            records: None,
             windows: self.run.windows.clone(),
             ahead: plan.before.cast_signed() - plan.window.cast_signed(),
             fixed_order: None,

@@ -145,7 +145,8 @@ impl<H: Dimensions> Kernel for OneByOneKernel<'_, '_, '_, H> {
                 let windows = self.run.base + rows.start..self.run.base + rows.end;
                 let (tile, base) = (&self.state.tile, self.run.base.cast_signed());
                 let outputs = &mut *self.outputs;
-                Write { tile, rows, base, block: window, windows, ahead, fixed_order: None, outputs }.run(simd);
+                Write { tile, rows, base, block: window, records: None, windows, ahead, fixed_order: None, outputs }
+                    .run(simd);
             }
         }
         store(simd, shape, &mut self.state.prefix, &prefix);

@@ -16,7 +16,8 @@ use crate::local_polynomials::off_centre::{Evaluated, OffCentre, Tabulate, Top};
 use crate::local_polynomials::options::{Order, PolynomialOptions};
 use crate::local_polynomials::order_average::Akaike;
 use crate::local_polynomials::order_shares::Wanted;
-use crate::local_polynomials::single_window::Window;
+use crate::local_polynomials::side_by_side::SideBySide;
+use crate::local_polynomials::single_window::{Window, WindowsOf};
 use crate::record::samples::Samples;
 use crate::simd::instructions::Instructions;
 use crate::simd::vectors::dispatch;
@@ -51,11 +52,12 @@ pub(crate) struct Ends {
 /// A table of the polynomials that is kept has at most so many numbers: 1 MB.
 const LARGEST_TABLE: usize = 1 << 17;
 
-/// A derivative at one position and its standard error.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Estimate {
-    pub(crate) value: f64,
-    pub(crate) error: f64,
+/// The first sample of the window at an end.
+fn first_window(basis: &Basis, samples: usize, end: End) -> usize {
+    match end {
+        End::First => 0,
+        End::Last => samples - basis.length(),
+    }
 }
 
 impl Ends {
@@ -93,101 +95,121 @@ impl Ends {
         wanted: Wanted,
         estimates: &mut Estimates<'_>,
     ) {
-        let (first, fit) = self.fit(basis, record, end, orders);
+        let first = first_window(basis, record.len(), end);
+        let mut window = vec![0.0; basis.length()];
+        record.read(first, &mut window);
+        let window = Window::project(basis, &window, self.floor);
+        self.write(basis, window, (end, first), orders, samples, wanted, estimates);
+    }
+
+    /// Writes the derivatives of several records at some samples, all of them at one end, so many elements a record.
+    pub(crate) fn estimate_side_by_side(
+        &self,
+        basis: &Basis,
+        records: &SideBySide,
+        end: End,
+        samples: Range<usize>,
+        elements: usize,
+        estimates: &mut Estimates<'_>,
+    ) {
+        let (first, floor) = (first_window(basis, records.samples(), end), self.floor);
+        let windows = dispatch(self.instructions, WindowsOf { basis, strips: records.strips(), first, floor });
+        for (record, window) in windows.into_iter().take(records.count()).enumerate() {
+            let usable = records.unusable(record, first..first + basis.length()).next().is_none();
+            let mut own = estimates.part(record * elements..(record + 1) * elements);
+            let (window, wanted) = (usable.then_some(window), Wanted::Derivatives);
+            self.write(basis, window, (end, first), None, samples.clone(), wanted, &mut own);
+        }
+    }
+
+    /// Writes what the window at an end, with its first sample, says of some samples.
+    #[allow(clippy::too_many_arguments, reason = "which samples of which window, and where they go")]
+    fn write(
+        &self,
+        basis: &Basis,
+        window: Option<Window>,
+        (end, first): (End, usize),
+        orders: Option<Vec<(usize, f64)>>,
+        samples: Range<usize>,
+        wanted: Wanted,
+        estimates: &mut Estimates<'_>,
+    ) {
         let elements = estimates.elements.of(samples);
-        let Some(fit) = fit else {
+        let Some(window) = window else {
             for element in elements {
                 estimates.nothing(element);
             }
             return;
         };
-        let places: Vec<usize> = elements.clone().map(|element| estimates.elements.sample(element) - first).collect();
-        self.evaluate(basis, (end, &fit), &places, |place, slot, estimate| {
-            estimates.derivatives[slot][elements.start + place] = match wanted {
-                Wanted::Derivatives => estimate.value,
-                Wanted::Errors => estimate.error,
-            };
-        });
+        let fit = self.fit(window, basis.length(), orders);
+        self.evaluate(basis, (end, &fit), first, elements.clone(), wanted, estimates);
         for element in elements {
             estimates.diagnose(element, fit.order, Status::EDGE | fit.status, fit.sigma);
         }
     }
 
-    /// The window at an end and its first sample.
-    fn fit(
-        &self,
-        basis: &Basis,
-        record: &dyn Samples,
-        end: End,
-        orders: Option<Vec<(usize, f64)>>,
-    ) -> (usize, Option<BoundaryFit>) {
-        let length = basis.length();
-        let first = match end {
-            End::First => 0,
-            End::Last => record.len() - length,
+    /// The orders of a window at an end, and its noise.
+    fn fit(&self, window: Window, length: usize, orders: Option<Vec<(usize, f64)>>) -> BoundaryFit {
+        let (order, chosen) = match self.order {
+            Order::Fixed(order) => (order, false),
+            Order::Chosen { .. } => (window.best(&self.weights), true),
         };
-        let mut samples = vec![0.0; length];
-        record.read(first, &mut samples);
-        let window = Window::project(basis, &samples, self.floor);
-        let fit = |window: Window| {
-            let (order, chosen) = match self.order {
-                Order::Fixed(order) => (order, false),
-                Order::Chosen { .. } => (window.best(&self.weights), true),
-            };
-            let orders = orders.or_else(|| self.averaged(&window)).unwrap_or_else(|| vec![(order, 1.0)]);
-            BoundaryFit::new(window, orders, chosen, length)
-        };
-        (first, window.map(fit))
+        let orders = orders.or_else(|| self.averaged(&window)).unwrap_or_else(|| vec![(order, 1.0)]);
+        BoundaryFit::new(window, orders, chosen, length)
     }
 
-    /// Gives every derivative at some samples of the window, by the place among those samples and among the derivatives asked for.
+    /// Writes every derivative, or its standard error, at some samples of the window that begins at sample `begin`.
     fn evaluate(
         &self,
         basis: &Basis,
         (end, fit): (End, &BoundaryFit),
-        places: &[usize],
-        mut give: impl FnMut(usize, usize, Estimate),
+        begin: usize,
+        elements: Range<usize>,
+        wanted: Wanted,
+        estimates: &mut Estimates<'_>,
     ) {
         let (lanes, numbers) = (self.instructions.lanes(), self.numbers(basis));
         let table = self.table(basis);
         let mut own = vec![0.0; if table.is_some() { 0 } else { numbers }];
         let mut found = vec![Evaluated::default(); self.highest() + 1];
         // The last window is looked at from its end, in reversed time: there odd polynomials and odd derivatives change their sign.
-        let outward = |place: usize| if end == End::First { place } else { basis.length() - 1 - place };
+        let all = estimates.elements;
+        let outward = |element: usize| {
+            let place = all.sample(element) - begin;
+            if end == End::First { place } else { basis.length() - 1 - place }
+        };
         let mut coefficients = fit.window.coefficients.clone();
         if end == End::Last {
             coefficients.iter_mut().skip(1).step_by(2).for_each(|odd| *odd = -*odd);
         }
-        let mut first = 0;
-        while let Some(place) = places.get(first) {
-            let group = outward(*place) / lanes;
-            let some = places[first..].iter().take_while(|place| outward(**place) / lanes == group);
+        let mut first = elements.start;
+        while first < elements.end {
+            let group = outward(first) / lanes;
+            let within = group * lanes..(group + 1) * lanes;
             let table = if let Some(table) = table {
                 &table[group * numbers..][..numbers]
             } else {
-                dispatch(self.instructions, Tabulate { basis, place: group * lanes, table: &mut own });
+                dispatch(self.instructions, Tabulate { basis, place: within.start, table: &mut own });
                 &own
             };
             let (coefficients, tops, chosen) = (&coefficients, &fit.tops, fit.chosen);
-            dispatch(self.instructions, OffCentre { table, coefficients, tops, chosen, found: &mut found });
-            let mut next = first;
-            for place in some {
-                let lane = outward(*place) % lanes;
-                let mut scale = 1.0;
-                for (derivative, found) in found.iter().enumerate() {
-                    if derivative > 0 {
-                        scale /= self.delta;
-                    }
-                    let sign = if end == End::Last && derivative % 2 == 1 { -scale } else { scale };
-                    let level = if derivative == 0 { fit.window.reference } else { 0.0 };
-                    let (value, error) = (found.values[lane] * sign + level, found.errors[lane] * scale);
-                    for (slot, _) in self.derivatives.iter().enumerate().filter(|(_, wanted)| **wanted == derivative) {
-                        give(next, slot, Estimate { value, error });
-                    }
+            let errors = wanted == Wanted::Errors;
+            dispatch(self.instructions, OffCentre { table, coefficients, tops, chosen, errors, found: &mut found });
+            let some = (first..elements.end).take_while(|&element| within.contains(&outward(element))).count();
+            for (values, &derivative) in estimates.derivatives.iter_mut().zip(&self.derivatives) {
+                let found = &found[derivative];
+                let scale = (0..derivative).fold(1.0, |scale, _| scale / self.delta);
+                let sign = if end == End::Last && derivative % 2 == 1 { -scale } else { scale };
+                let level = if derivative == 0 { fit.window.reference } else { 0.0 };
+                for (element, value) in (first..).zip(&mut values[first..first + some]) {
+                    let lane = outward(element) - within.start;
+                    *value = match wanted {
+                        Wanted::Derivatives => found.values[lane] * sign + level,
+                        Wanted::Errors => found.errors[lane] * scale,
+                    };
                 }
-                next += 1;
             }
-            first = next;
+            first += some;
         }
     }
 

@@ -3,20 +3,22 @@
 //! A record's windows are numbered by their first sample. Span `g` holds the windows `g S … (g+1) S - 1`; its start lies in its
 //! middle, at `g S + S/2`, or at the record's last window where that comes first. Blocks are one span, or several short ones, and are
 //! worked on in runs, as many side by side as there are lanes. Which spans share a run does not matter, since lanes keep apart, so
-//! any cutting of a record gives the same bits. Where few windows are wanted, each is projected on its own (`apart.rs`).
+//! any cutting of a record gives the same bits. Short records are side by side instead, one in each lane, which is one block of many
+//! spans (`side_by_side.rs`). Where few windows are wanted, each is projected on its own (`apart.rs`).
 
 use std::fmt::Debug;
 use std::ops::Range;
 
 use crate::lanes::interleaved::Strips;
 use crate::lanes::output::Outputs;
-use crate::lanes::store::Write;
+use crate::lanes::store::{Records, Write};
 use crate::lanes::tile::{TILE, Tile};
 use crate::local_polynomials::apart::{self, Apart, ApartScratch};
 use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::estimates::Estimates;
 use crate::local_polynomials::evaluate::{Finish, Functional};
 use crate::local_polynomials::kernels::{Direction, Fill, STEPS, Start, Sweep, replace, states};
+use crate::local_polynomials::side_by_side::SideBySide;
 use crate::local_polynomials::sliding_projection::{Projection, SHORTEST_BLOCK};
 use crate::record::buffer::Stretch;
 use crate::record::samples::Samples;
@@ -44,6 +46,16 @@ pub(crate) trait Walk: Debug + Send + Sync {
         &self,
         record: &dyn Samples,
         windows: Range<usize>,
+        estimates: &mut Estimates<'_>,
+        scratch: &mut EngineScratch,
+    );
+    /// Whether so many records of so many windows cost less side by side, where every `step`-th window is wanted.
+    fn joins(&self, records: usize, windows: usize, step: usize) -> bool;
+    /// All windows of records side by side, so many elements each.
+    fn walk_side_by_side(
+        &self,
+        records: &SideBySide,
+        elements: usize,
         estimates: &mut Estimates<'_>,
         scratch: &mut EngineScratch,
     );
@@ -76,16 +88,22 @@ pub(crate) struct Engine<const D: usize, const RESIDUAL: bool> {
 pub(crate) struct EngineScratch {
     stretch: Stretch,
     strips: Strips,
+    states: States,
+    /// For windows that are projected one by one.
+    apart: Option<ApartScratch>,
+}
+
+/// What the kernels of a run hand on to one another.
+#[derive(Debug)]
+struct States {
     /// The reference that is subtracted from each lane's samples.
     references: [f64; MOST_LANES],
     /// The start of each lane's block, and the windows that a sweep has come to.
     start: Aligned,
     state: Aligned,
     /// States between stepping and finishing.
-    states: Aligned,
+    stepped: Aligned,
     tile: Tile,
-    /// For windows that are projected one by one.
-    apart: Option<ApartScratch>,
 }
 
 impl<const D: usize, const RESIDUAL: bool> Engine<D, RESIDUAL> {
@@ -101,6 +119,20 @@ impl<const D: usize, const RESIDUAL: bool> Engine<D, RESIDUAL> {
     /// Samples of a window before the one it is said to be around: its centre, or the last one before that.
     fn before_centre(&self) -> usize {
         (self.projection.length() - 1) / 2
+    }
+
+    /// Makes those of some windows NaN that hold an unusable sample.
+    fn invalidate(&self, unusable: impl Iterator<Item = usize>, windows: &Range<usize>, outputs: &mut Outputs<'_>) {
+        let (before, length) = (self.before_centre(), self.projection.length());
+        let mut from = windows.start;
+        for sample in unusable {
+            let first = (sample + 1).saturating_sub(length).max(from);
+            let end = (sample + 1).min(windows.end);
+            if first < end {
+                outputs.invalidate(first + before..end + before, Status::INVALID);
+                from = end;
+            }
+        }
     }
 }
 
@@ -127,11 +159,13 @@ impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
         EngineScratch {
             stretch: Stretch::default(),
             strips: Strips::new(self.block(), self.projection.length(), lanes),
-            references: [0.0; MOST_LANES],
-            start: Aligned::zeros(states::<D>(1, lanes)),
-            state: Aligned::zeros(states::<D>(1, lanes)),
-            states: Aligned::zeros(states::<D>(STEPS, lanes)),
-            tile: Tile::new(self.finish.fields(RESIDUAL), TILE, lanes),
+            states: States {
+                references: [0.0; MOST_LANES],
+                start: Aligned::zeros(states::<D>(1, lanes)),
+                state: Aligned::zeros(states::<D>(1, lanes)),
+                stepped: Aligned::zeros(states::<D>(STEPS, lanes)),
+                tile: Tile::new(self.finish.fields(RESIDUAL), TILE, lanes),
+            },
             apart: None,
         }
     }
@@ -149,12 +183,7 @@ impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
         // The last span's start may have to move down to the last window; that span then runs alone.
         let in_span = last % self.projection.span();
         let moved = if in_span < backward { last - in_span } else { last + 1 };
-        let Estimates { elements, derivatives, order, status, sigma } = estimates;
-        let mut values: Vec<&mut [f64]> = derivatives.iter_mut().map(|values| &mut **values).collect();
-        if RESIDUAL {
-            values.push(sigma);
-        }
-        let mut outputs = Outputs { elements: *elements, values, order, status };
+        let mut outputs = outputs::<RESIDUAL>(estimates);
         if self.apart(outputs.elements.step) {
             let Self { projection, finish, instructions } = self;
             let apart =
@@ -178,37 +207,95 @@ impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
                     (STRETCH.cast_signed() / advance).clamp(1, (windows.end - window).cast_signed() / advance + 1);
                 scratch.stretch.load(record, base..base + read + (runs - 1) * advance);
             }
-            let run = EngineRun { engine: self, base, windows: window..end };
-            run.work(scratch, &mut outputs);
-            run.invalidate(scratch.stretch.unusable(base..base + read), &mut outputs);
+            let EngineScratch { stretch, strips, states, .. } = &mut *scratch;
+            dispatch(self.instructions, Fill { samples: stretch.from(base, strips.samples()), strips });
+            let (windows, records) = (window..end, None);
+            let run = EngineRun { engine: self, stretch, strips, base, block, latest: usize::MAX, windows, records };
+            run.work(states, &mut outputs);
+            let unusable = stretch.unusable(base..base + read).iter().copied();
+            self.invalidate(unusable, &run.windows, &mut outputs);
             window = end;
+        }
+    }
+
+    fn joins(&self, records: usize, windows: usize, step: usize) -> bool {
+        let block = self.block();
+        // Rows of windows that are stepped through, one record after the other.
+        let alone = windows.div_ceil(block * self.instructions.lanes()) * windows.min(block);
+        records > 1 && !self.apart(step) && records * alone >= windows
+    }
+
+    fn walk_side_by_side(
+        &self,
+        records: &SideBySide,
+        elements: usize,
+        estimates: &mut Estimates<'_>,
+        scratch: &mut EngineScratch,
+    ) {
+        let (count, samples) = (records.count(), records.samples());
+        let windows = 0..samples - self.projection.length() + 1;
+        let run = EngineRun {
+            engine: self,
+            stretch: records.stretch(),
+            strips: records.strips(),
+            base: 0,
+            block: samples,
+            latest: windows.end - 1,
+            windows: windows.clone(),
+            records: Some(Records { count, elements }),
+        };
+        run.work(&mut scratch.states, &mut outputs::<RESIDUAL>(estimates));
+        for record in 0..count {
+            let mut unusable = records.unusable(record, 0..samples).peekable();
+            if unusable.peek().is_some() {
+                let mut own = estimates.part(record * elements..(record + 1) * elements);
+                self.invalidate(unusable, &windows, &mut outputs::<RESIDUAL>(&mut own));
+            }
         }
     }
 }
 
-/// Blocks side by side: lane `l` works on the windows that begin from `base + l B` on, of which `windows` are wanted.
+/// The outputs as kernels fill them.
+fn outputs<'a, const RESIDUAL: bool>(estimates: &'a mut Estimates<'_>) -> Outputs<'a> {
+    let Estimates { elements, derivatives, order, status, sigma } = estimates;
+    let mut values: Vec<&mut [f64]> = derivatives.iter_mut().map(|values| &mut **values).collect();
+    if RESIDUAL {
+        values.push(sigma);
+    }
+    Outputs { elements: *elements, values, order, status }
+}
+
+/// Blocks side by side: lane `l` works on the windows that begin from `base + l B` on, of which `windows` are wanted. Or records: lane `l`
+/// works on those `windows` of the `l`-th record.
 struct EngineRun<'a, const D: usize, const RESIDUAL: bool> {
     engine: &'a Engine<D, RESIDUAL>,
+    stretch: &'a Stretch,
+    strips: &'a Strips,
     base: isize,
+    /// Samples from the block of one lane to that of the next.
+    block: usize,
+    /// The last row that a start may lie in.
+    latest: usize,
     windows: Range<usize>,
+    records: Option<Records>,
 }
 
 impl<const D: usize, const RESIDUAL: bool> EngineRun<'_, D, RESIDUAL> {
     /// Finishes the windows of the run, span by span, from the start forwards, then backwards.
     ///
     /// The kernels are called one by one, not from one another: in one function they would spill each other's registers.
-    fn work(&self, scratch: &mut EngineScratch, outputs: &mut Outputs<'_>) {
+    fn work(&self, states: &mut States, outputs: &mut Outputs<'_>) {
         let Engine { projection, finish, instructions } = self.engine;
-        let (instructions, span, wanted) = (*instructions, projection.span(), self.rows());
-        let EngineScratch { stretch, strips, references, start: at_start, state, states, tile, .. } = scratch;
-        dispatch(instructions, Fill { samples: stretch.from(self.base, strips.samples()), strips });
-        // A short block is written whole, with its spans together; a long one tile by tile.
+        let (instructions, span, strips, wanted) = (*instructions, projection.span(), self.strips, self.rows());
+        let States { references, start: at_start, state, stepped: states, tile } = states;
+        // Short spans are written whole, as many together as a tile holds; long ones tile by tile.
         let whole = projection.block() <= TILE;
+        let together = TILE - TILE % projection.block();
         let ahead = self.engine.before_centre().cast_signed();
         let finished = outputs.elements.rows_from(self.base + ahead, SHORTEST_BLOCK);
         for first in (wanted.start - wanted.start % span..wanted.end).step_by(span) {
-            let start = first + projection.backward();
-            self.take_references(stretch, start, references);
+            let start = (first + projection.backward()).min(self.latest);
+            self.take_references(start, references);
             dispatch(
                 instructions,
                 Start::<D, RESIDUAL> { projection, strips, references, row: start, state: at_start },
@@ -252,20 +339,22 @@ impl<const D: usize, const RESIDUAL: bool> EngineRun<'_, D, RESIDUAL> {
                     }
                 }
             }
-        }
-        if whole {
-            self.write(tile, wanted, outputs);
+            let end = wanted.end.min(first + span);
+            if whole && (end == wanted.end || end % together == 0) {
+                self.write(tile, wanted.start.max((end - 1) / together * together)..end, outputs);
+            }
         }
     }
 
     /// Writes out some rows, which the tile holds.
     fn write(&self, tile: &Tile, rows: Range<usize>, outputs: &mut Outputs<'_>) {
-        let Engine { projection, finish, instructions } = self.engine;
+        let Engine { finish, instructions, .. } = self.engine;
         let write = Write {
             tile,
             rows,
             base: self.base,
-            block: projection.block(),
+            block: if self.records.is_some() { 0 } else { self.block },
+            records: self.records,
             windows: self.windows.clone(),
             ahead: self.engine.before_centre().cast_signed(),
             fixed_order: finish.fixed_order(RESIDUAL),
@@ -275,34 +364,19 @@ impl<const D: usize, const RESIDUAL: bool> EngineRun<'_, D, RESIDUAL> {
     }
 
     /// Takes a reference for each lane: the sample at the centre of the start in a row, or the nearest to it that is a number.
-    fn take_references(&self, stretch: &Stretch, start: usize, references: &mut [f64; MOST_LANES]) {
-        let projection = &self.engine.projection;
-        let half = projection.length() / 2;
+    fn take_references(&self, start: usize, references: &mut [f64; MOST_LANES]) {
+        let half = self.engine.projection.length() / 2;
         let centre = self.base + (start + half).cast_signed();
         for (lane, reference) in references[..self.engine.instructions.lanes()].iter_mut().enumerate() {
-            *reference = stretch.nearest_usable(centre + (lane * projection.block()).cast_signed(), half);
+            *reference = self.stretch.nearest_usable(centre + (lane * self.block).cast_signed(), half);
         }
     }
 
     /// The rows of windows that any lane needs.
     fn rows(&self) -> Range<usize> {
-        let block = self.engine.block();
+        let block = self.block;
         let row = |window: usize| (window.cast_signed() - self.base).unsigned_abs();
         let (first, end) = (row(self.windows.start), row(self.windows.end));
         if end <= block { first..end } else { 0..block }
-    }
-
-    /// Makes windows with an unusable sample NaN.
-    fn invalidate(&self, unusable: &[usize], outputs: &mut Outputs<'_>) {
-        let (before, length) = (self.engine.before_centre(), self.engine.projection.length());
-        let mut from = self.windows.start;
-        for &sample in unusable {
-            let first = (sample + 1).saturating_sub(length).max(from);
-            let end = (sample + 1).min(self.windows.end);
-            if first < end {
-                outputs.invalidate(first + before..end + before, Status::INVALID);
-                from = end;
-            }
-        }
     }
 }

@@ -64,14 +64,24 @@ pub(crate) struct OffCentre<'a> {
     pub(crate) tops: &'a [Top],
     /// Whether a lower order may be taken.
     pub(crate) chosen: bool,
+    /// Whether standard errors are wanted.
+    pub(crate) errors: bool,
     /// The derivatives from 0 on, per sample.
     pub(crate) found: &'a mut [Evaluated],
 }
 
-/// Sums over the degrees up to each order.
+/// The polynomials at one position in each lane, and a window's coefficients.
+#[derive(Clone, Copy)]
+struct Terms<'a> {
+    table: &'a [f64],
+    coefficients: &'a [f64],
+}
+
+/// Sums over the degrees up to an order: the estimate, and its variance over that of the noise.
+#[derive(Clone, Copy)]
 struct Sums<S: Lanes> {
-    values: [S::f64s; MOST_DEGREES],
-    gains: [S::f64s; MOST_DEGREES],
+    value: S::f64s,
+    gain: S::f64s,
 }
 
 impl Kernel for OffCentre<'_> {
@@ -79,27 +89,21 @@ impl Kernel for OffCentre<'_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
-        let Self { table, coefficients, tops, chosen, found } = self;
-        let zero = simd.splat_f64s(0.0);
-        for (derivative, (found, table)) in
-            found.iter_mut().zip(table.chunks_exact(coefficients.len() * S::F64_LANES)).enumerate()
-        {
-            let mut sums = Sums::<S> { values: [zero; MOST_DEGREES], gains: [zero; MOST_DEGREES] };
-            let (mut value, mut gain) = (zero, zero);
-            for (degree, (c, (sum, sum_of_squares))) in
-                coefficients.iter().zip(sums.values.iter_mut().zip(&mut sums.gains)).enumerate()
-            {
-                let q = simd.load(table, degree * S::F64_LANES);
-                value = simd.add_f64s(value, simd.mul_f64s(simd.splat_f64s(*c), q));
-                gain = simd.add_f64s(gain, simd.mul_f64s(q, q));
-                (*sum, *sum_of_squares) = (value, gain);
+        let Self { table, coefficients, tops, chosen, errors, found } = self;
+        let tables = table.chunks_exact(coefficients.len() * S::F64_LANES);
+        for (derivative, (found, table)) in found.iter_mut().zip(tables).enumerate() {
+            let terms = Terms { table, coefficients };
+            if let [top] = tops {
+                let (value, variance) = best(simd, top, terms, derivative, chosen);
+                simd.store(&mut found.values, 0, value);
+                if errors {
+                    simd.store(&mut found.errors, 0, simd.sqrt_f64s(variance));
+                }
+            } else {
+                let (value, error) = shared(simd, tops, terms, derivative, chosen);
+                simd.store(&mut found.values, 0, value);
+                simd.store(&mut found.errors, 0, error);
             }
-            let (value, error) = match tops {
-                [top] => best(simd, top, &sums, derivative, chosen),
-                _ => shared(simd, tops, &sums, derivative, chosen),
-            };
-            simd.store(&mut found.values, 0, value);
-            simd.store(&mut found.errors, 0, error);
         }
     }
 }
@@ -144,39 +148,62 @@ fn differentiate<S: Lanes>(
     }
 }
 
-/// The estimate of the best order up to one that fits the window, not below `lowest`, and its standard error.
+/// The estimate of the best order up to one that fits the window, not below `lowest`, and its variance.
 #[inline(always)]
-fn best<S: Lanes>(simd: S, top: &Top, sums: &Sums<S>, lowest: usize, chosen: bool) -> (S::f64s, S::f64s) {
+fn best<S: Lanes>(simd: S, top: &Top, terms: Terms<'_>, lowest: usize, chosen: bool) -> (S::f64s, S::f64s) {
     let variance = simd.splat_f64s(top.variance);
-    let (top_value, top_gain) = (sums.values[top.order], sums.gains[top.order]);
-    let mut least = simd.mul_f64s(variance, top_gain);
-    let (mut value, mut gain) = (top_value, top_gain);
-    if chosen && !top.variance.is_nan() {
-        for order in (lowest..top.order).rev() {
-            let (lower, lower_gain) = (sums.values[order], sums.gains[order]);
-            let difference = simd.sub_f64s(lower, top_value);
-            let chance = simd.mul_f64s(variance, simd.sub_f64s(top_gain, lower_gain));
-            let bias = simd.sub_f64s(simd.mul_f64s(difference, difference), chance);
-            let bias = simd.max_f64s(bias, simd.splat_f64s(0.0));
-            let error = simd.add_f64s(bias, simd.mul_f64s(variance, lower_gain));
-            let better = simd.less_than_or_equal_f64s(error, least);
-            least = simd.select_f64s(better, error, least);
-            value = simd.select_f64s(better, lower, value);
-            gain = simd.select_f64s(better, lower_gain, gain);
-        }
+    let zero = Sums { value: simd.splat_f64s(0.0), gain: simd.splat_f64s(0.0) };
+    let mut up_to = zero;
+    for degree in 0..=top.order {
+        up_to = terms.add(simd, degree, up_to);
     }
-    (value, simd.sqrt_f64s(simd.mul_f64s(variance, gain)))
+    let (mut value, mut gain) = (up_to.value, up_to.gain);
+    if chosen && !top.variance.is_nan() && lowest < top.order {
+        // From the lowest order up, so that sums need not be kept: of equal errors the first counts.
+        let mut sums = zero;
+        for degree in 0..lowest {
+            sums = terms.add(simd, degree, sums);
+        }
+        let mut least = simd.splat_f64s(f64::INFINITY);
+        for order in lowest..top.order {
+            sums = terms.add(simd, order, sums);
+            let difference = simd.sub_f64s(sums.value, up_to.value);
+            let chance = simd.mul_f64s(variance, simd.sub_f64s(up_to.gain, sums.gain));
+            let bias = simd.sub_f64s(simd.mul_f64s(difference, difference), chance);
+            let bias = simd.max_f64s(bias, zero.value);
+            let error = simd.add_f64s(bias, simd.mul_f64s(variance, sums.gain));
+            let better = simd.less_than_f64s(error, least);
+            least = simd.select_f64s(better, error, least);
+            value = simd.select_f64s(better, sums.value, value);
+            gain = simd.select_f64s(better, sums.gain, gain);
+        }
+        let better = simd.less_than_f64s(simd.mul_f64s(variance, up_to.gain), least);
+        value = simd.select_f64s(better, up_to.value, value);
+        gain = simd.select_f64s(better, up_to.gain, gain);
+    }
+    (value, simd.mul_f64s(variance, gain))
+}
+
+impl Terms<'_> {
+    /// Adds the term of one more degree.
+    #[inline(always)]
+    fn add<S: Lanes>(self, simd: S, degree: usize, sums: Sums<S>) -> Sums<S> {
+        let q = simd.load(self.table, degree * S::F64_LANES);
+        let term = simd.mul_f64s(simd.splat_f64s(self.coefficients[degree]), q);
+        Sums { value: simd.add_f64s(sums.value, term), gain: simd.add_f64s(sums.gain, simd.mul_f64s(q, q)) }
+    }
 }
 
 /// The average of several orders' estimates, and an error that knows how far they disagree.
 #[inline(always)]
-fn shared<S: Lanes>(simd: S, tops: &[Top], sums: &Sums<S>, lowest: usize, chosen: bool) -> (S::f64s, S::f64s) {
+fn shared<S: Lanes>(simd: S, tops: &[Top], terms: Terms<'_>, lowest: usize, chosen: bool) -> (S::f64s, S::f64s) {
     let zero = simd.splat_f64s(0.0);
     let mut estimates = [(zero, zero); MOST_DEGREES];
     let mut value = zero;
     for (top, estimate) in tops.iter().zip(&mut estimates) {
-        *estimate = best(simd, top, sums, lowest, chosen);
-        value = simd.add_f64s(value, simd.mul_f64s(simd.splat_f64s(top.share), estimate.0));
+        let (one, variance) = best(simd, top, terms, lowest, chosen);
+        *estimate = (one, simd.sqrt_f64s(variance));
+        value = simd.add_f64s(value, simd.mul_f64s(simd.splat_f64s(top.share), one));
     }
     let mut error = zero;
     for (top, (one, its_error)) in tops.iter().zip(estimates) {
@@ -231,7 +258,8 @@ mod tests {
             let one = |instructions: Instructions, place: usize| {
                 let table = tabulated(&basis, 3, place, instructions);
                 let (mut found, coefficients) = ([Evaluated::default(); 3], &coefficients);
-                let kernel = OffCentre { table: &table, coefficients, tops, chosen: true, found: &mut found };
+                let kernel =
+                    OffCentre { table: &table, coefficients, tops, chosen: true, errors: true, found: &mut found };
                 dispatch(instructions, kernel);
                 found
             };

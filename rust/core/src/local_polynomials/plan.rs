@@ -1,16 +1,15 @@
 //! Local polynomials in every window, of an order chosen in every window: values, derivatives, noise.
 //!
-//! [`LocalPolynomials`] is the plan: made once for a window length, run over any number of records. [`LocalPolynomials::estimate`] is
-//! the one place where samples are walked. It is entered with absolute sample numbers and gives the same bits however a record is
+//! [`LocalPolynomials`] is the plan: made once for a window length, run over any number of records (`records.rs`). Its engine is the one place
+//! where samples are walked. [`LocalPolynomials::estimate`] enters it with absolute sample numbers and gives the same bits however a record is
 //! cut, since windows are reached from starts that lie on a grid of absolute numbers and every lane keeps to itself.
 
-use std::num::NonZeroUsize;
 use std::ops::Range;
 use std::sync::OnceLock;
 
 use crate::error::Error;
 use crate::exec::memory;
-use crate::exec::pool::{self, Piece, Watch};
+use crate::exec::pool::Watch;
 use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
 use crate::local_polynomials::boundary::{End, Ends};
 use crate::local_polynomials::criterion::Criterion;
@@ -19,20 +18,19 @@ use crate::local_polynomials::estimates::Estimates;
 use crate::local_polynomials::evaluate::Finish;
 use crate::local_polynomials::options::{HIGHEST_ORDER, Order, PolynomialOptions, Selection};
 use crate::local_polynomials::order_shares::{SelectionScratch, Selector, Wanted};
+use crate::local_polynomials::pieces::PIECE;
+use crate::local_polynomials::side_by_side::SideBySide;
 use crate::local_polynomials::single_window::Window;
 use crate::record::samples::Samples;
 use crate::simd::vectors::MOST_LANES;
-
-/// Samples in a piece of work, about: well below 20 ms on any processor, so that a call can be interrupted.
-const PIECE: usize = 1 << 14;
 
 /// The plan for windows of one length.
 #[derive(Debug)]
 pub struct LocalPolynomials {
     options: PolynomialOptions,
     basis: Basis,
-    ends: Ends,
-    engine: Box<dyn Walk>,
+    pub(crate) ends: Ends,
+    pub(crate) engine: Box<dyn Walk>,
     /// Made when it is first needed.
     selector: OnceLock<Option<Selector>>,
 }
@@ -40,12 +38,11 @@ pub struct LocalPolynomials {
 /// Memory of one thread: made once, used for any number of pieces.
 #[derive(Debug)]
 pub struct PolynomialScratch {
-    walk: crate::local_polynomials::engine::EngineScratch,
+    pub(crate) walk: crate::local_polynomials::engine::EngineScratch,
     selection: Option<SelectionScratch>,
+    /// Made when it is first needed.
+    pub(crate) beside: Option<SideBySide>,
 }
-
-/// A piece of work: some samples of a record, and where what is known of them goes.
-type Part<'a, 'b> = (&'a dyn Samples, Range<usize>, Estimates<'b>);
 
 impl LocalPolynomials {
     /// Prepares the tables.
@@ -149,12 +146,13 @@ impl LocalPolynomials {
         self.scratch_for(Wanted::Derivatives)
     }
 
-    fn scratch_for(&self, wanted: Wanted) -> PolynomialScratch {
-        PolynomialScratch { walk: self.engine.scratch(), selection: self.selector(wanted).map(Selector::scratch) }
+    pub(crate) fn scratch_for(&self, wanted: Wanted) -> PolynomialScratch {
+        let selection = self.selector(wanted).map(Selector::scratch);
+        PolynomialScratch { walk: self.engine.scratch(), selection, beside: None }
     }
 
     /// What looks at all orders, where it is needed: standard errors say how far the orders disagree.
-    fn selector(&self, wanted: Wanted) -> Option<&Selector> {
+    pub(crate) fn selector(&self, wanted: Wanted) -> Option<&Selector> {
         if wanted == Wanted::Derivatives && self.options.selection != Selection::Pooled {
             return None;
         }
@@ -227,7 +225,7 @@ impl LocalPolynomials {
         Ok(())
     }
 
-    fn everywhere(
+    pub(crate) fn everywhere(
         &self,
         record: &dyn Samples,
         samples: Range<usize>,
@@ -291,120 +289,16 @@ impl LocalPolynomials {
         Some(selector.orders(record, window, scratch))
     }
 
-    /// Estimates at all samples of several records, in parallel. Every element of the outputs must belong to a sample.
-    ///
-    /// The numbers do not depend on the number of workers.
-    ///
-    /// # Errors
-    /// If a record is shorter than the window, or the watch cancels.
-    pub fn run(
-        &self,
-        records: Vec<(&dyn Samples, Estimates<'_>)>,
-        ends: bool,
-        workers: NonZeroUsize,
-        watch: &mut Watch<'_>,
-    ) -> Result<(), Error> {
-        self.run_part(records, ends, None, workers, watch)
-    }
-
-    /// The same at the samples of a part, to which every element of the outputs must belong.
-    ///
-    /// # Errors
-    /// As [`LocalPolynomials::run`].
-    pub fn run_part(
-        &self,
-        records: Vec<(&dyn Samples, Estimates<'_>)>,
-        ends: bool,
-        part: Option<&Range<usize>>,
-        workers: NonZeroUsize,
-        watch: &mut Watch<'_>,
-    ) -> Result<(), Error> {
-        let work = |(record, samples, mut estimates): Part<'_, '_>, scratch: &mut PolynomialScratch| {
-            let outcome = if ends {
-                self.estimate(record, samples, &mut estimates, scratch)
-            } else {
-                self.estimate_centred(record, samples, &mut estimates, scratch)
-            };
-            debug_assert_eq!(outcome, Ok(()), "the lengths of all records were checked");
-        };
-        let pieces = self.pieces(records, ends, part, Wanted::Derivatives)?;
-        self.ask_for_scratch(Wanted::Derivatives, workers.get().min(pieces.len()))?;
-        pool::run(pieces, workers, || self.scratch(), work, watch)
-    }
-
-    /// Standard errors in the place of derivatives, at all samples of several records, in parallel.
-    ///
-    /// They are the noise times the gain of the order that is given; where it was chosen, `Σ w_n √(σ_n² g_n² + (d_n - d)²)`,
-    /// `d` the estimate. The plan must know the noise, and all outputs must be wanted.
-    ///
-    /// # Errors
-    /// As [`LocalPolynomials::run`].
-    pub fn errors(
-        &self,
-        records: Vec<(&dyn Samples, Estimates<'_>)>,
-        workers: NonZeroUsize,
-        watch: &mut Watch<'_>,
-    ) -> Result<(), Error> {
-        self.errors_of_part(records, None, workers, watch)
-    }
-
-    /// The same at the samples of a part, to which every element of the outputs must belong.
-    ///
-    /// # Errors
-    /// As [`LocalPolynomials::run`].
-    pub fn errors_of_part(
-        &self,
-        records: Vec<(&dyn Samples, Estimates<'_>)>,
-        part: Option<&Range<usize>>,
-        workers: NonZeroUsize,
-        watch: &mut Watch<'_>,
-    ) -> Result<(), Error> {
-        let work = |(record, samples, mut estimates): Part<'_, '_>, scratch: &mut PolynomialScratch| {
-            let outcome = self.everywhere(record, samples, Wanted::Errors, &mut estimates, scratch);
-            debug_assert_eq!(outcome, Ok(()), "the lengths of all records were checked");
-        };
-        let pieces = self.pieces(records, true, part, Wanted::Errors)?;
-        self.ask_for_scratch(Wanted::Errors, workers.get().min(pieces.len()))?;
-        pool::run(pieces, workers, || self.scratch_for(Wanted::Errors), work, watch)
-    }
-
     /// Asks for what the scratch memory of so many threads will take.
     pub(crate) fn ask_for_scratch(&self, wanted: Wanted, threads: usize) -> Result<(), Error> {
         let window = self.options.window_length;
-        // A run's samples as they are and side by side, and those of a window at an end.
-        let run = window.saturating_mul(3 + 2 * MOST_LANES).saturating_add(2 * PIECE + 4 * self.stride());
+        // A run's samples as they are and side by side, those of a window at an end, and short records in the same two ways.
+        let run = window.saturating_mul(3 + 2 * MOST_LANES).saturating_add(4 * PIECE + 4 * self.stride());
         // By order the coefficients, residuals and shares of the windows that are looked at together, and sums over their neighbours.
         let looked =
             self.selector(wanted).map_or(0, |selector| (2 * window).saturating_add(PIECE.max(selector.least_piece())));
         let numbers = run.saturating_add(looked.saturating_mul(4 * self.orders() + 8));
         memory::ask_for_numbers(numbers.saturating_mul(threads))
-    }
-
-    /// Cuts records into pieces of work.
-    fn pieces<'a, 'b>(
-        &self,
-        records: Vec<(&'a dyn Samples, Estimates<'b>)>,
-        ends: bool,
-        part: Option<&Range<usize>>,
-        wanted: Wanted,
-    ) -> Result<Vec<Piece<Part<'a, 'b>>>, Error> {
-        let least = self.selector(wanted).map_or(0, Selector::least_piece);
-        let mut pieces = Vec::new();
-        for (record, mut estimates) in records {
-            let (windows, before) = (self.windows(record.len())?, self.before_centre());
-            let there = if ends { 0..record.len() } else { before..before + windows };
-            let samples = part.map_or(there.clone(), |part| part.start.max(there.start)..part.end.min(there.end));
-            let piece = PIECE.max(least).next_multiple_of(self.engine.stride(estimates.elements.step));
-            let mut first = samples.start;
-            while first < samples.end {
-                let next = (first.max(before) - before) / piece * piece + piece + before;
-                let end = if next >= before + windows { samples.end } else { next.min(samples.end) };
-                let part = estimates.split_off_before(end);
-                pieces.push(Piece { size: end - first, content: (record, first..end, part) });
-                first = end;
-            }
-        }
-        Ok(pieces)
     }
 
     /// The criterion of every order in the window around a sample, equation (8); infinite for an order that is no candidate. Near an

@@ -23,15 +23,18 @@ impl Stretch {
     /// Copies samples of a record.
     pub(crate) fn load(&mut self, record: &dyn Samples, samples: Range<isize>) {
         self.first = samples.start;
-        self.samples.clear();
         self.samples.resize((samples.end - samples.start).max(0).unsigned_abs(), 0.0);
         let present = samples.start.max(0)..samples.end.min(record.len().cast_signed());
         self.unusable.clear();
         if present.is_empty() {
+            self.samples.fill(0.0);
             return;
         }
         let place = (present.start - self.first).unsigned_abs();
-        let held = &mut self.samples[place..place + (present.end - present.start).unsigned_abs()];
+        let (before, held) = self.samples.split_at_mut(place);
+        let (held, after) = held.split_at_mut((present.end - present.start).unsigned_abs());
+        before.fill(0.0);
+        after.fill(0.0);
         record.read(present.start.unsigned_abs(), held);
         if !all_usable(held) {
             for (number, value) in (present.start.unsigned_abs()..).zip(held).filter(|(_, value)| !is_usable(**value)) {
@@ -56,6 +59,9 @@ impl Stretch {
     /// The usable sample nearest to one, at most so far away, or zero where there is none.
     pub(crate) fn nearest_usable(&self, sample: isize, distance: usize) -> f64 {
         let end = self.first + self.samples.len().cast_signed();
+        if self.unusable.is_empty() && (self.first..end).contains(&sample) {
+            return self.samples[(sample - self.first).unsigned_abs()];
+        }
         let candidates = (0..=distance.cast_signed()).flat_map(|k| [sample - k, sample + k]);
         let mut usable = candidates.filter(|number| {
             (self.first..end).contains(number) && self.unusable.binary_search(&number.unsigned_abs()).is_err()

@@ -1,4 +1,4 @@
-//! Any cutting of a record gives the same bits: every kind of plan, on every path of instructions, with samples that are no number and
+//! Any cutting of a record gives the same bits, alone or beside others: every kind of plan, on every path of instructions, with samples that are no number and
 //! glitches that make lanes start afresh.
 
 use std::num::NonZeroUsize;
@@ -61,7 +61,38 @@ fn estimate_in_parallel(options: &PolynomialOptions, record: &[f64], workers: us
         sigma: if options.noise { sigma } else { &mut [] },
     };
     let workers = NonZeroUsize::new(workers).expect("not zero");
-    plan.run(vec![(&record, estimates)], true, workers, &mut |_, _| true).expect("the record is long enough");
+    plan.run(&[&record], estimates, true, workers, &mut |_, _| true).expect("the record is long enough");
+    all
+}
+
+/// Records of one length, all in one call or one by one, with their ends or without, by several threads.
+fn estimate_records(
+    options: &PolynomialOptions,
+    records: &[Vec<f64>],
+    (ends, step, workers): (bool, usize, usize),
+    together: bool,
+) -> Columns {
+    let plan = LocalPolynomials::new(options.clone()).expect("valid options");
+    let (first, samples) =
+        if ends { (0, records[0].len()) } else { (plan.before_centre(), records[0].len() + 1 - options.window_length) };
+    let each = samples.div_ceil(step);
+    let mut all = Columns::new(options.derivatives.len() + 1, records.len() * each);
+    let slices_of: Vec<&[f64]> = records.iter().map(Vec::as_slice).collect();
+    let sources: Vec<&dyn Samples> = slices_of.iter().map(|record| record as &dyn Samples).collect();
+    let workers = NonZeroUsize::new(workers).expect("not zero");
+    for (number, some) in sources.chunks(if together { sources.len() } else { 1 }).enumerate() {
+        let elements = number * some.len() * each..(number + 1) * some.len() * each;
+        let mut derivatives = slices(&mut all.numbers, elements.clone());
+        let sigma = derivatives.pop().expect("there is one more than derivatives");
+        let estimates = Estimates {
+            elements: Elements { first, step },
+            derivatives,
+            order: if options.noise { &mut all.order[elements.clone()] } else { &mut [] },
+            status: if options.noise { &mut all.status[elements] } else { &mut [] },
+            sigma: if options.noise { sigma } else { &mut [] },
+        };
+        plan.run(some, estimates, ends, workers, &mut |_, _| true).expect("records are long enough");
+    }
     all
 }
 
@@ -182,6 +213,23 @@ proptest! {
         let options = options(length, order, vec![0, 2], noise, path);
         let (whole, cut) = (estimate(&options, &record, &[], 1), estimate_in_parallel(&options, &record, workers));
         prop_assert!(whole.bits() == cut.bits());
+    }
+
+    #[test]
+    fn of_records_side_by_side(
+        (seed, length, more, count) in (any::<u64>(), lengths(), 0_usize..600, 1_usize..20),
+        (order, derivatives) in (orders(), prop::collection::vec(0_usize..4, 1..4)),
+        (noise, ends, workers) in (any::<bool>(), any::<bool>(), 1_usize..3),
+        (step, bad, path) in (prop_oneof![3 => Just(1_usize), 1 => 2_usize..20], bad_samples(), paths()),
+    ) {
+        // Bad samples in some of them.
+        let bad = |number: usize| &bad[..bad.len().min(number % 5)];
+        let records: Vec<Vec<f64>> =
+            (0..count).map(|number| record(seed ^ number as u64, length + more, bad(number))).collect();
+        let options = options(length, order, derivatives, noise, path);
+        let [together, alone] =
+            [true, false].map(|together| estimate_records(&options, &records, (ends, step, workers), together));
+        prop_assert!(together.bits() == alone.bits());
     }
 
     #[test]

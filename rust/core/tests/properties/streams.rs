@@ -128,11 +128,11 @@ proptest! {
         let slice = record.as_slice();
         let mut expected = polynomials(3, &whole, step, |estimates, _| {
             let estimates = std::mem::replace(estimates, Estimates { elements: estimates.elements, derivatives: Vec::new(), order: &mut [], status: &mut [], sigma: &mut [] });
-            plan.run(vec![(&slice as &dyn Samples, estimates)], true, one, &mut |_, _| true).expect("long enough");
+            plan.run(&[&slice], estimates, true, one, &mut |_, _| true).expect("long enough");
         });
         let errors = polynomials(3, &whole, step, |estimates, _| {
             let estimates = std::mem::replace(estimates, Estimates { elements: estimates.elements, derivatives: Vec::new(), order: &mut [], status: &mut [], sigma: &mut [] });
-            plan.errors(vec![(&slice as &dyn Samples, estimates)], one, &mut |_, _| true).expect("long enough");
+            plan.errors(&[&slice], estimates, one, &mut |_, _| true).expect("long enough");
         });
         expected.numbers.truncate(4);
         expected.numbers.extend(errors.numbers.into_iter().take(3));

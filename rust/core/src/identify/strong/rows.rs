@@ -43,7 +43,7 @@ pub(crate) fn differentiate(
             status: &mut found.status,
             sigma: &mut [],
         };
-        plan.run(vec![(motion.angle, estimates)], true, workers, watch)
+        plan.run(&[motion.angle], estimates, true, workers, watch)
     })?;
     take_measured(plan, &motion.measured, &mut found.derivatives, stages)?;
     let torque = Delayed::new(motion.torque, lag);
@@ -75,7 +75,7 @@ fn take_measured(
                 status: &mut status,
                 sigma: &mut [],
             };
-            plan.run(vec![(channel, estimates)], true, workers, watch)
+            plan.run(&[channel], estimates, true, workers, watch)
         })?;
         derivatives[derivative..].iter_mut().zip(own).for_each(|(column, own)| *column = own);
     }
@@ -107,7 +107,7 @@ fn smooth_torque(
                 status: &mut [],
                 sigma: &mut [],
             };
-            fixed.run(vec![(&recorded.as_slice() as &dyn Samples, estimates)], true, workers, watch)
+            fixed.run(&[&recorded.as_slice()], estimates, true, workers, watch)
         })?;
         let own = found.torque.iter_mut().zip(&smoothed).zip(&found.order);
         own.filter(|(_, one)| **one == order).for_each(|((torque, smooth), _)| *torque = *smooth);

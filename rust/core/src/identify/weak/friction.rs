@@ -195,8 +195,11 @@ fn velocity(
             status: &mut columns.1,
             sigma: &mut columns.2,
         };
-        let record = vec![(angle, estimates)];
-        if wants_errors { plan.errors(record, workers, watch)? } else { plan.run(record, true, workers, watch)? }
+        if wants_errors {
+            plan.errors(&[angle], estimates, workers, watch)?;
+        } else {
+            plan.run(&[angle], estimates, true, workers, watch)?;
+        }
     }
     Ok(both)
 }

@@ -190,7 +190,7 @@ impl Session<'_, '_, '_> {
             sigma: &mut columns.2,
         };
         let workers = self.stages.workers;
-        self.stages.stage(|watch| plan.run(vec![(angle, estimates)], true, workers, watch))?;
+        self.stages.stage(|watch| plan.run(&[angle], estimates, true, workers, watch))?;
         Ok(both)
     }
 }
