@@ -86,8 +86,14 @@ def jumps_beside_pulses(found: _core.Identification) -> list[int]:
     return [jump for jump in found.jumps if jump not in ends]
 
 
-def holds(found: _core.Identification, name: str, amount: float, period: float) -> str:
-    """Return what to do about a channel that holds every value for some samples."""
+def comes_late(found: _core.Identification, defect: tuple[str, str, float], period: float) -> str:
+    """Return what to do about a channel that is filtered beside a lag, or holds values: its name, what was done, and how much of it."""
+    name, what, amount = defect
+    if what == "filtered":
+        return (
+            f"seems to be filtered: a lag explains most, a filter remains, which changes parameters by up to {100 * amount:.2g} %, as "
+            "their errors say: pass the other channel through the same filter and give no lag, or record without a filter"
+        )
     if name in {"velocity", "acceleration"}:
         return f"holds every value for {amount:.0f} samples: keep every {amount:.0f}th sample of all channels"
     cure = (

@@ -11,7 +11,7 @@ import numpy as np
 
 from tvident import _core
 from tvident._advice.events import (
-    holds,
+    comes_late,
     jumps_beside_pulses,
     lost_samples,
     one_factor,
@@ -203,8 +203,8 @@ class Explained:
                     f"is clipped: {amount:.1%} of its samples lie at its largest or smallest value: they count as missing; record with a "
                     "larger range"
                 )
-            elif defect == "held":
-                cure = holds(self.found, name, amount, self.period)
+            elif defect in {"held", "filtered"}:
+                cure = comes_late(self.found, (name, defect, amount), self.period)
             else:
                 cure = f"jumps by {amount:.4g} rad: it is wrapped, give period={_period(amount):.8g}, or the period that it has"
             words.append(f"the {name} {cure}")

@@ -47,6 +47,8 @@ pub enum Defect {
     Wrapped(f64),
     /// The angle jumps between two samples at so many places, where samples were lost.
     Broken(usize),
+    /// It is filtered by more than the lag that is given explains, which changes constants by up to this part of them.
+    Filtered(f64),
 }
 
 impl Defect {
@@ -59,6 +61,7 @@ impl Defect {
             Self::Held(_) => "held",
             Self::Wrapped(_) => "wrapped",
             Self::Broken(_) => "broken",
+            Self::Filtered(_) => "filtered",
         }
     }
 
@@ -75,12 +78,15 @@ impl Defect {
         !matches!(self, Self::Broken(_))
     }
 
-    /// How much of it there is: a part of the samples, samples, the angle's unit or places.
+    /// How much of it there is: a part of the samples or of the constants, samples, the angle's unit or places.
     #[must_use]
     #[allow(clippy::cast_precision_loss, reason = "a few samples or places")]
     pub fn amount(&self) -> f64 {
         match *self {
-            Self::Clipped { part: amount, .. } | Self::LeftOut(amount) | Self::Wrapped(amount) => amount,
+            Self::Clipped { part: amount, .. }
+            | Self::LeftOut(amount)
+            | Self::Wrapped(amount)
+            | Self::Filtered(amount) => amount,
             Self::Held(count) | Self::Broken(count) => count as f64,
         }
     }

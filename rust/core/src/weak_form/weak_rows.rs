@@ -36,6 +36,10 @@ pub(crate) enum TermSamples<'a> {
     Given(&'a dyn Samples),
     /// The rate of the torque, which is the regressor of its lag.
     TorqueRate,
+    /// Its second derivative, which is a constant's.
+    TorqueCurvature,
+    /// Its third derivative, which is a constant's.
+    TorqueJerk,
 }
 
 /// The record that rows are built from.
@@ -170,7 +174,8 @@ impl WeakRows {
                     self.rows.usable.iter().map(|&usable| f64::from(u8::from(usable))).collect(),
                     vec![0.0; self.rows.usable.len()],
                 ),
-                _ => (next(), next()),
+                TermSamples::TorqueCurvature | TermSamples::TorqueJerk => (next(), vec![0.0; self.rows.usable.len()]),
+                TermSamples::Given(_) | TermSamples::TorqueRate => (next(), next()),
             };
             self.rows.regressors.push(Regressor { value, companion, noise: Default::default() });
         }
@@ -228,6 +233,13 @@ impl WeakRows {
         rows * self.stride < SHORT * self.function.window_length()
     }
 
+    /// A regressor at the rows without the roots of their weights.
+    pub(crate) fn plain_column(&self, regressor: usize) -> Vec<f64> {
+        let mut values = self.rows.regressors[regressor].value.clone();
+        values.iter_mut().zip(&self.rows.roots).for_each(|(value, root)| *value /= root.max(f64::MIN_POSITIVE));
+        values
+    }
+
     /// Rows that a test function reaches on either side.
     pub(crate) fn reach(&self) -> usize {
         self.function.half_width().div_ceil(self.stride)
@@ -263,6 +275,7 @@ fn tasks<'a>(
     let torque = || Box::new(Late { channel: record.torque, samples: whole as isize });
     tasks.add(Box::new(Whole(record.angle)), &all, stride);
     tasks.add(torque(), &[&late.values[2]], stride);
+    let jerk = rate_of(&late.values[0], delta);
     let [_, rate, value] = &kernels.values;
     let slope = &kernels.slopes[2];
     for term in &record.terms {
@@ -270,6 +283,8 @@ fn tasks<'a>(
             TermSamples::One => {}
             TermSamples::Given(samples) => tasks.add(Box::new(Whole(samples)), &[value, slope], stride),
             TermSamples::TorqueRate => tasks.add(torque(), &[&late.values[1], &late.slopes[1]], stride),
+            TermSamples::TorqueCurvature => tasks.add(torque(), &[&late.values[0]], stride),
+            TermSamples::TorqueJerk => tasks.add(torque(), &[&jerk], stride),
         }
     }
     for (index, coefficient) in record.coefficients.iter().enumerate() {
@@ -293,6 +308,12 @@ fn tasks<'a>(
         }
     }
     tasks
+}
+
+/// The kernel that gives the rate of what one gives: minus its derivative, by central differences. It is to be exact for constants.
+pub(crate) fn rate_of(kernel: &[f64], delta: f64) -> Vec<f64> {
+    let at = |place: Option<usize>| place.and_then(|place| kernel.get(place)).copied().unwrap_or(0.0);
+    (0..kernel.len()).map(|place| (at(place.checked_sub(1)) - at(Some(place + 1))) / (2.0 * delta)).collect()
 }
 
 /// The mean of the usable samples.

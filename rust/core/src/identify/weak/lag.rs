@@ -6,19 +6,16 @@
 //!
 //! Only the inertia separates the lag from the damping: with motion at a single frequency the lag is not determined.
 
-use std::sync::Arc;
-
 use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
+use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::JudgedTerm;
-use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
-use crate::regression::problem::Correlated;
-use crate::regression::row_covariance::RowCovariance;
+use crate::regression::problem::Problem;
 use crate::weak_form::weak_rows::WeakRows;
 
 /// Times that test function and windows are chosen again with the lag that was found.
@@ -149,23 +146,22 @@ impl Session<'_, '_, '_> {
     /// The covariance of the constants of a model together with the lag, or `None` if the lag was not estimated.
     pub(crate) fn covariance_beside_lag(
         &mut self,
-        rows: &Rows,
-        model: &Model,
-        rhs: &[f64],
+        problem: &Problem<'_>,
+        weak: &WeakRows,
+        decided: &Decided,
         fit: &Fit,
-        expected: Expected,
-        (covariance, correlated): (&RowCovariance, &Arc<Correlated>),
+        errors: &Errors,
     ) -> Result<Option<Vec<f64>>, Error> {
         if self.options.lag.is_some() {
             return Ok(None);
         }
-        let mut model = model.clone();
+        let (mut model, rows) = (decided.ordered(), decided.rows(&weak.rows));
         model.constant.push(self.rate());
-        let problem = model.problem(rows, rhs, self.noise[0], Some(correlated));
-        let Some(all) = fit.again(&problem, expected, self.options.instructions, &mut self.stages)? else {
+        let problem = model.problem(rows, decided.rhs(rows), self.noise[0], problem.correlated.as_ref());
+        let Some(all) = fit.again(&problem, errors.expected, self.options.instructions, &mut self.stages)? else {
             return Ok(None);
         };
-        let both = all.covariance(&problem, covariance, &mut self.stages)?;
+        let both = all.covariance(&problem, &errors.covariance, &mut self.stages)?;
         let count = problem.layout.constant;
         let rows = both.chunks_exact(count).take(count - 1);
         Ok(Some(rows.flat_map(|row| row[..count - 1].to_vec()).collect()))

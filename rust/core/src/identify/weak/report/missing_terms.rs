@@ -1,5 +1,7 @@
 //! Tests of terms missing from the equation, beside everything that was estimated.
 
+use std::ops::Range;
+
 use crate::equation::terms::BUILT_IN_TERMS;
 use crate::error::Error;
 use crate::identify::weak::decided::Decided;
@@ -25,8 +27,7 @@ impl Session<'_, '_, '_> {
         if !self.options.diagnose {
             return Ok(Vec::new());
         }
-        let (mut velocity, samples) = (weak.rows.regressors[1].value.clone(), self.record.angle.len());
-        velocity.iter_mut().zip(&weak.rows.roots).for_each(|(value, root)| *value /= root.max(f64::MIN_POSITIVE));
+        let (velocity, samples) = (weak.plain_column(1), self.record.angle.len());
         let velocity = Interpolated { values: &velocity, first: weak.first, stride: weak.stride, samples };
         let candidates = self.candidates();
         let mapped: Vec<_> = candidates.iter().map(|missing| missing.samples(self.record.angle, &velocity)).collect();
@@ -37,11 +38,7 @@ impl Session<'_, '_, '_> {
         });
         let record = Record { terms: terms.collect(), ..self.record.clone() };
         let (function, delta, workers) = (weak.function, self.options.delta, self.stages.workers);
-        let stretches = match fit.scale {
-            Some(scale) => stretches_of_rows(weak.rows.len()).filter(|_| holds(scale)),
-            None if decided.model.windowed.is_empty() => more_stretches_of_rows(weak.rows.len()),
-            None => None,
-        };
+        let stretches = stretches_to_judge(weak, decided, fit);
         let mut rhs = rhs.to_vec();
         if let Some(stretches) = &stretches {
             (weak.rows, rhs) = (thinned_rows(&weak.rows, stretches), thinned_column(&rhs, stretches));
@@ -88,5 +85,14 @@ impl Session<'_, '_, '_> {
         let terms = BUILT_IN_TERMS.iter().filter(|term| term.looked_for).map(Missing::Term);
         let all = terms.chain(std::iter::once(Missing::Lag));
         all.filter(|missing| !self.options.not_missing.contains(missing)).collect()
+    }
+}
+
+/// The rows of a long record that what may be missing is judged by.
+pub(crate) fn stretches_to_judge(weak: &WeakRows, decided: &Decided, fit: &Fit) -> Option<Vec<Range<usize>>> {
+    match fit.scale {
+        Some(scale) => stretches_of_rows(weak.rows.len()).filter(|_| holds(scale)),
+        None if decided.model.windowed.is_empty() => more_stretches_of_rows(weak.rows.len()),
+        None => None,
     }
 }

@@ -3,6 +3,7 @@
 pub(crate) mod at_rows;
 pub(crate) mod errors;
 pub(crate) mod explained;
+pub(crate) mod filter;
 pub(crate) mod missing_terms;
 pub(crate) mod record;
 pub(crate) mod tracks;

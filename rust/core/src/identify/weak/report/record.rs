@@ -51,20 +51,15 @@ impl Session<'_, '_, '_> {
         let Some(all) = all.as_deref() else { return Ok((self.undetermined(found, decided)?, None)) };
         found.condition = all.pooled.condition;
         found.weakest = weakest(&all.full, &all.pooled.weights);
-        found.covariance = all.covariance(&problem, &errors.covariance, &mut self.stages)?;
-        let (rhs, expected) = (decided.rhs(rows), errors.expected);
-        if let Some(covariance) =
-            self.covariance_beside_lag(rows, &ordered, rhs, fit, expected, (&errors.covariance, &correlated))?
-        {
-            found.covariance = covariance;
-        }
-        found.covariance.iter_mut().for_each(|entry| *entry *= errors.inflation);
+        let changes;
+        (found.covariance, changes) = self.covariance_of(&problem, &weak, decided, (fit, all), &errors)?;
 
         let slow = decided.slow.len();
         let count = ordered.constant.len();
         let mut values = vec![0.0; slow];
         values.extend(&fit.pooled.values);
         found.constants = constants(decided, &values, &found.covariance);
+        found.filtered = changes.map(|changes| largest_part(&found.constants, &changes));
         found.unexplained = match explained {
             Explained::Plainly => false,
             Explained::NoTorque => true,
@@ -111,6 +106,29 @@ impl Session<'_, '_, '_> {
         Ok((found, Some(results)))
     }
 
+    /// The covariance of the constants, and by how much they change beside what a lag leaves of a filter, if it does leave something.
+    fn covariance_of(
+        &mut self,
+        problem: &Problem<'_>,
+        weak: &WeakRows,
+        decided: &Decided,
+        (fit, all): (&Fit, &Fit),
+        errors: &Errors,
+    ) -> Result<(Vec<f64>, Option<Vec<f64>>), Error> {
+        let mut covariance = match self.covariance_beside_lag(problem, weak, decided, fit, errors)? {
+            Some(covariance) => covariance,
+            None => all.covariance(problem, &errors.covariance, &mut self.stages)?,
+        };
+        for entry in &mut covariance {
+            *entry *= errors.inflation;
+        }
+        let changes = self.left_of_filter(weak, decided, fit)?;
+        if let Some(changes) = &changes {
+            add_changes(&mut covariance, changes);
+        }
+        Ok((covariance, changes))
+    }
+
     /// Whether a constant differs between parts of the record. An offset that drifts by next to nothing of the torque, as noise of low
     /// frequencies makes it, is constant enough.
     fn is_contradicted(&self, weak: &WeakRows, constants: &[Constant]) -> bool {
@@ -144,6 +162,7 @@ impl Session<'_, '_, '_> {
             unexplained: false,
             suspects: Vec::new(),
             lag: None,
+            filtered: None,
             angle_zero: None,
             free_offset: self.free_offset,
             outside_mask: None,
@@ -187,6 +206,23 @@ impl Session<'_, '_, '_> {
         found.results = SampleResults::undetermined(found.changing.len(), elements, &mut self.stages)?;
         Ok(found)
     }
+}
+
+/// Adds what the last of the constants may be wrong by to their covariance, all at once.
+fn add_changes(covariance: &mut [f64], changes: &[f64]) {
+    let count = covariance.len().isqrt();
+    let slow = count - changes.len();
+    for (one, change) in changes.iter().enumerate() {
+        for (other, with) in changes.iter().enumerate() {
+            covariance[(slow + one) * count + slow + other] += change * with;
+        }
+    }
+}
+
+/// The largest change of a coefficient of the motion, as a part of it.
+fn largest_part(constants: &[Constant], changes: &[f64]) -> f64 {
+    let parts = constants.iter().zip(changes).filter(|(one, _)| one.unknown < 3);
+    parts.map(|(one, change)| (change / one.value).abs()).fold(0.0, f64::max)
 }
 
 /// The constants with their standard errors and tests.

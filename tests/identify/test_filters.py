@@ -1,0 +1,54 @@
+"""Channels that were low-passed: a lag explains most of that, and what it leaves is neither silent nor outside of the errors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import butter, lfilter
+
+import tvident
+from tvident import Status
+
+RATE = 1000.0
+SIDES = 50
+"""Samples on either side that a lag may move the torque by."""
+CLOSE = 3.5
+"""Standard errors from the truth: one of 2000 lies farther by chance."""
+
+
+def rig(seed: int = 0) -> tvident.Recording:
+    return tvident.simulate_torsional_rig(seed=seed, pattern="constant", torque_snr_db=34.0, angle_noise=1e-4)
+
+
+@pytest.mark.parametrize(("cutoff", "order", "lag"), [(20.0, 1, 7.39), (20.0, 2, 11.91), (50.0, 1, 3.11)])
+@pytest.mark.parametrize("channel", ["angle", "torque"])
+def test_what_a_lag_leaves_of_a_filter_is_said_and_within_the_errors(
+    channel: str, cutoff: float, order: int, lag: float
+) -> None:
+    recording = rig()
+    channels = {"angle": recording.angle, "torque": recording.torque}
+    channels[channel] = lfilter(*butter(order, cutoff, fs=RATE), channels[channel])
+    late = lag / RATE if channel == "torque" else -lag / RATE
+    result = tvident.identify(channels["angle"], channels["torque"], sample_rate=RATE, stiffness="constant", lag=late)
+    assert result.record_status & Status.CHANNEL_SUSPECTED
+    assert any(
+        line.startswith(f"the {channel} seems to be filtered: a lag explains most, a filter remains")
+        for line in result.advice
+    )
+    truth = {"inertia": recording.inertia, "damping": recording.damping, "stiffness": recording.stiffness}
+    for name, values in truth.items():
+        value, error, *_ = result.value(name)
+        assert abs(value - np.mean(values)) < CLOSE * error, name
+
+
+@pytest.mark.parametrize("samples", [-8, 2, 20])
+def test_a_lag_alone_leaves_no_filter(samples: int) -> None:
+    recording = rig(1)
+    angle, torque = (
+        recording.angle[SIDES:-SIDES],
+        recording.torque[SIDES - samples : recording.torque.size - SIDES - samples],
+    )
+    result = tvident.identify(angle, torque, sample_rate=RATE, lag=samples / RATE)
+    assert result.record_status == 0
+    alone = tvident.identify(angle, recording.torque[SIDES:-SIDES], sample_rate=RATE)
+    assert result.value("inertia").stderr < 1.1 * alone.value("inertia").stderr
