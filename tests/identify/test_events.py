@@ -148,3 +148,21 @@ def test_errors_that_look_like_one_factor_are_no_gain_that_drifts() -> None:
         rig.angle, rig.torque, sample_rate=RATE, method=tvident.WeakForm(regression_window=200), **windowed
     )
     assert not any("change by one factor" in advice for advice in result.advice)
+
+
+def test_pulses_of_the_inertia_are_none_of_the_stiffness() -> None:
+    begins, lasting = np.array([1.2, 3.0, 4.7, 10.0, 11.2, 14.6, 15.9]), 0.2
+
+    def inertia(times: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        held = ((times[:, None] >= begins) & (times[:, None] < begins + lasting)).any(axis=1)
+        return np.where(held, 1.4, 1.0) * 0.0123
+
+    rig = tvident.simulate_torsional_rig(
+        pattern="constant", inertia=inertia, damping=0.041, torque_snr_db=34.0, angle_noise=1e-3
+    )
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=RATE)
+    assert not any("the stiffness is another one for a short while" in reason for reason in result.reasons)
+    off = np.abs(result.stiffness - rig.stiffness)
+    wrong = (off > 3.0 * result.stderr["stiffness"]) & (off > 0.03 * rig.stiffness)
+    assert np.mean(wrong & (result.status & Status.NOISE_MODEL == 0)) < 0.005
+    assert abs(np.median(result.inertia) / 0.0123 - 1.0) < 0.002

@@ -14,6 +14,7 @@ use crate::identify::weak::found::WeakIdentified;
 use crate::identify::weak::session::Session;
 use crate::inference::constancy::NO_CHANCE;
 use crate::inference::jumps::pulses::{Pulse, PulseSearch};
+use crate::record::derived::{Interpolated, Ones};
 use crate::record::samples::Samples;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
@@ -38,8 +39,8 @@ const COMES_BACK: f64 = 0.25;
 const WITHIN: f64 = 1.96;
 /// The least part of the squares of what stands out that must be pulses.
 const EXPLAINED: f64 = 0.9;
-/// By how much less the squared errors of independent rows must be with pulses than without, or with a touch or a spike of the torque in their
-/// places, over the noise's variance.
+/// By how much less the squared errors of independent rows must be with pulses than without, or with a touch, a spike of the torque or
+/// pulses of the inertia in their places, over the noise's variance.
 const BETTER: f64 = 20.0;
 
 /// Where pulses would not be seen, and how large they are.
@@ -115,7 +116,12 @@ impl Session<'_, '_, '_> {
         if left.others_change {
             return Ok(Vec::new());
         }
-        let search = self.search(&chosen.weak, expected, &left);
+        // A touch is a torque of its own, and what is held for a while an inertia.
+        let (accelerations, samples) = (chosen.weak.plain_column(0), self.record.angle.len());
+        let (first, stride) = (chosen.weak.first, chosen.weak.stride);
+        let acceleration = Interpolated { values: &accelerations, first, stride, samples };
+        let others: [&dyn Samples; 2] = [&Ones(samples), &acceleration];
+        let search = PulseSearch { others: &others, ..self.search(&chosen.weak, expected, &left) };
         let pulse = |rows: &Range<usize>| search.within(rows).filter(|pulse| left.comes_back(pulse, rows));
         let found: Vec<Option<Pulse>> = over.iter().map(pulse).collect();
         // A few rows that stand out little do not speak against pulses that stand out much.
@@ -124,8 +130,8 @@ impl Session<'_, '_, '_> {
         let explained: f64 =
             over.iter().zip(&found).filter(|(_, pulse)| pulse.is_some()).map(|(rows, _)| squares(rows)).sum();
         let pulses: Vec<Pulse> = found.into_iter().flatten().collect();
-        let above_torque: f64 = pulses.iter().map(|pulse| pulse.above_torque).sum();
-        Ok(if explained >= EXPLAINED * all && above_torque > BETTER { pulses } else { Vec::new() })
+        let above_others: f64 = pulses.iter().map(|pulse| pulse.above_others).sum();
+        Ok(if explained >= EXPLAINED * all && above_others > BETTER { pulses } else { Vec::new() })
     }
 
     /// Whether rows with pulses taken off, which were predicted with some error, are predicted better than the same rows of the torque as it was
@@ -171,6 +177,7 @@ impl Session<'_, '_, '_> {
             usable: &left.usable,
             roots: &weak.rows.roots,
             signal: self.record.angle,
+            others: &[],
             function: &weak.kernels.values[2],
             first: weak.first,
             stride: weak.stride,

@@ -12,7 +12,6 @@
 
 use std::ops::Range;
 
-use crate::record::derived::Ones;
 use crate::record::samples::{Samples, all_usable};
 
 /// Places that are tried for either end at first.
@@ -47,8 +46,8 @@ pub(crate) struct Pulse {
     pub(crate) first: usize,
     pub(crate) change: Vec<f64>,
     pub(crate) variance: Vec<f64>,
-    /// By how much more it reduces the sum of squares than another torque in its place would, over the noise of one independent row.
-    pub(crate) above_torque: f64,
+    /// By how much more it reduces the sum of squares than anything else in its place would, over the noise of one independent row.
+    pub(crate) above_others: f64,
 }
 
 /// The rows in which pulses are searched.
@@ -60,6 +59,8 @@ pub(crate) struct PulseSearch<'a> {
     pub(crate) roots: &'a [f64],
     /// What the coefficient is multiplied by.
     pub(crate) signal: &'a dyn Samples,
+    /// What another coefficient is multiplied by that may change in its place.
+    pub(crate) others: &'a [&'a dyn Samples],
     /// The test function at its samples.
     pub(crate) function: &'a [f64],
     /// Sample of the first row, and samples from one to the next.
@@ -209,10 +210,12 @@ impl PulseSearch<'_> {
         if gain < BELIEVED * noise || left > LEFT * total {
             return None;
         }
-        let ones = Ones(self.signal.len());
-        let torque = PulseSearch { signal: &ones, ..*self }.products(&over, products.places.clone())?;
-        let of_torque = best(&torque).map_or(0.0, |(from, to)| torque.pulse(from, to).1);
-        let mut pulse = Pulse { above_torque: (gain - of_torque) / noise, ..Self::pulse(&products, pair, gain, noise) };
+        let mut of_others = 0.0_f64;
+        for &signal in self.others {
+            let other = PulseSearch { signal, ..*self }.products(&over, products.places.clone())?;
+            of_others = best(&other).map_or(0.0, |(from, to)| other.pulse(from, to).1).max(of_others);
+        }
+        let mut pulse = Pulse { above_others: (gain - of_others) / noise, ..Self::pulse(&products, pair, gain, noise) };
         let there = self.signal.len() - pulse.first;
         pulse.change.truncate(there);
         pulse.variance.truncate(there);
@@ -291,7 +294,7 @@ impl PulseSearch<'_> {
             change.push(mean);
             variance.push((sum[1] / all - mean * mean).max(0.0));
         }
-        Pulse { samples: places[best.0]..places[best.1], first, change, variance, above_torque: 0.0 }
+        Pulse { samples: places[best.0]..places[best.1], first, change, variance, above_others: 0.0 }
     }
 }
 
@@ -323,6 +326,7 @@ mod tests {
             usable: &vec![true; rows],
             roots: &[],
             signal: &signal.as_slice(),
+            others: &[],
             function: &function,
             first: half,
             stride: STRIDE,
@@ -367,6 +371,7 @@ mod tests {
                 usable: &vec![true; 1000],
                 roots: &[],
                 signal: &ones.as_slice(),
+                others: &[],
                 function: &function,
                 first: 4,
                 stride: 1,

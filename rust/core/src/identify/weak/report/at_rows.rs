@@ -176,13 +176,17 @@ impl LeftInWindows {
             .iter()
             .zip(problem.usable)
             .map(|(error, &usable)| if usable && error.is_finite() { [error * error, 1.0] } else { [0.0, 0.0] });
-        let sums = WindowSums::new(&counted.collect::<Vec<_>>(), span);
+        let counted: Vec<_> = counted.collect();
+        let sums = WindowSums::new(&counted, span);
+        let between = BetweenJumps::new(&counted, problem.jumps, span);
         let samples = tracks.status.len();
         let mut left = Self { deviation: vec![f64::NAN; samples], rows: vec![0.0; samples] };
         stages.fill([&mut left.deviation, &mut left.rows], |places, columns| {
             for (index, place) in places.enumerate() {
                 let row = (tracks.first + place.cast_signed()).max(0).unsigned_abs();
-                let [sum, count] = sums.around(row);
+                let of_part = between.around(row);
+                // All rows between two jumps may lie over one of them.
+                let [sum, count] = if of_part[1] > 0.0 { of_part } else { sums.around(row) };
                 if count > 0.0 {
                     columns[0][index] = (sum / count).sqrt();
                     columns[1][index] = count;
@@ -207,9 +211,41 @@ impl LeftInWindows {
     }
 }
 
+/// Sums over windows that end at jumps; nothing without jumps.
+struct BetweenJumps<'a> {
+    jumps: &'a [usize],
+    sums: Vec<WindowSums<2>>,
+}
+
+impl<'a> BetweenJumps<'a> {
+    fn new(rows: &[[f64; 2]], jumps: &'a [usize], span: usize) -> Self {
+        let ends = jumps.iter().copied().chain([rows.len()]);
+        let begins = std::iter::once(0).chain(jumps.iter().copied());
+        let parts = begins.zip(ends).filter(|_| !jumps.is_empty());
+        Self { jumps, sums: parts.map(|(begin, end)| WindowSums::new(&rows[begin..end], span)).collect() }
+    }
+
+    fn around(&self, row: usize) -> [f64; 2] {
+        let place = self.jumps.partition_point(|&jump| jump <= row);
+        let begin = if place == 0 { 0 } else { self.jumps[place - 1] };
+        self.sums.get(place).map_or([0.0; 2], |sums| sums.around(row - begin))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn windows_end_at_jumps() {
+        let rows: Vec<[f64; 2]> = (0..10).map(|row| [f64::from(row), 1.0]).collect();
+        let between = BetweenJumps::new(&rows, &[4, 6], 5);
+        assert_eq!(
+            [0, 3, 4, 5, 6, 9].map(|row| between.around(row)),
+            [[3.0, 3.0], [6.0, 3.0], [9.0, 2.0], [9.0, 2.0], [21.0, 3.0], [24.0, 3.0],]
+        );
+        assert_eq!(BetweenJumps::new(&rows, &[], 5).around(3), [0.0; 2]);
+    }
 
     #[test]
     fn what_chance_explains_or_is_next_to_nothing_is_explained() {
