@@ -126,6 +126,55 @@ def chain(
 
 
 @dataclass(frozen=True)
+class Coupled:
+    """Channels of coupled masses with noise, shape (trials, masses, n), and the true stiffness, shape (masses, masses, n)."""
+
+    angle: Array
+    torque: Array
+    stiffness: Array
+
+
+def coupled(
+    stiffness: Callable[[Array], Array],
+    inertia: Array,
+    damping: Array,
+    samples: int,
+    *,
+    seed: int,
+    trials: int = 1,
+    driven: tuple[int, ...] | None = None,
+    base: tuple[Array, Array] | None = None,
+    angle_noise: float = 1e-3,
+    highest: float = 12.0,
+) -> Coupled:
+    """Give trials of masses with any matrices, the stiffness a function of times: torque SNR 20 dB.
+
+    A base that moves is given as its position and its velocity at half samples; it pulls with what rows of the matrices lack to zero.
+    """
+    rng = np.random.default_rng(seed)
+    masses, step = len(inertia), 1e-3 / FINER
+    times = np.arange(2 * samples * FINER + 1) * step / 2
+    matrix = np.asarray(stiffness(times))
+    forces = np.stack([drive(rng, masses, times, highest) for _ in range(trials)], axis=1)
+    if driven is not None:
+        forces[[mass for mass in range(masses) if mass not in driven]] = 0.0
+    inverse = np.linalg.inv(inertia)
+    pulled = np.zeros((masses, times.size))
+    if base is not None:
+        pulled = matrix.sum(axis=1) * base[0] + np.outer(damping.sum(axis=1), base[1])
+
+    def slope(state: Array, half: int) -> Array:
+        angle, velocity = state
+        pull = matrix[:, :, half] @ angle + damping @ velocity - pulled[:, half, np.newaxis]
+        return np.stack([velocity, inverse @ (forces[:, :, half] - pull)])
+
+    angle = np.moveaxis(integrated(slope, np.zeros((2, masses, trials)), samples, step)[:, 0], 0, -1).swapaxes(0, 1)
+    whole = slice(0, 2 * FINER * samples, 2 * FINER)
+    torque = forces[:, :, whole].swapaxes(0, 1)
+    return Coupled(noisy(rng, angle, angle_noise), noisy(rng, torque, 0.1), matrix[:, :, whole])
+
+
+@dataclass(frozen=True)
 class Pendulum:
     """Channels of a double pendulum with noise, at times that jitter, and its true factors."""
 
