@@ -167,7 +167,8 @@ class Matrix:
         arguments.one_of("shape", self.shape, ("full", "symmetric", "diagonal"))
         kind_or_number("kind", self.kind)
         groups = [tuple((int(row), int(column)) for row, column in group) for group in self.tied]
-        each = [entry for group in groups for entry in group]
+        # Of a symmetric matrix an entry and its mirror image are one, and a group may name both.
+        each = [entry for group in groups for entry in dict.fromkeys(map(self._one_of, group))]
         if len(each) != len(set(each)):
             raise ValueError(f"an entry must be tied once; got tied={self.tied}; merge the groups that share an entry")
         object.__setattr__(self, "tied", tuple(groups))
@@ -186,14 +187,14 @@ class Matrix:
         everywhere = list(product(range(masses), repeat=2))
         unmentioned(f"entries of the {of}", self.entries, everywhere)
         unmentioned(f"tied entries of the {of}", dict.fromkeys(e for group in self.tied for e in group), everywhere)
-        leader = {entry: group[0] for group in self.tied for entry in group}
+        leader = {self._one_of(entry): self._one_of(group[0]) for group in self.tied for entry in group}
         groups: dict[tuple[int, int], list[tuple[int, int]]] = {}
         for row, column in everywhere:
             if self.shape == "diagonal" and row != column and (row, column) not in self.entries:
                 continue
-            mirrored = (min(row, column), max(row, column)) if self.shape == "symmetric" else (row, column)
+            mirrored = self._one_of((row, column))
             own = (row, column) in self.entries and mirrored not in self.entries
-            first = leader.get((row, column), leader.get(mirrored, (row, column) if own else mirrored))
+            first = leader.get(mirrored, (row, column) if own else mirrored)
             groups.setdefault(first, []).append((row, column))
         found = []
         for first, members in groups.items():
@@ -203,6 +204,10 @@ class Matrix:
             entries = tuple((row, coefficient, column, 1.0) for row, column in members)
             found.append(Element(name, of, entries, value))
         return found
+
+    def _one_of(self, entry: tuple[int, int]) -> tuple[int, int]:
+        """Return the entry that stands for one and for what mirrors it."""
+        return (min(entry), max(entry)) if self.shape == "symmetric" else entry
 
 
 def matrices(given: Mapping[str, Any], masses: int) -> list[Element]:
