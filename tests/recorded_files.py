@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -106,32 +107,47 @@ def c3d(path: Path) -> None:
 
 
 def xdf(path: Path) -> None:
+    # The clock of the stream is 5 s behind that of the recorder.
+    offsets = [(1000 + at, 5.0) for at in (0.0, 0.6, 1.2)]
+    channels = [("angle", "deg", ANGLE), ("torque", "N m", TORQUE)]
+    path.write_bytes(xdf_of([XdfStream("rig", 1000 + T, channels, offsets)]))
+
+
+@dataclass(frozen=True)
+class XdfStream:
+    """Stamps of a stream's own clock, channels as (label, unit, values), and (own time, recorder's clock less that of the stream)."""
+
+    name: str
+    stamps: Array
+    channels: list[tuple[str, str, Array]]
+    offsets: list[tuple[float, float]]
+
+
+def xdf_of(streams: list[XdfStream]) -> bytes:
+    """Give the content of a file of streams with 250 samples a second."""
+
     def chunk(tag: int, content: bytes) -> bytes:
         return b"\x04" + struct.pack("<I", len(content) + 2) + struct.pack("<H", tag) + content
 
-    channels = "".join(
-        f"<channel><label>{name}</label><unit>{unit}</unit></channel>"
-        for name, unit in (("angle", "deg"), ("torque", "N m"))
-    )
-    header = (
-        '<?xml version="1.0"?><info><name>rig</name><type>x</type><channel_count>2</channel_count><nominal_srate>250</nominal_srate>'
-        f"<channel_format>double64</channel_format><desc><channels>{channels}</channels></desc></info>"
-    )
-    samples = b"".join(
-        b"\x08" + struct.pack("<d", 1000 + at) + struct.pack("<dd", *row)
-        for at, *row in zip(T, ANGLE, TORQUE, strict=True)
-    )
-    stream = struct.pack("<I", 1)
-    # The clock of the stream is 5 s behind that of the recorder.
-    offsets = b"".join(chunk(4, stream + struct.pack("<dd", 1000 + at, 5.0)) for at in (0.0, 0.6, 1.2))
-    path.write_bytes(
-        b"XDF:"
-        + chunk(1, b'<?xml version="1.0"?><info><version>1.0</version></info>')
-        + chunk(2, stream + header.encode())
-        + chunk(3, stream + b"\x04" + struct.pack("<I", T.size) + samples)
-        + offsets
-        + chunk(6, stream + b"<?xml version='1.0'?><info></info>")
-    )
+    found = b"XDF:" + chunk(1, b'<?xml version="1.0"?><info><version>1.0</version></info>')
+    for number, one in enumerate(streams, start=1):
+        channels = "".join(
+            f"<channel><label>{name}</label><unit>{unit}</unit></channel>" for name, unit, _ in one.channels
+        )
+        count = len(one.channels)
+        header = (
+            f'<?xml version="1.0"?><info><name>{one.name}</name><type>x</type><channel_count>{count}</channel_count>'
+            "<nominal_srate>250</nominal_srate><channel_format>double64</channel_format>"
+            f"<desc><channels>{channels}</channels></desc></info>"
+        )
+        rows = zip(one.stamps, *(values for _, _, values in one.channels), strict=True)
+        samples = b"".join(b"\x08" + struct.pack(f"<d{count}d", at, *row) for at, *row in rows)
+        stream = struct.pack("<I", number)
+        found += chunk(2, stream + header.encode())
+        found += chunk(3, stream + b"\x04" + struct.pack("<I", one.stamps.size) + samples)
+        found += b"".join(chunk(4, stream + struct.pack("<dd", *offset)) for offset in one.offsets)
+        found += chunk(6, stream + b"<?xml version='1.0'?><info></info>")
+    return found
 
 
 def _joint_states(

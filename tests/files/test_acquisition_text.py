@@ -209,8 +209,9 @@ def test_measurements_of_labview(tmp_path: Path) -> None:
         recordings.read(path)
 
 
-def test_motions_of_opensim(tmp_path: Path) -> None:
-    path = tmp_path / "x.mot"
+@pytest.mark.parametrize("ending", [".mot", ".sto"])
+def test_motions_and_storages_of_opensim(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"x{ending}"
     path.write_text(OPENSIM)
     found, _ = read(path)
     assert list(found) == ["time [s]", "knee_angle_r [deg]", "pelvis_tx [m]", "knee_moment [N m]"]
@@ -218,3 +219,27 @@ def test_motions_of_opensim(tmp_path: Path) -> None:
     path.write_text(OPENSIM.replace("nRows=2", "nRows=3"))
     with pytest.raises(recordings.FileError, match="it says nrows=3, and there are 2; copy it again"):
         recordings.read(path)
+
+
+@pytest.mark.parametrize(("ending", "content"), [(".lvm", LABVIEW), (".mot", OPENSIM), (".sto", OPENSIM)])
+def test_files_of_instruments_that_are_damaged_or_empty_are_refused(tmp_path: Path, ending: str, content: str) -> None:
+    path = tmp_path / f"x{ending}"
+    header = content.rindex("***End_of_Header***" if ending == ".lvm" else "endheader")
+    names = content.index("\n", content.index("\n", header) + 1) + 1
+    for nothing in ("", "\n\n", content[:header], content[:names]):
+        path.write_text(nothing)
+        with pytest.raises(recordings.FileError):
+            recordings.read(path)
+    # Cut within a row, a word for a number, a byte that is no text, and a row that is lost where the header counts them.
+    rows = content.rstrip("\n").split("\n")
+    damaged = {
+        "every line must have 4 cells": content[: content.rstrip().rindex("\t")].encode(),
+        "must hold numbers": "\n".join([*rows[:-1], rows[-1].replace("\t", "\tx", 1)]).encode(),
+        "must not hold the character NUL": content[:names].encode() + b"\x00\xff" + content[names:].encode(),
+    }
+    if ending != ".lvm":
+        damaged["it says nrows=2, and there are 1"] = "\n".join(rows[:-1]).encode()
+    for message, left in damaged.items():
+        path.write_bytes(left)
+        with pytest.raises(recordings.FileError, match=message):
+            recordings.read(path)

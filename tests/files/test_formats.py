@@ -107,6 +107,24 @@ def test_what_is_missing_is_named_with_its_extra(tmp_path: Path, monkeypatch: py
         assert not (tmp_path / f"x{ending}").exists() or ending in FORMATS
 
 
+@pytest.mark.parametrize("drift", [0.0, 2e-4])
+def test_clocks_of_streams_are_put_right(tmp_path: Path, drift: float) -> None:
+    # One event in two streams: the clock of the angle is 5 s behind the recorder's, that of the torque 100 s ahead and may run fast.
+    path, times, begins = tmp_path / "x.xdf", np.arange(2500) / 250, 0.2
+    checks = np.arange(0, 10.6, 0.5)
+    streams = []
+    for name, start, ahead, fast in (("angle", 0.0, -5.0, 0.0), ("torque", begins, 100.0, drift)):
+        values = np.exp(-(((times + start - 5) / 0.05) ** 2))
+        own, at = (1000 + ahead + one * (1 + fast) for one in (times + start, checks))
+        offsets = [(float(stamp), float(1000 + check - stamp)) for stamp, check in zip(at, checks, strict=True)]
+        streams.append(examples.XdfStream(name, own, [(name, "deg" if name == "angle" else "N m", values)], offsets))
+    path.write_bytes(examples.xdf_of(streams))
+    found = tvident.read_recording(path)
+    for name, start in (("angle", 0.0), ("torque", begins)):
+        np.testing.assert_allclose(found[f"{name}.time"], times + start, atol=1e-6)
+        assert found[f"{name}.time"][np.argmax(found[name])] == pytest.approx(5, abs=1e-6)
+
+
 def test_matlab_structures_are_channels_with_units(tmp_path: Path) -> None:
     channel = np.zeros(2, dtype=[("Name", "O"), ("Data", "O"), ("Unit", "O")])
     channel[0], channel[1] = ("Model/angle", examples.ANGLE, "deg"), ("torque", examples.TORQUE, "N m")
