@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import tvident
 from merged.simulated import Masses, chain
+from parameters import long
 from reference import merged as reference
 
 Array = npt.NDArray[np.float64]
@@ -85,7 +86,7 @@ def test_constants_of_a_chain_are_those_of_all_equations_together(seed: int, hal
     np.testing.assert_array_less(np.abs(values - expected), 1e-2 * np.array(errors))
 
 
-@pytest.mark.parametrize(("masses", "most"), [(2, 0.004), (3, 0.01)])
+@pytest.mark.parametrize(("masses", "most"), [(2, 0.004), (3, 0.01), *long((6, 0.01))])
 def test_one_spring_of_a_chain_is_followed(masses: int, most: float) -> None:
     rest = [constant(18.0 - 2 * place) for place in range(masses - 1)]
     simulated = chain([changing, *rest], 12000, seed=masses)
@@ -103,6 +104,28 @@ def test_one_spring_of_a_chain_is_followed(masses: int, most: float) -> None:
     # The torques' noise, averaged over the test function, is the rest.
     assert found.held_back().predicted.shape == (masses,)
     assert (found.held_back().predicted > 99).all()
+
+
+@pytest.mark.parametrize("seeds", long(range(5, 13)))
+def test_errors_of_six_masses_are_as_large_as_is_said(seeds: range) -> None:
+    inside = []
+    for seed in seeds:
+        simulated = chain([changing, *(constant(18.0 - 2 * place) for place in range(5))], 12000, seed=seed)
+        found = identify(simulated.angle, simulated.torque, structure=tvident.Chain(6, springs(6)), **OPTIONS)
+        inertia, stiffness = matrices(simulated)
+        np.testing.assert_allclose(np.diagonal(found.inertia[:, :, 0]), np.diagonal(inertia), rtol=0.002)
+        for i, j in zip(*np.nonzero(stiffness.any(axis=2)), strict=True):
+            assert rms(found.stiffness[i, j], stiffness[i, j]) < 0.01, (seed, i, j)
+        for of, true in (
+            ("inertia", simulated.inertia),
+            ("damping", simulated.damping),
+            ("stiffness", simulated.stiffness),
+        ):
+            names = [name for name in found.elements if name.startswith(of)]
+            for name, value in zip(names, true, strict=True):
+                inside.append(np.mean(np.abs(found.elements[name] - value) < 1.96 * found.stderr[name]))
+    # 97 % of all; of the spring that changes alone 87 %.
+    assert 0.90 < np.mean(inside) < 0.98
 
 
 @pytest.mark.parametrize("changes", [True, False])

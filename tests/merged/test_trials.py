@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import tvident
-from merged.simulated import Trials, simulated
+from merged.simulated import Trials, coupled, simulated
+from parameters import long
 from reference import merged as reference
 
 Array = npt.NDArray[np.float64]
@@ -106,6 +107,28 @@ def test_a_window_that_there_is_not_is_refused(given: int, bound: str) -> None:
         tvident.identify(
             angles, torques, sample_rate=1000, ensemble_axis=0, method=tvident.WeakForm(regression_window=given)
         )
+
+
+@pytest.mark.parametrize("seed", long(1, 2, 3))
+def test_steps_of_a_full_endpoint_stiffness_are_followed(seed: int) -> None:
+    # kg, N s/m, N/m: an arm that holds a handle stiffens in every direction.
+    at_rest, step = np.array([[300.0, -80.0], [-80.0, 220.0]]), np.array([[40.0, -40.0], [-40.0, 40.0]])
+
+    def stiffness(t: Array) -> Array:
+        return np.asarray(at_rest[:, :, np.newaxis] + step[:, :, np.newaxis] * (t > 2.5))
+
+    inertia, damping = np.array([[1.5, 0.2], [0.2, 1.1]]), np.array([[15.0, 3.0], [3.0, 12.0]])
+    trials = coupled(stiffness, inertia, damping, 5000, seed=seed, trials=10)
+    symmetric = tvident.Matrix("symmetric")
+    found = identify(
+        trials.angle, trials.torque, inertia=symmetric, damping=symmetric, stiffness=symmetric, dof_axis=1, **OPTIONS
+    )
+    np.testing.assert_array_equal(found.stiffness[0, 1], found.stiffness[1, 0])
+    for place in ((0, 0), (0, 1), (1, 1)):
+        off = np.sqrt(np.mean((found.stiffness[place] - trials.stiffness[place]) ** 2))
+        assert off < 0.03 * np.abs(trials.stiffness[place].mean()), place
+    np.testing.assert_allclose(found.jumps, [2.5], atol=0.01)
+    assert all(found.identifiable.values())
 
 
 def test_trials_that_differ_are_said_to() -> None:
