@@ -279,21 +279,21 @@ pub(crate) fn finish<S: Lanes, H: Dimensions>(
         freedom = simd.div_f64s(simd.splat_f64s(1.0), fading::freedom(simd, shape, values, sums, &mut normal));
         normal
     });
-    let nothing = simd.select_f64s(determined, simd.splat_f64s(0.0), simd.splat_f64s(f64::NAN));
+    // Selected, not added: of two that are no number, addition gives either, and which one is the compiler's choice in every path.
+    let known = |value: S::f64s| simd.select_f64s(determined, value, simd.splat_f64s(f64::NAN));
     if plan.normal {
         let pairs = (0..p).flat_map(|i| (i + 1..p).map(move |k| (i, k)));
         for (pair, (i, k)) in pairs.enumerate() {
-            let entry = simd.add_f64s(covariance(simd, shape, values, i, k), nothing);
-            tile.put(simd, slots.normal + pair, offset, entry);
+            tile.put(simd, slots.normal + pair, offset, known(covariance(simd, shape, values, i, k)));
         }
     }
     for rhs in 0..q {
-        let residual = simd.add_f64s(factor[shape.row(p) + rhs], nothing);
+        let residual = known(factor[shape.row(p) + rhs]);
         let variance = simd.mul_f64s(residual, freedom);
         tile.put(simd, slots.residuals + rhs, offset, residual);
         for (pair, &(i, j)) in plan.covariances.iter().enumerate() {
             let one = covariance(simd, shape, values, i.min(j), i.max(j));
-            tile.put(simd, slots.covariances + pair * q + rhs, offset, simd.mul_f64s(one, variance));
+            tile.put(simd, slots.covariances + pair * q + rhs, offset, known(simd.mul_f64s(one, variance)));
         }
         let deviation = simd.sqrt_f64s(variance);
         tile.put(simd, slots.deviations + rhs, offset, deviation);
@@ -302,25 +302,24 @@ pub(crate) fn finish<S: Lanes, H: Dimensions>(
                 Some(variances) => variances[shape.row(i)],
                 None => covariance(simd, shape, values, i, i),
             };
-            let error =
-                if plan.normal { simd.add_f64s(over, nothing) } else { simd.mul_f64s(simd.sqrt_f64s(over), deviation) };
-            tile.put(simd, slots.errors + i * q + rhs, offset, error);
+            let error = if plan.normal { over } else { simd.mul_f64s(simd.sqrt_f64s(over), deviation) };
+            tile.put(simd, slots.errors + i * q + rhs, offset, known(error));
         }
     }
     for rhs in 0..q {
         solve(simd, shape, factor, rhs, values);
         for i in 0..p {
-            tile.put(simd, i * q + rhs, offset, simd.add_f64s(values[i], nothing));
+            tile.put(simd, i * q + rhs, offset, known(values[i]));
         }
         if plan.fit {
-            let mut residual = simd.add_f64s(own(p + rhs), nothing);
+            let mut residual = own(p + rhs);
             for i in 0..p {
                 residual = simd.negate_mul_add_f64s(own(i), values[i], residual);
             }
-            tile.put(simd, slots.own_residuals + rhs, offset, residual);
+            tile.put(simd, slots.own_residuals + rhs, offset, known(residual));
             let explained = explained(simd, shape, factor, rhs, usize::from(plan.constant_first));
-            let all = simd.add_f64s(explained, simd.add_f64s(factor[shape.row(p) + rhs], nothing));
-            tile.put(simd, slots.rsquared + rhs, offset, simd.div_f64s(explained, all));
+            let all = simd.add_f64s(explained, factor[shape.row(p) + rhs]);
+            tile.put(simd, slots.rsquared + rhs, offset, known(simd.div_f64s(explained, all)));
         }
     }
 }
