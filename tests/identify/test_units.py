@@ -56,7 +56,8 @@ def test_a_position_and_a_force_are_a_linear_axis(tmp_path: Path) -> None:
     words = found.summary() + found.scan().summary()
     assert "rad" not in words
     assert "N m" not in words
-    assert " m in the angle" in words
+    assert " m in the position" in words
+    assert "angle" not in words
     assert found.plot().axes[0].get_ylabel() == "N/m"
     found.save(tmp_path / "x.csv")
     assert (tmp_path / "x.csv").read_text().startswith("time [s],inertia [kg],inertia_stderr [kg],damping [N s/m],")
