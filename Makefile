@@ -28,9 +28,7 @@ demo: $(BUILT)  ## identify a simulated recording, print what was found against 
 test:  ## every test but the longest, and every lint; the last line says which tests had no recordings
 	# Packages are fetched and types are checked while Rust compiles.
 	$(MAKE) --no-print-directory --jobs=2 test-rust lint-python
-	$(MAKE) --no-print-directory lint-core test-alone
-	# Lints of Rust's sources have what of the processors the tests do not use.
-	$(MAKE) --no-print-directory --jobs=2 LEFTOVER="nice -n 19" lint-rust test-together
+	$(MAKE) --no-print-directory lint-rust lint-core test-python
 
 .PHONY: test-rust
 test-rust:  ## tests of the core
@@ -41,15 +39,9 @@ test-rust:  ## tests of the core
 	MAKEFLAGS= cargo test --workspace --doc --profile checked --quiet
 
 .PHONY: test-python
-test-python: test-alone test-together  ## tests of the Python package
-
-.PHONY: test-alone
-test-alone: $(BUILT)
+test-python: $(BUILT)  ## tests of the Python package
 	# What promises a time is alone on the machine.
 	$(BIN)/python -m pytest --quiet tests/house/test_parallel.py
-
-.PHONY: test-together
-test-together: $(BUILT)
 	# Two processes on neighbouring tests: what tests of one file share is made once. Whoever is done first takes over from the other.
 	$(BIN)/python -m pytest --quiet --numprocesses=2 --dist=worksteal --ignore=tests/house/test_parallel.py
 
@@ -67,8 +59,8 @@ lint: lint-rust lint-python lint-core  ## formatters, linters, type checkers
 .PHONY: lint-rust
 lint-rust:  ## of Rust's sources
 	cargo fmt --all --check
-	MAKEFLAGS= $(LEFTOVER) cargo clippy --workspace --all-targets --profile checked -- --deny warnings
-	MAKEFLAGS= RUSTDOCFLAGS="--deny warnings" $(LEFTOVER) cargo doc --workspace --no-deps --profile checked --quiet
+	cargo clippy --workspace --all-targets --profile checked -- --deny warnings
+	RUSTDOCFLAGS="--deny warnings" cargo doc --workspace --no-deps --profile checked --quiet
 
 .PHONY: lint-python
 lint-python: $(READY)  ## of Python's sources
