@@ -25,10 +25,10 @@ demo: $(BUILT)  ## identify a simulated recording, print what was found against 
 	$(BIN)/tvident demo
 
 .PHONY: test
-test:  ## every test but the longest, and every lint; the last line says which tests had no recordings
-	# Packages are fetched and types are checked while Rust compiles.
-	$(MAKE) --no-print-directory --jobs=2 test-rust lint-python
-	$(MAKE) --no-print-directory lint-rust lint-core test-python
+test:  ## every test but the longest; the last line says which tests had no recordings
+	# Packages are fetched while Rust compiles.
+	$(MAKE) --no-print-directory --jobs=2 test-rust $(READY)
+	$(MAKE) --no-print-directory test-python
 
 .PHONY: test-rust
 test-rust:  ## tests of the core
@@ -50,7 +50,7 @@ test-long: $(BUILT)  ## the longest tests: more seeds and cases of what `make te
 	TVIDENT_TESTS=long $(BIN)/python -m pytest --quiet --numprocesses=2 --dist=worksteal
 
 .PHONY: test-all
-test-all: test  ## every test there is but soaks and attacks
+test-all: lint test  ## every lint and every test there is but soaks and attacks
 	$(MAKE) --no-print-directory test-long
 
 .PHONY: lint
