@@ -19,8 +19,8 @@ CONSTANT: dict[str, Any] = {"inertia": "constant", "damping": "constant", "stiff
 
 SEEDS = range(100)
 
-COVERED = (0.90, 0.98)
-"""Of 95 %. Of 300 intervals, 100 for each parameter, 2.5 standard deviations are 3.1 %."""
+COVERED = {len(SEEDS): (0.90, 0.98), 20: (0.88, 1.0)}
+"""Of 95 %, by the number of records. Of 300 intervals, three for each, 2.5 standard deviations are 3.1 %; of 60 they are 7 %."""
 
 STRONG = tvident.StrongForm(window_length=101)
 
@@ -30,19 +30,21 @@ def records() -> tuple[Array, Array, Array]:
     return closed_loop(SEEDS)
 
 
+@pytest.mark.parametrize("count", [20, *long(len(SEEDS))], ids="{} records".format)
 @pytest.mark.parametrize("method", ["auto", STRONG], ids=["weak", "strong"])
 def test_estimates_are_right_under_feedback_and_their_errors_hold(
-    records: tuple[Array, Array, Array], method: Any
+    records: tuple[Array, Array, Array], method: Any, count: int
 ) -> None:
     inside = []
-    for angle, torque, reference in zip(*records, strict=True):
+    for angle, torque, reference in zip(*(channel[:count] for channel in records), strict=True):
         result = tvident.identify(angle, torque, sample_rate=RATE, method=method, instrument=reference)
         for name, truth in TRUTH.items():
             value, error = result.constants[name]
             # 1 % is more than five standard errors.
             assert value == pytest.approx(truth, rel=0.01)
             inside.append(abs(value - truth) < 1.96 * error)
-    assert COVERED[0] <= np.mean(inside) <= COVERED[1]
+    least, most = COVERED[count]
+    assert least <= np.mean(inside) <= most
 
 
 def test_without_an_instrument_feedback_is_said(records: tuple[Array, Array, Array]) -> None:
