@@ -74,7 +74,7 @@ def _as_array(name: str, values: npt.ArrayLike) -> npt.NDArray[Any]:
 
 def _filled(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """Return an array with NaN where it is masked: such samples are missing, and anything may lie below the mask."""
-    if array.dtype.kind not in "biuf" or not np.ma.is_masked(array):
+    if not isinstance(array, np.ma.MaskedArray) or array.dtype.kind not in "biuf" or not np.ma.is_masked(array):
         return array
     return np.asarray(np.ma.filled(array.astype(np.result_type(array.dtype, np.float16)), np.nan))
 
@@ -84,7 +84,7 @@ def along_axis(name: str, array: npt.NDArray[Any], axis: int) -> npt.NDArray[Any
     axis = whole_number("axis", axis)
     if not -array.ndim <= axis < array.ndim:
         raise ValueError(f"axis must name one of the {array.ndim} axes of {name}; got {axis}; use -1 for the last")
-    return np.moveaxis(array, axis, -1)
+    return array if axis in (-1, array.ndim - 1) else np.moveaxis(array, axis, -1)
 
 
 def check_nan(name: str, array: npt.NDArray[Any], policy: str, policies: Any = NanPolicy) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,14 @@ _MOST_NAMES = 6
 
 def package_of(values: object) -> str:
     """Return the package that the type of a value, or one that it is derived from, is of: pandas, polars, xarray, dask; or nothing."""
-    for kind in type(values).__mro__:
-        package = kind.__module__.partition(".")[0]
+    kind: Any = type(values)
+    return _package_of(kind)
+
+
+@lru_cache(maxsize=64)
+def _package_of(kind: type) -> str:
+    for base in kind.__mro__:
+        package = base.__module__.partition(".")[0]
         if package in {"pandas", "polars", "xarray", "dask", "dask_expr"}:
             return package.removesuffix("_expr")
     return ""

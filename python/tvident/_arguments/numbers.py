@@ -18,7 +18,8 @@ LARGEST = 1e70
 
 def whole_number(name: str, value: object, *, least: int | None = None, most: int | None = None) -> int:
     """Return a whole number, within limits if there are any."""
-    if not isinstance(value, Integral) or isinstance(value, bool):
+    # Most are Python's own, which are asked for first: abstract classes are slow to answer.
+    if type(value) is not int and (not isinstance(value, Integral) or isinstance(value, bool)):
         number = _float(value)
         whole = number is not None and number.is_integer()
         cure = f"pass {shown(int(number))}" if whole and number is not None else "pass an integer"
@@ -65,6 +66,8 @@ def real_number(name: str, value: object) -> float:
 
 def _float(value: object) -> float | None:
     """Return a real number as a double, or None for what is none."""
+    if type(value) is float:
+        return value
     if not isinstance(value, Real) or isinstance(value, bool):
         return None
     try:

@@ -113,7 +113,8 @@ class LocalPolynomialFit(Tabular):
 
     def _in_place(self, array: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Put the axis of the samples, last so far, where the user has it."""
-        return np.moveaxis(array, -1, self._axis - self._samples.ndim)
+        place = self._axis - self._samples.ndim
+        return array if place == -1 else np.moveaxis(array, -1, place)
 
     @cached_property
     def stderr(self) -> npt.NDArray[np.float64]:

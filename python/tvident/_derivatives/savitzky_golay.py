@@ -147,9 +147,11 @@ def savgol_filter(
     if not ends:
         samples = _padded(samples.astype(np.float64, copy=False), length, mode, beyond)
     derivatives = core_plan.estimate(samples, ends=ends, workers=arguments.worker_count(None)).derivatives
-    filtered: npt.NDArray[Any] = np.moveaxis(derivatives[0], -1, axis)
-    with np.errstate(all="ignore"):
-        return given.again(filtered if array.dtype != np.float32 else filtered.astype(np.float32))
+    filtered: npt.NDArray[Any] = derivatives[0] if samples.ndim == 1 else np.moveaxis(derivatives[0], -1, axis)
+    if array.dtype == np.float32:
+        with np.errstate(all="ignore"):
+            filtered = filtered.astype(np.float32)
+    return given.again(filtered)
 
 
 def _derivative(deriv: int, delta: float, order: int) -> tuple[int, float]:
