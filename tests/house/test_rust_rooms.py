@@ -128,6 +128,19 @@ def test_no_file_of_a_room_leads_back_to_itself(name: str) -> None:
         pytest.fail(f"uses in a circle: {' -> '.join(error.args[1])}")
 
 
+def test_no_file_of_the_binding_leads_back_to_itself() -> None:
+    texts = {
+        path.stem: path.read_text(encoding="utf-8")
+        for path in (RUST / "python" / "src").glob("*.rs")
+        if path.stem != "lib"
+    }
+    graph = {name: set(re.findall(r"\bcrate::(\w+)", text)) - {name} for name, text in texts.items()}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail(f"uses in a circle: {' -> '.join(error.args[1])}")
+
+
 @pytest.mark.parametrize("door", sorted(DOORS))
 def test_a_door_holds_its_purpose_its_files_and_what_it_offers(door: str) -> None:
     text = FILES[door].read_text(encoding="utf-8")

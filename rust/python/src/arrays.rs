@@ -19,3 +19,11 @@ pub(crate) fn zeros<'py, T: Element>(py: Python<'py>, shape: &[usize]) -> PyResu
     let array = ZEROS.import(py, "numpy", "zeros")?.call1((shape.to_vec(), dtype::<T>(py)))?;
     Ok(array.cast_into::<PyArray<T, _>>()?)
 }
+
+/// So many rows of so many values.
+pub(crate) fn rows(values: &mut [f64], rows: usize, count: usize) -> Vec<&mut [f64]> {
+    if count == 0 {
+        return std::iter::repeat_with(Default::default).take(rows).collect();
+    }
+    values.chunks_exact_mut(count).collect()
+}

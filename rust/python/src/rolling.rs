@@ -12,9 +12,8 @@ use tvident::least_squares::{Alignment, Equations, Regressions, RollingLeastSqua
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
-use crate::arrays::zeros;
+use crate::arrays::{rows, zeros};
 use crate::records::records;
-use crate::streams::rows;
 use crate::watch::{exception, watched};
 
 /// What windows are like.

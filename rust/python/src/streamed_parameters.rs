@@ -15,9 +15,9 @@ use tvident::stream::{
     WindowedStream,
 };
 
-use crate::arrays::zeros;
+use crate::arrays::{rows, zeros};
 use crate::local_polynomials::LocalPolynomials;
-use crate::streams::{elements, in_pieces, one, rows};
+use crate::streams::{elements, in_pieces, one};
 use crate::watch::exception;
 
 /// Parameters of some samples.

@@ -13,7 +13,7 @@ use tvident::record::Samples;
 use tvident::simd::Instructions;
 use tvident::stream::{PolynomialState, PolynomialStream as Polynomials, RollingState, RollingStream as Rolling};
 
-use crate::arrays::zeros;
+use crate::arrays::{rows, zeros};
 use crate::local_polynomials::{LocalEstimates, LocalPolynomials};
 use crate::records::{StridedSamples, records};
 use crate::rolling::RollingRegressions;
@@ -172,14 +172,6 @@ fn outputs<'py>(
         sigma: sigma.unbind(),
     };
     Ok((elements.first, estimates, errors))
-}
-
-/// So many rows of so many values.
-pub(crate) fn rows(values: &mut [f64], rows: usize, count: usize) -> Vec<&mut [f64]> {
-    if count == 0 {
-        return std::iter::repeat_with(Default::default).take(rows).collect();
-    }
-    values.chunks_exact_mut(count).collect()
 }
 
 /// The only record of an array.
