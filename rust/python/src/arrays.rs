@@ -1,7 +1,7 @@
 //! NumPy arrays for results.
 
-use numpy::{Element, PyArray, PyArrayDyn, dtype};
-use pyo3::exceptions::PyMemoryError;
+use numpy::{Element, PyArray, PyArray1, PyArrayDyn, PyArrayMethods, dtype};
+use pyo3::exceptions::{PyImportError, PyMemoryError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 
@@ -26,4 +26,19 @@ pub(crate) fn rows(values: &mut [f64], rows: usize, count: usize) -> Vec<&mut [f
         return std::iter::repeat_with(Default::default).take(rows).collect();
     }
     values.chunks_exact_mut(count).collect()
+}
+
+/// Looks up NumPy's functions for the numpy crate, which panics where that fails: an interrupt of the first array would end in a panic.
+/// In a thread of its own, since Python raises interrupts in the main thread alone.
+pub(crate) fn look_up_numpy(py: Python<'_>) -> PyResult<()> {
+    py.import("numpy")?;
+    let looked_up = py.detach(|| {
+        let first_array = || Python::attach(|py| drop(PyArray1::<f64>::zeros(py, 1, false).readonly()));
+        std::thread::Builder::new().spawn(first_array).ok()?.join().ok()
+    });
+    looked_up.ok_or_else(|| {
+        PyImportError::new_err(
+            "NumPy's functions were not found; tvident needs NumPy 2 or later, and memory for one thread",
+        )
+    })
 }

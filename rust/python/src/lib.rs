@@ -84,6 +84,11 @@ mod _core {
     #[pymodule_export]
     const FEWEST_SAMPLES: usize = tvident::auto_derivatives::FEWEST_SAMPLES;
 
+    #[pymodule_init]
+    fn first(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        crate::arrays::look_up_numpy(module.py())
+    }
+
     /// Every flag of a status: name and bits.
     #[pyfunction]
     fn status_flags() -> Vec<(&'static str, u16)> {
