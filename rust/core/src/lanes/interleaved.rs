@@ -64,10 +64,17 @@ impl Strips {
         self.values[index % self.block * self.columns + index / self.block] = 0.0;
     }
 
-    /// Sample `row` of the block that comes `block` blocks after each lane's.
+    /// Where [`Strips::in_place`] finds sample `row` of the block that comes `block` blocks after each lane's. Samples of several channels
+    /// have the same places.
     #[inline(always)]
-    pub(crate) fn in_block<S: Lanes>(&self, simd: S, row: usize, block: usize) -> S::f64s {
-        self.at(simd, Cursor { row, column: block })
+    pub(crate) fn place(&self, row: usize, block: usize) -> usize {
+        row * self.columns + block
+    }
+
+    /// The sample at a place of [`Strips::place`], one of each lane.
+    #[inline(always)]
+    pub(crate) fn in_place<S: Lanes>(&self, simd: S, place: usize) -> S::f64s {
+        simd.load(&self.values, place)
     }
 
     /// What is held from sample `row` of every lane's block on.
@@ -89,7 +96,7 @@ impl Strips {
     /// The sample at a place, one of each lane.
     #[inline(always)]
     pub(crate) fn at<S: Lanes>(&self, simd: S, cursor: Cursor) -> S::f64s {
-        simd.load(&self.values, cursor.row * self.columns + cursor.column)
+        self.in_place(simd, self.place(cursor.row, cursor.column))
     }
 
     /// The next place.

@@ -67,8 +67,9 @@ impl Write<'_, '_> {
         for (field, values) in outputs.values.iter_mut().enumerate().filter(|(_, values)| !values.is_empty()) {
             for row in squares() {
                 let square = tile.square(simd, field, row);
+                let values = &mut values[place(row)..place(row) + (lanes - 1) * apart + lanes];
                 for (lane, &vector) in square[..lanes].iter().enumerate() {
-                    simd.store(values, place(row) + lane * apart, vector);
+                    simd.store(values, lane * apart, vector);
                 }
             }
         }

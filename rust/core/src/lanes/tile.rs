@@ -35,12 +35,27 @@ impl Tile {
         simd.store(&mut self.values, at, value);
     }
 
+    /// Gives one field of one window of every lane.
+    #[inline(always)]
+    pub(crate) fn get<S: Lanes>(&self, simd: S, field: usize, window: usize) -> S::f64s {
+        simd.load(&self.values, self.at(field, window) * S::F64_LANES)
+    }
+
     /// Gives a square of one field: as many consecutive windows from one on as there are lanes, one vector for every lane.
     #[inline(always)]
     pub(crate) fn square<S: Lanes>(&self, simd: S, field: usize, window: usize) -> [S::f64s; MOST_LANES] {
         let mut square = [simd.splat_f64s(0.0); MOST_LANES];
-        for (row, vector) in square[..S::F64_LANES].iter_mut().enumerate() {
-            *vector = simd.load(&self.values, self.at(field, window + row) * S::F64_LANES);
+        let at = self.at(field, window) * S::F64_LANES;
+        if (window & (self.places - 1)) + S::F64_LANES <= self.places {
+            // In one piece, whose bounds are checked once.
+            let piece = &self.values[at..at + S::F64_LANES * S::F64_LANES];
+            for (row, vector) in square[..S::F64_LANES].iter_mut().enumerate() {
+                *vector = simd.load(piece, row * S::F64_LANES);
+            }
+        } else {
+            for (row, vector) in square[..S::F64_LANES].iter_mut().enumerate() {
+                *vector = self.get(simd, field, window + row);
+            }
         }
         simd.transpose(&mut square[..S::F64_LANES]);
         square

@@ -266,6 +266,7 @@ pub(crate) fn explained<S: Lanes, H: Dimensions>(
 /// Writes a factor to memory.
 #[inline(always)]
 pub(crate) fn store<S: Lanes, H: Dimensions>(simd: S, shape: H, to: &mut [f64], factor: &H::Factor<S::f64s>) {
+    let to = &mut to[..shape.size() * S::F64_LANES];
     for i in 0..shape.size() {
         simd.store(to, i * S::F64_LANES, factor[i]);
     }
@@ -274,6 +275,7 @@ pub(crate) fn store<S: Lanes, H: Dimensions>(simd: S, shape: H, to: &mut [f64], 
 /// Reads a factor from memory.
 #[inline(always)]
 pub(crate) fn load<S: Lanes, H: Dimensions>(simd: S, shape: H, from: &[f64], factor: &mut H::Factor<S::f64s>) {
+    let from = &from[..shape.size() * S::F64_LANES];
     for i in 0..shape.size() {
         factor[i] = simd.load(from, i * S::F64_LANES);
     }

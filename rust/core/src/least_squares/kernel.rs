@@ -88,7 +88,8 @@ impl<H: Dimensions> Kernel for RollingKernel<'_, '_, '_, H> {
                     suffix.load(simd, self.shape, &self.scratch.suffixes[place..place + size]);
                     let (freedom, own) = (self.freedom(simd, offset, full), offset + self.run.plan.before);
                     let RollingScratch { strips, tile, .. } = &mut *self.scratch;
-                    let at = |column: usize| strips[column].in_block(simd, own % window, own / window);
+                    let place = strips[0].place(own % window, own / window);
+                    let at = |column: usize| strips[column].in_place(simd, place);
                     finish(simd, self.shape, self.run.plan, &suffix, freedom, offset, tile, &mut row, at);
                 }
                 // The last windows are written together with some that were written before, to fill the vectors.
@@ -151,12 +152,14 @@ impl<H: Dimensions> RollingKernel<'_, '_, '_, H> {
     ) {
         let (shape, plan) = (self.shape, self.run.plan);
         let columns = shape.regressors() + shape.rhs_count();
+        let strips = &self.scratch.strips[..=columns];
+        let place = strips[0].place(offset, block);
         for column in 0..columns {
-            row[column] = self.scratch.strips[column].in_block(simd, offset, block);
+            row[column] = strips[column].in_place(simd, place);
         }
         let mut weight = simd.splat_f64s(1.0);
         if plan.is_weighted(self.equations) {
-            weight = self.scratch.strips[columns].in_block(simd, offset, block);
+            weight = strips[columns].in_place(simd, place);
         }
         if let (Some(fading), Some(sums)) = (&plan.fading, &mut summary.sums) {
             // The block's rows are appended from its last to its first, those of the next block from its first to its last.
@@ -279,21 +282,19 @@ pub(crate) fn finish<S: Lanes, H: Dimensions>(
         freedom = simd.div_f64s(simd.splat_f64s(1.0), fading::freedom(simd, shape, values, sums, &mut normal));
         normal
     });
-    // Selected, not added: of two that are no number, addition gives either, and which one is the compiler's choice in every path.
-    let known = |value: S::f64s| simd.select_f64s(determined, value, simd.splat_f64s(f64::NAN));
     if plan.normal {
         let pairs = (0..p).flat_map(|i| (i + 1..p).map(move |k| (i, k)));
         for (pair, (i, k)) in pairs.enumerate() {
-            tile.put(simd, slots.normal + pair, offset, known(covariance(simd, shape, values, i, k)));
+            tile.put(simd, slots.normal + pair, offset, covariance(simd, shape, values, i, k));
         }
     }
     for rhs in 0..q {
-        let residual = known(factor[shape.row(p) + rhs]);
+        let residual = factor[shape.row(p) + rhs];
         let variance = simd.mul_f64s(residual, freedom);
         tile.put(simd, slots.residuals + rhs, offset, residual);
         for (pair, &(i, j)) in plan.covariances.iter().enumerate() {
             let one = covariance(simd, shape, values, i.min(j), i.max(j));
-            tile.put(simd, slots.covariances + pair * q + rhs, offset, known(simd.mul_f64s(one, variance)));
+            tile.put(simd, slots.covariances + pair * q + rhs, offset, simd.mul_f64s(one, variance));
         }
         let deviation = simd.sqrt_f64s(variance);
         tile.put(simd, slots.deviations + rhs, offset, deviation);
@@ -303,23 +304,31 @@ pub(crate) fn finish<S: Lanes, H: Dimensions>(
                 None => covariance(simd, shape, values, i, i),
             };
             let error = if plan.normal { over } else { simd.mul_f64s(simd.sqrt_f64s(over), deviation) };
-            tile.put(simd, slots.errors + i * q + rhs, offset, known(error));
+            tile.put(simd, slots.errors + i * q + rhs, offset, error);
         }
     }
     for rhs in 0..q {
         solve(simd, shape, factor, rhs, values);
         for i in 0..p {
-            tile.put(simd, i * q + rhs, offset, known(values[i]));
+            tile.put(simd, i * q + rhs, offset, values[i]);
         }
         if plan.fit {
             let mut residual = own(p + rhs);
             for i in 0..p {
                 residual = simd.negate_mul_add_f64s(own(i), values[i], residual);
             }
-            tile.put(simd, slots.own_residuals + rhs, offset, known(residual));
+            tile.put(simd, slots.own_residuals + rhs, offset, residual);
             let explained = explained(simd, shape, factor, rhs, usize::from(plan.constant_first));
             let all = simd.add_f64s(explained, factor[shape.row(p) + rhs]);
-            tile.put(simd, slots.rsquared + rhs, offset, known(simd.div_f64s(explained, all)));
+            tile.put(simd, slots.rsquared + rhs, offset, simd.div_f64s(explained, all));
+        }
+    }
+    // Few windows are not determined, and they are written twice. Selected, not added: of two that are no number, addition gives either,
+    // and which one is the compiler's choice in every path.
+    if simd.bits(determined) != (1 << S::F64_LANES) - 1 {
+        for slot in 0..slots.condition {
+            let value = tile.get(simd, slot, offset);
+            tile.put(simd, slot, offset, simd.select_f64s(determined, value, simd.splat_f64s(f64::NAN)));
         }
     }
 }
