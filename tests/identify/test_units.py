@@ -70,8 +70,17 @@ def test_a_position_and_a_force_are_a_linear_axis(tmp_path: Path) -> None:
         ({"torque_unit": "V"}, "the torque must be in a unit that can be converted to N m; got 'V'"),
         (
             {"angle_unit": "rad", "torque_unit": "N"},
-            "the angle must be in a unit that can be converted to m; got 'rad'",
+            "an angle beside a torque or a position beside a force; got 'rad' and 'N'; give torque_unit='N m', say, if the axis turns",
         ),
+        (
+            {"angle_unit": "mm", "torque_unit": "N mm"},
+            "got 'mm' and 'N mm'; give torque_unit='N', say, if the axis slides and this is a force, or angle_unit='deg' if it turns",
+        ),
+        (
+            {"angle_unit": "mm", "torque_unit": "kg cm"},
+            "got 'mm' and 'kg cm'; give torque_unit='N', say, if the axis slides",
+        ),
+        ({"angle_unit": "mm", "torque_unit": "V"}, "the torque must be in a unit that can be converted to N; got 'V'"),
         ({"time_unit": "ticks"}, "got 'ticks'; write one of s, ms, min"),
         ({"angle_unit": "furlong"}, "must be one that is known; got 'furlong'"),
     ],
