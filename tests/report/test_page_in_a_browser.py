@@ -150,6 +150,7 @@ def test_an_hour_is_small_opens_at_once_and_shows_every_sample(
     first = round(line["x"][0] * 1000)
     expected = channels["noise 2 [V]"][first : first + len(line["x"])]
     np.testing.assert_allclose(line["y"], expected, atol=np.ptp(expected) / 2 / 126 + 1e-6)
+    assert "one of 127 levels between the extremes of 128 neighbours" in opened.page.inner_text("footer")
     # Where samples are missing there is a gap, from the first to the last.
     opened.show(1999.9, 2000.4)
     line = opened.drawn("noise 1")

@@ -287,7 +287,7 @@
     }
     byId("repeat").textContent = content.repeat;
     byId("repeat").closest("details").hidden = !content.repeat;
-    byId("foot").textContent = `Written by tvident ${content.version}. This page needs no network and loads nothing.`;
+    byId("foot").textContent = `${content.detail} Written by tvident ${content.version}. This page needs no network and loads nothing.`.trim();
     if (isTouch) byId("how").textContent = "Look closer with the buttons, or give the times. All plots show the same time.";
   }
 
