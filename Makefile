@@ -108,7 +108,7 @@ site: $(BUILT)  ## build the site in docs/site from the pages, the docstrings an
 docs: $(BUILT) rooms  ## make anew what documents show of the program (pictures, help of the commands, rooms), then the site
 	$(BIN)/tvident demo
 	cp tvident-demo/parameters.png docs/identified.png
-	$(BIN)/python docs/comparison.py README.md docs/comparison.png
+	$(BIN)/python docs/comparison.py README.md docs/compared.md docs/comparison.png
 	$(BIN)/python docs/command_line_reference.py docs/command-line.md
 	$(MAKE) --no-print-directory site
 
