@@ -213,6 +213,30 @@ def test_dragging_shows_the_same_time_in_all_plots_and_a_double_click_the_whole(
     opened.close()
 
 
+def test_words_of_a_plot_stand_apart_and_on_one_line(browser: Any, short: tuple[Path, tvident.Identification]) -> None:
+    opened = Opened(browser, short[0])
+    overlapping = """() => {
+        const bad = [];
+        for (const chart of tvidentReport.charts) {
+            const boxes = [...chart.div.querySelectorAll(".xtick text, .ytick text")].map((one) => one.getBoundingClientRect());
+            boxes.forEach((a, i) => boxes.slice(i + 1).forEach((b) => {
+                if (a.left < b.right && b.left < a.right && a.top < b.bottom - 1 && b.top < a.bottom - 1) bad.push(chart.about.title);
+            }));
+        }
+        return bad;
+    }"""
+    for title in ("Stiffness K", "Natural frequency", "Torque, averaged over the test function", "Status over time"):
+        question = "(title) => tvidentReport.charts.find((one) => one.about.title === title).div.scrollIntoView()"
+        opened.page.evaluate(question, title)
+        opened.page.wait_for_timeout(200)
+    assert opened.ask(f"({overlapping})()") == []
+    keys = "[...document.querySelectorAll('.head')].map((head) => [...head.querySelectorAll('.key')].map((key) => key.offsetTop))"
+    tops = opened.ask(keys)
+    assert any(len(each) > 2 for each in tops)
+    assert all(len(set(each)) <= 1 for each in tops)
+    opened.close()
+
+
 def test_a_page_of_masses_opens_like_any_other(browser: Any, tmp_path: Path) -> None:
     one = chain([changing, constant(18.0)], 1500, seed=3)
     structure = tvident.Chain(2, [("base", 0), (0, 1)])

@@ -167,6 +167,22 @@ def test_numbers_of_a_page_have_the_digits_of_their_errors_and_stand_alone(tmp_p
     assert abs(float(value)) < 5 * float(error)
 
 
+def test_where_windows_have_no_equations_there_is_no_condition_number(tmp_path: Path) -> None:
+    rig = tvident.simulate_torsional_rig(6.0)
+    angle = rig.angle.copy()
+    angle[3000:3300] = np.nan
+    result = tvident.identify(angle, rig.torque, sample_rate=1000)
+    assert result.condition[3150] == 0
+    result.report(tmp_path / "page.html")
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    about = content_of(tmp_path / "page.html")["series"]
+    (number,) = [index for index, one in enumerate(about) if one["name"] == "condition"]
+    parts = (text.split(f'id="{kind}-{number}">')[1].split("<")[0] for kind in ("extremes", "levels"))
+    found, _ = unpacked(Packed(about[number], *parts))
+    assert np.isnan(found[3150])
+    assert np.nanmin(found) >= 1
+
+
 def test_masses_have_a_page_with_every_element_and_torque(tmp_path: Path) -> None:
     one = chain([constant(12.0), lambda t: 18 + 2 * np.sin(3 * t)], 2500, seed=1, base=True)
     structure = tvident.Chain(2, [("base", 0), (0, 1)], base=one.base)
