@@ -102,6 +102,11 @@ def test_numbers_that_are_not_plausible_are_asked_about() -> None:
     assert "the angle reaches" in advice(degrees, RIG.torque)
     assert "160: degrees?" in advice(degrees, RIG.torque)
     assert "degrees?" not in advice(degrees, RIG.torque, angle_unit="deg")
+    doubtful, known = (
+        tvident.identify(degrees, RIG.torque, sample_rate=1000, angle_unit=unit).summary().splitlines()[0]
+        for unit in (None, "deg")
+    )
+    assert doubtful == f"{known}; all in other units if a channel is: see what to do"
     assert "time in milliseconds?" in advice(RIG.angle, RIG.torque, sample_rate=None, t=1e3 * RIG.time)
     assert "time in milliseconds?" in advice(RIG.angle, RIG.torque, sample_rate=None, t=1e2 * RIG.time)  # of 10 kHz
     assert "milliseconds" not in advice(RIG.angle, RIG.torque, sample_rate=None, t=10 * RIG.time)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tvident._arguments import explained_in_words, percent, to_digits_of
-from tvident._results.words import TRIED
+from tvident._results.words import OTHER_UNIT, TRIED
 from tvident._status import Status
 from tvident._units import in_words_of
 
@@ -95,6 +95,8 @@ def believed(result: Any, known: str, share: float | None) -> str:
     is_doubtful = result.record_status & _DOUBTS and result.advice
     if is_doubtful or any(TRIED in line for line in result.advice):
         return f"{words}; errors hold if the model does: see what to do"
+    if any(asked in line for asked in OTHER_UNIT for line in result.advice):
+        return f"{words}; all in other units if a channel is: see what to do"
     return words
 
 
