@@ -35,6 +35,14 @@ TESTS = (
 )
 """A part of the tests that takes little beside NumPy and touches every room of the core."""
 
+SIDE_BY_SIDE = (
+    "--numprocesses=2",
+    "--dist=worksteal",
+    "--ignore=tests/house/test_parallel.py",
+    "--ignore=tests/house/test_times.py",
+)
+"""All tests are run as `make test-python` runs them, but for those that promise a time, which need a machine of their own."""
+
 MADE = ("__pycache__", ".git", ".venv*", ".*_cache", ".hypothesis", ".benchmarks", "target", "dist", "*.so")
 """What stands beside the sources but is made from them."""
 
@@ -154,12 +162,14 @@ def try_out(wheel: Path, tests: Sequence[str], interpreter: str = sys.executable
         python = place / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
         run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel)
         print(run(python, "-c", "import tvident; print(tvident.__version__, sorted(tvident.__all__))"))
-        needed = _locked(TESTED_WITH) if tests == TESTS else ["--requirement", "requirements-development.txt"]
+        is_part = tests == TESTS
+        needed = _locked(TESTED_WITH) if is_part else ["--requirement", "requirements-development.txt"]
         run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *needed)
         copied = Path(folder) / "project"
         # Some tests read the sources. The package that they import is the wheel's: that of the sources is not on the path.
         shutil.copytree(ROOT, copied, ignore=shutil.ignore_patterns(*MADE))
-        print(run(python, "-m", "pytest", "--quiet", "-p", "no:cacheprovider", *tests, folder=copied).splitlines()[-1])
+        options = ["--quiet", "-p", "no:cacheprovider", *(() if is_part else SIDE_BY_SIDE)]
+        print(run(python, "-m", "pytest", *options, *tests, folder=copied).splitlines()[-1])
 
 
 def _check_and_try(wheels: Sequence[Path], tests: Sequence[str], threads: str | None) -> None:
@@ -195,7 +205,9 @@ def main() -> None:
     )
     given = parser.parse_args()
     if given.built:
-        wheels = sorted(given.out.glob("*.whl")) or sys.exit(f"{given.out} holds no wheels; build them first")
+        wheels = sorted(given.out.glob("*.whl"))
+        if not wheels:
+            sys.exit(f"{given.out} holds no wheels; build them first")
         _check_and_try(wheels, given.tests, next((one for one in FREE_THREADED if shutil.which(one)), None))
         return
     is_linux = platform.system() == "Linux"
