@@ -38,12 +38,13 @@ test-rust:  ## tests of the core
 	MAKEFLAGS= cargo test --workspace --test '*' --profile checked --quiet
 	MAKEFLAGS= cargo test --workspace --doc --profile checked --quiet
 
+TIMED := tests/house/test_parallel.py tests/house/test_times.py
 .PHONY: test-python
 test-python: $(BUILT)  ## tests of the Python package
 	# What promises a time is alone on the machine.
-	$(BIN)/python -m pytest --quiet tests/house/test_parallel.py
+	$(BIN)/python -m pytest --quiet $(TIMED)
 	# Two processes on neighbouring tests: what tests of one file share is made once. Whoever is done first takes over from the other.
-	$(BIN)/python -m pytest --quiet --numprocesses=2 --dist=worksteal --ignore=tests/house/test_parallel.py
+	$(BIN)/python -m pytest --quiet --numprocesses=2 --dist=worksteal $(addprefix --ignore=,$(TIMED))
 
 .PHONY: test-long
 test-long: $(BUILT)  ## the longest tests: more seeds and cases of what `make test` tests by some
@@ -107,7 +108,7 @@ site: $(BUILT)  ## build the site in docs/site from the pages, the docstrings an
 docs: $(BUILT) rooms  ## make anew what documents show of the program (pictures, help of the commands, rooms), then the site
 	$(BIN)/tvident demo
 	cp tvident-demo/parameters.png docs/identified.png
-	$(BIN)/python docs/comparison.py README.md docs/comparison.png
+	$(BIN)/python docs/comparison.py README.md docs/compared.md docs/comparison.png
 	$(BIN)/python docs/command_line_reference.py docs/command-line.md
 	$(MAKE) --no-print-directory site
 

@@ -35,6 +35,14 @@ TESTS = (
 )
 """A part of the tests that takes little beside NumPy and touches every room of the core."""
 
+SIDE_BY_SIDE = (
+    "--numprocesses=2",
+    "--dist=worksteal",
+    "--ignore=tests/house/test_parallel.py",
+    "--ignore=tests/house/test_times.py",
+)
+"""All tests are run as `make test-python` runs them, but for those that promise a time, which need a machine of their own."""
+
 MADE = ("__pycache__", ".git", ".venv*", ".*_cache", ".hypothesis", ".benchmarks", "target", "dist", "*.so")
 """What stands beside the sources but is made from them."""
 
@@ -154,16 +162,32 @@ def try_out(wheel: Path, tests: Sequence[str], interpreter: str = sys.executable
         python = place / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
         run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel)
         print(run(python, "-c", "import tvident; print(tvident.__version__, sorted(tvident.__all__))"))
-        needed = _locked(TESTED_WITH) if tests == TESTS else ["--requirement", "requirements-development.txt"]
+        is_part = tests == TESTS
+        needed = _locked(TESTED_WITH) if is_part else ["--requirement", "requirements-development.txt"]
         run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *needed)
         copied = Path(folder) / "project"
         # Some tests read the sources. The package that they import is the wheel's: that of the sources is not on the path.
         shutil.copytree(ROOT, copied, ignore=shutil.ignore_patterns(*MADE))
-        print(run(python, "-m", "pytest", "--quiet", "-p", "no:cacheprovider", *tests, folder=copied).splitlines()[-1])
+        options = ["--quiet", "-p", "no:cacheprovider", *(() if is_part else SIDE_BY_SIDE)]
+        print(run(python, "-m", "pytest", *options, *tests, folder=copied).splitlines()[-1])
+
+
+def _check_and_try(wheels: Sequence[Path], tests: Sequence[str], threads: str | None) -> None:
+    """Check wheels, and run tests with those that this machine takes."""
+    for wheel in wheels:
+        check(wheel)
+    machine = platform.machine().lower()
+    for wheel in wheels:
+        if "linux" in wheel.name and not wheel.stem.endswith(machine):
+            print(f"{wheel.name}: checked, not run: this machine is {machine}")
+        elif "-abi3-" not in wheel.name and threads is None:
+            print(f"{wheel.name}: checked, not run: no free-threaded Python here")
+        else:
+            try_out(wheel, tests, sys.executable if "-abi3-" in wheel.name else str(threads))
 
 
 def main() -> None:
-    """Build and check everything that this machine can."""
+    """Build and check everything that this machine can, or what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=ROOT / "dist", help="folder for what is published")
     parser.add_argument(
@@ -175,9 +199,20 @@ def main() -> None:
         default=TESTS,
         help="tests that the wheel of this machine must pass; `tests` is all of them",
     )
+    parser.add_argument("--here", action="store_true", help="only a wheel for this machine")
+    parser.add_argument(
+        "--built", action="store_true", help="check and try the wheels that are in the folder, build none"
+    )
     given = parser.parse_args()
+    if given.built:
+        wheels = sorted(given.out.glob("*.whl"))
+        if not wheels:
+            sys.exit(f"{given.out} holds no wheels; build them first")
+        _check_and_try(wheels, given.tests, next((one for one in FREE_THREADED if shutil.which(one)), None))
+        return
     is_linux = platform.system() == "Linux"
-    targets = given.targets or (list(LINUX) if is_linux else [None])
+    every = [one for one in LINUX if not given.here or one.startswith(platform.machine())]
+    targets = given.targets or (every if is_linux else [None])
     if is_linux and find_spec("ziglang") is None:
         sys.exit("wheels for Linux need zig: pip install 'maturin[zig]'")
     shutil.rmtree(given.out, ignore_errors=True)
@@ -194,14 +229,7 @@ def main() -> None:
         if threads is not None:
             target = next((one for one in targets if one and one.startswith(platform.machine())), None)
             wheels.append(build(unpacked, given.out.resolve(), target, threads))
-    for wheel in wheels:
-        check(wheel)
-    machine = platform.machine().lower()
-    for wheel in wheels:
-        if is_linux and not wheel.stem.endswith(machine):
-            print(f"{wheel.name}: checked, not run: this machine is {machine}")
-        else:
-            try_out(wheel, given.tests, sys.executable if "-abi3-" in wheel.name else str(threads))
+    _check_and_try(wheels, given.tests, threads)
     for target in absent:
         print(f"No wheel for {target}: rustup could not fetch Rust's standard library for it")
     if threads is None:

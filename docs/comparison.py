@@ -33,8 +33,11 @@ RATE = 1000.0
 TUNED = {0.0: (31, 4, 50), NOISE: (101, 7, 50)}
 """Window and order of the derivatives, and pieces of the spline, that are best for the true stiffness of either recording."""
 
+BY_HAND = ((51, 5, 20), (51, 5, 40), (51, 5, 70), (61, 5, 40), (71, 5, 40), (81, 5, 40))
+"""Others that one may come to by hand: the filter of the first row, the spline's pieces tuned; then longer windows against the noise."""
+
 MARKS = ("<!-- comparison: `make docs` -->", "<!-- end -->")
-"""Where the table stands in the README."""
+"""Where a table stands in the README, and one in the page beside it."""
 
 
 def with_scipy(angle: Array, torque: Array, window: int = 51, order: int = 5, rows: int = 200) -> Array:
@@ -135,6 +138,26 @@ def table() -> str:
     return "\n".join(lines)
 
 
+def table_of_splines() -> str:
+    """Return what the spline makes of other settings."""
+    clean, noisy = (recording_with(noise) for noise in TUNED)
+    lines = ["| window | order | pieces | error | with 1 % of noise |", "|-|-|-|-|-|"]
+    for one in (*BY_HAND, *TUNED.values()):
+        errors = (error_of(with_spline(each.angle, each.torque, *one), each) for each in (clean, noisy))
+        lines.append(
+            f"| {' | '.join(map(str, one))} | {' | '.join(f'{error:#.2g}'.rstrip('.') + ' %' for error in errors)} |"
+        )
+    return "\n".join(lines)
+
+
+def _written(page: Path, content: str) -> None:
+    """Put a table into a page."""
+    text = page.read_text(encoding="utf-8")
+    begin = text.index(MARKS[0]) + len(MARKS[0])
+    end = text.index(MARKS[1], begin)
+    page.write_text(f"{text[:begin]}\n\n{content}\n\n{text[end:]}", encoding="utf-8")
+
+
 def picture(place: Path) -> None:
     """Draw the stiffness that the paper's settings and tvident find in the noisy recording."""
     recording = recording_with(NOISE)
@@ -162,16 +185,15 @@ def picture(place: Path) -> None:
 
 
 def main() -> None:
-    """Write the picture and the table."""
+    """Write the picture and the tables."""
     if sys.argv[1:] == ["tune"]:
         for noise in TUNED:
             sys.stdout.write(f"{noise:.0%}: {tuned_on_the_truth(recording_with(noise))}\n")
         return
-    readme, place = map(Path, sys.argv[1:])
+    readme, page, place = map(Path, sys.argv[1:])
     mpl.use("agg")
-    text = readme.read_text(encoding="utf-8")
-    begin, end = (text.index(mark) for mark in MARKS)
-    readme.write_text(f"{text[: begin + len(MARKS[0])]}\n\n{table()}\n\n{text[end:]}", encoding="utf-8")
+    _written(readme, table())
+    _written(page, table_of_splines())
     picture(place)
 
 

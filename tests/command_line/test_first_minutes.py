@@ -182,3 +182,60 @@ def test_a_plan_says_which_file_it_goes_on_from() -> None:
     call = "identify messung.csv --angle Winkel --torque Drehmoment --time Zeit --stiffness constant -o result.npz"
     assert run(*call.split()).returncode == 0
     assert "stiffness within 2 %" in run("plan", "result.npz").stdout
+
+
+@pytest.fixture
+def bare(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Write degrees and N mm without a word about units, names with blanks beside them, and times with three digits at 512 Hz."""
+    rig = tvident.simulate_torsional_rig(duration=3.0, sample_rate=512, seed=4, pattern="constant")
+    rows = zip(rig.time, np.rad2deg(rig.angle), 1e3 * rig.torque, strict=True)
+    lines = [f"{time:.3f},{angle:.4f},{torque:.2f}" for time, angle, torque in rows]
+    (tmp_path / "bare.csv").write_text("\n".join(["Rig B, test 12", "", "Time,Angle,Torque", *lines]))
+    (tmp_path / "named.csv").write_text("\n".join(["Time (s),Crank angle (deg),Motor torque (N mm)", *lines]))
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.usefixtures("bare")
+@pytest.mark.parametrize("command", ["identify", "report"])
+def test_units_that_nobody_said_are_told(command: str) -> None:
+    names = "--angle Angle --torque Torque --time Time"
+    call = [command, "bare.csv", *names.split(), "--stiffness", "constant"]
+    call += ["-o", "page.html"] if command == "report" else []
+    none = run(*call)
+    said = (
+        "Units: none said of angle, torque and time, taken as rad, N m and s; if they are others, give --angle-unit, "
+    )
+    assert f"{said}--torque-unit and --time-unit\n" in none.stderr
+    one = run(*call, "--angle-unit", "deg", "--time-unit", "s")
+    assert "Units: none said of torque, taken as N m; if they are others, give --torque-unit\n" in one.stderr
+    slides = run(*call, "--angle-unit", "mm")
+    assert "Units: none said of torque and time, taken as N and s;" in slides.stderr
+    scaled = run(*call, "--angle-unit", "deg", "--torque-scale", "0.001", "--time-unit", "s")
+    assert "Units:" not in scaled.stderr
+    named = [command, "named.csv", "--angle", "Crank angle", "--torque", "Motor torque", "--time", "Time"]
+    done = run(*named, *call[8:])
+    assert done.returncode == 0
+    assert "Units:" not in done.stderr
+    assert (
+        done.stdout.splitlines()[:9]
+        == run(*call, "--angle-unit", "deg", "--torque-unit", "Nmm").stdout.splitlines()[:9]
+    )
+
+
+@pytest.mark.usefixtures("bare")
+def test_a_name_with_a_blank_is_put_in_quotes() -> None:
+    words = "identify named.csv --angle Crank angle --torque Motor torque --time Time"
+    done = run(*words.split())
+    assert done.returncode == 2
+    assert (
+        "unexpected extra arguments (angle torque); a name that has blanks needs quotes: --angle 'crank angle'"
+        in done.stderr
+    )
+
+
+@pytest.mark.usefixtures("bare")
+def test_times_that_scatter_are_shown_in_hertz() -> None:
+    words = run("info", "named.csv").stdout
+    assert "increasing: 512.0" in words
+    assert " Hz, steps scatter by 0.2" in words
+    assert "Hz" not in run("info", "bare.csv").stdout

@@ -146,6 +146,26 @@ def test_derivatives_behave_as_identify_does(folder: Path) -> None:
     np.testing.assert_array_equal(np.load(folder / "found.npz")["derivative_2 [rad/s^2]"], expected)
 
 
+def test_derivatives_without_a_channel_list_what_there_is(folder: Path) -> None:
+    none = run("derivatives", "rig.npz", "--sample-rate", 1000, cwd=folder)
+    assert none.returncode == 2
+    listed = f"Missing option '--channel'; rig.npz has {', '.join(np.load(folder / 'rig.npz'))}; name the channel"
+    assert listed in none.stderr
+    # One channel beside times needs no name, whatever the times are called.
+    values = np.column_stack([np.arange(200) / 100, np.sin(np.arange(200) / 20)])
+    np.savetxt(folder / "one.csv", values, delimiter=",", header="t / s,flexion [deg]", comments="")
+    np.savetxt(folder / "odd.csv", values, delimiter=",", header="clock,flexion [deg]", comments="")
+    done = run("derivatives", "one.csv", "--time", "t", "-o", "found.csv", "--plot", "found.svg", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert (folder / "found.csv").read_text().startswith("time [s],value [deg],")
+    odd = run("derivatives", "odd.csv", "--time", "clock", "-o", "odd-found.csv", cwd=folder)
+    assert odd.returncode == 0, odd.stderr
+    assert (folder / "odd-found.csv").read_text() == (folder / "found.csv").read_text()
+    (folder / "times.csv").write_text("time\n0\n1\n2\n")
+    times = run("derivatives", "times.csv", "--time", "time", cwd=folder)
+    assert "Missing option '--channel'; times.csv has time; name the channel" in times.stderr
+
+
 @pytest.mark.usefixtures("folder")
 def test_the_demo_says_at_once_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.modules["tvident._commands.demo"], "find_spec", lambda _: None)

@@ -39,6 +39,14 @@ def test_units_that_cannot_be_converted_are_a_line_and_a_status(tmp_path: Path) 
     done = run(*call.split())
     assert done.returncode == 2
     assert "the torque must be in a unit that can be converted to N m; got 'V'; write one of" in done.stderr
+    # Both units are named where they belong to different axes, one of the header, one of an option.
+    (tmp_path / "y.csv").write_text((tmp_path / "x.csv").read_text().replace("[V]", "[N mm]"))
+    other = run(*call.replace("x.csv", "y.csv").split(), "--angle-unit", "mm")
+    assert other.returncode == 2
+    assert (
+        "got 'mm' and 'N mm'; give --torque-unit N, say, if the axis slides and this is a force, or --angle-unit deg"
+        in other.stderr
+    )
     # A scale is known by whoever gives it: the unit of the header is no longer that of the numbers.
     scaled = run(*call.split(), "--torque-scale", "0.001", "--stiffness", "constant")
     assert scaled.returncode == 0, scaled.stderr

@@ -187,6 +187,15 @@ def test_the_readmes_first_table_is_measured() -> None:
             assert float(cell.rstrip("% ")) == pytest.approx(float(number.rstrip("% ")), rel=MEASURED)
 
 
+def test_the_splines_beside_the_readmes_table_are_measured() -> None:
+    shown = table(ROOT / "docs" / "compared.md", "window")
+    measured = [line.strip("| ").split(" | ") for line in script("comparison").table_of_splines().splitlines()[2:]]
+    for row, again in zip(shown, measured, strict=True):
+        assert [row[name] for name in ("window", "order", "pieces")] == again[:3]
+        for cell, number in ((row["error"], again[3]), (row["with 1 % of noise"], again[4])):
+            assert float(cell.rstrip("% ")) == pytest.approx(float(number.rstrip("% ")), rel=MEASURED)
+
+
 def test_the_reference_has_every_public_name() -> None:
     page = (ROOT / "docs" / "api.rst").read_text(encoding="utf-8")
     listed = re.findall(r"^   ([\w.]+)$", page, re.MULTILINE)

@@ -209,6 +209,26 @@ def test_measurements_of_labview(tmp_path: Path) -> None:
         recordings.read(path)
 
 
+def test_measurements_of_labview_that_lost_rows_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "x.lvm"
+    rows = LABVIEW.rstrip("\n").split("\n")
+    for lost in (1, 2):
+        path.write_text("\n".join(rows[:-lost]) + "\n")
+        with pytest.raises(recordings.FileError, match=f"it says Samples 3, and there are {3 - lost}; copy it again"):
+            recordings.read(path)
+    # The first of two segments, and the second.
+    second = "\nChannels" + LABVIEW.partition("Channels")[2]
+    for damaged in ("\n".join(rows[:-1]) + "\n" + second, LABVIEW + "\n".join(second.split("\n")[:-2]) + "\n"):
+        path.write_text(damaged)
+        with pytest.raises(recordings.FileError, match="it says Samples 3, and there are 2"):
+            recordings.read(path)
+    # The channel with most samples has as many as there are rows; one header may serve what was appended later, or say nothing.
+    expected = [1.5, 2.5, 3.5]
+    for said in ("2\t3", "3\t2", "1\t1", "\t"):
+        path.write_text(LABVIEW.replace("Samples\t3\t3", f"Samples\t{said}"))
+        assert read(path)[0]["Angle [deg]"] == expected
+
+
 @pytest.mark.parametrize("ending", [".mot", ".sto"])
 def test_motions_and_storages_of_opensim(tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"x{ending}"
@@ -237,8 +257,8 @@ def test_files_of_instruments_that_are_damaged_or_empty_are_refused(tmp_path: Pa
         "must hold numbers": "\n".join([*rows[:-1], rows[-1].replace("\t", "\tx", 1)]).encode(),
         "must not hold the character NUL": content[:names].encode() + b"\x00\xff" + content[names:].encode(),
     }
-    if ending != ".lvm":
-        damaged["it says nrows=2, and there are 1"] = "\n".join(rows[:-1]).encode()
+    said = "it says Samples 3, and there are 2" if ending == ".lvm" else "it says nrows=2, and there are 1"
+    damaged[said] = "\n".join(rows[:-1]).encode()
     for message, left in damaged.items():
         path.write_bytes(left)
         with pytest.raises(recordings.FileError, match=message):

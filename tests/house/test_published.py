@@ -26,6 +26,18 @@ def test_continuous_integration_calls_targets_that_users_have(name: str) -> None
     assert set(called) <= targets
 
 
+def test_every_system_runs_what_depends_on_it() -> None:
+    text = (ROOT / ".github" / "workflows" / "check.yml").read_text(encoding="utf-8")
+    jobs = dict(re.findall(r"^  ([a-z]+):\n(.*?)(?=^  [a-z]+:\n|\Z)", text, re.MULTILINE | re.DOTALL))
+    for job, called in (
+        ("tests", {"lint-rust", "test-rust", "lint-core", "test-python", "test-long"}),
+        ("wheels", {"wheels"}),
+    ):
+        assert {"macos-14", "windows-2022"} <= set(re.findall(r"[a-z]+-\d[\w.-]*", jobs[job]))
+        assert called == set(re.findall(r"run: make ([a-z-]+)", jobs[job]))
+    assert "run: .ci/run" in jobs["everything"]
+
+
 def test_the_tests_of_a_wheel_are_there_and_what_they_need_is_locked() -> None:
     spec = spec_from_file_location("wheels", ROOT / ".ci" / "wheels.py")
     assert spec is not None

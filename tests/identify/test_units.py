@@ -70,8 +70,17 @@ def test_a_position_and_a_force_are_a_linear_axis(tmp_path: Path) -> None:
         ({"torque_unit": "V"}, "the torque must be in a unit that can be converted to N m; got 'V'"),
         (
             {"angle_unit": "rad", "torque_unit": "N"},
-            "the angle must be in a unit that can be converted to m; got 'rad'",
+            "an angle beside a torque or a position beside a force; got 'rad' and 'N'; give torque_unit='N m', say, if the axis turns",
         ),
+        (
+            {"angle_unit": "mm", "torque_unit": "N mm"},
+            "got 'mm' and 'N mm'; give torque_unit='N', say, if the axis slides and this is a force, or angle_unit='deg' if it turns",
+        ),
+        (
+            {"angle_unit": "mm", "torque_unit": "kg cm"},
+            "got 'mm' and 'kg cm'; give torque_unit='N', say, if the axis slides",
+        ),
+        ({"angle_unit": "mm", "torque_unit": "V"}, "the torque must be in a unit that can be converted to N; got 'V'"),
         ({"time_unit": "ticks"}, "got 'ticks'; write one of s, ms, min"),
         ({"angle_unit": "furlong"}, "must be one that is known; got 'furlong'"),
     ],
@@ -93,6 +102,11 @@ def test_numbers_that_are_not_plausible_are_asked_about() -> None:
     assert "the angle reaches" in advice(degrees, RIG.torque)
     assert "160: degrees?" in advice(degrees, RIG.torque)
     assert "degrees?" not in advice(degrees, RIG.torque, angle_unit="deg")
+    doubtful, known = (
+        tvident.identify(degrees, RIG.torque, sample_rate=1000, angle_unit=unit).summary().splitlines()[0]
+        for unit in (None, "deg")
+    )
+    assert doubtful == f"{known}; all in other units if a channel is: see what to do"
     assert "time in milliseconds?" in advice(RIG.angle, RIG.torque, sample_rate=None, t=1e3 * RIG.time)
     assert "time in milliseconds?" in advice(RIG.angle, RIG.torque, sample_rate=None, t=1e2 * RIG.time)  # of 10 kHz
     assert "milliseconds" not in advice(RIG.angle, RIG.torque, sample_rate=None, t=10 * RIG.time)

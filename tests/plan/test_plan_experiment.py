@@ -1,6 +1,8 @@
 """Plans: the bound holds in simulation, and what is planned reaches what was wanted."""
 
+import json
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -99,6 +101,60 @@ def test_power_goes_where_it_tells_most() -> None:
 def test_what_is_missing_is_said(changed: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         tvident.plan_experiment(**{**GUESS, "torque_noise": 0.02, "torque_rms": 0.1, **changed})
+
+
+def test_units_are_those_of_the_axis(tmp_path: Any) -> None:
+    turning = tvident.plan_experiment(**GUESS, torque_noise=0.02, angle_noise=1e-4, torque_rms=0.01)
+    inner = tvident.plan_experiment(
+        **GUESS, torque_noise=20, angle_noise=math.degrees(1e-4), torque_rms=10, angle_unit="deg", torque_unit="N mm"
+    )
+    np.testing.assert_allclose(inner.amplitudes, turning.amplitudes, rtol=1e-12)
+    assert inner.duration == pytest.approx(turning.duration, rel=1e-9)
+    assert inner.units == turning.units
+    assert turning.units["stiffness"] == "N m/rad"
+    sliding = tvident.plan_experiment(**GUESS, torque_noise=0.02, angle_noise=0.1, torque_rms=0.01, angle_unit="mm")
+    # One equation is the other in other units, and so is what is said.
+    np.testing.assert_array_equal(sliding.amplitudes, turning.amplitudes)
+    assert sliding.units == {"angle": "m", "torque": "N", "inertia": "kg", "damping": "N s/m", "stiffness": "N/m"}
+    words = turning.summary().replace("torque", "force").replace("the angle", "the position")
+    # The column of amplitudes is narrower.
+    assert sliding.summary().split() == words.replace("N m", "N").replace(" rad ", " m ").split()
+    assert "torque_rms= in N, or" in refused(angle_unit="mm")
+    assert "torque_rms= in N mm, or" in refused(torque_unit="N mm")
+    assert "angle and torque must be those of one axis" in refused(angle_unit="mm", torque_unit="N mm")
+    # What goes on from a result has its units.
+    rig = tvident.simulate_torsional_rig(duration=4.0)
+    channels = (tvident.Channel(rig.angle, "m"), tvident.Channel(rig.torque, "N"))
+    tvident.identify(*channels, sample_rate=1000).save(tmp_path / "one.npz")
+    assert tvident.plan_experiment(result=tvident.load(tmp_path / "one.npz")).units == sliding.units
+
+
+def refused(**units: Any) -> str:
+    with pytest.raises(ValueError, match=r"must|needs") as said:
+        tvident.plan_experiment(**GUESS, torque_noise=0.02, **units)
+    return str(said.value)
+
+
+def test_the_command_says_units_and_writes_them(tmp_path: Any) -> None:
+    numbers = "--inertia 1.2 --damping 3 --stiffness 1300 --band 0.5 12 --torque-noise 0.02 --torque-rms 0.1"
+    slides = ["plan", *numbers.split(), "--torque-unit", "N"]
+    ran = run(*slides, "-o", str(tmp_path / "force.csv"))
+    assert ran.returncode == 0, ran.stderr
+    assert "force of 0.1 N rms, which moves the position by about" in ran.stdout
+    assert not re.search(r"N m|rad\b|torque|angle", ran.stdout)
+    assert (tmp_path / "force.csv").read_text().startswith("time [s],torque [N]\n")
+    found = json.loads(run(*slides, "--json").stdout)
+    assert found["units"]["torque"] == "N"
+    assert found["units"]["inertia"] == "kg"
+    assert found["torque_rms"] == 0.1
+    assert found["verdict"] == ran.stdout.splitlines()[0]
+    assert len(found["frequencies"]) == len(found["amplitudes"]) > 0
+    rig = tvident.simulate_torsional_rig(duration=4.0)
+    tvident.identify(rig.angle, rig.torque, sample_rate=1000).save(tmp_path / "one.npz")
+    more = json.loads(run("plan", str(tmp_path / "one.npz"), "--json").stdout)
+    assert (more["torque_rms"], more["frequencies"]) == (None, [])
+    assert more["units"]["torque"] == "N m"
+    assert 0 < more["errors"]["inertia"] < more["before"]["inertia"]
 
 
 def test_the_command(tmp_path: Any) -> None:

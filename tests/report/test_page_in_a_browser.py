@@ -150,6 +150,7 @@ def test_an_hour_is_small_opens_at_once_and_shows_every_sample(
     first = round(line["x"][0] * 1000)
     expected = channels["noise 2 [V]"][first : first + len(line["x"])]
     np.testing.assert_allclose(line["y"], expected, atol=np.ptp(expected) / 2 / 126 + 1e-6)
+    assert "one of 127 levels between the extremes of 128 neighbours" in opened.page.inner_text("footer")
     # Where samples are missing there is a gap, from the first to the last.
     opened.show(1999.9, 2000.4)
     line = opened.drawn("noise 1")
@@ -209,6 +210,30 @@ def test_dragging_shows_the_same_time_in_all_plots_and_a_double_click_the_whole(
     shown = opened.ask("tvidentReport.shown")
     assert shown["from"] < 3.0
     assert shown["to"] > 3.4
+    opened.close()
+
+
+def test_words_of_a_plot_stand_apart_and_on_one_line(browser: Any, short: tuple[Path, tvident.Identification]) -> None:
+    opened = Opened(browser, short[0])
+    overlapping = """() => {
+        const bad = [];
+        for (const chart of tvidentReport.charts) {
+            const boxes = [...chart.div.querySelectorAll(".xtick text, .ytick text")].map((one) => one.getBoundingClientRect());
+            boxes.forEach((a, i) => boxes.slice(i + 1).forEach((b) => {
+                if (a.left < b.right && b.left < a.right && a.top < b.bottom - 1 && b.top < a.bottom - 1) bad.push(chart.about.title);
+            }));
+        }
+        return bad;
+    }"""
+    for title in ("Stiffness K", "Natural frequency", "Torque, averaged over the test function", "Status over time"):
+        question = "(title) => tvidentReport.charts.find((one) => one.about.title === title).div.scrollIntoView()"
+        opened.page.evaluate(question, title)
+        opened.page.wait_for_timeout(200)
+    assert opened.ask(f"({overlapping})()") == []
+    keys = "[...document.querySelectorAll('.head')].map((head) => [...head.querySelectorAll('.key')].map((key) => key.offsetTop))"
+    tops = opened.ask(keys)
+    assert any(len(each) > 2 for each in tops)
+    assert all(len(set(each)) <= 1 for each in tops)
     opened.close()
 
 

@@ -22,7 +22,7 @@ import tvident
 from merged.simulated import chain, simulated
 from merged.test_masses import constant
 from tvident._command_line import main
-from tvident._report.packed import Packed, Series, packed
+from tvident._report.packed import Packed, Series, in_words, packed
 
 Array = npt.NDArray[np.float64]
 
@@ -73,14 +73,44 @@ def test_a_spike_does_not_cost_what_is_beside_it() -> None:
     assert np.abs(found - values)[elsewhere].max() < 1e6 * 2**-23
 
 
+@pytest.mark.parametrize(
+    ("most_bytes", "levels"), [(850_000, 65_535), (720_000, 16_383), (570_000, 2047), (415_000, 255), (375_000, 127)]
+)
+def test_levels_have_as_many_bits_as_there_is_room_for(most_bytes: int, levels: int) -> None:
+    generator = np.random.default_rng(0)
+    many = [Series(str(number), "", generator.standard_normal(100_000), 0.0, 1e-3) for number in range(4)]
+    many[1].values[500:700] = np.nan
+    parts = packed(many, most_bytes=most_bytes)
+    assert sum(len(part.extremes) + len(part.levels) for part in parts) < 1.05 * 4 / 3 * most_bytes
+    for series, part in zip(many, parts, strict=True):
+        assert (part.about["top"] + 1, part.about["merged"]) == (levels, 1)
+        found, half = unpacked(part)
+        assert np.nanmax(half) <= np.ptp(series.values[np.isfinite(series.values)]) / 2 / (levels - 1) * (1 + 1e-6)
+        np.testing.assert_array_equal(np.isnan(found), np.isnan(series.values))
+        there = np.isfinite(found)
+        assert (np.abs(found - series.values)[there] <= half[there] + 1e-6).all()
+    assert f"one of {levels:,} levels".replace(",", " ") in in_words(parts)
+    assert in_words(parts).startswith("Every sample is in this page")
+
+
+def test_series_that_compress_leave_their_room_to_others() -> None:
+    noise, still = np.random.default_rng(0).standard_normal(100_000), np.full(100_000, 3.0)
+    for values, levels in ((still, 65_535), (noise, 255)):
+        parts = packed([Series(name, "", one, 0.0, 1e-3) for name, one in (("a", noise), ("b", values))], 220_000)
+        assert {part.about["top"] + 1 for part in parts} == {levels}
+
+
 def test_what_does_not_fit_keeps_its_extremes() -> None:
     generator = np.random.default_rng(0)
     many = [Series(str(number), "", generator.standard_normal(100_000), 0.0, 1e-3) for number in range(4)]
     many[0].values[70_001] = 9.0
-    parts = packed(many, most_bytes=420_000)
+    parts = packed(many, most_bytes=190_000)
     # As text three bytes are four; what is estimated from some blocks is known to some percent.
-    assert sum(len(part.extremes) + len(part.levels) for part in parts) < 1.05 * 4 / 3 * 420_000
+    assert sum(len(part.extremes) + len(part.levels) for part in parts) < 1.05 * 4 / 3 * 190_000
     assert {part.about["merged"] for part in parts} == {4}
+    assert "of 4 of 4 series it has the least and the greatest of every few, each as one of 127 levels" in in_words(
+        parts
+    )
     for series, part in zip(many, parts, strict=True):
         found, half = unpacked(part)
         pairs = series.values.reshape(-1, 4)
@@ -135,6 +165,22 @@ def test_numbers_of_a_page_have_the_digits_of_their_errors_and_stand_alone(tmp_p
     value, error = named["Offset"]["value"].split(" ± ")
     assert float(error) < 1e-4
     assert abs(float(value)) < 5 * float(error)
+
+
+def test_where_windows_have_no_equations_there_is_no_condition_number(tmp_path: Path) -> None:
+    rig = tvident.simulate_torsional_rig(6.0)
+    angle = rig.angle.copy()
+    angle[3000:3300] = np.nan
+    result = tvident.identify(angle, rig.torque, sample_rate=1000)
+    assert result.condition[3150] == 0
+    result.report(tmp_path / "page.html")
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    about = content_of(tmp_path / "page.html")["series"]
+    (number,) = [index for index, one in enumerate(about) if one["name"] == "condition"]
+    parts = (text.split(f'id="{kind}-{number}">')[1].split("<")[0] for kind in ("extremes", "levels"))
+    found, _ = unpacked(Packed(about[number], *parts))
+    assert np.isnan(found[3150])
+    assert np.nanmin(found) >= 1
 
 
 def test_masses_have_a_page_with_every_element_and_torque(tmp_path: Path) -> None:

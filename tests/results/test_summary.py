@@ -160,7 +160,18 @@ def test_records_of_a_batch_are_judged_each() -> None:
     assert "do not trust 1 of them, such as record 1: inertia is negative" in first
 
 
-@pytest.mark.parametrize(("share", "words"), [(0.9991, "99.910 %"), (0.5, "50 %"), (0.00123, "0.12 %"), (1.0, "100 %")])
+@pytest.mark.parametrize(
+    ("share", "words"),
+    [
+        (0.9991, "99.910 %"),
+        (0.5, "50 %"),
+        (0.00123, "0.12 %"),
+        (1.0, "100 %"),
+        (1 - 1.4e-8, "99.999999 %"),
+        (1 - 1e-9, "over 99.999999 %"),
+        (1e-10, "under 0.000001 %"),
+    ],
+)
 def test_percents_have_two_digits_of_what_is_left(share: float, words: str) -> None:
     assert percent(share) == words
 

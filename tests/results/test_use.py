@@ -113,6 +113,30 @@ def test_a_stored_result_comes_back_to_the_last_bit(method: str, ending: str, tm
     assert_same(pickle.loads(pickle.dumps(result)), result)  # noqa: S301 - made here
 
 
+@pytest.mark.parametrize("ending", [".csv", ".h5", ".hdf5", ".mat", ".xlsx"])
+@pytest.mark.parametrize("method", METHODS)
+def test_tables_of_other_programs_give_back_every_column_unit_and_setting(
+    method: str, ending: str, tmp_path: Path
+) -> None:
+    angle = RIG.angle.copy()
+    angle[1000:1400] = np.nan
+    result = tvident.identify(angle, RIG.torque, t=RIG.time + 5, **METHODS[method])
+    result.save(tmp_path / f"result{ending}")
+    back, columns = tvident.read_recording(tmp_path / f"result{ending}"), result.columns()
+    assert list(back) == list(columns)
+    for name, values in columns.items():
+        assert back.units[name] == result.units.get(name.removesuffix("_stderr"), "")
+        found, expected = np.asarray(back[name], np.float64), values.astype(np.float64)
+        if ending == ".xlsx":  # 16 digits, as openpyxl writes them
+            expected[~np.isfinite(expected)] = np.nan
+            np.testing.assert_allclose(found, expected, rtol=1e-15)
+        else:
+            np.testing.assert_array_equal(found, expected)
+    kept = json.loads((tmp_path / f"result{ending}.settings.json").read_text())
+    again = tvident.identify(angle, RIG.torque, t=RIG.time + 5, settings=kept["settings"], step=result.settings["step"])
+    assert_array_equal(again.stiffness, result.stiffness)
+
+
 def test_batches_and_labels_come_back(tmp_path: Path) -> None:
     BATCH.save(tmp_path / "batch.npz")
     back = tvident.load(tmp_path / "batch.npz")

@@ -38,11 +38,18 @@ def to_digits_of(value: float, error: float) -> str:
     return f"{round(value, places):.{max(0, places)}f}"
 
 
+_MOST_DIGITS = 6
+"""Behind the point of a percentage."""
+
+
 def percent(share: float) -> str:
     """Return a share of 1 in percent with two digits of what it leaves: 99.9964 is far from 100."""
     value = 100 * share
     left = min(abs(100 - value), abs(value))
-    digits = min(6, max(0, 1 - math.floor(math.log10(left)))) if 0 < left < math.inf else 0
+    digits = min(_MOST_DIGITS, max(0, 1 - math.floor(math.log10(left)))) if 0 < left < math.inf else 0
+    least = 10.0**-_MOST_DIGITS
+    if 0 < left < least / 2:
+        return f"over {100 - least:.{_MOST_DIGITS}f} %" if value > 1 else f"under {least:.{_MOST_DIGITS}f} %"
     return f"{value:.{digits}f} %"
 
 

@@ -13,7 +13,7 @@ from tvident._command_line.options import CRITERION, PERIOD, RUN, TIME
 
 @main.command(epilog="Example: tvident derivatives rig.csv --channel angle --time time -o derivatives.csv")
 @click.argument("file", type=click.Path())
-@click.option("--channel", required=True, metavar="NAME", help="Channel to differentiate.")
+@click.option("--channel", metavar="NAME", help="Channel to differentiate; of one channel beside times not needed.")
 @click.option(
     "--window-length",
     default="auto",

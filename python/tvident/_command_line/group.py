@@ -27,7 +27,7 @@ def _in_plain_words() -> Iterator[None]:
         yield
     except click.ClickException as error:
         # Names of files and channels are part of messages, and may hold what a terminal obeys.
-        error.message = "\n".join(_line(line) for line in error.message.split("\n"))
+        error.message = "\n".join(_line(line) for line in error.message.split("\n")) + _cure(error)
         raise
     except (click.exceptions.Exit, click.Abort):
         raise
@@ -49,6 +49,12 @@ def _in_plain_words() -> Iterator[None]:
         _let_go_of_output()
         place = "the output" if error.filename is None else _line(error.filename)
         raise click.ClickException(f"{place}: {_line(error.strerror)}") from None
+
+
+def _cure(error: click.ClickException) -> str:
+    """Return what to do about words that belong to nothing: a shell parts names at their blanks."""
+    is_extra = error.message.startswith("Got unexpected extra argument")
+    return "; a name that has blanks needs quotes: --angle 'crank angle'" if is_extra else ""
 
 
 def _let_go_of_output() -> None:

@@ -48,6 +48,16 @@ def channel_of(channels: recordings.Channels, name: str, file: str | None) -> np
     return Channel(channels[full], named_unit(full)[1])
 
 
+def only_channel(channels: recordings.Channels, time_channel: str | None, file: str) -> str:
+    """Return the name of the only channel beside times, where none is named; refuse to choose between several."""
+    times = "" if time_channel is None else full_name(channels, time_channel, file)
+    recorded = [name for name, values in channels.items() if values.ndim == 1] or list(channels)
+    others = [name for name in recorded if name != times and not time_channels([name])]
+    if len(others) == 1:
+        return others[0]
+    raise click.UsageError(f"Missing option '--channel'; {printable(file)} has {listed(recorded)}; name the channel")
+
+
 def times_of(channels: recordings.Channels, name: str | None, beside: str, file: str | None) -> npt.NDArray[Any] | None:
     """Return a channel of times; of several called ``time`` the one of the group that another channel is in."""
     if name is None:

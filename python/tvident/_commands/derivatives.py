@@ -9,17 +9,17 @@ import numpy as np
 import numpy.typing as npt
 
 import tvident
-from tvident._commands.channels import channel_of, channels_in, check_has_times
+from tvident._commands.channels import channel_of, channels_in, check_has_times, only_channel
 from tvident._commands.given import check_time, given, length, period_of, wanted_progress
 from tvident._commands.output import PICTURE, RECORDING, RESULTS, check_outputs, figures_on_file, give, save_figure
 from tvident._status import describe
-from tvident._units import derivative_units, times_in_seconds, unit_said
+from tvident._units import derivative_units, named_unit, times_in_seconds, unit_said
 
 
 # Options that need work before they are passed on are parameters of their own.
 def derivatives(
     file: str,
-    channel: str,
+    channel: str | None,
     window_length: str,
     sample_rate: float | None,
     delta: float | None,
@@ -35,6 +35,8 @@ def derivatives(
     """Differentiate a channel of FILE with a polynomial order chosen in every window."""
     check_outputs({RESULTS: output, PICTURE: plot}, {RECORDING: file})
     channels = channels_in(file)
+    if channel is None:
+        channel = only_channel(channels, time_channel, file)
     check_has_times("derivatives need", check_time(sample_rate, delta, time_channel), channels)
     samples = channel_of(channels, channel, file)
     times = None if time_channel is None else times_in_seconds(channel_of(channels, time_channel, file))
@@ -72,5 +74,6 @@ def derivatives(
     if plot is not None:
         raw = samples[:: options["step"]]
         is_raw = period is None and raw.shape == fit.time.shape
-        drawn = figures_on_file().plot_derivatives(fit.time, fit, channel, samples=raw if is_raw else None, unit=unit)
+        name = named_unit(channel)[0]
+        drawn = figures_on_file().plot_derivatives(fit.time, fit, name, samples=raw if is_raw else None, unit=unit)
         save_figure(drawn, Path(plot))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import click
@@ -18,6 +18,7 @@ from tvident._commands.method import NAMES, method_of
 from tvident._commands.output import RECORDING
 from tvident._commands.settings import read_settings
 from tvident._equation import COEFFICIENTS
+from tvident._units import axis_of
 
 
 def inputs(file: str | None, options: Mapping[str, Any]) -> dict[str, str | None]:
@@ -75,9 +76,12 @@ def identified(
     signals = dict(zip(named, recorded, strict=False))
     if "angle" in signals:
         signals["angle"] = scaled(signals["angle"], angle_scale, channels, file)
+    signals["torque"] = scaled(recorded[-1], torque_scale, channels, file)
+    scales = {"angle": angle_scale, "torque": torque_scale}
+    _say_assumed({name: one for name, one in signals.items() if scales.get(name) is None}, times, options)
     result = tvident.identify(
         signals.get("angle"),
-        scaled(recorded[-1], torque_scale, channels, file),
+        signals["torque"],
         velocity=signals.get("velocity"),
         acceleration=signals.get("acceleration"),
         method=method_of(method, of_method, has_settings=settings is not None),
@@ -100,6 +104,24 @@ def identified(
     if "times" in result.settings:
         click.echo(f"Times: {result.reasons[0]}", err=True)
     return result
+
+
+def _say_assumed(signals: Mapping[str, Any], times: Any, options: Mapping[str, Any]) -> None:
+    """Say of which channels neither the file nor an option has the unit, and what they are taken for."""
+    given = {name: options.get(name) for name in ("angle_unit", "torque_unit", "time_unit")}
+    axis = axis_of(signals.get("angle"), signals.get("torque"), times, **given)
+    there = {"angle": "angle" in signals, "torque": "torque" in signals, "time": times is not None}
+    names = [name for name, is_there in there.items() if is_there and name in axis.assumed]
+    if names:
+        units, cures = [axis.system.units[name] for name in names], [f"--{name}-unit" for name in names]
+        click.echo(
+            f"Units: none said of {_and(names)}, taken as {_and(units)}; if they are others, give {_and(cures)}",
+            err=True,
+        )
+
+
+def _and(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def _both(times: npt.NDArray[Any] | None, of_torque: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:

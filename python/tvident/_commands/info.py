@@ -52,22 +52,27 @@ def _remark(name: str, values: npt.NDArray[Any]) -> str:
             period = (values[-1] - values[0]) / steps.size
             grid = values[0] + period * np.arange(values.size)
             if np.abs(values - grid).max() <= 1e-3 * period:
-                unit = unit_of(named_unit(name)[1])
-                is_time = unit is not None and unit.dimension == ROTARY.dimensions["time"]
-                hertz = f", {1 / (period * unit.factor):.6g} Hz" if is_time and unit is not None else ""
-                return f"uniform: {1 / period:.6g} per unit{hertz}"
-            return _steps(values)
+                return f"uniform: {1 / period:.6g} per unit{_in_hertz(name, period)}"
+            return _steps(name, values)
     return "constant" if steps.size and not steps.any() else ""
 
 
-def _steps(times: npt.NDArray[np.float64]) -> str:
+def _in_hertz(name: str, period: float) -> str:
+    """Return the sample rate of a channel whose unit is one of time."""
+    unit = unit_of(named_unit(name)[1])
+    if unit is None or unit.dimension != ROTARY.dimensions["time"]:
+        return ""
+    return f", {1 / (period * unit.factor):.6g} Hz"
+
+
+def _steps(name: str, times: npt.NDArray[np.float64]) -> str:
     """Return in words how increasing times are spaced."""
     try:
         grid = grid_of(times)
     except ValueError:
         return "increasing, mostly gaps"
     gaps = int(np.count_nonzero(np.diff(grid.places) > grid.bridged))
-    words = f"increasing: {1 / grid.period:.6g} per unit"
+    words = f"increasing: {1 / grid.period:.6g} per unit{_in_hertz(name, grid.period)}"
     if grid.jitter:
         words += f", steps scatter by {grid.jitter:.2g} of a step"
     elif grid.samples > times.size:

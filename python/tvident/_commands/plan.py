@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +15,17 @@ import numpy as np
 import tvident
 from tvident._commands.given import given
 from tvident._commands.output import RECORDING, RESULTS, check_outputs, say
+from tvident._commands.words import in_options
 from tvident._equation import COEFFICIENTS
 from tvident._files import RESULT_ENDINGS, printable, write_table
 
 
-def plan(file: str | None, output: str | None, **options: Any) -> None:
+def plan(
+    file: str | None,
+    output: str | None,
+    as_json: bool,  # noqa: FBT001 - click passes options by name
+    **options: Any,
+) -> None:
     """Plan an experiment, or say what more of a recording would bring."""
     check_outputs({RESULTS: output}, {RECORDING: file})
     asked = given(options)
@@ -28,7 +38,7 @@ def plan(file: str | None, output: str | None, **options: Any) -> None:
         if output is not None:
             raise click.UsageError("a plan to go on has no torque to write; got -o; leave it out")
         kept = {name: asked[name] for name in ("wanted", "more") if name in asked}
-        say(tvident.plan_experiment(result=tvident.load(file), **kept).summary())
+        _show(tvident.plan_experiment(result=tvident.load(file), **kept), as_json=as_json)
         return
     if not asked.keys() & COEFFICIENTS:
         raise click.UsageError(
@@ -36,10 +46,27 @@ def plan(file: str | None, output: str | None, **options: Any) -> None:
             "--torque-noise, or a FILE that identify saved as .npz or .parquet"
         )
     found = tvident.plan_experiment(**asked)
-    say(found.summary())
+    _show(found, as_json=as_json)
     if output is not None:
         rate = asked.get("sample_rate", 1000.0)
         torque = found.excitation(sample_rate=rate)
-        write_table(
-            Path(output), {"time": np.arange(torque.size) / rate, "torque": torque}, {"time": "s", "torque": "N m"}
-        )
+        columns = {"time": np.arange(torque.size) / rate, "torque": torque}
+        write_table(Path(output), columns, {"time": "s", "torque": found.units["torque"]})
+
+
+def _show(found: tvident.ExperimentPlan, *, as_json: bool) -> None:
+    """Print a plan in words, or as JSON, where numbers that are none are null."""
+    if not as_json:
+        say(found.summary())
+        return
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, np.ndarray):
+            return value.tolist()
+        if isinstance(value, Mapping):
+            return {name: plain(one) for name, one in value.items()}
+        return value if not isinstance(value, float) or math.isfinite(value) else None
+
+    words = found.summary().splitlines()[0]
+    content = {"verdict": in_options(words)} | {one.name: plain(getattr(found, one.name)) for one in fields(found)}
+    click.echo(json.dumps(content, indent=1, ensure_ascii=False))

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from tvident import _arguments as arguments
 from tvident._derivatives import SHORTEST_WINDOW, LocalPolynomialFit, fit_local_polynomials
-from tvident._figures.style import ACCENT, FAINT, FOUND, MUTED, Place, panels, style
+from tvident._figures.style import ACCENT, FAINT, FOUND, INK, MUTED, Place, panels, style
 
 
 def plot_window(
@@ -111,9 +111,7 @@ def _draw_scores(ax: Axes, scores: npt.NDArray[np.float64]) -> None:
     best = int(np.where(candidates, scores, np.inf).argmin())
     ax.plot(orders[candidates], scores[candidates], "-o", color=MUTED, markersize=3.5, linewidth=1)
     ax.plot(best, scores[best], "o", color=ACCENT, markersize=8)
-    ax.annotate(
-        f"n = {best}", (best, scores[best]), xytext=(0, 10), textcoords="offset points", ha="center", color=ACCENT
-    )
+    ax.annotate(f"n = {best}", (best, scores[best]), xytext=(0, 10), textcoords="offset points", ha="center", color=INK)
     ax.set_title("Akaike's criterion by order")
     ax.set_xlabel("order n")
     ax.set_ylabel("AICc")

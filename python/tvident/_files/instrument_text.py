@@ -57,6 +57,7 @@ def _segment(text: str, places: tuple[int, int, int], say: Say) -> Channels:
     keys = {line.split("\t")[0]: line.rstrip("\n\t ").split("\t")[1:] for line in text[header:start].split("\n")}
     # Empty lines above keep the numbers of lines in messages.
     found = read_columns(io.StringIO("\n" * text.count("\n", 0, start) + text[start:stop]), say)
+    _check_rows(keys.get("Samples", []), next((values.size for values in found.values()), 0))
     units = keys.get("Y_Unit_Label", [])
     channels: Channels = {}
     of_channels = 0
@@ -72,6 +73,16 @@ def _segment(text: str, places: tuple[int, int, int], say: Say) -> Channels:
             channels[with_unit(name, units[of_channels] if of_channels < len(units) else "")] = values
             of_channels += 1
     return channels
+
+
+def _check_rows(said: list[str], rows: int) -> None:
+    """Refuse a segment that has lost rows; where one header serves all that was written later, there are more than it says."""
+    most = max((int(one) for one in said if one.strip().isdecimal()), default=0)
+    if rows < most:
+        raise FileError(
+            f"the header must say how much follows; it says Samples {most}, and there are {rows}; copy it again, or, where the "
+            f"recording broke off, write Samples {rows} there"
+        )
 
 
 def _times(keys: dict[str, list[str]], count: int) -> Numbers:
@@ -97,7 +108,8 @@ def read_opensim(path: Path, say: Say) -> Channels:
     for key, found in (("nrows", rows), ("ncolumns", len(channels))):
         if keys.get(key, str(found)) != str(found):
             raise FileError(
-                f"the header must say how much follows; it says {key}={printable(keys[key], 20)}, and there are {found}; copy it again"
+                f"the header must say how much follows; it says {key}={printable(keys[key], 20)}, and there are {found}; copy it again, "
+                "or, where the recording broke off, write what there is"
             )
     degrees = keys.get("indegrees", "").lower() == "yes"
     return {with_unit(name, _unit(name, degrees=degrees)): values for name, values in channels.items()}

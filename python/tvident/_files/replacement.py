@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import shutil
 import signal
 import stat
 import threading
@@ -118,7 +117,8 @@ def _gone_when_terminated(path: Path) -> Iterator[None]:
 @contextmanager
 def _at_the_end(path: Path) -> Iterator[IO[bytes]]:
     """Give a file without a name whose content goes to a pipe or a device when it is whole."""
-    import tempfile  # noqa: PLC0415 - the library loads without
+    import shutil  # noqa: PLC0415 - the library loads without
+    import tempfile  # noqa: PLC0415 - likewise
 
     with os.fdopen(_descriptor(path), "wb") as end, tempfile.TemporaryFile() as file:
         yield file

@@ -20,8 +20,13 @@ _FORMULA = ("=", "+", "-", "@")
 
 def header(name: str, units: Mapping[str, str]) -> str:
     """Return a column's name with its unit in brackets, where it has one."""
-    unit = units.get(name) or units.get(name.removesuffix("_stderr"))
+    unit = unit_of(name, units)
     return f"{name} [{unit}]" if unit else name
+
+
+def unit_of(name: str, units: Mapping[str, str]) -> str:
+    """Return the unit of a column: a standard error has that of what it belongs to."""
+    return units.get(name) or units.get(name.removesuffix("_stderr"), "")
 
 
 def _cell(name: str) -> str:
@@ -43,7 +48,7 @@ def write_table(path: str | Path, columns: Mapping[str, npt.NDArray[Any]], units
         check_rows(ending, len(next(iter(columns.values()), ())))
     with replaced(path) as file:
         if ending in WRITERS:
-            WRITERS[ending](file, columns, units)
+            WRITERS[ending](file, columns, {name: unit_of(name, units) for name in columns})
         elif ending == ".npz":
             _write_npz(file, {header(name, units): values for name, values in columns.items()})
         else:

@@ -9,10 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._equation import COEFFICIENTS
+from tvident._equation import COEFFICIENTS, LINEAR_UNITS, UNITS
 from tvident._plan.information import Guess, best_powers, variances
 from tvident._plan.plan import PERIODS, ExperimentPlan
 from tvident._results import Identification
+from tvident._units import ROTARY, axis_of
 
 _GRID = 60
 """Frequencies at which power may be."""
@@ -25,6 +26,9 @@ _LEAST_SHARE = 0.01
 
 _LONGEST = 1e7
 """Seconds: a third of a year."""
+
+_SHOWN = ("angle", "torque", *COEFFICIENTS)
+"""Quantities of a plan that have units."""
 
 
 # All are options, as users call it.
@@ -41,6 +45,8 @@ def plan_experiment(
     torque_rms: float | None = None,
     resolution: float | None = None,
     sample_rate: float = 1000.0,
+    angle_unit: str | None = None,
+    torque_unit: str | None = None,
     result: Identification | None = None,
     more: float = 60.0,
 ) -> ExperimentPlan:
@@ -56,25 +62,28 @@ def plan_experiment(
     Parameters
     ----------
     inertia, damping, stiffness : float
-        A guess of the system, in kg m², N m s/rad and N m/rad.
+        A guess of the system, in kg m², N m s/rad and N m/rad; of an axis that slides in kg, N s/m and N/m.
     band : (float, float)
         The lowest and the highest frequency that can be excited, in Hz.
     torque_noise : float
-        Standard deviation of the torque's noise at each sample, N m.
+        Standard deviation of the torque's noise at each sample, in `torque_unit`.
     angle_noise : float, optional
-        The same of the angle, rad.
+        The same of the angle, in `angle_unit`.
     wanted : float, optional
         Relative standard error of the stiffness that is wanted.
     duration : float, optional
         Seconds. With a duration and without `torque_rms` the amplitude is planned. Less than ten periods of the lowest frequency are said
         in the summary: the bound is for many.
     torque_rms : float, optional
-        Root mean square of the torque, N m. Without a duration that is planned, ten periods of the lowest frequency at least.
+        Root mean square of the torque, in `torque_unit`. Without a duration that is planned, ten periods of the lowest frequency at least.
     resolution : float, optional
         The stiffness changes, and this is the time in seconds over which it may be averaged: the length of a regression window, or the
         record over the number of functions of an :class:`Expansion`. By default it is constant.
     sample_rate : float, optional
         Samples per second.
+    angle_unit, torque_unit : str, optional
+        Units of `angle_noise`, `torque_noise` and `torque_rms`, by default rad and N m. Those of a length or a force (``"mm"``, ``"N"``)
+        say that the axis slides. What is planned is in rad and N m, or in m and N: ``units`` says it.
     result : Identification, optional
         Of a recording at hand, instead of all of these but `wanted`.
     more : float, optional
@@ -89,8 +98,8 @@ def plan_experiment(
     Raises
     ------
     ValueError
-        If a number is missing or not positive, the band is none or beyond half the sample rate, or neither a duration nor a torque is
-        given.
+        If a number is missing or not positive, the band is none or beyond half the sample rate, neither a duration nor a torque is
+        given, or units are unknown or of different axes.
 
     Notes
     -----
@@ -125,7 +134,10 @@ def plan_experiment(
     numbers = {name: _needed(name, one) for name, one in given.items()}
     rate = arguments.positive_number("sample_rate", sample_rate)
     low, high = _band(band, rate)
-    noise = (arguments.finite_number("angle_noise", angle_noise, least=0), numbers["torque_noise"])
+    axis = axis_of(None, None, angle_unit=angle_unit, torque_unit=torque_unit)
+    units = UNITS if axis.system is ROTARY else LINEAR_UNITS
+    angle_error = arguments.finite_number("angle_noise", angle_noise, least=0)
+    noise = (angle_error * axis.angle, numbers["torque_noise"] * axis.torque)
     guess = Guess(np.array([numbers[name] for name in COEFFICIENTS]), noise)
     frequencies, share = _powers(guess, low, high)
     each = np.einsum("f,fij->ij", share, guess.information(frequencies))
@@ -133,13 +145,14 @@ def plan_experiment(
     if torque_rms is None:
         if duration is None:
             raise ValueError(
-                "a plan needs the torque or the time; got neither; give torque_rms= in N m, or duration= in s"
+                f"a plan needs the torque or the time; got neither; give torque_rms= in {torque_unit or units['torque']}, or "
+                "duration= in s"
             )
         seconds = arguments.positive_number("duration", duration)
         unit = math.sqrt(variances(each, seconds * rate, window)[2]) / numbers["stiffness"]
         rms = unit / wanted
     else:
-        rms = arguments.positive_number("torque_rms", torque_rms)
+        rms = arguments.positive_number("torque_rms", torque_rms) * axis.torque
         seconds = (
             max(_duration(each * rms**2, rate, window, wanted * numbers["stiffness"]), PERIODS / low)
             if duration is None
@@ -157,6 +170,7 @@ def plan_experiment(
         before={},
         wanted=wanted,
         reached=bool(errors[2] <= wanted * (1 + 1e-9)),
+        units={name: units[name] for name in _SHOWN},
     )
 
 
@@ -231,4 +245,5 @@ def _longer(result: Identification, wanted: float, more: float) -> ExperimentPla
         before=now,
         wanted=wanted,
         reached=bool(time_helps or then.get("stiffness", math.inf) <= wanted),
+        units={name: result.units[name] for name in _SHOWN},
     )

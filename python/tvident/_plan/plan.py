@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._files import aligned
+from tvident._units import in_words_of
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -30,7 +31,7 @@ class ExperimentPlan:
     duration : float
         Seconds.
     frequencies, amplitudes : ndarray, shape (f,)
-        Sines of the torque: Hz, and N m. Empty of a plan to go on with a recording.
+        Sines of the torque: Hz, and N m, or N of an axis that slides. Empty of a plan to go on with a recording.
     torque_rms, angle_rms : float
         Of the torque, and of the motion that it is expected to make; NaN of a plan to go on.
     errors : dict of str to float
@@ -41,6 +42,8 @@ class ExperimentPlan:
         The relative standard error of the stiffness that was asked for.
     reached : bool
         Whether it is expected.
+    units : dict of str to str
+        Units of angle, torque and parameters: those of an axis that turns, or of one that slides (m, N).
 
     See Also
     --------
@@ -70,6 +73,7 @@ class ExperimentPlan:
     before: Mapping[str, float]
     wanted: float
     reached: bool
+    units: Mapping[str, str]
 
     def excitation(self, *, sample_rate: float, seed: int = 0) -> Array:
         """Return the torque as samples: sines of random phase.
@@ -84,7 +88,7 @@ class ExperimentPlan:
         Returns
         -------
         ndarray of float64, shape (duration times sample_rate,)
-            N m.
+            In N m, or N of an axis that slides.
         """
         rate = arguments.positive_number("sample_rate", sample_rate)
         time = np.arange(round(self.duration * rate)) / rate
@@ -114,7 +118,8 @@ class ExperimentPlan:
             lines = [f"{name} cannot be reached by recording longer: {cure}"]
         if self.frequencies.size:
             lines.append(
-                f"torque of {self.torque_rms:.3g} N m rms, which moves the angle by about {self.angle_rms:.3g} rad rms:"
+                f"torque of {self.torque_rms:.3g} {self.units['torque']} rms, which moves the angle by about "
+                f"{self.angle_rms:.3g} {self.units['angle']} rms:"
             )
             if periods < PERIODS * (1 - _ROUNDING):
                 lines.append(
@@ -122,13 +127,13 @@ class ExperimentPlan:
                     f"which holds for {PERIODS} or more; record longer, or begin with a higher frequency"
                 )
             each = zip(self.frequencies, self.amplitudes, strict=True)
-            lines += aligned([("Hz", "N m"), *((f"{one:.4g}", f"{other:.3g}") for one, other in each)])
+            lines += aligned([("Hz", self.units["torque"]), *((f"{one:.4g}", f"{other:.3g}") for one, other in each)])
         heads = ("parameter", *(["now"] if self.before else []), "expected error")
         rows = [
             (one, *([f"{100 * self.before[one]:.3g} %"] if self.before else []), f"{100 * error:.3g} %")
             for one, error in self.errors.items()
         ]
-        return "\n".join([*lines, "", *aligned([heads, *rows])])
+        return in_words_of(self.units, "\n".join([*lines, "", *aligned([heads, *rows])]))
 
     def _of_more(self) -> str:
         """Return what more of a recording at hand is worth for the stiffness."""

@@ -229,6 +229,8 @@ class _Drawn:
         }
         for name, values in self.shown.quality.items():
             numbers = np.asarray(values)
+            if name == "condition":
+                numbers = np.where(numbers == 0, np.nan, numbers)  # where windows have no equations
             if np.isfinite(numbers).any() and np.nanmin(numbers) < np.nanmax(numbers):
                 unit = unit_of(name, self.result.units)
                 self._draw("How well", words[name], unit, line=self._add(name, unit, numbers), robust=name != "order")
@@ -333,7 +335,7 @@ def _warnings(result: Reported, marks: Mapping[Status, npt.NDArray[np.bool_]]) -
         longest = np.sort(np.argsort(first - end, kind="stable")[:_STRETCHES])
         times = [[float(result.time[first[one]]), float(result.time[end[one] - 1])] for one in longest]
         share = float(mark.mean())
-        where = f"{share:.1%} of the samples" if share >= _FEW else f"{int(mark.sum())} samples"
+        where = f"{100 * share:.1f} % of the samples" if share >= _FEW else f"{int(mark.sum())} samples"
         warnings.append(
             {"flag": flag.name, "words": flag.advice, "where": where, "times": times, "more": first.size - longest.size}
         )

@@ -2,7 +2,8 @@
 
 A page that shows an hour has some 1000 columns, so it begins with the blocks' extremes and needs samples only after zooming in. Levels
 within a block rather than levels of the whole series: beside a spike of a thousand times the signal 65 536 levels of the whole would show
-the signal as steps, and with blocks seven bits a sample are finer than a screen, which an hour of five channels has room for.
+the signal as steps. Levels have 16 bits, or as many as there is room for: an hour of five channels that are noise has room for 7, which is
+as fine as a screen.
 """
 
 from __future__ import annotations
@@ -23,11 +24,11 @@ Array: TypeAlias = npt.NDArray[np.float64]
 BLOCK = 128
 """Samples: fewer make extremes cost more than levels, more make levels coarse where the series changes."""
 
-_FINE, _COARSE = 65534, 126
-"""Highest level of two bytes and of seven bits; the next one says that there is no sample."""
+_MOST_BITS, _LEAST_BITS = 16, 7
+"""Of a level, of which the last two say that a sample is the greatest, and that there is none."""
 
-_FINE_VALUES = 6_000_000
-"""So many samples of all series may take two bytes each: 16 MB in a page if nothing compresses."""
+_ONE_BYTE = 254
+"""The highest level that leaves one for samples that are missing, in a byte."""
 
 _MOST_BYTES = 16_950_000
 """Of all series, packed. As text that is 22.6 MB, which leaves room for plotly in 25 MB."""
@@ -89,10 +90,8 @@ class Packed:
 
 def packed(series: Sequence[Series], most_bytes: int = _MOST_BYTES) -> list[Packed]:
     """Return series packed: where samples do not fit, the finest level is of their extremes."""
-    top = _FINE if sum(one.values.size for one in series) <= _FINE_VALUES else _COARSE
     reduced = list(series)
-    bits = [_bits(one, top) for one in series]
-    sizes = [one.values.size * (cost / 8 + 8 / BLOCK) for one, cost in zip(reduced, bits, strict=True)]
+    top, sizes = _finest(series, most_bytes)
     merged = [1] * len(sizes)
     while sum(sizes) > most_bytes:
         largest = int(
@@ -108,6 +107,44 @@ def packed(series: Sequence[Series], most_bytes: int = _MOST_BYTES) -> list[Pack
     # Nearly all of the work is NumPy's and zlib's, which let other threads run.
     with ThreadPoolExecutor(min(_MOST_THREADS, os.cpu_count() or 1)) as pool:
         return list(pool.map(work, reduced, merged))
+
+
+def in_words(parts: Sequence[Packed]) -> str:
+    """Return what a page says of how near its plots are to the samples; nothing of a page without plots."""
+    if not parts:
+        return ""
+    levels = f"one of {parts[0].about['top'] + 1:,} levels between the extremes of {BLOCK} neighbours".replace(",", " ")
+    of_extremes = [one.about["name"] for one in parts if one.about["merged"] > 1]
+    if not of_extremes:
+        return f"Every sample is in this page, as {levels}."
+    return (
+        "The record is too long for every sample to be in this page: "
+        f"of {len(of_extremes)} of {len(parts)} series it has the least and the greatest of every few, each as {levels}."
+    )
+
+
+def _finest(series: Sequence[Series], most_bytes: int) -> tuple[int, list[float]]:
+    """Return the highest level of the most bits that fit, and how many bytes each series takes with them."""
+    found = _sizes(series, _highest(_LEAST_BITS))
+    if sum(found) > most_bytes:
+        return _highest(_LEAST_BITS), found
+    fit, too_many = _LEAST_BITS, _MOST_BITS + 1
+    while too_many - fit > 1:
+        bits = (fit + too_many) // 2
+        sizes = _sizes(series, _highest(bits))
+        if sum(sizes) <= most_bytes:
+            fit, found = bits, sizes
+        else:
+            too_many = bits
+    return _highest(fit), found
+
+
+def _highest(bits: int) -> int:
+    return (1 << bits) - 2
+
+
+def _sizes(series: Sequence[Series], top: int) -> list[float]:
+    return [one.values.size * (_bits(one, top) / 8 + 8 / BLOCK) for one in series]
 
 
 def _of_extremes(series: Series, every: int) -> Series:
@@ -143,7 +180,7 @@ def _levels(rows: Array, low: Array, high: Array, top: int) -> npt.NDArray[Any]:
 
 
 def _kind(top: int) -> type[np.unsignedinteger[Any]]:
-    return np.uint16 if top == _FINE else np.uint8
+    return np.uint16 if top > _ONE_BYTE else np.uint8
 
 
 def _differences(levels: npt.NDArray[Any]) -> npt.NDArray[Any]:

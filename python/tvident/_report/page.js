@@ -87,7 +87,7 @@
       this.div.className = "plot";
       this.div.setAttribute("role", "img");
       this.div.setAttribute("aria-label", `${about.title} over time`);
-      if (this.strips.length) this.div.style.height = `${62 + 26 * this.strips.length}px`;
+      if (this.strips.length) this.div.style.height = `${66 + 26 * this.strips.length}px`;
       card.append(head, this.div);
       place.append(card);
     }
@@ -179,14 +179,16 @@
       const names = this.strips.map((one) => one.flag.replaceAll("_", " ").toLowerCase());
       const ofStrips = { range: [names.length - 0.4, -0.6], tickvals: names.map((_, row) => row), ticktext: names, showgrid: false };
       const ofLine = { range: line.length ? yRange(line, this.isRobust) : [0, 1], nticks: 5, gridcolor: grid, exponentformat: "power" };
+      // Marks that are not seen keep the two axes' words apart where they meet.
+      const apart = { ticks: "outside", tickcolor: "rgba(0,0,0,0)" };
       return {
-        margin: { l: this.strips.length ? 118 : 64, r: 18, t: 10, b: 30 },
+        margin: { l: this.strips.length ? 118 : 64, r: 18, t: 10, b: 34 },
         paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
         font: { color: ink, size: 12, family: getComputedStyle(document.body).fontFamily },
         showlegend: false, hovermode: "x", dragmode: isTouch ? false : "zoom", shapes,
         hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { color: colour("ink") } },
-        xaxis: { range: [shown.from, shown.to], ticksuffix: " s", gridcolor: grid, zeroline: false, exponentformat: "none", separatethousands: false, hoverformat: ".6f", nticks: Math.max(3, Math.round(this.div.clientWidth / 120)) },
-        yaxis: { fixedrange: true, zeroline: false, automargin: false, ...(this.strips.length ? ofStrips : ofLine) },
+        xaxis: { ...apart, ticklen: 9, range: [shown.from, shown.to], ticksuffix: " s", gridcolor: grid, zeroline: false, exponentformat: "none", separatethousands: false, hoverformat: ".6f", nticks: Math.max(3, Math.round(this.div.clientWidth / 120)) },
+        yaxis: { ...apart, ticklen: 4, fixedrange: true, zeroline: false, automargin: false, ...(this.strips.length ? ofStrips : ofLine) },
       };
     }
 
@@ -287,7 +289,7 @@
     }
     byId("repeat").textContent = content.repeat;
     byId("repeat").closest("details").hidden = !content.repeat;
-    byId("foot").textContent = `Written by tvident ${content.version}. This page needs no network and loads nothing.`;
+    byId("foot").textContent = `${content.detail} Written by tvident ${content.version}. This page needs no network and loads nothing.`.trim();
     if (isTouch) byId("how").textContent = "Look closer with the buttons, or give the times. All plots show the same time.";
   }
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from tvident._files import printable, replaced
 from tvident._report.content import Shown, content_of
-from tvident._report.packed import Packed, Series, packed, text_of
+from tvident._report.packed import Packed, Series, in_words, packed, text_of
 
 _LONGEST_TITLE = 200
 
@@ -53,6 +53,7 @@ def write_report(path: str | Path, shown: Shown, recorded: list[Series], title: 
 def _pieces(content: dict[str, Any], parts: list[Packed], plotly: str) -> list[str]:
     """Return the page in pieces: what is seen first comes first."""
     content["series"] = [part.about for part in parts]
+    content["detail"] = in_words(parts)
     # A name may end the script that holds it.
     plain = json.dumps(content, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
     folder = files("tvident._report")

@@ -75,7 +75,7 @@ def _settings(s: Mapping[str, Any], units: Mapping[str, str]) -> list[Row]:
         *((_report.title_of(name), str(kind)) for name, kind in s["kinds"].items()),
         (
             in_words_of(units, "Delay of the torque"),
-            f"{s['lag']} s" if isinstance(s["lag"], int | float) else str(s["lag"]),
+            f"{s['lag']:.6g} s" if isinstance(s["lag"], int | float) else str(s["lag"]),
         ),
     ]
     if s["step"] != 1:

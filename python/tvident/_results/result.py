@@ -400,8 +400,9 @@ class Identification(Simulated, Telling, Valued):
         """Write a report: one page that opens in a browser without a network.
 
         It begins with the verdict, the parameters, what to do and the warnings with their times, and shows the recording and every
-        result over time in plots that can be zoomed down to the sample. Up to 6 million numbers have 16 bits each between the extremes
-        of their 128 neighbours, more have 7; the extremes themselves have 24, so a single sample that stands out is seen at every zoom.
+        result over time in plots that can be zoomed down to the sample. Samples have 16 bits each between the extremes of their
+        128 neighbours, or as many as 25 MB have room for, at least 7: the page says how many levels these are. The extremes themselves have
+        24 bits, so a single sample that stands out is seen at every zoom.
         Takes about 0.1 s for a million numbers, and as long as :meth:`summary` if that was not asked for before.
 
         Parameters

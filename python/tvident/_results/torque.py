@@ -99,7 +99,9 @@ def _where_known(values: npt.NDArray[np.number], averaged: Callable[[Array], Arr
 def touched_by(missing: npt.NDArray[np.bool_], half: int) -> npt.NDArray[np.bool_]:
     """Return around which samples a window does not fit, or touches a sample that is missing."""
     touched = np.ones(missing.size, bool)
-    if missing.size > 2 * half:
+    if not missing.any():
+        touched[half : missing.size - half] = False
+    elif missing.size > 2 * half:
         count = np.concatenate([[0], np.cumsum(missing)])
         touched[half : missing.size - half] = count[2 * half + 1 :] - count[: -2 * half - 1] > 0
     return touched

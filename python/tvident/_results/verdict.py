@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from tvident._arguments import explained_in_words, percent, to_digits_of
-from tvident._results.words import TRIED
+from tvident._results.words import OTHER_UNIT, TRIED
 from tvident._status import Status
 from tvident._units import in_words_of
 
@@ -73,10 +74,11 @@ def _verdict(result: Any) -> str:
 
 
 def _of_one(result: Any) -> str:
-    reason = distrust(result)
+    share = cache(lambda: explained(result))  # a prediction of the whole record
+    reason = _distrusted(result, share)
     if reason:
         return disbelieved(result, reason)
-    return believed(result, _errors(result), explained(result))
+    return believed(result, _errors(result), share())
 
 
 def disbelieved(result: Any, reason: str) -> str:
@@ -93,6 +95,8 @@ def believed(result: Any, known: str, share: float | None) -> str:
     is_doubtful = result.record_status & _DOUBTS and result.advice
     if is_doubtful or any(TRIED in line for line in result.advice):
         return f"{words}; errors hold if the model does: see what to do"
+    if any(asked in line for asked in OTHER_UNIT for line in result.advice):
+        return f"{words}; all in other units if a channel is: see what to do"
     return words
 
 
@@ -114,11 +118,12 @@ def share_of(recorded: Any, predicted: Any) -> float | None:
 
 def distrust(result: Any) -> str | None:
     """Return why numbers of a record are not to be trusted, in words; None where nothing says so."""
-    return why_not(
-        result,
-        lambda: next(filter(None, (_sign(result, name) for name in ("inertia", "damping", "stiffness"))), None),
-        lambda: explained(result),
-    )
+    return _distrusted(result, lambda: explained(result))
+
+
+def _distrusted(result: Any, share: Callable[[], float | None]) -> str | None:
+    signs = (_sign(result, name) for name in ("inertia", "damping", "stiffness"))
+    return why_not(result, lambda: next(filter(None, signs), None), share)
 
 
 def why_not(result: Any, sign: Callable[[], str | None], share: Callable[[], float | None]) -> str | None:

@@ -8,6 +8,9 @@ from dataclasses import dataclass
 TRIED = "of what is held back are predicted"
 """What advice says that was tried on the record."""
 
+OTHER_UNIT = ("degrees?", "milliseconds?")
+"""How advice asks about units, of which all numbers depend."""
+
 
 @dataclass(frozen=True)
 class Words:

@@ -15,8 +15,9 @@ def describe(status: npt.NDArray[Any], record_status: npt.ArrayLike = 0) -> list
     if not status.size:
         return ["no samples"]
     lines = [f"{float(np.mean(status == 0)):6.1%}  good"]
-    shares = {flag: float(np.mean(status & flag != 0)) for flag in Status}
-    lines += [f"{share:6.1%}  {flag.name}: {flag.advice}" for flag, share in shares.items() if share > 0]
+    there = int(np.bitwise_or.reduce(status, axis=None))
+    shares = {flag: float(np.mean(status & flag != 0)) for flag in Status if there & flag}
+    lines += [f"{share:6.1%}  {flag.name}: {flag.advice}" for flag, share in shares.items()]
     records = np.atleast_1d(np.asarray(record_status))
     counts = {flag: int(np.count_nonzero(records & flag)) for flag in Status}
     for flag, count in counts.items():

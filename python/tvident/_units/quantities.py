@@ -50,12 +50,34 @@ _EXAMPLES = {
 
 
 def system_of(angle: str | None, torque: str | None) -> System:
-    """Return the system that the units of an angle and a torque belong to: linear where either says so, rotary otherwise."""
-    for text, quantity in ((angle, "angle"), (torque, "torque")):
-        unit = None if not text else unit_of(text)
-        if unit is not None and unit.dimension == LINEAR.dimensions[quantity]:
-            return LINEAR
-    return ROTARY
+    """Return the system that the units of an angle and a torque belong to: linear where either says so, rotary otherwise.
+
+    Raises
+    ------
+    UnitError
+        If one belongs to an axis that turns and the other to one that slides.
+    """
+    said = {_system(text, quantity) for text, quantity in ((angle, "angle"), (torque, "torque"))}
+    if said >= {ROTARY.name, LINEAR.name}:
+        cure = (
+            "give torque_unit='N', say, if the axis slides and this is a force, or angle_unit='deg' if it turns"
+            if _system(angle, "angle") == LINEAR.name
+            else "give torque_unit='N m', say, if the axis turns, or angle_unit='mm' if it slides and this is a position"
+        )
+        raise UnitError(
+            "angle and torque must be those of one axis, an angle beside a torque or a position beside a force; got "
+            f"{angle!r} and {torque!r}; {cure}; if one is scaled by a lever, multiply it by a factor of your own"
+        )
+    return LINEAR if LINEAR.name in said else ROTARY
+
+
+def _system(text: str | None, quantity: str) -> str:
+    """Return the name of the system whose quantity has this unit; nothing where it has none, or belongs to neither."""
+    unit = None if not text else unit_of(text)
+    found = (
+        one.name for one in (ROTARY, LINEAR) if unit is not None and not math.isnan(_in(unit, one.dimensions[quantity]))
+    )
+    return next(found, "")
 
 
 def factor_to(system: System, quantity: str, text: str | None, *, name: str) -> float:
