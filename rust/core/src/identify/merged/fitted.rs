@@ -16,7 +16,7 @@ use crate::regression::model::Model;
 use crate::regression::problem::Correlated;
 use crate::regression::residuals::residuals;
 use crate::regression::row_covariance::RowCovariance;
-use crate::regression::subsample::{holds, stretches_of_rows, thinned_rows};
+use crate::regression::subsample::{holds, stretches_of_times, thinned_rows};
 use crate::regression::window_length::Scale;
 
 /// So many of the longest windows that stretches of a long record hold are tried again on all of it, where one of them is best.
@@ -128,7 +128,7 @@ impl MergedSession<'_, '_, '_> {
             let problem = model.problem(rows, &rows.rhs, 1.0, Some(&correlated));
             validate(&problem, scales, expected, instructions, stages)
         };
-        let Some(stretches) = stretches_of_rows(rows.len()).filter(|_| scales.len() > 1) else {
+        let Some(stretches) = stretches_of_times(rows.len(), self.all.group).filter(|_| scales.len() > 1) else {
             return validated(rows, scales);
         };
         let short = scales.partition_point(|scale| holds(*scale));
