@@ -144,6 +144,16 @@ def test_errors_know_that_every_equation_has_another_noise(masses: int, angle_no
     assert 0.92 < np.mean(inside) < 0.98
 
 
+@pytest.mark.parametrize("seed", [700, *long(702)])
+def test_a_change_is_found_that_makes_all_constants_fail(seed: int) -> None:
+    # Constants leave 145 times what noise explains, and no part of the record differs from the others by more than that.
+    simulated = chain([lambda t: 10 + t / 3, constant(18.0), constant(16.0)], 12000, seed=seed, angle_noise=1e-2)
+    found = identify(simulated.angle, simulated.torque, structure=tvident.Chain(3, springs(3)), **OPTIONS)
+    assert [name for name, kind in found.kinds.items() if kind == "windowed"] == ["stiffness_base_0"]
+    assert rms(found.elements["stiffness_base_0"], simulated.stiffness[0]) < 0.01
+    assert not found.record_status & tvident.Status.NOISE_MODEL
+
+
 @pytest.mark.parametrize("changes", [True, False])
 def test_masses_respond_as_they_were_simulated(changes: bool) -> None:
     spring = changing if changes else constant(12.0)

@@ -23,6 +23,8 @@ use crate::regression::window_length::Scale;
 const OVERLAP: usize = 2;
 /// What was constant is windowed from here on only if rows are predicted at least so much better.
 const BETTER: f64 = 0.98;
+/// What no test shows to change is windowed only if rows are predicted so much better: it is what the equations lack.
+const LACKING: f64 = 0.5;
 
 /// Rounds of looking for jumps and fitting again with windows that end there.
 const JUMP_ROUNDS: usize = 4;
@@ -176,6 +178,11 @@ impl MergedSession<'_, '_, '_> {
             let mut differs: Vec<&(usize, Test)> =
                 found.iter().filter(|(_, test)| test.probability < constancy::NO_CHANCE).collect();
             fitted.contradicted = !differs.is_empty();
+            // What constants leave may be so much that no part of the record differs by more, though one of them changes.
+            let hidden = differs.is_empty() && fitted.error > NOISE_MODEL_FAILS;
+            if hidden {
+                differs = found.iter().collect();
+            }
             differs.retain(|(one, _)| tested(*one));
             differs.sort_by(|a, b| b.1.excess().total_cmp(&a.1.excess()));
             // What changes makes its neighbours seem to change, too: the one that explains most is set free.
@@ -191,7 +198,9 @@ impl MergedSession<'_, '_, '_> {
                     best = Some((found, self.parameters.clone()));
                 }
             }
-            let better = |found: &MergedFit| fitted.model.windowed.is_empty() || found.error < BETTER * fitted.error;
+            let most = if hidden { LACKING } else { BETTER };
+            let free = fitted.model.windowed.is_empty() && !hidden;
+            let better = |found: &MergedFit| free || found.error < most * fitted.error;
             let Some((found, parameters)) = best.filter(|(found, _)| better(found)) else {
                 self.parameters = before;
                 self.fill();
