@@ -1,4 +1,4 @@
-"""Which elements only noise tells from each other, where equations hardly determine them: as much noise as motion in a combination.
+"""Which elements only noise tells from each other: there is as much noise as motion in a combination of them.
 
 A motion at one frequency makes the regressors of inertia and stiffness proportional; two masses that move at two frequencies do the same
 for whole matrices. Combinations of columns of which half or more is what noise of the known variance leaves are lost, and with them
@@ -24,6 +24,9 @@ _MOSTLY_NOISE = 0.5
 
 _PART = 0.001
 """Of an element's square in combinations that are lost, from which on it is: 3 % of their error is its own."""
+
+_MOST = 0.5
+"""The part of windows from which on those by themselves do not tell an element."""
 
 _OVERLAP = 6
 """Rows within the half-width of a test function."""
@@ -70,7 +73,7 @@ def undetermined(part: Part, period: float) -> dict[str, str]:
     within = f" within windows of {length} samples" if windowed else ""
     reasons = {}
     for place, name in enumerate(names):
-        own = place < len(windowed) and found.alone[place, place] > _PART
+        own = place < len(windowed) and found.alone[place, place] > _MOST
         if not own and shared[place, place] <= _PART:
             continue
         with_others = np.abs(shared[place])

@@ -243,8 +243,7 @@ class MergedIdentification(Reported):
         lost = {name for part in merging.parts for name in part.names if np.isinf(part.found.condition)}
         noisy: dict[str, str] = {}
         for part in merging.parts:
-            if _hardly(part):
-                noisy |= undetermined(part, merging.sampling.period)
+            noisy |= undetermined(part, merging.sampling.period)
         for element in merging.elements:
             name = element.name
             if name in merging.unknowable:
@@ -421,9 +420,3 @@ class MergedIdentification(Reported):
     def __repr__(self) -> str:
         what = whose(self._merging.trials, max(self._merging.masses, 1))
         return f"MergedIdentification({what}, {self.time.size} samples, {len(self.elements)} elements)"
-
-
-def _hardly(part: Part) -> bool:
-    """Whether equations hardly determine what they were solved for: the constants, or most windows."""
-    windows = part.found.status & int(Status.ILL_CONDITIONED) > 0
-    return bool(part.found.record_status & Status.ILL_CONDITIONED or (windows.size and 2 * np.mean(windows) > 1))
