@@ -69,6 +69,14 @@ def test_friction(tmp_path: Path) -> None:
         assert abs(value - truth) < 4 * error + 1e-4
 
 
+def test_reflex(tmp_path: Path) -> None:
+    printed = run("reflex.py", tmp_path)
+    for name in ("inertia", "damping", "stiffness", "reflex", "reflex.delay", "reflex.corner"):
+        value, error, truth = numbers(printed, rf"{name} +(\S+) ± (\S+) +\(truth (\S+)\)")
+        # The delay was 3 ms off, 32 standard errors, while a corner that is wrong made up for it.
+        assert abs(value - truth) < 4 * error + 1e-4, name
+
+
 def test_own_file(tmp_path: Path) -> None:
     printed = run("own_file.py", tmp_path)
     # 19 samples are missing, and so are equations whose test function, at most a sixteenth of the record, holds one of them.

@@ -13,7 +13,7 @@ import pytest
 import tvident
 from merged.simulated import chain, simulated
 from merged.test_masses import OPTIONS, changing, constant, rms, springs
-from tvident._identify.together import _ALONE, Options
+from tvident._identify.together import _ALONE, _CURES, Options
 
 identify: Any = tvident.identify
 """Its type is that of a single record."""
@@ -93,6 +93,25 @@ def test_no_option_is_passed_over() -> None:
     known = {one.name for one in fields(Options)} | set(_ALONE)
     known |= {"sample_rate", "delta", "t", "angle_unit", "torque_unit", "time_unit", "inertia", "damping", "stiffness"}
     assert given <= known
+    assert set(_CURES) == set(_ALONE)
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        ({"weights": np.ones(SAMPLES)}, r"weights= is not supported .* got .*; leave out by mask="),
+        ({"lag": 0.004}, r"lag= is not supported .* got 0.004; shift the torque"),
+        ({"period": 2 * np.pi}, r"period= is not supported .* got 6.28.*; unwrap the angle"),
+        ({"loss": "huber"}, r"loss= is not supported .* got 'huber'; leave out by mask="),
+        ({"settings": {"form": "weak"}}, r"settings= is not supported .* got .*; pass method=WeakForm\(window_length"),
+        ({"velocity": np.ones((2, SAMPLES))}, r"velocity= is not supported .*; leave it out: the angle alone"),
+        ({"nan_policy": "propagate"}, r"nan_policy= is not supported .* got 'propagate'; use 'omit'"),
+    ],
+)
+def test_a_refusal_says_what_to_do_without(channels: Any, option: dict[str, Any], words: str) -> None:
+    angle, torque = channels[False, True]
+    with pytest.raises(ValueError, match=words):
+        identify(angle, torque, **OPTIONS, **option)
 
 
 def test_trials_of_masses_know_more_than_one() -> None:

@@ -184,3 +184,18 @@ def test_an_entry_is_tied_once() -> None:
         tvident.Matrix(tied=[[(0, 0), (1, 1)], [(1, 1), (0, 1)]])
     with pytest.raises(ValueError, match="tied once"):
         tvident.Matrix("symmetric", tied=[[(0, 0), (0, 1)], [(1, 0), (1, 1)]])
+
+
+@pytest.mark.parametrize("entry", [(0, 1), (1, 0)])
+@pytest.mark.parametrize("value", ["windowed", -18.0])
+def test_an_entry_of_a_symmetric_matrix_is_its_mirror_image(entry: tuple[int, int], value: Any) -> None:
+    found = tvident.Matrix("symmetric", "constant", entries={entry: value}).elements("stiffness", 2)
+    assert [one.name for one in found] == ["stiffness_0_0", "stiffness_0_1", "stiffness_1_1"]
+    assert found[1].value == value
+    assert found[1].entries == ((0, 2, 1, 1.0), (1, 2, 0, 1.0))
+    both = tvident.Matrix("symmetric", "constant", entries={(0, 1): value, (1, 0): value}).elements("stiffness", 2)
+    assert both == found
+    with pytest.raises(ValueError, match=r"must be what its mirror image is; got .*; give one of them"):
+        tvident.Matrix("symmetric", entries={entry: "constant", entry[::-1]: value})
+    # Of a full matrix they are two.
+    assert len(tvident.Matrix("full", entries={entry: value}).elements("stiffness", 2)) == 4

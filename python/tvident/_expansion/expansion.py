@@ -38,7 +38,7 @@ class Expansion:
     family : str, callable, or a pair of them
         ``"bspline"``, ``"chebyshev"`` (first kind), ``"chebyshev2"`` (second), ``"legendre"``, ``"powers"`` (computed with
         Legendre polynomials, which keep their digits), ``"fourier"`` (size 1, 3, 5…: a constant, then cosine and sine of every
-        harmonic of the range), ``"laguerre"``, ``"block_pulse"``, ``"haar"`` (size 1, 2, 4…), Daubechies' ``"db2"`` to ``"db5"`` (of
+        harmonic), ``"laguerre"``, ``"block_pulse"``, ``"haar"`` (size 1, 2, 4…), Daubechies' ``"db2"`` to ``"db5"`` (of
         so many vanishing moments); or a function ``f(x, size)`` of values of the channel, shape (m,), which returns shape (m, size). A pair
         belongs to the two channels of `of`.
     size : "auto", int, or a pair of them
@@ -49,7 +49,8 @@ class Expansion:
         the functions of each. Its noise counts as part of the curve. Equations that touch a missing value are left out.
     limits : (float, float), or a pair of them, optional
         The range of the channel that functions live on, in its unit; by default from its smallest value to its largest. For
-        ``"fourier"`` it is the period.
+        ``"fourier"`` limits that are given are a period: one turn of an angle. By default the period is half as long again as the
+        range, so that the curve need not end as it begins.
     degree : int, optional
         Of B-splines, 1 to 5.
     inertia_times : {"acceleration", "momentum"}, optional
@@ -199,7 +200,7 @@ class Expansion:
     def _family(self, one: Any, limits: tuple[float, float]) -> Family:
         if callable(one):
             return Family(partial(_own_values, one, limits), every)
-        return family_of(arguments.one_of("family", one, _NAMES), self.degree)
+        return family_of(arguments.one_of("family", one, _NAMES), self.degree, is_period=self.limits is not None)
 
 
 _STEP = 1e-3

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeAlias
 
@@ -23,6 +23,9 @@ Values: TypeAlias = Callable[[Array, int, int], Array]
 
 LAGUERRE_LENGTH = 5.0
 """The interval in units of the argument of Laguerre functions, whose first has faded to a twelfth at its end."""
+
+OPEN_PERIOD = 1.5
+"""Period of harmonics over the interval where the curve need not end as it begins: longer ones are harder to tell from each other."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +104,11 @@ def _fourier(places: Array, size: int, derivative: int) -> Array:
     return np.asarray(values)
 
 
+def _open_fourier(places: Array, size: int, derivative: int) -> Array:
+    """Return the same with a period that is longer than the interval, so that nothing is said of what joins its ends."""
+    return np.asarray(_fourier(places / OPEN_PERIOD, size, derivative) / OPEN_PERIOD**derivative)
+
+
 def _block_pulse(places: Array, size: int, derivative: int) -> Array:
     if derivative:
         raise ValueError("block pulses have no derivatives")
@@ -129,8 +137,10 @@ FAMILIES: dict[str, Family] = {
 """By name; B-splines depend on a degree: :func:`family_of`."""
 
 
-def family_of(name: str, degree: int) -> Family:
-    """Return a family by its name, B-splines of a degree."""
+def family_of(name: str, degree: int, *, is_period: bool = True) -> Family:
+    """Return a family by its name, B-splines of a degree, harmonics of the interval if it is a period."""
     if name == "bspline":
         return Family(partial(spline_values, degree), every, smooth=degree - 1)
+    if name == "fourier" and not is_period:
+        return replace(FAMILIES[name], values=_open_fourier)
     return FAMILIES[name]

@@ -20,8 +20,8 @@ from tvident._results import Estimates
 Array: TypeAlias = npt.NDArray[np.float64]
 Inner: TypeAlias = Mapping[str, Array]
 
-_ROUNDS = 4
-"""Of Newton's method at most, after golden sections."""
+_ROUNDS = 16
+"""Of Newton's method at most, after golden sections: enough to cross the range, where one inner parameter makes up for another."""
 
 _SETTLED = 0.05
 """Of its standard error, by which the last round may still move an inner parameter."""

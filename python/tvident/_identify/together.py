@@ -44,6 +44,22 @@ _ALONE: dict[str, tuple[Any, ...]] = {
 }
 """Options that merged rows do not know yet, and what they may be."""
 
+_CURES = {
+    "velocity": "leave it out: the angle alone tells the motion",
+    "acceleration": "leave it out: the angle alone tells the motion",
+    "instrument": "identify one trial of one mass with it",
+    "weights": "leave out by mask= what is not to count",
+    "lag": "shift the torque by it before, with np.interp, or find it in one trial of one mass",
+    "quantisation": "leave it out: the noise of the channels is estimated, that of rounding with it",
+    "period": "unwrap the angle before, with np.unwrap(angle, period=…)",
+    "settings": "pass method=WeakForm(window_length=…, exponent=…) with those of settings, and kinds by name",
+    "loss": "leave out by mask= what holds spikes",
+    "share": "leave it out: what is merged shares all of its parameters",
+    "align": "shift the torque by it before, with np.interp",
+    "nan_policy": "use 'omit', and look at the flag GAP",
+}
+"""What to do without them."""
+
 
 @dataclass(frozen=True)
 class Options:
@@ -228,7 +244,7 @@ def _check(angle: Any, options: Options) -> None:
         value = options.alone[name]
         if not any(value is one or (isinstance(value, int | float | str | tuple) and value == one) for one in allowed):
             raise ValueError(
-                f"{name}= is not supported beside ensemble_axis= and dof_axis= yet; got {arguments.shown(value)}; leave it out"
+                f"{name}= is not supported beside ensemble_axis= and dof_axis= yet; got {arguments.shown(value)}; {_CURES[name]}"
             )
     if options.structure is not None and options.dof_axis is None:
         raise ValueError(

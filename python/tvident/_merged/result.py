@@ -14,6 +14,7 @@ import numpy.typing as npt
 from tvident._equation import COEFFICIENTS
 from tvident._files import RESULT_ENDINGS, write_settings, write_table
 from tvident._merged import modal
+from tvident._merged.determined import undetermined
 from tvident._merged.elements import matrix_of
 from tvident._merged.held_back import HeldBackTorque
 from tvident._merged.heterogeneity import differences_of, excess
@@ -239,18 +240,23 @@ class MergedIdentification(Reported):
     def _identifiable(self) -> dict[str, Identifiable]:
         """Return what can be known: of what was asked beforehand, and of what the equations determined."""
         merging, found = self._merging, {}
-        undetermined = {name for part in merging.parts for name in part.names if np.isinf(part.found.condition)}
+        lost = {name for part in merging.parts for name in part.names if np.isinf(part.found.condition)}
+        noisy: dict[str, str] = {}
+        for part in merging.parts:
+            noisy |= undetermined(part, merging.sampling.period)
         for element in merging.elements:
             name = element.name
             if name in merging.unknowable:
                 found[name] = Identifiable(identifiable=False, reason=merging.unknowable[name])
             elif element.is_known:
                 found[name] = Identifiable(identifiable=True, reason="it is known")
-            elif name in undetermined:
+            elif name in lost:
                 found[name] = Identifiable(
                     identifiable=False,
                     reason="the equations do not determine it: its regressors are a combination of others",
                 )
+            elif name in noisy:
+                found[name] = Identifiable(identifiable=False, reason=noisy[name])
             else:
                 found[name] = Identifiable(identifiable=True, reason=self._why(name))
         return found

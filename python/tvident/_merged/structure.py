@@ -132,14 +132,14 @@ class Matrix:
     kind : str or float
         Of every entry that `entries` does not name.
     entries : mapping of (int, int) to str or float, optional
-        Kinds or known values of some entries.
+        Kinds or known values of some entries; of a symmetric matrix one stands for its mirror image, too.
     tied : sequence of sequence of (int, int), optional
         Entries that are one unknown.
 
     Raises
     ------
     ValueError
-        If a word is unknown, or an entry is tied twice.
+        If a word is unknown, an entry is tied twice, or one of a symmetric matrix is something else than its mirror image.
 
     See Also
     --------
@@ -172,6 +172,12 @@ class Matrix:
         if len(each) != len(set(each)):
             raise ValueError(f"an entry must be tied once; got tied={self.tied}; merge the groups that share an entry")
         object.__setattr__(self, "tied", tuple(groups))
+        for entry, value in self.entries.items():
+            if self.entries.get(self._one_of(entry), value) != value:
+                raise ValueError(
+                    f"an entry of a symmetric matrix must be what its mirror image is; got {arguments.shown(value)} for {entry} and "
+                    f"{arguments.shown(self.entries[self._one_of(entry)])} for {self._one_of(entry)}; give one of them, or shape='full'"
+                )
 
     def elements(self, of: str, masses: int) -> list[Element]:
         """Return the elements of the matrix.
@@ -193,8 +199,7 @@ class Matrix:
             if self.shape == "diagonal" and row != column and (row, column) not in self.entries:
                 continue
             mirrored = self._one_of((row, column))
-            own = (row, column) in self.entries and mirrored not in self.entries
-            first = leader.get(mirrored, (row, column) if own else mirrored)
+            first = leader.get(mirrored, mirrored)
             groups.setdefault(first, []).append((row, column))
         found = []
         for first, members in groups.items():

@@ -153,7 +153,7 @@ fn alone(
     let enough = shortened.into_iter().filter(|&length| length > problem.layout.regressors());
     let mut fits = enough.filter_map(|length| Fit::in_rows(&part, length, expected, instructions));
     let fit = fits.find(|fit| (0..fit.full.len()).any(|window| is_determined(&fit.full, window)))?;
-    let covariance = fit.covariance_of(&part, 0..fit.full.len(), &fit.pooled, covariance);
+    let covariance = fit.covariance_of(&part, 0..fit.full.len(), &fit.pooled, &covariance.from_row(rows.start));
     Some((fit.pooled.values, covariance))
 }
 
@@ -259,7 +259,7 @@ mod tests {
         }
         let problem = model().problem(&rows, &rows.rhs, 0.0, None);
         let variance = deviation * deviation;
-        let covariance = &RowCovariance { lags: vec![variance] };
+        let covariance = &RowCovariance::by_distance(vec![variance]);
         let fit = Fit::in_rows(&problem, 64, white(variance), Instructions::Scalar).expect("constants");
         let expected = white(variance);
         let noise = TestNoise { expected, covariance, inflation: 1.0, from };

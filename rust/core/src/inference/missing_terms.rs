@@ -118,7 +118,7 @@ mod tests {
             }
             rows.regressors.push(Regressor { companion: vec![0.0; ROWS], value, ..Regressor::default() });
         }
-        let (model, covariance) = (model(), RowCovariance { lags: vec![DEVIATION * DEVIATION] });
+        let (model, covariance) = (model(), RowCovariance::by_distance(vec![DEVIATION * DEVIATION]));
         let correlated = staged(|stages| model.correlated(&rows, &covariance, stages));
         let problem = model.problem(&rows, &rows.rhs, 0.0, Some(&correlated));
         let expected = white(DEVIATION * DEVIATION);

@@ -396,7 +396,7 @@ mod tests {
     /// What is averaged of one coefficient alone.
     fn averaged(rows: &Rows, best: usize) -> Averages {
         let model = Model { windowed: vec![0], constant: Vec::new(), linear: true };
-        let covariance = RowCovariance { lags: vec![DEVIATION * DEVIATION] };
+        let covariance = RowCovariance::by_distance(vec![DEVIATION * DEVIATION]);
         let correlated = staged(|stages| model.correlated(rows, &covariance, stages));
         let problem = model.problem(rows, &rows.rhs, 0.0, Some(&correlated));
         let (scales, expected) = (Scale::all(ROWS, 3), white(DEVIATION * DEVIATION));

@@ -261,7 +261,7 @@ mod tests {
     fn misfits_of_windows_that_hold_the_expected_noise_are_one() {
         let rows = rows(ROWS, steps, 0.1);
         // What the windows' own unknowns take up is counted with the rows' covariance.
-        let covariance = RowCovariance { lags: vec![0.01] };
+        let covariance = RowCovariance::by_distance(vec![0.01]);
         let correlated = staged(|stages| model().correlated(&rows, &covariance, stages));
         let problem = model().problem(&rows, &rows.rhs, 0.0, Some(&correlated));
         let shapes = [WindowShape::of(0..1, SPAN)];

@@ -283,7 +283,7 @@ mod tests {
     fn what_the_covariance_of_rows_makes_of_a_window_is_summed_with_its_own_time() {
         // Independent rows of variance 0.7 make 0.7 times the products of the columns.
         let rows = noisy();
-        let covariance = crate::regression::row_covariance::RowCovariance { lags: vec![0.7] };
+        let covariance = crate::regression::row_covariance::RowCovariance::by_distance(vec![0.7]);
         let correlated = crate::regression::simulated::staged(|stages| model().correlated(&rows, &covariance, stages));
         let problem = model().problem(&rows, &rows.rhs, 0.0, Some(&correlated));
         let plain = model().problem(&rows, &rows.rhs, 0.0, None);

@@ -145,7 +145,8 @@ impl Fit {
         let constants = 0..problem.layout.constant;
         let columns: Vec<_> =
             constants.map(|constant| self.influence(problem, &windows, &pooled.weights, constant)).collect();
-        sandwich(&columns, &pooled.inverse, covariance)
+        let first = (self.full.first + windows.start.cast_signed()) * self.step.cast_signed();
+        sandwich(&columns, &pooled.inverse, &covariance.from_row(usize::try_from(first).unwrap_or(0)))
     }
 
     /// The influence of every row within some windows on a constant estimated from them.
@@ -276,7 +277,7 @@ mod tests {
         let problem = model.problem(&rows, &rows.rhs, 0.0, None);
         let fit =
             staged(|stages| Fit::new(&problem, None, white(1.0), Instructions::Scalar, stages)).expect("constants");
-        let covariance = RowCovariance { lags: vec![3.0] };
+        let covariance = RowCovariance::by_distance(vec![3.0]);
         let found = staged(|stages| fit.covariance(&problem, &covariance, stages));
         for (found, inverse) in found.iter().zip(&fit.pooled.inverse) {
             assert_near(*found, 3.0 * inverse, 1e-12);
@@ -289,7 +290,7 @@ mod tests {
         let rows = rows(3000, |time| [1.0 + 0.1 * time, 0.1], 0.5);
         let problem = model().problem(&rows, &rows.rhs, 0.0, None);
         let fit = Fit::in_rows(&problem, 200, white(0.25), Instructions::Scalar).expect("constants");
-        let covariance = RowCovariance { lags: vec![0.5, 0.2, -0.1, 0.05] };
+        let covariance = RowCovariance::by_distance(vec![0.5, 0.2, -0.1, 0.05]);
         let all = staged(|stages| fit.covariance(&problem, &covariance, stages));
         let size = problem.layout.constant;
         for constant in 0..size {

@@ -125,7 +125,7 @@ mod tests {
     #[test]
     fn the_variance_of_a_line_is_least_near_its_middle() {
         let rows = rows(64, line, 0.1);
-        let covariance = RowCovariance { lags: vec![0.01] };
+        let covariance = RowCovariance::by_distance(vec![0.01]);
         let correlated = staged(|stages| model().correlated(&rows, &covariance, stages));
         let problem = model().problem(&rows, &rows.rhs, 0.0, Some(&correlated));
         let solved = solve_windows(&problem, 1, &(0..40), &[WindowShape::of(0..SPAN, 1)], Instructions::Scalar);

@@ -12,17 +12,58 @@ use crate::weak_form::test_function::Kernels;
 /// Correlations that exceed their standard deviation so many times are significant.
 const CHANCE: f64 = 5.0;
 
+/// Rounds of all equations whose weights are laid out side by side.
+const ROUNDS: usize = 16;
+
 /// Rows that are multiplied at a time.
 const PIECE: usize = 1 << 11;
 
 /// Covariance of rows by their distance.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RowCovariance {
-    /// By distance in rows, beginning with the variance.
+    /// By distance in rows, beginning with the variance; the mean over the places of rows where these differ.
     pub(crate) lags: Vec<f64>,
+    /// Of rows of several equations that take turns.
+    places: Option<Places>,
+}
+
+/// Covariances of rows of several equations that take turns: every equation has another noise, which it shares with some of the others.
+#[derive(Clone, Debug, PartialEq)]
+struct Places {
+    /// How many equations there are.
+    count: usize,
+    /// That of row 0.
+    first: usize,
+    /// By distance, then by equation: the covariance of one of its rows with the row that comes so much later.
+    lags: Vec<f64>,
 }
 
 impl RowCovariance {
+    /// The covariance of rows that are all alike.
+    pub(crate) fn by_distance(lags: Vec<f64>) -> Self {
+        Self { lags, places: None }
+    }
+
+    /// The covariance of rows of several equations that take turns, beginning with the first: `between(distance, equation)` is that of a row
+    /// of an equation with the row that comes so much later.
+    pub(crate) fn of_equations(count: usize, distances: usize, between: impl Fn(usize, usize) -> f64) -> Self {
+        let lags: Vec<f64> = (0..distances)
+            .flat_map(|lag| (0..count).map(move |place| (lag, place)))
+            .map(|(a, b)| between(a, b))
+            .collect();
+        let mean = lags.chunks(count).map(|lag| lag.iter().sum::<f64>() / count as f64).collect();
+        Self { lags: mean, places: (count > 1).then_some(Places { count, first: 0, lags }) }
+    }
+
+    /// The same where a row is counted as row 0.
+    pub(crate) fn from_row(&self, row: usize) -> Self {
+        let mut moved = self.clone();
+        if let Some(places) = &mut moved.places {
+            places.first = (places.first + row) % places.count;
+        }
+        moved
+    }
+
     /// The covariance that the noise of both channels gives rows `stride` samples apart. `parameters` are inertia,
     /// damping and stiffness; `kernels` are those by which the angle's noise enters; the noise is given by its variance, that of the angle first.
     pub(crate) fn known(
@@ -39,12 +80,12 @@ impl RowCovariance {
         let lags = (0..inertia.len())
             .step_by(stride)
             .map(|lag| noise[0] * products(&mixed, &mixed, lag) + noise[1] * products(torque, torque, lag));
-        Self { lags: lags.collect() }
+        Self::by_distance(lags.collect())
     }
 
     /// The covariance of rows with independent noise of variance one.
     pub(crate) fn white() -> Self {
-        Self { lags: vec![1.0] }
+        Self::by_distance(vec![1.0])
     }
 
     /// The covariance estimated from residuals up to some distance, tapered to stay positive semidefinite.
@@ -60,7 +101,7 @@ impl RowCovariance {
             let sum = sum_of_products(&residuals[..rows], &residuals[later..]);
             (1.0 - lag as f64 / (farthest + 1) as f64) * sum / count.max(1.0)
         });
-        Self { lags: lags.collect() }
+        Self::by_distance(lags.collect())
     }
 
     /// Whether rows that share no sample are correlated: by more than a share of the variance, and significantly.
@@ -83,7 +124,8 @@ impl RowCovariance {
     /// The same correlations with another variance.
     pub(crate) fn with_variance(mut self, variance: f64) -> Self {
         let factor = variance / self.variance();
-        self.lags.iter_mut().for_each(|lag| *lag *= factor);
+        let of_places = self.places.iter_mut().flat_map(|places| &mut places.lags);
+        self.lags.iter_mut().chain(of_places).for_each(|lag| *lag *= factor);
         self
     }
 
@@ -106,7 +148,7 @@ impl RowCovariance {
 
     /// Adds some rows of the covariance times a column.
     pub(crate) fn add_product(&self, column: &[f64], rows: Range<usize>, sums: &mut [f64]) {
-        self.add(column, rows, |lag| [self.lags[lag]; 2], sums);
+        self.add(column, rows, |covariance, _| [covariance; 2], sums);
     }
 
     /// The covariance times the windowed regressors and their companions, whose times count from their own row.
@@ -122,24 +164,34 @@ impl RowCovariance {
         stages.fill(found.windowed.iter_mut().chain(&mut found.companions), |rows, columns| {
             let (values, slopes) = columns.split_at_mut(windowed.len());
             for (regressor, (value, slope)) in values.iter_mut().zip(slopes).enumerate() {
-                self.add(windowed[regressor], rows.clone(), |lag| [self.lags[lag]; 2], value);
-                self.add(companions[regressor], rows.clone(), |lag| [self.lags[lag]; 2], slope);
-                let weight = |lag: usize| self.lags[lag] * lag as f64 * period;
-                self.add(windowed[regressor], rows.clone(), |lag| [weight(lag), -weight(lag)], slope);
+                self.add(windowed[regressor], rows.clone(), |covariance, _| [covariance; 2], value);
+                self.add(companions[regressor], rows.clone(), |covariance, _| [covariance; 2], slope);
+                let moved = |covariance: f64, lag: usize| {
+                    let weight = covariance * lag as f64 * period;
+                    [weight, -weight]
+                };
+                self.add(windowed[regressor], rows.clone(), moved, slope);
             }
         })?;
         Ok(found)
     }
 
-    /// Adds a column to some of its rows, each row's neighbours by their distance with one weight for those that come later and one for
-    /// those that came before.
-    fn add(&self, column: &[f64], rows: Range<usize>, weights: impl Fn(usize) -> [f64; 2], sums: &mut [f64]) {
+    /// Adds a column to some of its rows, each row's neighbours with weights that follow from their covariance and distance: one for those
+    /// that come later and one for those that came before.
+    fn add(&self, column: &[f64], rows: Range<usize>, weights: impl Fn(f64, usize) -> [f64; 2], sums: &mut [f64]) {
+        let instructions = Instructions::current();
         let lags = self.lags.len().min(column.len());
-        dispatch(Instructions::current(), AddNeighbours { lags, column, rows, weights, sums });
+        match &self.places {
+            None => {
+                let weights = |lag: usize| weights(self.lags[lag], lag);
+                dispatch(instructions, AddNeighbours { lags, column, rows, weights, sums });
+            }
+            Some(places) => dispatch(instructions, AddOfEquations { lags, places, column, rows, weights, sums }),
+        }
     }
 }
 
-/// What [`RowCovariance::add`] does.
+/// What [`RowCovariance::add`] does where all rows are alike.
 struct AddNeighbours<'a, W> {
     lags: usize,
     column: &'a [f64],
@@ -168,6 +220,59 @@ impl<W: Fn(usize) -> [f64; 2]> Kernel for AddNeighbours<'_, W> {
                     *sum += before * value;
                 }
             }
+        }
+    }
+}
+
+/// What [`RowCovariance::add`] does where equations take turns.
+struct AddOfEquations<'a, W> {
+    lags: usize,
+    places: &'a Places,
+    column: &'a [f64],
+    rows: Range<usize>,
+    weights: W,
+    sums: &'a mut [f64],
+}
+
+impl<W: Fn(f64, usize) -> [f64; 2]> Kernel for AddOfEquations<'_, W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _simd: S) {
+        let Self { lags, places, column, rows, weights, sums } = self;
+        let count = places.count;
+        // Weights of some rounds of all equations, so that many rows are added at a time.
+        let mut round = vec![0.0; ROUNDS * count];
+        for lag in 0..lags {
+            let covariances = &places.lags[lag * count..][..count];
+            if covariances.iter().all(|&covariance| covariance == 0.0) {
+                continue;
+            }
+            // The earlier row of a pair tells its covariance.
+            let fill = |earlier: usize, which: usize, round: &mut [f64]| {
+                for (place, weight) in round.iter_mut().enumerate() {
+                    *weight = weights(covariances[(places.first + earlier + place) % count], lag)[which];
+                }
+            };
+            let late = column.get(rows.start + lag..).unwrap_or_default();
+            fill(rows.start, 0, &mut round);
+            add_in_rounds(sums, late, &round);
+            if lag > 0 && rows.end > lag {
+                let first = rows.start.max(lag);
+                let early = &column[first - lag..rows.end - lag];
+                fill(first - lag, 1, &mut round);
+                add_in_rounds(&mut sums[first - rows.start..], early, &round);
+            }
+        }
+    }
+}
+
+/// Adds values with weights that repeat.
+#[inline(always)]
+fn add_in_rounds(sums: &mut [f64], values: &[f64], weights: &[f64]) {
+    for (sums, values) in sums.chunks_mut(weights.len()).zip(values.chunks(weights.len())) {
+        for ((sum, value), weight) in sums.iter_mut().zip(values).zip(weights) {
+            *sum += weight * value;
         }
     }
 }
@@ -215,7 +320,7 @@ mod tests {
     /// The same sums in the same order, however few rows the last piece has.
     #[test]
     fn the_last_rows_of_a_long_column_have_fewer_neighbours() {
-        let covariance = RowCovariance { lags: vec![1.0, -0.5, 0.25, 0.125, 3.0] };
+        let covariance = RowCovariance::by_distance(vec![1.0, -0.5, 0.25, 0.125, 3.0]);
         for count in (1..8).map(|more| ROWS + more).chain([1, 2, 3, 7, ROWS]) {
             let column: Vec<f64> = (0..count).map(|row| (row as f64 * 0.7).sin()).collect();
             let mut watch = |_: usize, _: usize| true;
@@ -238,6 +343,43 @@ mod tests {
                     near(found.windowed[0][row], value) && near(found.companions[0][row], value + slope),
                     "{row} of {count}"
                 );
+            }
+        }
+    }
+    /// Rows of three equations, of which each has noise of its own and shares some with the next: every pair of rows by itself.
+    #[test]
+    fn rows_of_equations_that_take_turns_have_the_covariance_of_their_pair() {
+        let (count, distances, period) = (3, 8, 0.5);
+        let between =
+            |lag: usize, place: usize| if lag == 5 { 0.0 } else { ((lag * 7 + place * 3) as f64 * 0.9).cos() };
+        let covariance = RowCovariance::of_equations(count, distances, between);
+        for (lag, mean) in covariance.lags.iter().enumerate() {
+            let sum: f64 = (0..count).map(|place| between(lag, place)).sum();
+            assert!((mean - sum / count as f64).abs() < 1e-15, "{lag}");
+        }
+        for rows in [1, 2, 7, 50, ROWS + 5, PIECE + 17] {
+            let column: Vec<f64> = (0..rows).map(|row| (row as f64 * 0.7).sin()).collect();
+            for first in [0, 1, 5] {
+                let pair = |one: usize, other: usize| {
+                    let (early, lag) = (one.min(other), one.abs_diff(other));
+                    if lag < distances { between(lag, (first + early) % count) } else { 0.0 }
+                };
+                let near = |row: usize| row.saturating_sub(distances)..(row + distances).min(rows);
+                let found = covariance.from_row(first).times(&column);
+                let mut watch = |_: usize, _: usize| true;
+                let mut stages = Stages::new(NonZeroUsize::MIN, 1, 1, &mut watch);
+                let both = covariance.from_row(first).correlated(&[&column], &[&column], period, &mut stages);
+                let both = both.expect("not cancelled");
+                for row in (0..rows).rev().take(60).chain(0..rows.min(60)) {
+                    let value: f64 = near(row).map(|other| pair(row, other) * column[other]).sum();
+                    let later = |other: usize| (other as f64 - row as f64) * period;
+                    let moved: f64 = near(row).map(|other| pair(row, other) * later(other) * column[other]).sum();
+                    for (found, expected) in
+                        [(found[row], value), (both.windowed[0][row], value), (both.companions[0][row], value + moved)]
+                    {
+                        assert!((found - expected).abs() < 1e-12, "{row} of {rows} from {first}");
+                    }
+                }
             }
         }
     }

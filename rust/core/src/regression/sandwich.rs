@@ -153,7 +153,7 @@ mod tests {
             staged(|stages| Fit::new(&problem, None, white(1.0), Instructions::Scalar, stages)).expect("constants");
         let columns: Vec<Vec<f64>> =
             (0..2).map(|one| fit.influence(&problem, &(0..1), &fit.pooled.weights, one)).collect();
-        let covariance = RowCovariance { lags: vec![1.0, 0.4, -0.2] };
+        let covariance = RowCovariance::by_distance(vec![1.0, 0.4, -0.2]);
         let found = sandwich(&columns, &fit.pooled.inverse, &covariance);
         // Row by row: what each moves the constants by, times the covariance of two rows.
         let weight = |constant: usize, row: usize| -> f64 {

@@ -305,7 +305,7 @@ mod tests {
         rows.usable.resize(4000, true);
         let whitening = Whitening::new(&covariance, &rows, STRIDE).expect("a covariance");
         assert!(whitening.factor.len() < 2000, "{}", whitening.factor.len());
-        let longer = RowCovariance { lags: vec![1.0, 0.6] };
+        let longer = RowCovariance::by_distance(vec![1.0, 0.6]);
         assert!(Whitening::new(&longer, &rows, STRIDE).is_none(), "no covariance has such neighbours");
     }
 }

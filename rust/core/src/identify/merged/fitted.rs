@@ -16,13 +16,15 @@ use crate::regression::model::Model;
 use crate::regression::problem::Correlated;
 use crate::regression::residuals::residuals;
 use crate::regression::row_covariance::RowCovariance;
-use crate::regression::subsample::{holds, stretches_of_rows, thinned_rows};
+use crate::regression::subsample::{holds, stretches_of_times, thinned_rows};
 use crate::regression::window_length::Scale;
 
 /// So many of the longest windows that stretches of a long record hold are tried again on all of it, where one of them is best.
 const OVERLAP: usize = 2;
 /// What was constant is windowed from here on only if rows are predicted at least so much better.
 const BETTER: f64 = 0.98;
+/// What no test shows to change is windowed only if rows are predicted so much better: it is what the equations lack.
+const LACKING: f64 = 0.5;
 
 /// Rounds of looking for jumps and fitting again with windows that end there.
 const JUMP_ROUNDS: usize = 4;
@@ -128,7 +130,7 @@ impl MergedSession<'_, '_, '_> {
             let problem = model.problem(rows, &rows.rhs, 1.0, Some(&correlated));
             validate(&problem, scales, expected, instructions, stages)
         };
-        let Some(stretches) = stretches_of_rows(rows.len()).filter(|_| scales.len() > 1) else {
+        let Some(stretches) = stretches_of_times(rows.len(), self.all.group).filter(|_| scales.len() > 1) else {
             return validated(rows, scales);
         };
         let short = scales.partition_point(|scale| holds(*scale));
@@ -176,6 +178,11 @@ impl MergedSession<'_, '_, '_> {
             let mut differs: Vec<&(usize, Test)> =
                 found.iter().filter(|(_, test)| test.probability < constancy::NO_CHANCE).collect();
             fitted.contradicted = !differs.is_empty();
+            // What constants leave may be so much that no part of the record differs by more, though one of them changes.
+            let hidden = differs.is_empty() && fitted.error > NOISE_MODEL_FAILS;
+            if hidden {
+                differs = found.iter().collect();
+            }
             differs.retain(|(one, _)| tested(*one));
             differs.sort_by(|a, b| b.1.excess().total_cmp(&a.1.excess()));
             // What changes makes its neighbours seem to change, too: the one that explains most is set free.
@@ -191,7 +198,9 @@ impl MergedSession<'_, '_, '_> {
                     best = Some((found, self.parameters.clone()));
                 }
             }
-            let better = |found: &MergedFit| fitted.model.windowed.is_empty() || found.error < BETTER * fitted.error;
+            let most = if hidden { LACKING } else { BETTER };
+            let free = fitted.model.windowed.is_empty() && !hidden;
+            let better = |found: &MergedFit| free || found.error < most * fitted.error;
             let Some((found, parameters)) = best.filter(|(found, _)| better(found)) else {
                 self.parameters = before;
                 self.fill();

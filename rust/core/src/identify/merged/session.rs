@@ -155,8 +155,7 @@ impl MergedSession<'_, '_, '_> {
 
     /// The covariance of the rows as the noise of all channels makes it, and what windows are expected to leave.
     ///
-    /// The row at a distance is of the same equation, or of another one of the same trial: then it is the mean over the pairs of equations
-    /// that lie so far apart.
+    /// The row at a distance is of the same equation, or of another one of the same trial, which has noise of the same angles.
     pub(crate) fn covariance(&self) -> (RowCovariance, Expected) {
         let (equations, channels, group) = (self.merged.equations(), self.merged.channels(), self.all.group);
         let (stride, torque) = (self.all.function.stride(), &self.all.kernels.values[2]);
@@ -173,15 +172,16 @@ impl MergedSession<'_, '_, '_> {
                 .sum::<f64>();
             let of_torque =
                 if one == other { self.noise[1][one] * products(torque, torque, times * stride) } else { 0.0 };
-            weights[one] * weights[other] * (of_angles + of_torque) / equations as f64
+            weights[one] * weights[other] * (of_angles + of_torque)
         };
         let times = torque.len().div_ceil(stride);
-        let mut lags = vec![0.0; (times - 1) * group + equations];
+        let distances = (times - 1) * group + equations;
+        let mut lags = vec![0.0; distances * equations];
         for time in 0..times {
             for one in 0..equations {
                 for other in 0..equations {
                     if let Some(lag) = (time * group + other).checked_sub(one).filter(|_| time > 0 || other >= one) {
-                        lags[lag] += between(one, other, time);
+                        lags[lag * equations + one] += between(one, other, time);
                     }
                 }
             }
@@ -189,11 +189,12 @@ impl MergedSession<'_, '_, '_> {
         let of_torque = (0..equations)
             .map(|one| weights[one].powi(2) * self.noise[1][one] * products(torque, torque, 0) / equations as f64)
             .sum();
-        if lags[0] <= 0.0 {
+        let known = if (0..equations).all(|one| lags[one] <= 0.0) {
             // Without any noise rows count as if each had some of its own.
-            lags = vec![1.0];
-        }
-        let known = RowCovariance { lags };
+            RowCovariance::white()
+        } else {
+            RowCovariance::of_equations(equations, distances, |lag, one| lags[lag * equations + one])
+        };
         let expected = Expected::new(&known, of_torque);
         (known, expected)
     }

@@ -114,7 +114,7 @@ pub(crate) fn identify_strong(
     let variance = variance(&problem, &fit);
     let reach = derivatives.options().window_length / 2;
     let sandwich = |rows: &RowCovariance| sandwich(&columns, &fit.pooled.inverse, rows);
-    let ordinary = sandwich(&RowCovariance { lags: vec![variance] });
+    let ordinary = sandwich(&RowCovariance::by_distance(vec![variance]));
     let shown = row_covariance(&problem, &fit, reach, variance, &mut stages)?;
     let covariance = at_least(sandwich(&shown), &ordinary, count);
     problem.constants.truncate(count);
