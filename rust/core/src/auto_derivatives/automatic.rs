@@ -74,7 +74,7 @@ impl<'a> AutomaticRecord<'a> {
             }
             None => (SHORTEST, noise.clone()),
         };
-        let trend = trend(record, &noise)?;
+        let trend = trend(record, &noise, instructions)?;
         let survey = Survey::new(record, highest.min(HIGHEST_ORDER), instructions)?;
         Ok(Self { survey, noise, shortest, trend, instructions })
     }
@@ -190,15 +190,15 @@ pub fn estimate_automatically(
             }
         }
     }
-    for (sample, (status, value)) in estimates.status.iter_mut().zip(&*estimates.values).enumerate() {
-        let mut flags = Status::GOOD;
-        if sample < pair.half || sample >= samples - pair.half {
-            flags |= Status::EDGE;
+    let (good, invalid) = (Status::GOOD.bits(), Status::INVALID.bits());
+    for (status, value) in estimates.status.iter_mut().zip(&*estimates.values) {
+        *status = if value.is_nan() { invalid } else { good };
+    }
+    for end in [0..pair.half, samples - pair.half..samples] {
+        let of_end = estimates.status.get_mut(end).unwrap_or_default();
+        for status in of_end {
+            *status |= Status::EDGE.bits();
         }
-        if value.is_nan() {
-            flags |= Status::INVALID;
-        }
-        *status = flags.bits();
     }
     let Pair { half, order } = pair;
     Ok(Some(AutomaticChoice { window_length: 2 * half + 1, order }))

@@ -44,7 +44,11 @@ impl Grid {
 
     /// The means that belong to some of the samples.
     pub(crate) fn means(self, samples: &Range<usize>) -> Range<usize> {
-        let mean = |sample: usize| sample.saturating_sub(self.first).div_ceil(self.step).min(self.count);
+        let mean = |sample: usize| {
+            let distance = sample.saturating_sub(self.first);
+            // Samples themselves are common, and divisions slow.
+            if self.step == 1 { distance } else { distance.div_ceil(self.step) }.min(self.count)
+        };
         mean(samples.start)..mean(samples.end)
     }
 }

@@ -30,14 +30,15 @@ use crate::auto_derivatives::candidate_weights::Reference;
 use crate::auto_derivatives::candidates::{Target, correlated};
 use crate::auto_derivatives::global_choice::{CheckCancelled, Pair, rounded};
 use crate::auto_derivatives::reference_line::ReferenceLine;
-use crate::auto_derivatives::slopes::SampleSlopes;
+use crate::auto_derivatives::slopes::{BasisSums, SampleSlopes};
 use crate::auto_derivatives::survey::{CLOSELY, Survey};
 use crate::error::Error;
-use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
+use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::boundary::End;
 use crate::local_polynomials::coefficients::Projected;
 use crate::local_polynomials::single_window::Window;
 use crate::noise::correlated::CorrelatedNoise;
+use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
 /// The windows over the record's best, in half steps of a doubling, and every how many are tried in records that are not short.
 const LADDER: Range<i32> = -4..5;
@@ -192,18 +193,15 @@ impl Near<'_> {
         let shrunk = |j: usize| shrinkage.iter().zip(&outermost.coefficients).map(|(row, c)| row[j] * c).sum::<f64>();
         let of_slopes = slopes.combined(&(0..=highest).map(shrunk).collect::<Vec<f64>>());
         let constant = f64::from(u8::from(derivative == 0));
-        let value = |place: usize| {
-            let sum: f64 = slopes.of_basis(place).iter().zip(&of_slopes).map(|(slope, c)| slope * c).sum();
-            sign * (scale * sum + constant * outermost.reference)
-        };
-        let values = (0..count).map(value).collect();
+        let sums = slopes.sums(&of_slopes, count, target.instructions);
+        let values = sums.into_iter().map(|sum| sign * (scale * sum + constant * outermost.reference)).collect();
         let risk = |place: usize| {
             let at_place = slopes.of_coefficients(place);
             let weights: Vec<f64> = shrinkage
                 .iter()
                 .map(|row| scale * row.iter().zip(&at_place).map(|(a, q)| a * q).sum::<f64>())
                 .collect();
-            let estimates = BoundaryEstimates::new(projected, &weights, constant, derivative);
+            let estimates = BoundaryEstimates::new(projected, &weights, constant, target);
             let difference = |window: usize| {
                 let start = starts[window];
                 [
@@ -215,7 +213,7 @@ impl Near<'_> {
             let (sum, compared) =
                 differences.fold((0.0, 0_usize), |(sum, count), difference| (sum + difference * difference, count + 1));
             let own = quadratic(&weights, &correlations);
-            let shared = self.shared(basis, step, &weights, (place, target.noise));
+            let shared = self.shared(basis, step, &weights, (place, target));
             let risk = sum / compared as f64 + variance * (2.0 * shared - self.reference.gain);
             if compared < FEWEST_WINDOWS { f64::INFINITY } else { risk.max(variance * own) }
         };
@@ -227,25 +225,19 @@ impl Near<'_> {
     }
 
     /// The product of the kernel at a place of a window, given by the weights of its coefficients, with that of the reference.
-    fn shared(&self, basis: &Basis, step: usize, weights: &[f64], (place, noise): (usize, &CorrelatedNoise)) -> f64 {
+    fn shared(&self, basis: &Basis, step: usize, weights: &[f64], (place, target): (usize, &Target<'_>)) -> f64 {
         let length = basis.length() * step;
-        let reference = correlated(self.reference.kernel.clone(), place.max(length - place), noise);
+        let reference = correlated(self.reference.kernel.clone(), place.max(length - place), target.noise);
         let reach = reference.len() / 2;
         let meeting = place.saturating_sub(reach)..length.min(place + reach + 1);
         let at = |index: usize| reference[reach + index - place];
-        // Of even and of odd degrees.
-        let mut sums = [0.0; MOST_DEGREES];
-        for mean in meeting.start / step..meeting.end.div_ceil(step) {
+        let means = meeting.start / step..meeting.end.div_ceil(step);
+        let value = |mean: usize| {
             let samples = meeting.start.max(mean * step)..meeting.end.min((mean + 1) * step);
-            let value = samples.map(at).sum::<f64>() / step as f64;
-            let (row, mirrored) = basis.row(mean);
-            let signs = if mirrored { [value, -value] } else { [value; 2] };
-            for (pair, q) in sums.chunks_exact_mut(2).zip(row.chunks(2)) {
-                for ((sum, q), sign) in pair.iter_mut().zip(q).zip(signs) {
-                    *sum += q * sign;
-                }
-            }
-        }
+            samples.map(at).sum::<f64>() / step as f64
+        };
+        let values: Vec<f64> = means.clone().map(value).collect();
+        let sums = dispatch(target.instructions, BasisSums { basis, first: means.start, values: &values });
         sums.iter().zip(weights).map(|(sum, weight)| sum * weight).sum()
     }
 }
@@ -275,6 +267,26 @@ fn interpolated(count: usize, of: impl Fn(usize) -> f64) -> Vec<f64> {
     values
 }
 
+/// Adds every coefficient times its weight: those of even degree, and those of odd degree.
+struct SumsByParity<'a> {
+    coefficients: &'a [Vec<f64>],
+    weights: &'a [f64],
+    sums: [&'a mut [f64]; 2],
+}
+
+impl Kernel for SumsByParity<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _: S) {
+        for (degree, (row, weight)) in self.coefficients.iter().zip(self.weights).enumerate() {
+            for (sum, c) in self.sums[degree % 2].iter_mut().zip(row) {
+                *sum += weight * c;
+            }
+        }
+    }
+}
+
 /// Estimates at one place of every window, and at its mirror image.
 struct BoundaryEstimates {
     forwards: Vec<f64>,
@@ -282,17 +294,13 @@ struct BoundaryEstimates {
 }
 
 impl BoundaryEstimates {
-    fn new(projected: &Projected, weights: &[f64], constant: f64, derivative: usize) -> Self {
-        let mut parts = [projected.level.iter().map(|level| level * constant).collect::<Vec<f64>>(), Vec::new()];
-        parts[1].resize(projected.level.len(), 0.0);
-        for (degree, (row, weight)) in projected.coefficients.iter().zip(weights).enumerate() {
-            for (sum, c) in parts[degree % 2].iter_mut().zip(row) {
-                *sum += weight * c;
-            }
-        }
-        let [even, odd] = parts;
+    fn new(projected: &Projected, weights: &[f64], constant: f64, target: &Target<'_>) -> Self {
+        let mut even: Vec<f64> = projected.level.iter().map(|level| level * constant).collect();
+        let mut odd = vec![0.0; even.len()];
+        let (coefficients, sums) = (&*projected.coefficients, [&mut *even, &mut *odd]);
+        dispatch(target.instructions, SumsByParity { coefficients, weights, sums });
         // In reversed time odd coefficients change their sign, and so do odd derivatives.
-        let sign = if derivative % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = if target.derivative % 2 == 0 { 1.0 } else { -1.0 };
         let forwards = even.iter().zip(&odd).map(|(even, odd)| even + odd).collect();
         let backwards = even.iter().zip(&odd).map(|(even, odd)| sign * (even - odd)).collect();
         Self { forwards, backwards }

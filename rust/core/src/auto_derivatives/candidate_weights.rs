@@ -56,12 +56,12 @@ pub(crate) struct Refinement {
     pub(crate) samples: usize,
     /// Half-width of the record's best window, and samples in half a neighbourhood.
     pub(crate) half: usize,
-    reach: f64,
+    pub(crate) reach: f64,
     /// By candidate of all banks: twice the covariance with the reference and what optimism adds; variance of the difference from the
     /// reference; `T`; variance; order.
     pub(crate) offsets: Vec<f64>,
-    differences: Vec<f64>,
-    temperatures: Vec<f64>,
+    pub(crate) differences: Vec<f64>,
+    pub(crate) temperatures: Vec<f64>,
     pub(crate) variances: Vec<f64>,
     pub(crate) orders: Vec<u8>,
     pub(crate) instructions: Instructions,
@@ -90,16 +90,6 @@ impl Reference {
     }
 }
 
-/// The weight and bias of every candidate, block by block.
-pub(crate) struct Weighed {
-    /// The first of the blocks.
-    pub(crate) first: usize,
-    /// Logarithms of weights.
-    pub(crate) logarithms: Vec<f64>,
-    /// Squared biases.
-    pub(crate) biases: Vec<f64>,
-}
-
 /// Memory of one thread.
 pub(crate) struct AverageScratch {
     pub(crate) banks: Vec<CoefficientScratch>,
@@ -116,6 +106,8 @@ pub(crate) struct AverageScratch {
     pub(crate) rows: Vec<Vec<f64>>,
     /// By bank, the first of these means.
     pub(crate) firsts: Vec<usize>,
+    /// The samples at which the rows of all candidates are known, where they are those that were compared.
+    pub(crate) kept: Option<Range<usize>>,
 }
 
 impl Refinement {
@@ -211,7 +203,13 @@ impl Refinement {
             squares: Vec::new(),
             rows: vec![Vec::new(); self.offsets.len()],
             firsts: vec![0; self.banks.len()],
+            kept: None,
         }
+    }
+
+    /// Whether candidates are compared at every sample: then neighbourhoods are short beside pieces, and what is compared is what is averaged.
+    pub(crate) fn at_every_sample(&self) -> bool {
+        self.banks.iter().all(|bank| self.step(bank) == 1)
     }
 
     /// Sums the squared differences from the reference over the places in every block, and counts the places that can be compared: candidate by
@@ -227,6 +225,8 @@ impl Refinement {
         let (samples, own) = (self.samples(&blocks), &self.reference);
         let finest = self.banks.iter().map(|bank| self.step(bank)).min().unwrap_or(own.bank.step);
         let AverageScratch { banks, reference, projected, compare, compare_at, parts, squares, .. } = scratch;
+        let (kept_rows, mut kept) = (&mut scratch.rows, Vec::new());
+        scratch.kept = None;
         let every = Grid::new(self.samples, finest);
         let (known, centres) = own.bank.places(self.samples, every, &every.means(&samples));
         compare.clear();
@@ -234,7 +234,7 @@ impl Refinement {
             return;
         }
         let estimates = own.bank.estimates(means, centres, finest / own.bank.step, reference, projected);
-        compare.extend(&estimates[0]);
+        std::mem::swap(compare, &mut estimates[0]);
         let mut column = 0;
         for (index, (bank, scratch)) in self.banks.iter().zip(banks).enumerate() {
             let grid = Grid::new(self.samples, self.step(bank));
@@ -242,8 +242,13 @@ impl Refinement {
             let (places, centres) = bank.places(self.samples, grid, &of_reference);
             if !places.is_empty() {
                 let first = (grid.sample(places.start) - every.first) / finest - known.start;
-                compare_at.clear();
-                compare_at.extend(compare[first..].iter().step_by(grid.step / finest).take(places.len()));
+                let compare_at = if grid.step == finest {
+                    &compare[first..first + places.len()]
+                } else {
+                    compare_at.clear();
+                    compare_at.extend(compare[first..].iter().step_by(grid.step / finest).take(places.len()));
+                    &*compare_at
+                };
                 let rows = bank.estimates(means, centres, grid.step / bank.step, scratch, projected);
                 let blocks_here =
                     self.blocks.of(grid.sample(places.start))..self.blocks.of(grid.sample(places.end - 1)) + 1;
@@ -270,9 +275,15 @@ impl Refinement {
                     }
                     counts[from * self.banks.len() + index] += count;
                 }
+                if grid.step == 1 {
+                    kept_rows[column..].iter_mut().zip(rows).for_each(|(kept, row)| std::mem::swap(kept, row));
+                    kept.push(places);
+                }
             }
             column += bank.orders.len();
         }
+        let same = kept.len() == self.banks.len() && kept.iter().all(|places| *places == kept[0]);
+        scratch.kept = kept.pop().filter(|_| same);
     }
 
     /// The means that a bank's windows are made of.
@@ -298,62 +309,6 @@ impl Refinement {
             _ => (bank.half / PLACES).clamp(1, LONGEST_STEP).max(self.half / PLACES_OF_BEST),
         };
         COARSER.pow(wanted.ilog(COARSER)).max(bank.step).max(self.reference.bank.step)
-    }
-
-    /// The logarithm of every candidate's weight and its squared bias in some blocks, from the risk around each. Sums and counts begin with a block.
-    pub(crate) fn weigh(&self, blocks: Range<usize>, begin: usize, sums: &[f64], counts: &[f64]) -> Weighed {
-        let (candidates, length) = (self.offsets.len(), self.blocks.length as f64);
-        let bank_of: Vec<usize> =
-            self.banks.iter().enumerate().flat_map(|(place, bank)| vec![place; bank.orders.len()]).collect();
-        let reach = self.reach();
-        let bell = |distance: usize| {
-            let u = distance as f64 * length / (self.reach + length / 2.0);
-            (1.0 - u * u).powi(2)
-        };
-        let bell: Vec<f64> = (0..=reach).map(bell).collect();
-        let neighbourhood = length * (2.0 * bell.iter().sum::<f64>() - bell[0]);
-        let mut weights = vec![0.0; blocks.len() * candidates];
-        let mut biases = vec![0.0; blocks.len() * candidates];
-        let mut sum = vec![0.0; candidates];
-        let mut count = vec![0.0; self.banks.len()];
-        let rows = weights.chunks_exact_mut(candidates).zip(biases.chunks_exact_mut(candidates));
-        for (block, (weights, biases)) in blocks.clone().zip(rows) {
-            sum.fill(0.0);
-            count.fill(0.0);
-            for other in self.blocks_around(&(block..block + 1), reach) {
-                let weight = bell[block.abs_diff(other)];
-                let other = other - begin;
-                add(&mut sum, &sums[other * candidates..(other + 1) * candidates], weight);
-                add(&mut count, &counts[other * self.banks.len()..(other + 1) * self.banks.len()], weight);
-            }
-            for (candidate, (weight, bias)) in weights.iter_mut().zip(&mut *biases).enumerate() {
-                let count = count[bank_of[candidate]];
-                *weight = f64::INFINITY;
-                if count > 0.0 {
-                    let difference = sum[candidate] / count;
-                    *weight = difference + self.offsets[candidate];
-                    *bias = (difference - self.differences[candidate]).max(0.0);
-                }
-            }
-            let best = (0..candidates).min_by(|&a, &b| weights[a].total_cmp(&weights[b]));
-            let Some(best) = best.filter(|&best| weights[best].is_finite()) else {
-                weights.fill(f64::NEG_INFINITY);
-                continue;
-            };
-            let (least, temperature) = (weights[best], self.temperatures[best]);
-            for weight in weights {
-                // In this order: for an infinite temperature the quotient is zero, and zero times infinity would be NaN.
-                *weight = (least - *weight) / (2.0 * temperature) * neighbourhood;
-            }
-        }
-        Weighed { first: blocks.start, logarithms: weights, biases }
-    }
-}
-
-/// Adds numbers with a weight.
-fn add(sums: &mut [f64], numbers: &[f64], weight: f64) {
-    for (sum, number) in sums.iter_mut().zip(numbers) {
-        *sum += weight * number;
     }
 }
 

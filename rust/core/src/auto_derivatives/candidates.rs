@@ -22,6 +22,7 @@ use crate::local_polynomials::mirrored_kernels::{LONGEST, MirroredKernel, Mirror
 use crate::local_polynomials::tables::{TablesWanted, WindowTables, tables};
 use crate::noise::correlated::CorrelatedNoise;
 use crate::simd::instructions::Instructions;
+use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
 /// The derivative to be estimated, and its orders.
 #[derive(Clone, Copy, Debug)]
@@ -80,7 +81,7 @@ pub(crate) struct Bank {
     constant: f64,
     /// The candidates as sums over the samples of short windows, made when they are first needed.
     mirrored: OnceLock<MirroredKernels>,
-    instructions: Instructions,
+    pub(crate) instructions: Instructions,
 }
 
 impl Bank {
@@ -186,8 +187,10 @@ impl Bank {
         let degrees = self.tables.basis.degrees();
         if let Some(mirrored) = self.mirrored().filter(|mirrored| mirrored.serve(every, degrees)) {
             let rows = &mut projected.coefficients;
-            rows.resize_with(self.orders.len(), Vec::new);
+            // Never fewer than there are: what is let go would be asked for again.
+            rows.resize_with(rows.len().max(self.orders.len()), Vec::new);
             let count = windows.len().div_ceil(every);
+            let rows = &mut rows[..self.orders.len()];
             for row in &mut *rows {
                 row.resize(count, 0.0);
             }
@@ -201,25 +204,22 @@ impl Bank {
             // NaN stays NaN.
             *sum *= self.constant;
         }
-        for (row, weight) in rows.iter_mut().zip(&self.weights) {
-            for (sum, value) in sums.iter_mut().zip(row) {
-                *sum += weight * *value;
-                *value = *sum;
-            }
-        }
+        dispatch(self.instructions, Accumulate { sums, rows, weights: &self.weights });
         &mut rows[self.first..]
     }
 
     /// The candidates of a short window as sums over its samples.
     fn mirrored(&self) -> Option<&MirroredKernels> {
         let inner = self.inner();
-        let kernel = |candidate: usize| MirroredKernel {
-            odd: self.derivative % 2 == 1,
-            constant: self.constant,
-            outwards: (inner + 1..=2 * inner).map(|index| self.weight(candidate, index)).collect(),
-        };
+        let (odd, constant) = (self.derivative % 2 == 1, self.constant);
         let make = || {
-            let kernels: Vec<MirroredKernel> = (0..self.orders.len()).map(kernel).collect();
+            let kernel = || MirroredKernel { odd, constant, outwards: Vec::with_capacity(inner) };
+            let mut kernels: Vec<MirroredKernel> = self.orders.iter().map(|_| kernel()).collect();
+            for row in self.tables.basis.rows().skip(1) {
+                let products = self.weights.iter().zip(row[self.derivative..].iter().step_by(2)).map(|(w, q)| w * q);
+                let sums = running_sums(products).skip(self.first);
+                kernels.iter_mut().zip(sums).for_each(|(kernel, sum)| kernel.outwards.push(sum));
+            }
             MirroredKernels::new(inner, &kernels, self.instructions)
         };
         (inner <= LONGEST).then(|| self.mirrored.get_or_init(make))
@@ -228,16 +228,10 @@ impl Bank {
     /// The same from the coefficients of all degrees.
     pub(crate) fn combine(&self, projected: &Projected) -> Vec<Vec<f64>> {
         let mut sums: Vec<f64> = projected.level.iter().map(|level| level * self.constant).collect();
-        let mut rows = Vec::with_capacity(self.orders.len());
-        for (l, weight) in self.weights.iter().enumerate() {
-            let coefficients = &projected.coefficients[self.derivative + 2 * l];
-            for (sum, value) in sums.iter_mut().zip(coefficients) {
-                *sum += weight * *value;
-            }
-            if l >= self.first {
-                rows.push(sums.clone());
-            }
-        }
+        let coefficients = projected.coefficients[self.derivative..].iter().step_by(2);
+        let mut rows: Vec<Vec<f64>> = coefficients.take(self.weights.len()).cloned().collect();
+        dispatch(self.instructions, Accumulate { sums: &mut sums, rows: &mut rows, weights: &self.weights });
+        rows.drain(..self.first);
         rows
     }
 
@@ -273,6 +267,27 @@ impl Bank {
     fn weight(&self, candidate: usize, index: usize) -> f64 {
         let weights = self.weights[..=self.first + candidate].iter().enumerate();
         weights.map(|(l, weight)| weight * self.tables.basis.value(self.derivative + 2 * l, index)).sum()
+    }
+}
+
+/// Turns rows of coefficients into the sums of all up to each, with their weights.
+struct Accumulate<'a> {
+    sums: &'a mut [f64],
+    rows: &'a mut [Vec<f64>],
+    weights: &'a [f64],
+}
+
+impl Kernel for Accumulate<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _: S) {
+        for (row, weight) in self.rows.iter_mut().zip(self.weights) {
+            for (sum, value) in self.sums.iter_mut().zip(row) {
+                *sum += weight * *value;
+                *value = *sum;
+            }
+        }
     }
 }
 

@@ -19,35 +19,70 @@ impl Kernel for SquaredDifferences<'_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, _: S) {
-        self.sums.clear();
-        for part in self.parts {
-            self.sums.extend(self.rows.iter().map(|row| squared_distance(row, self.compare, part)));
+        let Self { rows, compare, parts, sums } = self;
+        sums.clear();
+        sums.resize(parts.len() * rows.len(), 0.0);
+        // Plain loops: what extends a vector would be compiled by itself, without the instructions of the kernel.
+        for (part, sums) in parts.iter().zip(sums.chunks_exact_mut(rows.len().max(1))) {
+            let short = part.len() <= WIDTH && part.start + WIDTH <= compare.len();
+            let compare_at = if short { Packet::load(&compare[part.start..]) } else { Packet::ZERO };
+            for (row, sum) in rows.iter().zip(sums) {
+                *sum = if short && part.start + WIDTH <= row.len() {
+                    let differences = Packet::load(&row[part.start..]) - compare_at;
+                    total(squares_of(differences, part.len()))
+                } else {
+                    squared_distance(row, compare, part)
+                };
+            }
         }
     }
 }
 
 /// `Σ (a - b)²` over a part of two rows, in eight sums side by side.
+pub(crate) struct SquaredDistance<'a> {
+    pub(crate) rows: [&'a [f64]; 2],
+    pub(crate) part: &'a Range<usize>,
+}
+
+impl Kernel for SquaredDistance<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _: S) -> f64 {
+        squared_distance(self.rows[0], self.rows[1], self.part)
+    }
+}
+
 #[inline(always)]
-pub(crate) fn squared_distance(a: &[f64], b: &[f64], part: &Range<usize>) -> f64 {
-    let mut sums = Packet::ZERO;
-    for at in part.clone().step_by(WIDTH) {
+fn squared_distance(a: &[f64], b: &[f64], part: &Range<usize>) -> f64 {
+    let (mut sums, mut at) = (Packet::ZERO, part.start);
+    while at < part.end {
         let mut differences = Packet::ZERO;
         let count = part.end - at;
         if at + WIDTH <= a.len().min(b.len()) {
             differences = Packet::load(&a[at..]) - Packet::load(&b[at..]);
-            if count < WIDTH {
-                // Beyond the part.
-                for lane in 0..WIDTH {
-                    differences.0[lane] = if lane < count { differences.0[lane] } else { 0.0 };
-                }
-            }
         } else {
             for lane in 0..count.min(WIDTH) {
                 differences.0[lane] = a[at + lane] - b[at + lane];
             }
         }
-        sums += differences * differences;
+        sums += squares_of(differences, count);
+        at += WIDTH;
     }
+    total(sums)
+}
+
+/// Squares of as many differences as there are, and zeros.
+#[inline(always)]
+fn squares_of(mut differences: Packet, count: usize) -> Packet {
+    for lane in 0..WIDTH {
+        differences.0[lane] = if lane < count { differences.0[lane] } else { 0.0 };
+    }
+    differences * differences
+}
+
+#[inline(always)]
+fn total(sums: Packet) -> f64 {
     let [a, b, c, d, e, f, g, h] = sums.0;
     ((a + e) + (c + g)) + ((b + f) + (d + h))
 }

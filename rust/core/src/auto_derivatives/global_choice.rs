@@ -22,11 +22,12 @@
 use std::ops::Range;
 
 use crate::auto_derivatives::candidates::{Bank, Target, correlated};
-use crate::auto_derivatives::differences::squared_distance;
+use crate::auto_derivatives::differences::SquaredDistance;
 use crate::auto_derivatives::survey::{LONGEST, Survey, Surveyed};
 use crate::auto_derivatives::symmetric_grid::within;
 use crate::error::Error;
 use crate::noise::correlated::CorrelatedNoise;
+use crate::simd::vectors::dispatch;
 
 /// Half-width of the shortest window.
 pub(crate) const SHORTEST: usize = 4;
@@ -196,7 +197,7 @@ fn risks(
     }
     let distance = |row: &[f64]| {
         let sum = match &all {
-            Some(all) => squared_distance(row, &compare, all),
+            Some(part) => dispatch(looked.bank.instructions, SquaredDistance { rows: [row, &*compare], part }),
             None => some.iter().map(|&place| (row[place] - compare[place]).powi(2)).sum(),
         };
         sum / count as f64

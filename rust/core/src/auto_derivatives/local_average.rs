@@ -24,9 +24,9 @@ use std::num::NonZeroUsize;
 use std::ops::Range;
 
 use crate::auto_derivatives::block_means::{BlockMeans, Grid};
-use crate::auto_derivatives::candidate_weights::{AverageScratch, Refinement, Weighed};
+use crate::auto_derivatives::candidate_weights::{AverageScratch, Refinement};
 use crate::auto_derivatives::interpolated_average::{POINTS, fill_between};
-use crate::auto_derivatives::local_weights::{DerivativeOutputs, LocalWeights};
+use crate::auto_derivatives::local_weights::{DerivativeOutputs, LocalWeights, Weighed};
 use crate::auto_derivatives::mixture::Mixture;
 use crate::error::Error;
 use crate::exec::pool::{self, Piece, Watch};
@@ -44,26 +44,38 @@ const NOTHING: f64 = -46.0;
 const LITTLE: f64 = -11.6;
 const MANY_TIMES: f64 = 100.0;
 
-/// Turns logarithms of weights, of which the largest is zero, into weights. Where all are left out there is nothing to average.
-fn normalise(weights: &mut [f64], variances: &[f64]) {
-    let best = (0..weights.len()).max_by(|&a, &b| weights[a].total_cmp(&weights[b]));
-    let variance = best.map_or(0.0, |best| variances[best]);
-    for (weight, own) in weights.iter_mut().zip(variances) {
-        let counts = *weight > LITTLE || (*weight > NOTHING && *own > MANY_TIMES * variance);
-        *weight = if counts { weight.exp() } else { 0.0 };
+/// Turns logarithms of weights, of which the largest is zero, into weights, and lists the candidates that may have any. Where all are left out there is
+/// nothing to average.
+fn normalise(weights: &mut [f64], variances: &[f64], counted: &mut Vec<usize>) {
+    // The last of the best: all others are below zero, or the negative zero.
+    let mut variance = 0.0;
+    for (weight, own) in weights.iter().zip(variances) {
+        variance = if weight.to_bits() == 0 { *own } else { variance };
     }
-    let total: f64 = weights.iter().sum();
+    // Nothing is decided before all are looked at: which candidates count changes from block to block.
+    counted.resize(weights.len(), 0);
+    let mut count = 0;
+    for (candidate, (weight, own)) in weights.iter_mut().zip(variances).enumerate() {
+        let counts = *weight > if *own > MANY_TIMES * variance { NOTHING } else { LITTLE };
+        *weight = if counts { *weight } else { 0.0 };
+        counted[count] = candidate;
+        count += usize::from(counts);
+    }
+    counted.truncate(count);
+    let mut total = 0.0;
+    for &candidate in &*counted {
+        weights[candidate] = weights[candidate].exp();
+        total += weights[candidate];
+    }
     let mut kept = 0.0;
-    for (weight, own) in weights.iter_mut().zip(variances) {
-        let share = *weight / total;
-        let counts = share > NEGLIGIBLE || share * own > NEGLIGIBLE_VARIANCE * variance;
-        *weight = if counts { share } else { 0.0 };
-        kept += *weight;
+    for &candidate in &*counted {
+        let share = weights[candidate] / total;
+        let counts = share > NEGLIGIBLE || share * variances[candidate] > NEGLIGIBLE_VARIANCE * variance;
+        weights[candidate] = if counts { share } else { 0.0 };
+        kept += weights[candidate];
     }
-    if kept > 0.0 {
-        for weight in weights {
-            *weight /= kept;
-        }
+    for &candidate in &*counted {
+        weights[candidate] /= kept;
     }
 }
 
@@ -78,28 +90,56 @@ impl Refinement {
     ) -> Result<(), Error> {
         let (samples, total) = (self.samples, 2 * self.samples);
         let DerivativeOutputs { values, errors, order } = outputs;
-        let (mut values, mut errors, mut order) = (&mut **values, &mut **errors, &mut **order);
+        let mut rest = DerivativeOutputs { values, errors, order };
+        if self.at_every_sample() {
+            let work = |(part, mut outputs): (Range<usize>, DerivativeOutputs<'_>), scratch: &mut AverageScratch| {
+                let weighed = self.weigh_alone(means, &part, scratch);
+                self.average(means, part, &weighed, &mut outputs, scratch);
+            };
+            let pieces = self.chunks().flat_map(|chunk| self.pieces_of(&chunk, &mut rest)).collect();
+            pool::run(pieces, workers, || self.scratch(), work, &mut |done, _| watch(2 * done, total))?;
+            return if watch(2 * samples, total) { Ok(()) } else { Err(Error::Cancelled) };
+        }
         for chunk in self.chunks() {
             // What is done of both passes.
             let (before, size) = (2 * self.samples(&chunk).start, self.samples(&chunk).len());
             let weighed =
                 self.weigh_around(means, &chunk, workers, &mut |done, _| watch(before + done.min(size), total))?;
-            let mut pieces = Vec::new();
-            for part in self.pieces(&chunk) {
-                let size = self.samples(&part).len();
-                let own = DerivativeOutputs {
-                    values: split_off(&mut values, size),
-                    errors: split_off(&mut errors, size),
-                    order: split_off(&mut order, size),
-                };
-                pieces.push(Piece { size, content: (part, own) });
-            }
+            let pieces = self.pieces_of(&chunk, &mut rest);
             let work = |(part, mut outputs): (Range<usize>, DerivativeOutputs<'_>), scratch: &mut AverageScratch| {
                 self.average(means, part, &weighed, &mut outputs, scratch);
             };
             pool::run(pieces, workers, || self.scratch(), work, &mut |done, _| watch(before + size + done, total))?;
         }
         if watch(2 * samples, total) { Ok(()) } else { Err(Error::Cancelled) }
+    }
+
+    /// Pieces of some blocks, each with its outputs, which are taken off the rest.
+    fn pieces_of<'b>(
+        &self,
+        blocks: &Range<usize>,
+        rest: &mut DerivativeOutputs<'b>,
+    ) -> Vec<Piece<(Range<usize>, DerivativeOutputs<'b>)>> {
+        let mut piece = |part: Range<usize>| {
+            let size = self.samples(&part).len();
+            let own = DerivativeOutputs {
+                values: split_off(&mut rest.values, size),
+                errors: split_off(&mut rest.errors, size),
+                order: split_off(&mut rest.order, size),
+            };
+            Piece { size, content: (part, own) }
+        };
+        self.pieces(blocks).map(&mut piece).collect()
+    }
+
+    /// The weights of some blocks and of those beside them, on one thread. The estimates that were compared stay where they are averaged.
+    fn weigh_alone(&self, means: &BlockMeans<'_>, blocks: &Range<usize>, scratch: &mut AverageScratch) -> Weighed {
+        let around = self.blocks_around(blocks, self.blocks_beside());
+        let known = self.blocks_around(&around, self.reach());
+        let mut sums = vec![0.0; known.len() * self.offsets.len()];
+        let mut counts = vec![0.0; known.len() * self.banks.len()];
+        self.compare(means, known.clone(), &mut sums, &mut counts, scratch);
+        self.weigh(around, known.start, &sums, &counts)
     }
 
     /// The weights of some blocks and of those beside them.
@@ -143,10 +183,13 @@ impl Refinement {
         let around = self.blocks_around(&blocks, self.blocks_beside());
         let part = (around.start - weighed.first) * candidates..(around.end - weighed.first) * candidates;
         let (logarithms, biases) = (&weighed.logarithms[part.clone()], &weighed.biases[part]);
-        let mut weights = logarithms.to_vec();
-        weights.chunks_exact_mut(candidates).for_each(|row| normalise(row, &self.variances));
-        let weighed = |candidate: usize| weights[candidate..].iter().step_by(candidates).any(|&weight| weight > 0.0);
-        let used = (0..candidates).map(weighed).collect();
+        let (mut weights, mut used, mut counted) = (logarithms.to_vec(), vec![false; candidates], Vec::new());
+        for row in weights.chunks_exact_mut(candidates) {
+            normalise(row, &self.variances, &mut counted);
+            for &candidate in &counted {
+                used[candidate] |= row[candidate] > 0.0;
+            }
+        }
         let local = LocalWeights { first: around.start, candidates, logarithms, biases, weights: &weights, used };
         for run in self.interpolate(means, &samples, &local, outputs, scratch) {
             self.average_run(means, &run, samples.start, &local, outputs, scratch);
@@ -173,13 +216,17 @@ impl Refinement {
             errors: &mut outputs.errors[in_errors],
             order: &mut outputs.order[in_order],
         };
-        self.fill(means, run, &local.used, scratch);
+        if !scratch.kept.as_ref().is_some_and(|kept| kept.start <= run.start && run.end <= kept.end) {
+            self.fill(means, run, &local.used, scratch);
+        }
+        let first = scratch.kept.as_ref().map_or(0, |kept| run.start - kept.start);
         let mut parts = Vec::new();
         self.between_centres(Grid::new(self.samples, 1), run.clone(), |part, place| {
             parts.push((part.start - run.start..part.end - run.start, place));
         });
         let (rows, variances, orders) = (&*scratch.rows, &*self.variances, &*self.orders);
-        let left = dispatch(self.instructions, Mixture { rows, variances, orders, local, parts: &parts, outputs });
+        let left =
+            dispatch(self.instructions, Mixture { rows, first, variances, orders, local, parts: &parts, outputs });
         let mut missing = Vec::new();
         for (part, place) in left.into_iter().map(|index| parts[index].clone()) {
             let shares = (0..candidates).filter(|&one| local.used[one]);
@@ -190,10 +237,10 @@ impl Refinement {
             });
             let active: Vec<Share> = shares.filter(|share| share.weight != (0.0, 0.0)).collect();
             // A few samples between the same centres.
-            for first in part.clone().step_by(TOGETHER) {
-                let distance = |i: usize| place.advance * (first - part.start + i) as f64;
-                let places = first..part.end.min(first + TOGETHER);
-                for place in self.mix(&active, &std::array::from_fn(distance), places, outputs, scratch) {
+            for begin in part.clone().step_by(TOGETHER) {
+                let distance = |i: usize| place.advance * (begin - part.start + i) as f64;
+                let places = begin..part.end.min(begin + TOGETHER);
+                for place in self.mix(&active, &std::array::from_fn(distance), places, outputs, (first, scratch)) {
                     missing.push((place, self.blocks.of(run.start + place)));
                 }
             }
@@ -203,20 +250,23 @@ impl Refinement {
         }
         // Near the ends and near unusable samples the best windows do not fit: take the best of those that do.
         let rest: Vec<bool> = local.used.iter().map(|used| !used).collect();
-        self.fill(means, run, &rest, scratch);
+        if scratch.kept.is_none() {
+            self.fill(means, run, &rest, scratch);
+        }
         for (place, block) in missing {
             let own = (block - local.first) * candidates..(block - local.first + 1) * candidates;
             let (row, biases) = (&local.logarithms[own.clone()], &local.biases[own]);
-            let fits =
-                (0..candidates).filter(|&one| !scratch.rows[one][place].is_nan() && row[one] > f64::NEG_INFINITY);
+            let fits = (0..candidates)
+                .filter(|&one| !scratch.rows[one][first + place].is_nan() && row[one] > f64::NEG_INFINITY);
             let best = fits.max_by(|&a, &b| row[a].total_cmp(&row[b]));
             let share = best.map(|candidate| Share { candidate, weight: (1.0, 0.0), bias: (biases[candidate], 0.0) });
-            let _ = self.mix(share.as_slice(), &[0.0; TOGETHER], place..place + 1, outputs, scratch);
+            let _ = self.mix(share.as_slice(), &[0.0; TOGETHER], place..place + 1, outputs, (first, scratch));
         }
     }
 
     /// Fills the rows of the candidates wanted at all samples of a run; NaN where a window does not fit.
     fn fill(&self, means: &BlockMeans<'_>, run: &Range<usize>, wanted: &[bool], scratch: &mut AverageScratch) {
+        scratch.kept = None;
         for bank in 0..self.banks.len() {
             let (own, grid) = (self.candidates_of(bank), self.grid(bank));
             if !wanted[own.clone()].contains(&true) {
@@ -243,20 +293,20 @@ impl Refinement {
         }
     }
 
-    /// Writes the average of some candidates at a few places, or NaN. Returns the places where there is none.
+    /// Writes the average of some candidates at a few places, or NaN. Returns the places where there is none. Rows begin so much before the run.
     fn mix(
         &self,
         shares: &[Share],
         distances: &[f64; TOGETHER],
         places: Range<usize>,
         outputs: &mut DerivativeOutputs<'_>,
-        scratch: &AverageScratch,
+        (before, scratch): (usize, &AverageScratch),
     ) -> impl Iterator<Item = usize> + use<> {
         let count = places.len();
         // Estimates and weights, zero where there is no estimate.
         let known = |share: &Share| {
             let mut estimates = [f64::NAN; TOGETHER];
-            estimates[..count].copy_from_slice(&scratch.rows[share.candidate][places.clone()]);
+            estimates[..count].copy_from_slice(&scratch.rows[share.candidate][before + places.start..][..count]);
             let mut weights = line(share.weight, distances);
             for (estimate, weight) in estimates.iter_mut().zip(&mut weights) {
                 let usable = *weight > 0.0 && !estimate.is_nan();
@@ -322,4 +372,59 @@ struct Share {
 /// Numbers on a line, at some distances from its start.
 fn line((start, growth): (f64, f64), distances: &[f64; TOGETHER]) -> [f64; TOGETHER] {
     distances.map(|distance| start + distance * growth)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::auto_derivatives::candidates::Target;
+    use crate::auto_derivatives::global_choice::Pair;
+    use crate::noise::correlated::CorrelatedNoise;
+    use crate::noise::quantisation::tests::uniform;
+    use crate::simd::instructions::Instructions;
+
+    #[test]
+    fn what_was_compared_at_every_sample_is_averaged_as_it_is() {
+        let samples = 40_000;
+        let mut sum = 0.0;
+        let walk = |e: f64| {
+            sum += e;
+            sum
+        };
+        let mut record: Vec<f64> = uniform(samples).into_iter().map(walk).collect();
+        record[12_345] = f64::NAN;
+        let (record, noise) = (record.as_slice(), CorrelatedNoise::white(0.02));
+        let means = BlockMeans::new(&record, 40).expect("little memory");
+        let instructions = Instructions::current();
+        let target = Target {
+            derivative: 1,
+            highest: 15,
+            fixed: false,
+            shortest: 4,
+            of_means: true,
+            delta: 1.0,
+            noise: &noise,
+            instructions,
+        };
+        let of = Refinement::new(samples, Pair { half: 5, order: 3 }, &target);
+        let of = of.expect("little memory").expect("long enough");
+        assert!(of.at_every_sample());
+        let (mut values, mut errors, mut order) = (vec![0.0; samples], vec![0.0; samples], vec![0; samples]);
+        let mut outputs = DerivativeOutputs { values: &mut values, errors: &mut errors, order: &mut order };
+        of.estimate(&means, &mut outputs, NonZeroUsize::MIN, &mut |_, _| true).expect("nobody cancels");
+        let (mut again, mut of_errors, mut of_order) = (vec![0.0; samples], vec![0.0; samples], vec![0; samples]);
+        let mut rest = DerivativeOutputs { values: &mut again, errors: &mut of_errors, order: &mut of_order };
+        for chunk in of.chunks() {
+            let weighed = of.weigh_around(&means, &chunk, NonZeroUsize::MIN, &mut |_, _| true).expect("nobody cancels");
+            for Piece { content: (part, mut own), .. } in of.pieces_of(&chunk, &mut rest) {
+                // Nothing is kept: all is estimated anew.
+                of.average(&means, part, &weighed, &mut own, &mut of.scratch());
+            }
+        }
+        let bits = |numbers: &[f64]| numbers.iter().map(|number| number.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&values), bits(&again));
+        assert_eq!(bits(&errors), bits(&of_errors));
+        assert_eq!(order, of_order);
+        assert!(values[12_345].is_nan() && values.iter().filter(|value| value.is_nan()).count() < 60);
+    }
 }

@@ -1,9 +1,11 @@
-//! The weights of candidates at any place: linear between the centres of blocks.
+//! The weights of candidates in every block, and at any place: linear between the centres of blocks.
 
 use std::ops::Range;
 
 use crate::auto_derivatives::block_means::{BlockMeans, Grid};
 use crate::auto_derivatives::candidate_weights::{AverageScratch, Refinement};
+use crate::simd::f64x8::{Packet, WIDTH};
+use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
 /// Where the estimates of one record go. Slices that are empty are not wanted.
 #[derive(Debug)]
@@ -11,6 +13,16 @@ pub(crate) struct DerivativeOutputs<'a> {
     pub(crate) values: &'a mut [f64],
     pub(crate) errors: &'a mut [f64],
     pub(crate) order: &'a mut [u8],
+}
+
+/// The weight and bias of every candidate, block by block.
+pub(crate) struct Weighed {
+    /// The first of the blocks.
+    pub(crate) first: usize,
+    /// Logarithms of weights.
+    pub(crate) logarithms: Vec<f64>,
+    /// Squared biases.
+    pub(crate) biases: Vec<f64>,
 }
 
 /// The weights of all candidates in some blocks.
@@ -69,6 +81,23 @@ impl LocalWeights<'_> {
 }
 
 impl Refinement {
+    /// The logarithm of every candidate's weight and its squared bias in some blocks, from the risk around each. Sums and counts begin with a block.
+    pub(crate) fn weigh(&self, blocks: Range<usize>, begin: usize, sums: &[f64], counts: &[f64]) -> Weighed {
+        let (candidates, length) = (self.offsets.len(), self.blocks.length as f64);
+        let bell = |distance: usize| {
+            let u = distance as f64 * length / (self.reach + length / 2.0);
+            (1.0 - u * u).powi(2)
+        };
+        let bell: Vec<f64> = (0..=self.reach()).map(bell).collect();
+        let columns: Vec<Range<usize>> = (0..self.banks.len()).map(|bank| self.candidates_of(bank)).collect();
+        let (first, all) = (blocks.start, blocks.len() * candidates);
+        let mut weighed = Weighed { first, logarithms: vec![0.0; all], biases: vec![0.0; all] };
+        let (refinement, bell, columns) = (self, &*bell, &*columns);
+        let weighing = Weighing { refinement, blocks, begin, sums, counts, bell, columns, weighed: &mut weighed };
+        dispatch(self.instructions, weighing);
+        weighed
+    }
+
     /// Calls for all means of a part of a grid that lie between the same centres of blocks.
     pub(crate) fn between_centres(&self, grid: Grid, means: Range<usize>, mut with: impl FnMut(Range<usize>, Between)) {
         let length = self.blocks.length;
@@ -104,5 +133,155 @@ impl Refinement {
             rows[own.clone()].iter_mut().zip(estimates).for_each(|(row, estimates)| std::mem::swap(row, estimates));
         }
         (centres.start, own.start)
+    }
+}
+
+/// Weighs the candidates of some blocks.
+struct Weighing<'a> {
+    refinement: &'a Refinement,
+    blocks: Range<usize>,
+    /// The block that sums and counts begin with.
+    begin: usize,
+    sums: &'a [f64],
+    counts: &'a [f64],
+    /// The weights of blocks in a neighbourhood by their distance, and the candidates of every bank.
+    bell: &'a [f64],
+    columns: &'a [Range<usize>],
+    weighed: &'a mut Weighed,
+}
+
+impl Kernel for Weighing<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _: S) {
+        let Self { refinement, blocks, begin, sums, counts, bell, columns, weighed } = self;
+        let (candidates, banks) = (refinement.offsets.len(), columns.len());
+        let packets = candidates.div_ceil(WIDTH);
+        let padded = |numbers: &[f64]| -> Vec<Packet> { (0..packets).map(|at| packet(numbers, at * WIDTH)).collect() };
+        let (offsets, differences) = (padded(&refinement.offsets), padded(&refinement.differences));
+        let neighbourhood = refinement.blocks.length as f64 * (2.0 * bell.iter().sum::<f64>() - bell[0]);
+        let (mut sum, mut risks) = (vec![Packet::ZERO; packets], vec![0.0; packets * WIDTH]);
+        // Counts change near what is missing only.
+        let (mut count, mut last, mut spread) = (vec![0.0; banks], Vec::new(), vec![Packet::ZERO; packets]);
+        let rows = weighed.logarithms.chunks_exact_mut(candidates).zip(weighed.biases.chunks_exact_mut(candidates));
+        for (block, (weights, biases)) in blocks.zip(rows) {
+            let around = refinement.blocks_around(&(block..block + 1), bell.len() - 1);
+            // As many at once as hide how long each sum takes.
+            let mut at = 0;
+            while at < packets {
+                let of = |other: usize| (bell[block.abs_diff(other)], (other - begin) * candidates + at * WIDTH);
+                let weighted = around.clone().map(of);
+                match packets - at {
+                    1 => sum[at..][..1].copy_from_slice(&weighted_sums::<1>(sums, weighted)),
+                    2 | 3 => sum[at..][..2].copy_from_slice(&weighted_sums::<2>(sums, weighted)),
+                    _ => sum[at..][..4].copy_from_slice(&weighted_sums::<4>(sums, weighted)),
+                }
+                at += if packets - at > 3 { 4 } else { (packets - at).min(2) };
+            }
+            for (bank, all) in count.iter_mut().enumerate() {
+                *all = 0.0;
+                for other in around.clone() {
+                    *all += bell[block.abs_diff(other)] * counts[(other - begin) * banks + bank];
+                }
+            }
+            if count != last {
+                last.clone_from(&count);
+                for (own, &count) in columns.iter().zip(&count) {
+                    own.clone().for_each(|candidate| spread[candidate / WIDTH].0[candidate % WIDTH] = count);
+                }
+            }
+            for (at, (&sum, &count)) in sum.iter().zip(&spread).enumerate() {
+                let difference = sum / count;
+                let (mut risk, mut bias) = (difference + offsets[at], (difference - differences[at]).max(Packet::ZERO));
+                for lane in 0..WIDTH {
+                    let known = count.0[lane] > 0.0;
+                    risk.0[lane] = if known { risk.0[lane] } else { f64::INFINITY };
+                    bias.0[lane] = if known { bias.0[lane] } else { 0.0 };
+                }
+                risk.store(&mut risks[at * WIDTH..]);
+                let own = candidates.min((at + 1) * WIDTH) - at * WIDTH;
+                biases[at * WIDTH..][..own].copy_from_slice(&bias.0[..own]);
+            }
+            let best = least(&risks[..candidates]);
+            let (least, temperature) = (risks[best], refinement.temperatures[best]);
+            if !least.is_finite() {
+                weights.fill(f64::NEG_INFINITY);
+                continue;
+            }
+            let (least, twice) = (Packet::splat(least), Packet::splat(2.0 * temperature));
+            for (at, weights) in weights.chunks_mut(WIDTH).enumerate() {
+                // In this order: for an infinite temperature the quotient is zero, and zero times infinity would be NaN.
+                let risks = Packet::load(&risks[at * WIDTH..]);
+                let logarithms = (least - risks) / twice * Packet::splat(neighbourhood);
+                weights.copy_from_slice(&logarithms.0[..weights.len()]);
+            }
+        }
+    }
+}
+
+/// Some packets side by side, each the sum of what begins at some places times their weights.
+#[inline(always)]
+fn weighted_sums<const PACKETS: usize>(
+    numbers: &[f64],
+    weighted: impl Iterator<Item = (f64, usize)>,
+) -> [Packet; PACKETS] {
+    let mut sums = [Packet::ZERO; PACKETS];
+    for (weight, from) in weighted {
+        for (at, sum) in sums.iter_mut().enumerate() {
+            *sum += Packet::splat(weight) * packet(numbers, from + at * WIDTH);
+        }
+    }
+    sums
+}
+
+/// The place of the first of the least numbers.
+#[inline(always)]
+fn least(numbers: &[f64]) -> usize {
+    let (mut best, mut least, mut sum) = (0, numbers[0], 0.0);
+    for (place, &number) in numbers.iter().enumerate() {
+        best = if number < least { place } else { best };
+        least = if number < least { number } else { least };
+        sum += number;
+    }
+    if sum.is_nan() {
+        // What is no number is rare.
+        return (0..numbers.len()).min_by(|&a, &b| numbers[a].total_cmp(&numbers[b])).unwrap_or(0);
+    }
+    best
+}
+
+/// Eight numbers from a place on, zero beyond the last.
+#[inline(always)]
+fn packet(numbers: &[f64], from: usize) -> Packet {
+    if from + WIDTH <= numbers.len() {
+        return Packet::load(&numbers[from..]);
+    }
+    let mut packet = Packet::ZERO;
+    for (slot, number) in packet.0.iter_mut().zip(numbers.get(from..).unwrap_or_default()) {
+        *slot = *number;
+    }
+    packet
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_of_the_least_numbers_is_found() {
+        assert_eq!(least(&[3.0, 1.0, 2.0, 1.0]), 1);
+        assert_eq!(least(&[f64::INFINITY, f64::INFINITY]), 0);
+        // What is no number comes after all others, or before them, by its sign.
+        assert_eq!(least(&[f64::NAN, 2.0, 1.0]), 2);
+        assert_eq!(least(&[2.0, -f64::NAN, 1.0]), 1);
+    }
+
+    #[test]
+    fn packets_end_with_zeros() {
+        let numbers: Vec<f64> = (1..12).map(f64::from).collect();
+        assert_eq!(packet(&numbers, 3).0, [4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0]);
+        assert_eq!(packet(&numbers, 9).0, [10.0, 11.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(packet(&numbers, 20), Packet::ZERO);
     }
 }

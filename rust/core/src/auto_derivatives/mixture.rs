@@ -11,8 +11,9 @@ const COMPLETE: f64 = 0.5;
 
 /// Averages a run of samples.
 pub(crate) struct Mixture<'a, 'b> {
-    /// By candidate: estimates at all samples of the run, variance and order.
+    /// By candidate: estimates at all samples of the run, from some place of the row on, variance and order.
     pub(crate) rows: &'a [Vec<f64>],
+    pub(crate) first: usize,
     pub(crate) variances: &'a [f64],
     pub(crate) orders: &'a [u8],
     pub(crate) local: &'a LocalWeights<'a>,
@@ -22,7 +23,7 @@ pub(crate) struct Mixture<'a, 'b> {
 }
 
 /// What a candidate contributes to a part: numbers at its first sample, and by how much they grow from sample to sample.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct ShareLine {
     candidate: usize,
     weight: f64,
@@ -59,26 +60,27 @@ impl Mixture<'_, '_> {
     /// The candidates that share in a part. Returns whether there are weights on both of its sides.
     #[inline(always)]
     fn lines(&self, place: &Between, lines: &mut Vec<ShareLine>) -> bool {
-        lines.clear();
+        lines.resize(self.variances.len(), ShareLine::default());
+        let mut count = 0;
         let (weights, biases) =
             (self.local.beside(self.local.weights, place), self.local.beside(self.local.biases, place));
         let mut totals = [0.0; 2];
         for (candidate, &variance) in self.variances.iter().enumerate() {
             let (low, high) = (weights[0][candidate], weights[1][candidate]);
-            if low == 0.0 && high == 0.0 {
-                continue;
-            }
             totals[0] += low;
             totals[1] += high;
             let (bias, more) = (biases[0][candidate], biases[1][candidate] - biases[0][candidate]);
-            lines.push(ShareLine {
+            // Which candidates share changes from part to part: each is written, and some are written over.
+            lines[count] = ShareLine {
                 candidate,
                 weight: low + (high - low) * place.distance,
                 growth: (high - low) * place.advance,
                 square: bias + more * place.distance + variance,
                 square_growth: more * place.advance,
-            });
+            };
+            count += usize::from(low + high != 0.0);
         }
+        lines.truncate(count);
         totals.iter().all(|&total| total > COMPLETE)
     }
 
@@ -92,7 +94,7 @@ impl Mixture<'_, '_> {
             }
             let mut values = Packet::ZERO;
             for line in lines {
-                values += line.weights(distance) * Packet::load(&self.rows[line.candidate][at..]);
+                values += line.weights(distance) * Packet::load(&self.rows[line.candidate][self.first + at..]);
             }
             if values.0[..WIDTH.min(part.end - at)].iter().any(|value| value.is_nan()) {
                 return false;
@@ -101,7 +103,7 @@ impl Mixture<'_, '_> {
             if !self.outputs.errors.is_empty() {
                 let mut squares = Packet::ZERO;
                 for line in lines {
-                    let away = Packet::load(&self.rows[line.candidate][at..]) - values;
+                    let away = Packet::load(&self.rows[line.candidate][self.first + at..]) - values;
                     let own = Packet::splat(line.square) + Packet::splat(line.square_growth) * distance;
                     squares += line.weights(distance) * (own + away * away);
                 }
@@ -173,8 +175,15 @@ mod tests {
         for instructions in Instructions::available() {
             let (mut values, mut errors, mut order) = (vec![0.0; count], vec![0.0; count], vec![0; count]);
             let outputs = &mut DerivativeOutputs { values: &mut values, errors: &mut errors, order: &mut order };
-            let mixture =
-                Mixture { rows: &rows, variances: &variances, orders: &orders, local: &local, parts: &parts, outputs };
+            let mixture = Mixture {
+                rows: &rows,
+                first: 0,
+                variances: &variances,
+                orders: &orders,
+                local: &local,
+                parts: &parts,
+                outputs,
+            };
             // Something missing; no weights on one side, and the end of the run.
             assert_eq!(dispatch(instructions, mixture), [2, 5]);
             for (index, (part, place)) in parts.iter().enumerate().filter(|(index, _)| ![2, 5].contains(index)) {

@@ -1,7 +1,12 @@
-//! Derivatives of a basis at many places of a window.
+//! Derivatives of a basis at many places of a window, and sums over such places.
 
 use crate::auto_derivatives::deconvolution::AtCentre;
+use std::ops::{Add, Mul, Sub};
+
 use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
+use crate::simd::f64x8::{Packet, WIDTH};
+use crate::simd::instructions::Instructions;
+use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
 /// A derivative at the samples of a window that is made of means, or of samples.
 pub(crate) struct SampleSlopes<'a> {
@@ -18,13 +23,26 @@ impl<'a> SampleSlopes<'a> {
         Self { basis, step, derivative, polynomials }
     }
 
+    /// The products of some factors with the derivative of every polynomial of the basis, summed, at the first samples of the window: at
+    /// eight at a time, with the bits of each by itself.
+    pub(crate) fn sums(&self, factors: &[f64], count: usize, instructions: Instructions) -> Vec<f64> {
+        let mut sums = vec![0.0; count];
+        dispatch(instructions, SlopeSums { slopes: self, factors, sums: &mut sums });
+        sums
+    }
+
     /// The derivative of every polynomial of the basis at a sample.
     pub(crate) fn of_basis(&self, place: usize) -> [f64; MOST_DEGREES] {
         if self.step == 1 {
             return slopes(self.basis, place, self.derivative);
         }
+        slopes_between(self.basis, self.between(place), self.derivative)
+    }
+
+    /// Where a sample lies from the centre, in means.
+    fn between(&self, place: usize) -> f64 {
         let centre = self.basis.length() * self.step / 2;
-        slopes_between(self.basis, (place as f64 - centre as f64) / self.step as f64, self.derivative)
+        (place as f64 - centre as f64) / self.step as f64
     }
 
     /// The derivative of what every coefficient belongs to.
@@ -60,7 +78,7 @@ fn slopes(basis: &Basis, place: usize, derivative: usize) -> [f64; MOST_DEGREES]
     let known = values.iter_mut().take(basis.degrees()).enumerate();
     known.for_each(|(degree, value)| *value = basis.value(degree, place));
     for d in 1..=derivative {
-        climb(basis, basis.position(place), d, &mut values);
+        climb(basis, basis.position(place), d, &mut values, |number| number);
     }
     values
 }
@@ -69,20 +87,111 @@ fn slopes(basis: &Basis, place: usize, derivative: usize) -> [f64; MOST_DEGREES]
 fn slopes_between(basis: &Basis, x: f64, derivative: usize) -> [f64; MOST_DEGREES] {
     let mut values = [0.0; MOST_DEGREES];
     for d in 0..=derivative {
-        climb(basis, x, d, &mut values);
+        climb(basis, x, d, &mut values, |number| number);
     }
     values
 }
 
-/// The `d`-th derivatives from those below.
-fn climb(basis: &Basis, x: f64, d: usize, values: &mut [f64; MOST_DEGREES]) {
+/// The `d`-th derivatives from those below, of one number or of several side by side.
+#[inline(always)]
+fn climb<N>(basis: &Basis, x: N, d: usize, values: &mut [N; MOST_DEGREES], of: impl Fn(f64) -> N)
+where
+    N: Copy + Add<Output = N> + Sub<Output = N> + Mul<Output = N>,
+{
     // The derivative of the last degree and of this one, while `values` still holds the one below.
-    let mut last = 0.0;
-    let mut current = if d == 0 { 1.0 / (basis.length() as f64).sqrt() } else { 0.0 };
-    for (value, (ratio, inverse)) in values.iter_mut().zip(basis.steps()).take(basis.degrees()) {
+    let mut last = of(0.0);
+    let mut current = of(if d == 0 { 1.0 / (basis.length() as f64).sqrt() } else { 0.0 });
+    for (value, &(ratio, inverse)) in values.iter_mut().zip(basis.steps()).take(basis.degrees()) {
         let below = std::mem::replace(value, current);
-        let following = (x * current + d as f64 * below) * inverse - ratio * last;
+        let following = (x * current + of(d as f64) * below) * of(inverse) - of(ratio) * last;
         (last, current) = (current, following);
+    }
+}
+
+/// [`SampleSlopes::sums`].
+struct SlopeSums<'a> {
+    slopes: &'a SampleSlopes<'a>,
+    factors: &'a [f64],
+    sums: &'a mut [f64],
+}
+
+impl Kernel for SlopeSums<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _: S) {
+        let Self { slopes, factors, sums } = self;
+        let (basis, last) = (slopes.basis, sums.len().saturating_sub(1));
+        for (index, part) in sums.chunks_mut(WIDTH).enumerate() {
+            let (mut values, mut x) = ([Packet::ZERO; MOST_DEGREES], Packet::ZERO);
+            for lane in 0..WIDTH {
+                // Lanes beyond the last sample are not used.
+                let place = (index * WIDTH + lane).min(last);
+                if slopes.step > 1 {
+                    x.0[lane] = slopes.between(place);
+                    continue;
+                }
+                x.0[lane] = basis.position(place);
+                let (row, mirrored) = basis.row(place);
+                for (degree, &value) in row.iter().enumerate() {
+                    values[degree].0[lane] = if mirrored && degree % 2 == 1 { -value } else { value };
+                }
+            }
+            for d in usize::from(slopes.step == 1)..=slopes.derivative {
+                climb(basis, x, d, &mut values, Packet::splat);
+            }
+            // As sums of numbers begin.
+            let mut sum = Packet::splat(-0.0);
+            for (&value, &factor) in values.iter().zip(factors) {
+                sum += value * Packet::splat(factor);
+            }
+            part.copy_from_slice(&sum.0[..part.len()]);
+        }
+    }
+}
+
+/// The products of numbers at some samples, or means, of a window with every polynomial of its basis, summed.
+pub(crate) struct BasisSums<'a> {
+    pub(crate) basis: &'a Basis,
+    pub(crate) first: usize,
+    pub(crate) values: &'a [f64],
+}
+
+impl Kernel for BasisSums<'_> {
+    type Output = [f64; MOST_DEGREES];
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _: S) -> [f64; MOST_DEGREES] {
+        match self.basis.degrees() / WIDTH {
+            0 => self.of_groups::<0>(),
+            1 => self.of_groups::<1>(),
+            _ => self.of_groups::<2>(),
+        }
+    }
+}
+
+impl BasisSums<'_> {
+    /// Groups of eight degrees at once, and the others one by one.
+    #[inline(always)]
+    fn of_groups<const GROUPS: usize>(&self) -> [f64; MOST_DEGREES] {
+        let mut groups = [Packet::ZERO; GROUPS];
+        let mut sums = [0.0; MOST_DEGREES];
+        for (place, &value) in (self.first..).zip(self.values) {
+            let (row, mirrored) = self.basis.row(place);
+            let (whole, rest) = row.split_at(GROUPS * WIDTH);
+            let odd = if mirrored { -value } else { value };
+            let values = Packet([value, odd, value, odd, value, odd, value, odd]);
+            for (group, row) in groups.iter_mut().zip(whole.chunks_exact(WIDTH)) {
+                *group += Packet::load(row) * values;
+            }
+            for (degree, (sum, q)) in sums[GROUPS * WIDTH..].iter_mut().zip(rest).enumerate() {
+                *sum += q * if degree % 2 == 0 { value } else { odd };
+            }
+        }
+        for (sums, group) in sums.chunks_mut(WIDTH).zip(groups) {
+            sums.copy_from_slice(&group.0);
+        }
+        sums
     }
 }
 
@@ -104,6 +213,42 @@ mod tests {
                 let (one, other) =
                     (sum(slopes.of_basis(place), &combined), sum(slopes.of_coefficients(place), &coefficients));
                 assert!((one - other).abs() < 1e-13 * one.abs().max(1.0), "{one} {other}");
+            }
+        }
+    }
+
+    #[test]
+    fn sums_at_eight_samples_have_the_bits_of_each() {
+        let basis = Basis::new(97, 8).expect("little memory");
+        let factors: Vec<f64> = (0..8).map(|j| (f64::from(j) - 2.5) / 3.0).collect();
+        for (step, derivative) in [(1, 0), (1, 1), (1, 2), (3, 0), (9, 2)] {
+            let slopes = SampleSlopes::new(&basis, step, derivative, 8);
+            for instructions in Instructions::available() {
+                for count in [0, 1, 8, 51, 97 * step] {
+                    let sums = slopes.sums(&factors, count, instructions);
+                    assert_eq!(sums.len(), count);
+                    for (place, found) in sums.iter().enumerate() {
+                        let of_basis = slopes.of_basis(place);
+                        let sum: f64 = of_basis.iter().zip(&factors).map(|(slope, factor)| slope * factor).sum();
+                        assert_eq!(found.to_bits(), sum.to_bits(), "{step} {derivative} {place}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn sums_over_a_basis_are_those_of_the_definition() {
+        for degrees in [3, 8, 11, 16, 19] {
+            let basis = Basis::new(41, degrees).expect("little memory");
+            let values: Vec<f64> = (0..30).map(|i| (f64::from(i) * 0.7).sin()).collect();
+            for instructions in Instructions::available() {
+                let sums = dispatch(instructions, BasisSums { basis: &basis, first: 6, values: &values });
+                for (degree, found) in sums.into_iter().enumerate() {
+                    let known = (6..).zip(&values).take_while(|_| degree < degrees);
+                    let sum = known.map(|(place, value)| basis.value(degree, place) * value).sum::<f64>();
+                    assert_eq!(found, sum, "{degree} of {degrees}");
+                }
             }
         }
     }

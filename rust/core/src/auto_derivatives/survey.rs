@@ -301,7 +301,8 @@ impl<'a> Survey<'a> {
     ) -> Vec<Vec<f64>> {
         let samples = self.record().len();
         let places = Grid::new(samples, self.step_of(bank));
-        let mut rows = vec![Vec::new(); rows];
+        let count = self.stretches.iter().map(|stretch| places.means(stretch).len()).sum();
+        let mut rows: Vec<Vec<f64>> = (0..rows).map(|_| Vec::with_capacity(count)).collect();
         let resize = |rows: &mut [Vec<f64>], count: usize| {
             for row in rows {
                 row.resize(count, f64::NAN);

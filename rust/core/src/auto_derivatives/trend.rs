@@ -11,9 +11,13 @@
 
 use crate::error::Error;
 use crate::exec::memory;
+use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::tables::basis;
 use crate::noise::correlated::CorrelatedNoise;
 use crate::record::samples::{Samples, is_usable};
+use crate::simd::f64x8::{Packet, WIDTH};
+use crate::simd::instructions::Instructions;
+use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
 /// Degrees of a trend, and those that are tested.
 const TRENDS: usize = 3;
@@ -38,7 +42,11 @@ const COLOURED: f64 = 0.25;
 ///
 /// # Errors
 /// If there is not the memory.
-pub(crate) fn trend(record: &dyn Samples, noise: &CorrelatedNoise) -> Result<Option<usize>, Error> {
+pub(crate) fn trend(
+    record: &dyn Samples,
+    noise: &CorrelatedNoise,
+    instructions: Instructions,
+) -> Result<Option<usize>, Error> {
     let samples = record.len();
     if samples > LONGEST || noise.variance().is_nan() || noise.variance() <= 0.0 {
         return Ok(None);
@@ -54,7 +62,7 @@ pub(crate) fn trend(record: &dyn Samples, noise: &CorrelatedNoise) -> Result<Opt
     let halving = std::iter::successors(Some(samples), |length| Some(length / SHORTER));
     // The shortest windows see the highest frequencies.
     for length in halving.take_while(|&length| length > 2 * SHORTEST).chain([SHORTEST]) {
-        let power = powers(&values, length, noise)?;
+        let power = powers(&values, length, noise, instructions)?;
         let count = (samples / length) as f64;
         let noise_alone = |group: &[f64]| {
             let freedom = count * group.len() as f64;
@@ -69,21 +77,58 @@ pub(crate) fn trend(record: &dyn Samples, noise: &CorrelatedNoise) -> Result<Opt
 }
 
 /// By degree, the mean square of the coefficients of windows side by side, over that of the noise.
-fn powers(values: &[f64], length: usize, noise: &CorrelatedNoise) -> Result<Vec<f64>, Error> {
+fn powers(
+    values: &[f64],
+    length: usize,
+    noise: &CorrelatedNoise,
+    instructions: Instructions,
+) -> Result<Vec<f64>, Error> {
     let basis = basis(length, DEGREES)?;
-    let total = noise.variance();
-    let power = |degree: usize| {
+    let (total, count) = (noise.variance(), (values.len() / length) as f64);
+    let squares = dispatch(instructions, CoefficientSquares { values, basis: &basis });
+    let power = |(degree, square): (usize, f64)| {
         let row: Vec<f64> = (0..length).map(|index| basis.value(degree, index)).collect();
         let expected: f64 = row.iter().zip(noise.correlate(&row)).map(|(a, b)| a * b).sum();
-        let windows = values.chunks_exact(length);
-        let count = windows.len() as f64;
-        // The reference keeps the digits of a small motion on a large offset.
-        let square = |window: &[f64]| {
-            window.iter().zip(&row).map(|(value, q)| (value - window[length / 2]) * q).sum::<f64>().powi(2)
-        };
-        windows.map(square).sum::<f64>() / count / (expected * total)
+        square / count / (expected * total)
     };
-    Ok((0..DEGREES).map(power).collect())
+    Ok(squares.into_iter().enumerate().map(power).collect())
+}
+
+/// By degree, the sum of the squared coefficients of windows side by side.
+struct CoefficientSquares<'a> {
+    values: &'a [f64],
+    basis: &'a Basis,
+}
+
+impl Kernel for CoefficientSquares<'_> {
+    type Output = [f64; DEGREES];
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _: S) -> [f64; DEGREES] {
+        let length = self.basis.length();
+        let mut squares = [Packet::ZERO; DEGREES / WIDTH];
+        for window in self.values.chunks_exact(length) {
+            let mut sums = [Packet::ZERO; DEGREES / WIDTH];
+            for (index, value) in window.iter().enumerate() {
+                // The reference keeps the digits of a small motion on a large offset.
+                let value = value - window[length / 2];
+                let (row, mirrored) = self.basis.row(index);
+                let odd = if mirrored { -value } else { value };
+                let values = Packet([value, odd, value, odd, value, odd, value, odd]);
+                for (sum, row) in sums.iter_mut().zip(row.chunks_exact(WIDTH)) {
+                    *sum += values * Packet::load(row);
+                }
+            }
+            for (square, sum) in squares.iter_mut().zip(sums) {
+                *square += sum * sum;
+            }
+        }
+        let mut all = [0.0; DEGREES];
+        for (all, square) in all.chunks_mut(WIDTH).zip(squares) {
+            all.copy_from_slice(&square.0);
+        }
+        all
+    }
 }
 
 #[cfg(test)]
@@ -98,7 +143,7 @@ mod tests {
 
     fn found(signal: impl Fn(f64) -> f64) -> Option<usize> {
         let samples: Vec<f64> = noise().iter().enumerate().map(|(i, e)| e + signal(i as f64 / 4000.0)).collect();
-        trend(&samples.as_slice(), &CorrelatedNoise::white(1.0)).expect("little memory")
+        trend(&samples.as_slice(), &CorrelatedNoise::white(1.0), Instructions::current()).expect("little memory")
     }
 
     #[test]
@@ -119,8 +164,11 @@ mod tests {
     #[test]
     fn missing_samples_and_no_noise_are_no_trend() {
         let mut samples = noise();
-        assert_eq!(trend(&samples.as_slice(), &CorrelatedNoise::white(0.0)), Ok(None));
+        let found = |samples: &[f64], variance: f64| {
+            trend(&samples, &CorrelatedNoise::white(variance), Instructions::current())
+        };
+        assert_eq!(found(&samples, 0.0), Ok(None));
         samples[100] = f64::NAN;
-        assert_eq!(trend(&samples.as_slice(), &CorrelatedNoise::white(1.0)), Ok(None));
+        assert_eq!(found(&samples, 1.0), Ok(None));
     }
 }
