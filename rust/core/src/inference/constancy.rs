@@ -153,7 +153,7 @@ fn alone(
     let enough = shortened.into_iter().filter(|&length| length > problem.layout.regressors());
     let mut fits = enough.filter_map(|length| Fit::in_rows(&part, length, expected, instructions));
     let fit = fits.find(|fit| (0..fit.full.len()).any(|window| is_determined(&fit.full, window)))?;
-    let covariance = fit.covariance_of(&part, 0..fit.full.len(), &fit.pooled, &covariance.from_row(rows.start));
+    let covariance = fit.covariance_of(&part, 0..fit.full.len(), &fit.pooled, &covariance.beginning_at(rows.start));
     Some((fit.pooled.values, covariance))
 }
 

@@ -146,7 +146,7 @@ impl Fit {
         let columns: Vec<_> =
             constants.map(|constant| self.influence(problem, &windows, &pooled.weights, constant)).collect();
         let first = (self.full.first + windows.start.cast_signed()) * self.step.cast_signed();
-        sandwich(&columns, &pooled.inverse, &covariance.from_row(usize::try_from(first).unwrap_or(0)))
+        sandwich(&columns, &pooled.inverse, &covariance.beginning_at(usize::try_from(first).unwrap_or(0)))
     }
 
     /// The influence of every row within some windows on a constant estimated from them.

@@ -24,12 +24,12 @@ pub(crate) struct RowCovariance {
     /// By distance in rows, beginning with the variance; the mean over the places of rows where these differ.
     pub(crate) lags: Vec<f64>,
     /// Of rows of several equations that take turns.
-    places: Option<Places>,
+    places: Option<EquationLags>,
 }
 
 /// Covariances of rows of several equations that take turns: every equation has another noise, which it shares with some of the others.
 #[derive(Clone, Debug, PartialEq)]
-struct Places {
+struct EquationLags {
     /// How many equations there are.
     count: usize,
     /// That of row 0.
@@ -52,11 +52,16 @@ impl RowCovariance {
             .map(|(a, b)| between(a, b))
             .collect();
         let mean = lags.chunks(count).map(|lag| lag.iter().sum::<f64>() / count as f64).collect();
-        Self { lags: mean, places: (count > 1).then_some(Places { count, first: 0, lags }) }
+        Self { lags: mean, places: (count > 1).then_some(EquationLags { count, first: 0, lags }) }
+    }
+
+    /// The mean over all equations.
+    pub(crate) fn mean(&self) -> Self {
+        Self::by_distance(self.lags.clone())
     }
 
     /// The same where a row is counted as row 0.
-    pub(crate) fn from_row(&self, row: usize) -> Self {
+    pub(crate) fn beginning_at(&self, row: usize) -> Self {
         let mut moved = self.clone();
         if let Some(places) = &mut moved.places {
             places.first = (places.first + row) % places.count;
@@ -227,7 +232,7 @@ impl<W: Fn(usize) -> [f64; 2]> Kernel for AddNeighbours<'_, W> {
 /// What [`RowCovariance::add`] does where equations take turns.
 struct AddOfEquations<'a, W> {
     lags: usize,
-    places: &'a Places,
+    places: &'a EquationLags,
     column: &'a [f64],
     rows: Range<usize>,
     weights: W,
@@ -365,10 +370,10 @@ mod tests {
                     if lag < distances { between(lag, (first + early) % count) } else { 0.0 }
                 };
                 let near = |row: usize| row.saturating_sub(distances)..(row + distances).min(rows);
-                let found = covariance.from_row(first).times(&column);
+                let found = covariance.beginning_at(first).times(&column);
                 let mut watch = |_: usize, _: usize| true;
                 let mut stages = Stages::new(NonZeroUsize::MIN, 1, 1, &mut watch);
-                let both = covariance.from_row(first).correlated(&[&column], &[&column], period, &mut stages);
+                let both = covariance.beginning_at(first).correlated(&[&column], &[&column], period, &mut stages);
                 let both = both.expect("not cancelled");
                 for row in (0..rows).rev().take(60).chain(0..rows.min(60)) {
                     let value: f64 = near(row).map(|other| pair(row, other) * column[other]).sum();

@@ -59,13 +59,6 @@ pub(crate) fn stretches_of_rows(rows: usize) -> Option<Vec<Range<usize>>> {
     (rows > LONG).then(|| stretches_of_blocks(rows, MOST_ROWS, STRETCHES))
 }
 
-/// The same of rows of which `group` belong to one time: whole times.
-pub(crate) fn stretches_of_times(rows: usize, group: usize) -> Option<Vec<Range<usize>>> {
-    let whole = |row: usize| row - row % group;
-    let stretches = stretches_of_rows(rows)?;
-    Some(stretches.into_iter().map(|one| whole(one.start)..whole(one.end)).collect())
-}
-
 /// Stretches of few rows, and how many of some lengths, shortest first, they hold: enough to rule most of them out before more rows compare the
 /// others. `None` if the rows are so few that there is nothing to rule out.
 pub(crate) fn few_stretches(rows: usize, scales: &[Scale]) -> Option<(Vec<Range<usize>>, usize)> {

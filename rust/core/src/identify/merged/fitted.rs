@@ -16,7 +16,7 @@ use crate::regression::model::Model;
 use crate::regression::problem::Correlated;
 use crate::regression::residuals::residuals;
 use crate::regression::row_covariance::RowCovariance;
-use crate::regression::subsample::{holds, stretches_of_times, thinned_rows};
+use crate::regression::subsample::{holds, stretches_of_rows, thinned_rows};
 use crate::regression::window_length::Scale;
 
 /// So many of the longest windows that stretches of a long record hold are tried again on all of it, where one of them is best.
@@ -122,6 +122,8 @@ impl MergedSession<'_, '_, '_> {
     /// How well windows of some lengths predict what they have not seen: on stretches of many rows as far as they hold windows so long.
     fn validated(&mut self, model: &Model, scales: &[Scale]) -> Result<Vec<Validated>, Error> {
         let (covariance, expected) = self.covariance();
+        // Stretches may begin with the row of any equation.
+        let covariance = covariance.mean();
         let instructions = self.options.instructions;
         let rows = &self.all.rows;
         let stages = &mut self.stages;
@@ -130,7 +132,7 @@ impl MergedSession<'_, '_, '_> {
             let problem = model.problem(rows, &rows.rhs, 1.0, Some(&correlated));
             validate(&problem, scales, expected, instructions, stages)
         };
-        let Some(stretches) = stretches_of_times(rows.len(), self.all.group).filter(|_| scales.len() > 1) else {
+        let Some(stretches) = stretches_of_rows(rows.len()).filter(|_| scales.len() > 1) else {
             return validated(rows, scales);
         };
         let short = scales.partition_point(|scale| holds(*scale));

@@ -16,7 +16,7 @@ use crate::regression::predictor::without_constants;
 use crate::regression::residuals::residuals;
 use crate::regression::sandwich::joint_covariance;
 use crate::regression::solved::sensitivity;
-use crate::regression::subsample::{stretches_of_times, thinned_rows};
+use crate::regression::subsample::{stretches_of_rows, thinned_rows};
 use crate::status::Status;
 
 /// Flags, standard errors of windowed elements, their covariances with others, and which those are, by row.
@@ -105,7 +105,7 @@ impl MergedSession<'_, '_, '_> {
         let whole = model.problem(rows, &rows.rhs, 1.0, Some(&fitted.correlated));
         let rhs = without_constants(&whole, constants);
         let rest = model.without_constants(rows, &whole, &rhs, constants, 1.0);
-        let thinned = stretches_of_times(rows.len(), self.all.group).map(|stretches| thinned_rows(rows, &stretches));
+        let thinned = stretches_of_rows(rows.len()).map(|stretches| thinned_rows(rows, &stretches));
         let of_thinned = thinned.as_ref().map(|rows| model.problem(rows, &rows.rhs, 1.0, None));
         let thinned_rhs = of_thinned.as_ref().map_or_else(Vec::new, |problem| without_constants(problem, constants));
         let of_thinned = thinned
