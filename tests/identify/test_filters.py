@@ -52,3 +52,17 @@ def test_a_lag_alone_leaves_no_filter(samples: int) -> None:
     assert result.record_status == 0
     alone = tvident.identify(angle, recording.torque[SIDES:-SIDES], sample_rate=RATE)
     assert result.value("inertia").stderr < 1.1 * alone.value("inertia").stderr
+
+
+@pytest.mark.parametrize("samples", [-3, 12])
+def test_a_lag_beside_the_one_that_is_given_is_suspected(samples: int) -> None:
+    recording = rig(1)
+    angle, torque = (
+        recording.angle[SIDES:-SIDES],
+        recording.torque[SIDES - samples : recording.torque.size - SIDES - samples],
+    )
+    result = tvident.identify(angle, torque, sample_rate=RATE, lag=(samples - 0.5) / RATE)
+    assert result.record_status & Status.LAG_SUSPECTED
+    advice = next(line for line in result.advice if "beside the lag that is given" in line)
+    told = float(advice.split("give lag=")[1].split()[0])
+    assert told * RATE == pytest.approx(samples, abs=0.05)

@@ -70,6 +70,8 @@ class Explained:
         Samples from one number to the next.
     coherence : float, optional
         Of the noise of both channels, above the motion.
+    lag : float, optional
+        Samples by which the torque was taken to be late.
     units : mapping of str to str, optional
         Of parameters and terms.
     """
@@ -81,6 +83,7 @@ class Explained:
     period: float
     step: int
     coherence: float | None = None
+    lag: float = 0.0
     units: Mapping[str, str] = field(default_factory=lambda: UNITS)
 
     def words(self) -> Words:
@@ -367,9 +370,10 @@ class Explained:
                 continue
             if one.name == "lag":
                 amount = f"{abs(one.value):.3g} ± {one.stderr:.1g}"
+                beside = " beside the lag that is given" if self.lag else ""
                 words.append(
-                    f"the torque seems to be {'delayed' if one.value > 0 else 'early'} by {amount} samples: give "
-                    f"lag={one.value * self.period:.3g} (seconds), or align the channels"
+                    f"the torque seems to be {'delayed' if one.value > 0 else 'early'} by {amount} samples{beside}: give "
+                    f"lag={(self.lag + one.value) * self.period:.4g} (seconds), or align the channels"
                 )
             else:
                 term = BUILT_IN[one.name]
