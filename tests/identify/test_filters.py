@@ -14,6 +14,8 @@ SIDES = 50
 """Samples on either side that a lag may move the torque by."""
 CLOSE = 3.5
 """Standard errors from the truth: one of 2000 lies farther by chance."""
+LEFT = 0.02
+"""What a lag may leave wrong of a torque that was low-passed at 20 Hz; without the lag it is 0.95."""
 
 
 def rig(seed: int = 0) -> tvident.Recording:
@@ -52,3 +54,28 @@ def test_a_lag_alone_leaves_no_filter(samples: int) -> None:
     assert result.record_status == 0
     alone = tvident.identify(angle, recording.torque[SIDES:-SIDES], sample_rate=RATE)
     assert result.value("inertia").stderr < 1.1 * alone.value("inertia").stderr
+
+
+@pytest.mark.parametrize("samples", [-3, 12])
+def test_a_lag_beside_the_one_that_is_given_is_suspected(samples: int) -> None:
+    recording = rig(1)
+    angle, torque = (
+        recording.angle[SIDES:-SIDES],
+        recording.torque[SIDES - samples : recording.torque.size - SIDES - samples],
+    )
+    result = tvident.identify(angle, torque, sample_rate=RATE, lag=(samples - 0.5) / RATE)
+    assert result.record_status & Status.LAG_SUSPECTED
+    advice = next(line for line in result.advice if "beside the lag that is given" in line)
+    told = float(advice.split("give lag=")[1].split()[0])
+    assert told * RATE == pytest.approx(samples, abs=0.05)
+
+
+@pytest.mark.parametrize("seed", [0, 5])
+def test_a_lag_much_longer_than_the_test_function_is_found(seed: int) -> None:
+    recording = tvident.simulate_torsional_rig(seed=seed, pattern="slider", angle_noise=1e-3)
+    torque = lfilter(*butter(2, 20.0, fs=RATE), recording.torque)
+    result = tvident.identify(recording.angle, torque, sample_rate=RATE, lag="auto")
+    assert result.settings["lag"] * RATE == pytest.approx(11.9, abs=0.5)
+    for name in ("inertia", "stiffness"):
+        off = np.asarray(getattr(result, name)) / getattr(recording, name) - 1
+        assert np.sqrt(np.mean(off[1000:-1000] ** 2)) < LEFT, name

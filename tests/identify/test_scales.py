@@ -60,6 +60,22 @@ def test_under_white_noise_the_test_function_of_the_spectra_lies_on_the_plateau(
     assert "estimates are the same from" in result.summary()
 
 
+@pytest.mark.parametrize("rate", [300.0, 1000.0])
+@pytest.mark.parametrize("seed", [3, 4])
+def test_without_noise_sums_in_place_of_integrals_contradict_nothing(rate: float, seed: int) -> None:
+    # Noise that is smaller than rounding.
+    recorded = tvident.simulate_torsional_rig(
+        20.0, rate, seed=seed, pattern="constant", angle_noise=0.0, torque_snr_db=300.0
+    )
+    result = tvident.identify(recorded.angle, recorded.torque, sample_rate=rate)
+    assert result.record_status == 0
+    scan = result.scan()
+    assert scan.plateau is not None
+    assert scan.plateau[1] >= 4 * scan.plateau[0]
+    # What all blocks may have wrong alike is in the errors that are compared.
+    assert (scan.stderr["inertia"] > 1e-8 * recorded.inertia[0]).all()
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_hum_is_left_to_wider_test_functions(seed: int) -> None:
     recorded = rig(seed)

@@ -33,7 +33,6 @@ _BEYOND_CHANCE = 4.0
 _TAKES_PART = 0.3
 """A constant that has at least this share in the worst determined combination is named."""
 
-
 _PERIODS = (2 * math.pi, math.pi, 360.0, 180.0, 1.0, *(2.0**bits for bits in range(8, 25)))
 """Periods of wrapped angles: a turn or half of one in rad, degrees and turns, and encoders' counts."""
 
@@ -43,10 +42,11 @@ _NEAR = 0.1
 
 def _period(jump: float) -> float:
     """Return the period of an angle that jumps so far."""
-    near = [one for one in _PERIODS if (1 - _NEAR) * one <= jump <= (1 + _NEAR / 2) * one]
+    near = (one for one in _PERIODS if (1 - _NEAR) * one <= jump <= (1 + _NEAR / 2) * one)
     return min(near, key=lambda one: abs(one - jump), default=jump)
 
 
+_BESIDE = " beside the lag that is given"
 _BEGIN = "begin with the first of these: the others may then disappear"
 
 
@@ -64,12 +64,12 @@ class Explained:
         Settings that were chosen from the record.
     tested : collection of str
         Unknowns that the record was to decide upon.
-    period : float
-        Seconds from one sample to the next.
-    step : int
-        Samples from one number to the next.
+    period, step : float, int
+        Seconds from one sample to the next; samples from one number to the next.
     coherence : float, optional
         Of the noise of both channels, above the motion.
+    lag : float, optional
+        Samples by which the torque was taken to be late.
     units : mapping of str to str, optional
         Of parameters and terms.
     """
@@ -81,6 +81,7 @@ class Explained:
     period: float
     step: int
     coherence: float | None = None
+    lag: float = 0.0
     units: Mapping[str, str] = field(default_factory=lambda: UNITS)
 
     def words(self) -> Words:
@@ -353,11 +354,11 @@ class Explained:
     @property
     def suspects(self) -> list[Any]:
         """What seems to be missing, the surest first; friction that drives the motion is no friction."""
-        found = [
-            one for one in self.found.suspects if one.conspicuous and not (one.name == "coulomb" and one.value <= 0)
-        ]
-        found.sort(key=lambda suspect: -abs(suspect.value) / suspect.stderr if suspect.stderr > 0 else -math.inf)
-        return found
+        suspects = [one for one in self.found.suspects if one.conspicuous]
+        found = [one for one in suspects if one.name != "coulomb" or one.value > 0]
+        return sorted(
+            found, key=lambda suspect: -abs(suspect.value) / suspect.stderr if suspect.stderr > 0 else -math.inf
+        )
 
     def suspicions(self, names: Collection[str] | None = None) -> list[str]:
         """Return what seems to be missing, in words: everything, or some of it by name."""
@@ -368,8 +369,8 @@ class Explained:
             if one.name == "lag":
                 amount = f"{abs(one.value):.3g} ± {one.stderr:.1g}"
                 words.append(
-                    f"the torque seems to be {'delayed' if one.value > 0 else 'early'} by {amount} samples: give "
-                    f"lag={one.value * self.period:.3g} (seconds), or align the channels"
+                    f"the torque seems to be {'delayed' if one.value > 0 else 'early'} by {amount} samples{_BESIDE * bool(self.lag)}: give "
+                    f"lag={(self.lag + one.value) * self.period:.4g} (seconds), or align the channels"
                 )
             else:
                 term = BUILT_IN[one.name]

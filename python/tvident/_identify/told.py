@@ -123,11 +123,12 @@ class Told:
             if data.weights is not None:
                 variances = [one * spread for one, spread in zip(variances, data.weights.spread, strict=True)]
             coherences = _core.noise_coherence(data.angles, data.torques, variances)
+        lags = np.broadcast_to(np.divide(self.settings["lag"], data.period), data.records)
         return [
             Explained(
-                one, names, self.settings["chosen"], tested, data.period, data.step, coherence, data.units
+                one, names, self.settings["chosen"], tested, data.period, data.step, coherence, late, data.units
             ).words()
-            for one, coherence in zip(self.found, coherences, strict=True)
+            for one, coherence, late in zip(self.found, coherences, lags.tolist(), strict=True)
         ]
 
     def _of_strong_form(self) -> ExplainedStrong:

@@ -197,7 +197,8 @@ pub(crate) fn regressors(motion: &Motion<'_>) -> Vec<usize> {
     unknowns(&motion.coefficients, motion.terms.len())
 }
 
-/// What cannot be missing because it is there, or is not a question that anybody asked: a cubic spring beside a known one.
+/// What cannot be missing because it is there, or is not a question that anybody asked: a cubic spring beside a known one. A lag that is found leaves
+/// none; one that is given may be another.
 fn not_missing(task: &Task<'_>) -> Vec<Missing> {
     let built_in = task.motion.terms.iter().filter_map(|term| match term {
         Term::BuiltIn(term) => Some(Missing::Term(term)),
@@ -205,6 +206,6 @@ fn not_missing(task: &Task<'_>) -> Vec<Missing> {
     });
     let cubic = BuiltInTerm::named("cubic").map(Missing::Term);
     let cubic = cubic.filter(|_| !matches!(task.motion.coefficients[2], Coefficient::Unknown));
-    let lag = (task.lag != Some(0.0)).then_some(Missing::Lag);
+    let lag = task.lag.is_none().then_some(Missing::Lag);
     built_in.chain(cubic).chain(lag).collect()
 }

@@ -24,6 +24,10 @@ const BLOCKS_OF_A_CONSTANT: usize = 2;
 const SPREAD: f64 = 3.0;
 const SPREAD_BESIDE_WINDOWED: f64 = 5.0;
 
+/// A constant is known no better than to what makes this part of the right-hand side, root mean squares compared: sums in place of integrals, rounding
+/// and models leave that much alike in all blocks, which their scatter does not show.
+const ALIKE: f64 = 1e-6;
+
 /// Constants and their standard errors.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct BlockFit {
@@ -227,7 +231,11 @@ pub(crate) fn fit_in_blocks(
             covariance: covariance
                 .into_iter()
                 .enumerate()
-                .map(|(place, value)| value * unscaled(place / constants) * unscaled(place % constants))
+                .map(|(place, value)| {
+                    let (row, column) = (place / constants, place % constants);
+                    let alike = if row == column { ALIKE * ALIKE } else { 0.0 };
+                    (value + alike) * unscaled(row) * unscaled(column)
+                })
                 .collect(),
         })
     };
@@ -339,7 +347,8 @@ mod tests {
         let fit = fit_in_blocks(&rows, &model(), &[0.0], &blocks(20), 1).remove(0).unwrap();
         for (place, (value, error)) in fit.values.iter().zip(&fit.errors()).enumerate() {
             assert_near(*value, CONSTANTS[place], 1e-8);
-            assert!(*error < 1e-8);
+            // Nothing scatters, and no more is known than blocks may have wrong alike.
+            assert!(*error > 1e-7 && *error < 1e-4, "{error}");
         }
     }
 

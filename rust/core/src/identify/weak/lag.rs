@@ -13,9 +13,12 @@ use crate::identify::weak::decided::Decided;
 use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::JudgedTerm;
+use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
 use crate::regression::problem::Problem;
+use crate::weak_form::test_function::TestFunction;
+use crate::weak_form::test_function_choice::spectrum_length;
 use crate::weak_form::weak_rows::WeakRows;
 
 /// Times that test function and windows are chosen again with the lag that was found.
@@ -30,6 +33,12 @@ const CHOSEN: f64 = 0.1;
 const LEAST_RESPONSE: f64 = 0.05;
 /// A lag that is not known to this part of the test function's half-width is not determined: beyond it the rate is no line.
 const UNKNOWN: f64 = 0.5;
+
+/// A lag beside constants is known well enough to begin with from a step of so many samples on, and is at most so many half-widths. It is large from
+/// this part of the half-width that was chosen without it.
+const ABOUT: f64 = 0.1;
+const MOST_HALVES: f64 = 2.0;
+const LARGE: f64 = 0.25;
 
 /// By how many samples the torque comes late.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,6 +56,10 @@ impl Session<'_, '_, '_> {
     /// Decides what is constant with the test function that was chosen, finds the lag where it is not given, and chooses again with it.
     pub(crate) fn decide_and_choose_again(&mut self, mut chosen: Chosen, model: &Model) -> Result<Settled, Error> {
         let mut lag = None;
+        if let Some(about) = self.large_lag(&chosen)? {
+            self.record.lag = about;
+            chosen = self.choose(model)?;
+        }
         for choice in 1..=CHOICES {
             if choice > 1 {
                 chosen = self.choose(model)?;
@@ -70,6 +83,43 @@ impl Session<'_, '_, '_> {
         let mut chosen = self.choose(model)?;
         let decided = self.decide(&mut chosen, model)?;
         Ok((chosen, decided, lag))
+    }
+
+    /// A lag that is large beside the test function that was chosen without it, about, or `None` where there is none or it is given. Windows follow
+    /// what such a lag leaves as if it were motion, and nothing of it is seen beside them: so unknowns are constant here, and the test function is
+    /// half a typical cycle wide on either side.
+    fn large_lag(&mut self, chosen: &Chosen) -> Result<Option<f64>, Error> {
+        if self.options.lag.is_some() {
+            return Ok(None);
+        }
+        let samples = self.record.angle.len();
+        let typical = 0.5 * self.evidence(spectrum_length(samples, 200))?.period();
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the record's length")]
+        let half = (typical as usize).min(samples / 16).max(chosen.weak.function.half_width());
+        let function = TestFunction::new(half, chosen.weak.function.exponent(), self.options.delta)?;
+        let constant = self.unknowns().into_iter().chain([self.rate()]).collect();
+        let model = Model { windowed: Vec::new(), constant, linear: self.options.linear };
+        let start = self.record.lag;
+        let mut lag = start;
+        for _ in 0..STEPS {
+            self.record.lag = lag;
+            let weak = self.rows(function);
+            self.record.lag = start;
+            let weak = weak?;
+            let problem = model.problem(&weak.rows, &weak.rows.rhs, self.noise[0], None);
+            let fit = Fit::new(&problem, None, Expected::UNKNOWN, self.options.instructions, &mut self.stages)?;
+            let step = fit.and_then(|fit| fit.pooled.values.last().map(|left| -left / self.options.delta));
+            let Some(step) = step.filter(|step| step.is_finite()) else { return Ok(None) };
+            lag += step.clamp(-UNKNOWN * half as f64, UNKNOWN * half as f64);
+            if lag.abs() > MOST_HALVES * half as f64 {
+                return Ok(None);
+            }
+            if step.abs() < ABOUT {
+                let least = (LARGE * chosen.weak.function.half_width() as f64).max(1.0);
+                return Ok(Some(lag).filter(|lag| lag.abs() > least));
+            }
+        }
+        Ok(None)
     }
 
     /// The lag, iterated until its correction vanishes, or `None` if the rows do not determine it.

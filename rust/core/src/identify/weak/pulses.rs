@@ -62,6 +62,11 @@ struct Left {
 }
 
 impl Left {
+    /// Adds something to what is left of every row.
+    fn add(&mut self, more: &[f64]) {
+        self.rows.iter_mut().zip(more).for_each(|(left, more)| *left += more);
+    }
+
     /// Whether the stiffness around some rows is such as a pulse in them leaves it.
     fn comes_back(&self, pulse: &Pulse, rows: &Range<usize>) -> bool {
         let reach = self.span / 2 + 1;
@@ -91,9 +96,9 @@ impl Session<'_, '_, '_> {
         let (error, expected) = (fitted.error, fitted.expected);
         chosen.fitted = Some(fitted);
         let Some(mut left) = left.filter(|_| error <= NOISE_MODEL_FAILS) else { return Ok(known.to_vec()) };
-        if !known.is_empty() && !self.are_better(chosen, model, (torque, error), &mut left.rows)? {
-            return Ok(Vec::new());
-        }
+        let added = if known.is_empty() { None } else { self.better_by(chosen, model, (torque, error))? };
+        let Some(added) = added.or(known.is_empty().then(Vec::new)) else { return Ok(Vec::new()) };
+        left.add(&added);
         let search = self.search(&chosen.weak, expected, &left);
         let mut over = search.conspicuous();
         if over.len() > MANY && search.is_chance(&over) {
@@ -101,10 +106,6 @@ impl Session<'_, '_, '_> {
         }
         let turns = if known.is_empty() { TURNS } else { 0 };
         for _ in 0..turns {
-            let rows: usize = over.iter().map(Range::len).sum();
-            if over.is_empty() || rows as f64 > MOST * left.rows.len() as f64 {
-                return Ok(Vec::new());
-            }
             let Some(again) = self.left_without(chosen, model, &over)? else { return Ok(Vec::new()) };
             left = again;
             let before = over;
@@ -116,12 +117,28 @@ impl Session<'_, '_, '_> {
         if left.others_change {
             return Ok(Vec::new());
         }
+        let placed = self.pulses_in(&chosen.weak, expected, &left, &over);
+        if placed.is_some() || known.is_empty() {
+            return Ok(placed.unwrap_or_default());
+        }
+        // One that was misplaced leaves something in windows that hold its rows, and seems not to come back.
+        let Some(mut left) = self.left_without(chosen, model, &over)? else { return Ok(Vec::new()) };
+        left.add(&added);
+        let over = self.search(&chosen.weak, expected, &left).conspicuous();
+        if left.others_change {
+            return Ok(Vec::new());
+        }
+        Ok(self.pulses_in(&chosen.weak, expected, &left, &over).unwrap_or_default())
+    }
+
+    /// The pulses in some stretches of rows, if they explain what stands out there, and better than anything else in their places.
+    fn pulses_in(&self, weak: &WeakRows, expected: Expected, left: &Left, over: &[Range<usize>]) -> Option<Vec<Pulse>> {
         // A touch is a torque of its own, and what is held for a while an inertia.
-        let (accelerations, samples) = (chosen.weak.plain_column(0), self.record.angle.len());
-        let (first, stride) = (chosen.weak.first, chosen.weak.stride);
+        let (accelerations, samples) = (weak.plain_column(0), self.record.angle.len());
+        let (first, stride) = (weak.first, weak.stride);
         let acceleration = Interpolated { values: &accelerations, first, stride, samples };
         let others: [&dyn Samples; 2] = [&Ones(samples), &acceleration];
-        let search = PulseSearch { others: &others, ..self.search(&chosen.weak, expected, &left) };
+        let search = PulseSearch { others: &others, ..self.search(weak, expected, left) };
         let pulse = |rows: &Range<usize>| search.within(rows).filter(|pulse| left.comes_back(pulse, rows));
         let found: Vec<Option<Pulse>> = over.iter().map(pulse).collect();
         // A few rows that stand out little do not speak against pulses that stand out much.
@@ -131,29 +148,26 @@ impl Session<'_, '_, '_> {
             over.iter().zip(&found).filter(|(_, pulse)| pulse.is_some()).map(|(rows, _)| squares(rows)).sum();
         let pulses: Vec<Pulse> = found.into_iter().flatten().collect();
         let above_others: f64 = pulses.iter().map(|pulse| pulse.above_others).sum();
-        Ok(if explained >= EXPLAINED * all && above_others > BETTER { pulses } else { Vec::new() })
+        (explained >= EXPLAINED * all && above_others > BETTER).then_some(pulses)
     }
 
-    /// Whether rows with pulses taken off, which were predicted with some error, are predicted better than the same rows of the torque as it was
-    /// recorded. What pulses make of the rows is added to what is left of them.
-    fn are_better(
+    /// What pulses that were taken off add to rows, which were predicted with some error without them, or `None` if the same rows of the torque as it
+    /// was recorded are predicted hardly worse.
+    fn better_by(
         &mut self,
         chosen: &mut Chosen,
         model: &Model,
         (torque, error): (&dyn Samples, f64),
-        left: &mut [f64],
-    ) -> Result<bool, Error> {
+    ) -> Result<Option<Vec<f64>>, Error> {
         let record = Record { torque, ..self.record.clone() };
         let (function, delta, workers) = (chosen.weak.function, self.options.delta, self.stages.workers);
         let whole = self.stages.stage(|watch| WeakRows::build(&record, function, delta, None, workers, watch))?;
-        for ((left, whole), calm) in left.iter_mut().zip(&whole.rows.rhs).zip(&chosen.weak.rows.rhs) {
-            *left += whole - calm;
-        }
+        let added = whole.rows.rhs.iter().zip(&chosen.weak.rows.rhs).map(|(whole, calm)| whole - calm).collect();
         let calm = std::mem::replace(&mut chosen.weak.rows.rhs, whole.rows.rhs);
         let without = self.error_of(chosen, model);
         chosen.weak.rows.rhs = calm;
         let independent = self.record.angle.len() as f64 / function.half_width() as f64;
-        Ok((without? - error) * independent > BETTER)
+        Ok(((without? - error) * independent > BETTER).then_some(added))
     }
 
     /// Samples at which a pulse like those that were found would hardly be seen, and the change of such a pulse.
@@ -186,13 +200,17 @@ impl Session<'_, '_, '_> {
         }
     }
 
-    /// What is left of every row by windows that hold none of some rows, and whether they say anything of it.
+    /// What is left of every row by windows that hold none of some rows, and whether they say anything of it; nothing where these are none or too many.
     fn left_without(
         &mut self,
         chosen: &mut Chosen,
         model: &Model,
         rows: &[Range<usize>],
     ) -> Result<Option<Left>, Error> {
+        let count: usize = rows.iter().map(Range::len).sum();
+        if rows.is_empty() || count as f64 > MOST * chosen.weak.rows.len() as f64 {
+            return Ok(None);
+        }
         let whole = chosen.weak.rows.clone();
         chosen.weak.rows.exclude(rows.iter().cloned().flatten());
         let mut fitted = self.fit_first(chosen, model)?;
