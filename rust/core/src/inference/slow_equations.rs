@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use crate::inference::slow_curve::Varying;
+use crate::inference::slow_triangles::Triangles;
 use crate::regression::constants::{Expected, pool};
 use crate::regression::fit::Fit;
 use crate::regression::layout::{Fields, Layout};
@@ -23,6 +24,9 @@ pub(crate) const QUADRATIC: usize = 3;
 /// Points within one bandwidth.
 const DENSITY: usize = 8;
 
+/// Equations that are absorbed at a time.
+const AT_A_TIME: usize = 6;
+
 /// The equations that windows leave for slow coefficients, which come first among their constants.
 pub(crate) struct Slow<'a> {
     pub(crate) fit: &'a Fit,
@@ -41,20 +45,31 @@ pub(crate) struct Slow<'a> {
 }
 
 impl Slow<'_> {
-    /// Fits the slow coefficients, polynomials in time of so many terms, to equations up to `reach` rows away, leaving out those nearer than `hole` rows. Returns `None` if they
-    /// are not determined.
-    pub(crate) fn fit(&self, terms: usize, reach: f64, hole: f64, instructions: Instructions) -> Option<Varying> {
-        let spacing = reach / DENSITY as f64;
+    /// The stretches between which the slow coefficients may jump.
+    fn stretches(&self) -> impl Iterator<Item = Range<usize>> {
         let ends = self.breaks.iter().copied().chain([self.rows]);
-        let stretches: Vec<Range<usize>> =
-            std::iter::once(0).chain(self.breaks.iter().copied()).zip(ends).map(|(a, b)| a..b).collect();
-        let solve = |rows: &Range<usize>| {
+        std::iter::once(0).chain(self.breaks.iter().copied()).zip(ends).map(|(a, b)| a..b)
+    }
+
+    /// Fits the slow coefficients, polynomials in time of so many terms, to equations up to `reach` rows away, leaving out those nearer than `hole`
+    /// rows. Returns `None` if they are not determined.
+    pub(crate) fn fit(
+        &self,
+        equations: &[Triangles],
+        terms: usize,
+        (reach, hole): (f64, f64),
+        instructions: Instructions,
+    ) -> Option<Varying> {
+        let spacing = reach / DENSITY as f64;
+        let stretches: Vec<Range<usize>> = self.stretches().collect();
+        let solve = |(rows, equations): (&Range<usize>, &Triangles)| {
             let last = rows.len() as f64 - 1.0;
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "points of a record")]
             let count = (last.max(0.0) / spacing).ceil() as usize + 1;
-            dispatch(instructions, Points { slow: self, terms, rows: rows.clone(), reach, hole, spacing, count })
+            let (coefficients, start) = (self.coefficients, rows.start);
+            dispatch(instructions, Points { equations, coefficients, terms, start, reach, hole, count })
         };
-        let solved: Vec<Solved> = stretches.iter().map(solve).collect();
+        let solved: Vec<Solved> = stretches.iter().zip(equations).map(solve).collect();
         let starts = solved.iter().scan(0, |next, solved| Some(std::mem::replace(next, *next + solved.len())));
         let starts = stretches.iter().map(|rows| rows.start as f64).zip(starts).collect();
         let solved = Solved::join(&solved.iter().collect::<Vec<_>>());
@@ -90,6 +105,32 @@ impl Slow<'_> {
             rhs + entry * self.current.map_or(0.0, |current| current.at(j, row).0)
         })
     }
+
+    /// The equations of every stretch, the same for every reach.
+    pub(crate) fn equations(&self) -> Vec<Triangles> {
+        let full = &self.fit.full;
+        let all = full.fields.layout.constant;
+        let windows: Vec<(usize, f64)> = (0..full.len())
+            .filter(|&window| is_determined(full, window))
+            .map(|window| (window, self.fit.centre(window)))
+            .collect();
+        let of = |stretch: Range<usize>| {
+            let within = stretch.start as f64 - 0.5..stretch.end as f64 - 0.5;
+            let mut found = Triangles::new(all);
+            for &(window, row) in windows.iter().filter(|(_, row)| within.contains(row)) {
+                let root = self.weights[window].sqrt();
+                let rows = found.push(row, root > 0.0);
+                for (i, of_row) in rows.chunks_exact_mut(all + 1).enumerate() {
+                    for (j, entry) in of_row.iter_mut().enumerate().take(all).skip(i) {
+                        *entry = root * full.field(full.fields.left(i, j))[window];
+                    }
+                    of_row[all] = root * self.rhs(window, row, i);
+                }
+            }
+            found
+        };
+        self.stretches().map(of).collect()
+    }
 }
 
 /// Fills gaps with the nearest number, or returns `None` if there is none.
@@ -101,79 +142,73 @@ fn fill(values: &[Option<f64>]) -> Option<Vec<f64>> {
 }
 
 /// The kernel: eight points at a time.
-pub(crate) struct Points<'a, 'b> {
-    slow: &'a Slow<'b>,
+pub(crate) struct Points<'a> {
+    /// The equations of the stretch that they lie in, of which so many coefficients are slow.
+    equations: &'a Triangles,
+    coefficients: usize,
     /// Coefficients of the polynomials in time.
     terms: usize,
-    /// The stretch that they lie in.
-    rows: Range<usize>,
+    /// The first row of the stretch.
+    start: usize,
     reach: f64,
     hole: f64,
-    spacing: f64,
     count: usize,
 }
 
-impl Kernel for Points<'_, '_> {
+impl Kernel for Points<'_> {
     type Output = Solved;
 
     #[inline(always)]
     fn run<S: Lanes>(self, _simd: S) -> Solved {
-        let Self { slow, terms, rows: stretch, reach, hole, spacing, count: points } = self;
-        let within = stretch.start as f64 - 0.5..stretch.end as f64 - 0.5;
-        let full = &slow.fit.full;
-        let from = full.fields;
-        let (all, slow_ones) = (from.layout.constant, slow.coefficients);
+        let Self { equations, coefficients: slow_ones, terms, start, reach, hole, count: points } = self;
+        let spacing = reach / DENSITY as f64;
+        let all = equations.unknowns;
         let layout = Layout { windowed: terms * slow_ones, linear: false, constant: all - slow_ones };
         let columns = layout.columns();
         let noise = RowNoise::new(&vec![[].as_slice(); 2 * layout.windowed + layout.constant + 1], 0.0);
         let mut solved = Solved::new(layout, 0, points);
         let mut scratch = SolveScratch::new(layout);
         let mut summary = vec![Packet::ZERO; layout.size()];
-        let mut rows = vec![Packet::ZERO; all * columns];
+        let mut rows = vec![Packet::ZERO; AT_A_TIME * all * columns];
         let mut fields = vec![Packet::ZERO; Fields { layout }.size()];
-        let usable: Vec<(usize, f64)> = (0..full.len())
-            .filter(|&window| is_determined(full, window))
-            .map(|window| (window, slow.fit.centre(window)))
-            .filter(|(_, row)| within.contains(row))
-            .collect();
-        // Every window is near many points, but the curve of the previous round at its centre is the same for all of them.
-        let rhs: Vec<f64> =
-            usable.iter().flat_map(|&(window, row)| (0..all).map(move |i| slow.rhs(window, row, i))).collect();
         for first in (0..points).step_by(WIDTH) {
             summary.fill(Packet::ZERO);
-            let point = |lane: usize| stretch.start as f64 + (first + lane) as f64 * spacing;
-            let near = usable.partition_point(|(_, row)| *row < point(0) - reach)
-                ..usable.partition_point(|(_, row)| *row <= point(WIDTH - 1) + reach);
-            for (&(window, row), rhs) in usable[near.clone()].iter().zip(rhs[near.start * all..].chunks(all.max(1))) {
-                let distance: [f64; WIDTH] = std::array::from_fn(|lane| (row - point(lane)) / reach);
-                let weight = Packet(distance.map(|distance| {
-                    let seen = distance.abs() < 1.0 && distance.abs() * reach >= hole;
-                    if seen { slow.weights[window] * (1.0 - distance * distance) } else { 0.0 }
-                }));
-                let root = weight.sqrt();
-                let distance = Packet(distance);
-                for i in 0..all {
-                    let row_of = &mut rows[i * columns..(i + 1) * columns];
-                    row_of.fill(Packet::ZERO);
-                    for j in i..all {
-                        let entry = full.field(from.left(i, j))[window];
-                        if j < slow_ones {
+            let point = |lane: usize| start as f64 + (first + lane) as f64 * spacing;
+            let places = &equations.places;
+            let near = places.partition_point(|(row, _)| *row < point(0) - reach)
+                ..places.partition_point(|(row, _)| *row <= point(WIDTH - 1) + reach);
+            for from in near.clone().step_by(AT_A_TIME) {
+                let mut count = 0;
+                let some = from..near.end.min(from + AT_A_TIME);
+                for (&(row, counts), triangle) in places[some.clone()].iter().zip(equations.triangles(some)) {
+                    let distance: [f64; WIDTH] = std::array::from_fn(|lane| (row - point(lane)) / reach);
+                    let weight = Packet(distance.map(|distance| {
+                        let seen = distance.abs() < 1.0 && distance.abs() * reach >= hole;
+                        if seen { 1.0 - distance * distance } else { 0.0 }
+                    }));
+                    let root = weight.sqrt();
+                    let distance = Packet(distance);
+                    for (i, entries) in triangle.chunks_exact(all + 1).enumerate() {
+                        let row_of = &mut rows[count * columns..(count + 1) * columns];
+                        row_of.fill(Packet::ZERO);
+                        for (j, &entry) in entries.iter().enumerate().skip(i) {
                             let mut value = root * Packet::splat(entry);
+                            if j >= slow_ones {
+                                row_of[layout.windowed + j - slow_ones] = value;
+                                continue;
+                            }
                             for term in 0..terms {
                                 row_of[j * terms + term] = value;
                                 value = value * distance;
                             }
-                        } else {
-                            row_of[layout.windowed + j - slow_ones] = root * Packet::splat(entry);
                         }
+                        count += 1;
                     }
-                    row_of[columns - 1] = root * Packet::splat(rhs[i]);
+                    for (count, weight) in summary[layout.sums()].0.iter_mut().zip(weight.0) {
+                        *count += if counts && weight > 0.0 { all as f64 } else { 0.0 };
+                    }
                 }
-                absorb(layout, &mut summary, &mut rows, all, false);
-                let sums = layout.noise() - 3;
-                for (count, weight) in summary[sums].0.iter_mut().zip(weight.0) {
-                    *count += if weight > 0.0 { all as f64 } else { 0.0 };
-                }
+                absorb(layout, &mut summary, &mut rows, count, false);
             }
             solve(layout, &summary, &noise, Some(1.0), &mut scratch, &mut fields);
             solved.put(first, &fields);
@@ -270,7 +305,7 @@ mod tests {
         let companions = vec![rows.regressors[1].companion.as_slice()];
         let slow =
             Slow { fit: &fit, coefficients: 1, companions, current: None, weights: &ones, rows: ROWS, breaks: &[] };
-        slow.fit(QUADRATIC, reach, hole, Instructions::Scalar).expect("a curve")
+        slow.fit(&slow.equations(), QUADRATIC, (reach, hole), Instructions::Scalar).expect("a curve")
     }
 
     /// The largest distance between two curves, the ends left out, where points reach over half of what they see.

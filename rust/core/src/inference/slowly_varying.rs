@@ -25,6 +25,8 @@ const STRETCH: usize = 8;
 
 /// Rounds of estimating the slow coefficients, each starting from the last one's result.
 const ROUNDS: usize = 3;
+/// So many bandwidths in a row that are no better end the search for better ones around the last round's.
+const NO_BETTER: usize = 2;
 
 /// The slow coefficients found.
 #[derive(Clone, Debug)]
@@ -78,6 +80,7 @@ pub(crate) fn find(
     };
     let mut scale = shortened(first);
     let mut found: Option<SlowCoefficients> = None;
+    let mut last: Option<f64> = None;
     for _ in 0..ROUNDS {
         let current = found.as_ref().map(|found| &found.varying);
         let rhs = found.as_ref().map_or_else(|| rows.rhs.clone(), |found| found.rhs.clone());
@@ -90,23 +93,30 @@ pub(crate) fn find(
         let companions = slow.iter().map(|&one| rows.regressors[one].companion.as_slice()).collect();
         let equations = Slow { fit: &fit, coefficients, companions, current, weights, rows: rows.len(), breaks };
         let hole = (scale.span() / 2 + scale.reach) as f64;
-        let mut best: Option<(f64, Varying, f64)> = None;
+        let reaches: Vec<f64> =
+            REACHES.iter().map(|multiple| multiple * hole).take_while(|reach| 2.0 * reach <= whole).collect();
+        let triangles = equations.equations();
+        let mut best: Option<(usize, Varying, f64)> = None;
         let mut least = f64::INFINITY;
-        let reaches = REACHES.map(|multiple| multiple * hole).into_iter();
-        let quadratics = reaches.take_while(|reach| 2.0 * reach <= whole).map(|reach| (QUADRATIC, reach));
-        // Between jumps a coefficient may be constant.
-        let constants = (!breaks.is_empty()).then_some((1, 2.0 * whole));
-        for (terms, reach) in quadratics.chain(constants) {
-            let Some(leave_gap_out) = equations.fit(terms, reach, hole, instructions) else { continue };
-            let Some(full) = equations.fit(terms, reach, 0.0, instructions) else { continue };
+        let mut consider = |terms: usize, reach: f64| {
+            let fitted = |hole: f64| equations.fit(&triangles, terms, (reach, hole), instructions);
+            let (Some(leave_gap_out), Some(full)) = (fitted(hole), fitted(0.0)) else { return false };
             let error = equations.error(&problem, &leave_gap_out, &full, scale, expected.variance);
             let counts = if terms == 1 { simpler * error } else { error };
-            if best.is_none() || counts < least {
+            let is_better = best.is_none() || counts < least;
+            if is_better {
                 least = counts;
-                best = Some((error, full, reach));
+                best = Some((terms, full, reach));
             }
+            is_better
+        };
+        outward(&reaches, last, |reach| consider(QUADRATIC, reach));
+        // Between jumps a coefficient may be constant.
+        if !breaks.is_empty() {
+            consider(1, 2.0 * whole);
         }
-        let Some((_, varying, reach)) = best else { return Ok(None) };
+        let Some((terms, varying, reach)) = best else { return Ok(None) };
+        last = (terms > 1).then_some(reach);
         let rhs = without(rows, slow, &varying);
         let problem = rest.problem(rows, &rhs, noise, None);
         let validated = validate(&problem, scales, expected, instructions, stages)?;
@@ -117,6 +127,24 @@ pub(crate) fn find(
         found = Some(SlowCoefficients { varying, rhs, scale: best, error, reach: reach.min(whole / 2.0) });
     }
     Ok(found)
+}
+
+/// Tries bandwidths in ascending order, or outward from the last round's in both directions until they get no better.
+fn outward(reaches: &[f64], last: Option<f64>, mut is_better: impl FnMut(f64) -> bool) {
+    let last = last.unwrap_or(f64::NEG_INFINITY);
+    let most = if last.is_finite() { NO_BETTER } else { usize::MAX };
+    let (below, above) = reaches.split_at(reaches.partition_point(|&reach| reach < last));
+    let mut walk = |reaches: &mut dyn Iterator<Item = &f64>| {
+        let mut worse = 0;
+        for &reach in reaches {
+            worse = if is_better(reach) { 0 } else { worse + 1 };
+            if worse == most {
+                return;
+            }
+        }
+    };
+    walk(&mut above.iter());
+    walk(&mut below.iter().rev());
 }
 
 /// The right-hand side without slow coefficients.

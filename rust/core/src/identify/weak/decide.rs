@@ -24,7 +24,8 @@ const BETTER: f64 = 0.8;
 /// Where constants jump, those that do not change in between stand unless others predict so much better.
 const SIMPLER: f64 = 0.98;
 
-/// Rounds of looking for jumps and fitting again with windows that end there.
+/// Rounds of looking for jumps and fitting again with windows that end there. One is enough where even then constants seem to vary and windows are the
+/// shortest there are: these follow anything, and what they follow looks like jumps.
 const JUMP_ROUNDS: usize = 4;
 
 impl Session<'_, '_, '_> {
@@ -37,7 +38,7 @@ impl Session<'_, '_, '_> {
                 if round == 0 { self.jumps_of_constants(&chosen.weak, &decided, model)? } else { Vec::new() };
             let found = if !of_constants.is_empty() {
                 of_constants
-            } else if round < JUMP_ROUNDS {
+            } else if round < JUMP_ROUNDS && !(round > 0 && decided.follows_anything()) {
                 self.find_jumps(&chosen.weak, &decided, &jumps, whole.as_ref())?
             } else {
                 jumps.clone()

@@ -64,6 +64,11 @@ impl Decided {
         self.scales.len() > 1 && scale.is_some() && self.scales.first().copied() == scale
     }
 
+    /// Whether constants seem to vary and windows are the shortest of those that were tried.
+    pub(crate) fn follows_anything(&self) -> bool {
+        !self.slow.is_empty() && self.has_shortest_windows()
+    }
+
     /// The rows that the fit was made with.
     pub(crate) fn rows<'a>(&'a self, rows: &'a Rows) -> &'a Rows {
         self.white.as_ref().map_or(rows, |(white, _)| white)
