@@ -179,3 +179,31 @@ def test_settings_are_checked_when_they_are_made(form: Any, settings: dict[str, 
 def test_settings_are_those_of_a_result() -> None:
     with pytest.raises(TypeError, match="settings must be those of an earlier result"):
         tvident.identify(RIG.angle, RIG.torque, **WHOLE, settings={"kinds": 1})
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"preset": "paper"}, "identify has no option 'preset'; use method='auto' or method='paper'"),
+        (
+            {"window_length": 201},
+            "it belongs to a form: use method=tvident.WeakForm(window_length=…) or method=tvident",
+        ),
+        ({"max_order": 5}, "use method=tvident.StrongForm(max_order=…)"),
+        ({"fs": 1000}, "use sample_rate= in Hz"),
+        ({"stifness": 0}, "did you mean 'stiffness'?"),
+        ({"colour": "blue"}, "it has acceleration, align, angle, "),
+    ],
+    ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
+)
+def test_an_option_that_there_is_not_is_told_what_is_right(options: dict[str, Any], words: str) -> None:
+    with pytest.raises(TypeError, match=re.escape(words)):
+        tvident.identify(np.zeros(100), np.zeros(100), **options)
+
+
+@pytest.mark.parametrize("method", ["paper", tvident.StrongForm()], ids=["paper", "strong"])
+def test_what_varies_slowly_needs_the_weak_form(method: Any) -> None:
+    with pytest.raises(
+        ValueError, match=r"inertia='varying' needs the weak form; got the strong form; use tvident.WeakForm"
+    ):
+        tvident.identify(np.zeros(1000), np.zeros(1000), sample_rate=1000, method=method, inertia="varying")

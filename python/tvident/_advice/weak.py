@@ -329,7 +329,11 @@ class Explained:
         if self.found.pooling is not None:
             varying = [name for name, one in zip(self.names, self.found.unknowns, strict=True) if one.kind == "varying"]
             slow = varying or [name for name in ("inertia", "damping") if name in self._changing()]
-            why = "parts of the record differ by more than noise" if set(slow) <= set(self.tested) else "as given"
+            why = (
+                "parts of the record differ by more than noise"
+                if set(slow) <= set(self.tested)
+                else "given as changing"
+            )
             seconds = self.found.pooling * self.period
             words.append(
                 f"{listed(slow)} varying: {why}; local quadratics in time over {seconds:.3g} s, the bandwidth that predicts best"

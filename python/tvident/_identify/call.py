@@ -10,6 +10,7 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident._equation import GivenTerm
 from tvident._identify.aligned import Align
+from tvident._identify.keywords import explained
 from tvident._identify.methods import Method
 from tvident._identify.prepared import prepared
 from tvident._identify.records import calls_of_records, identify_records, names_shared
@@ -54,6 +55,7 @@ def identify(
 @overload
 def identify(angle: npt.ArrayLike | None, torque: npt.ArrayLike, **options: Unpack[OfOne]) -> Identification: ...
 # All but the data are options, as users call it.
+@explained
 def identify(
     angle: npt.ArrayLike | None,
     torque: npt.ArrayLike,
@@ -144,7 +146,8 @@ def identify(
     inertia, damping, stiffness : {"windowed", "constant", "auto", "varying"}, float or array_like, optional
         ``"windowed"``: unknown and time-varying, one value per sample. ``"constant"``: unknown, one value per record. ``"auto"``: constant
         unless a test rejects it (windowed, for stiffness). ``"varying"``: time-varying, but more slowly than windowed parameters (weak
-        form). A number or an array of the angle's shape: known; 0 leaves it out.
+        form; an inertia or a damping that is windowed beside a windowed stiffness is followed so, and what is varying beside nothing
+        windowed has windows). A number or an array of the angle's shape: known; 0 leaves it out.
     terms : sequence, optional
         Further terms of the left-hand side, each with an unknown factor: ``"offset"``, ``"coulomb"`` (the sign of the velocity),
         ``"cubic"`` (the cube of the angle), ``"gravity"`` (the sine of the angle), ``"viscous_asymmetric"`` (the magnitude of the

@@ -152,6 +152,11 @@ def resolve(
     if earlier is not None and earlier.get("instrument") and not has_instrument:
         raise ValueError("settings of a result with an instrument need it again; got none; pass instrument=")
     asked = _as_far_as_measured(asked, {**before, **given}, channels, has_instrument=has_instrument)
+    for parameter in COEFFICIENTS if isinstance(form, StrongForm) else ():
+        if arguments.is_word(given.get(parameter), "varying"):
+            raise ValueError(
+                f"{parameter}='varying' needs the weak form; got the strong form; use tvident.WeakForm, or {parameter}='windowed'"
+            )
     lag = asked["lag"]
     if isinstance(lag, tuple | list) and isinstance(form, WeakForm):
         by_record["lag"] = [arguments.finite_number("lag", one) for one in lag]

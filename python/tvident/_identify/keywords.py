@@ -1,0 +1,52 @@
+"""What is said of an option that ``identify`` does not have: whose it is, what it is called, or what it may have been meant for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields
+from difflib import get_close_matches
+from functools import wraps
+from inspect import signature
+from typing import Any, TypeVar
+
+from tvident import _arguments as arguments
+from tvident._identify.methods import StrongForm, WeakForm
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+_CALLED = {
+    "form": "method=tvident.WeakForm() or tvident.StrongForm()",
+    "preset": "method='auto' or method='paper'",
+    "equations": "regression_window= of a form: method=tvident.StrongForm(regression_window=200)",
+    "fs": "sample_rate= in Hz",
+    "rate": "sample_rate= in Hz",
+    "dt": "delta= in seconds",
+    "time": "t= in seconds",
+    "times": "t= in seconds",
+}
+"""What options are called that other libraries, and earlier versions, have under these names."""
+
+
+def explained(function: _Function) -> _Function:
+    """Return the function; an option that it does not have is an error that says what would be right."""
+    known = frozenset(signature(function).parameters)
+
+    @wraps(function)
+    def call(*args: Any, **options: Any) -> Any:
+        if not known.issuperset(options):
+            name = next(name for name in options if name not in known)
+            raise TypeError(f"{function.__name__} has no option {arguments.shown(name)}; {_right(name, known)}")
+        return function(*args, **options)
+
+    return call  # type: ignore[return-value]  # takes what the function takes
+
+
+def _right(name: str, known: frozenset[str]) -> str:
+    """Return what would be right in place of an option that there is not."""
+    if name in _CALLED:
+        return f"use {_CALLED[name]}"
+    forms = [form.__name__ for form in (WeakForm, StrongForm) if name in {one.name for one in fields(form)}]
+    if forms:
+        return "it belongs to a form: use " + " or ".join(f"method=tvident.{form}({name}=…)" for form in forms)
+    near = get_close_matches(name, known, n=1)
+    return f"did you mean {near[0]!r}?" if near else f"it has {', '.join(sorted(known))}"
