@@ -141,6 +141,17 @@ pub enum Error {
     /// A call in which everything is known.
     #[error("at least one parameter must be unknown; all are given; let one be windowed or constant")]
     NothingUnknown,
+    /// Something that only the weak form does.
+    #[error("{what} needs the weak form; got the strong form; {cure}")]
+    NeedsWeakForm {
+        /// What was asked for.
+        what: &'static str,
+        /// What would be right.
+        cure: &'static str,
+    },
+    /// Numbers at every so many samples, and that is none.
+    #[error("step must be at least 1; got 0; give 1 for numbers at every sample")]
+    StepTooSmall,
     /// Equations that do not determine what is constant.
     #[error("the record must determine what is constant; it does not; excite the system, or leave a parameter out")]
     NotDetermined,

@@ -13,6 +13,7 @@ use crate::identify::route::identify_all;
 use crate::local_polynomials::criterion::Criterion;
 use crate::local_polynomials::options::{Order, PolynomialOptions, Selection};
 use crate::local_polynomials::plan::LocalPolynomials;
+use crate::noise::quantisation::quantisation_step;
 use crate::simd::instructions::Instructions;
 
 /// How inertia, damping or stiffness comes about: unknown, of some kind, or known.
@@ -61,8 +62,6 @@ pub struct StrongSettings {
     pub filter_torque: bool,
     /// Whether windowed coefficients may grow linearly within a window.
     pub linear: bool,
-    /// The step that the angle was rounded to: no residual is taken to be smaller than it leaves.
-    pub quantisation: f64,
 }
 
 impl Default for StrongSettings {
@@ -76,7 +75,6 @@ impl Default for StrongSettings {
             regression_window: 200,
             filter_torque: false,
             linear: false,
-            quantisation: 0.0,
         }
     }
 }
@@ -213,7 +211,7 @@ impl<'a> Identify<'a> {
 
     /// Says every how many samples numbers are wanted.
     pub fn step(mut self, step: usize) -> Self {
-        self.step = step.max(1);
+        self.step = step;
         self
     }
 
@@ -227,7 +225,7 @@ impl<'a> Identify<'a> {
     ///
     /// # Errors
     /// If channels or mask differ in length, the sample rate is no positive number, a term has no such name, nothing is unknown, settings are
-    /// impossible, or the record is too short for them.
+    /// impossible or of the other form, or the record is too short for them.
     pub fn run(self) -> Result<Identification, Error> {
         self.run_watched(&mut |_, _| true)
     }
@@ -241,7 +239,10 @@ impl<'a> Identify<'a> {
         let delta = self.sample_rate.recip();
         let plan = match &self.form {
             Form::Weak(_) => None,
-            Form::Strong(settings) => Some(plan(settings, delta)?),
+            Form::Strong(settings) => {
+                let step = self.quantisation.unwrap_or_else(|| quantisation_step(&self.angle));
+                Some(plan(settings, step, delta)?)
+            }
         };
         let method = match (&self.form, &plan) {
             (Form::Strong(settings), Some(derivatives)) => Method::Strong(StrongForm {
@@ -299,6 +300,19 @@ impl<'a> Identify<'a> {
         if self.terms.is_empty() && !self.coefficients.iter().any(|one| matches!(one, Parameter::Unknown(_))) {
             return Err(Error::NothingUnknown);
         }
+        if self.step == 0 {
+            return Err(Error::StepTooSmall);
+        }
+        if matches!(self.form, Form::Strong(_)) {
+            if self.lag.is_none() {
+                let cure = "give the lag that it finds, or leave estimate_lag out";
+                return Err(Error::NeedsWeakForm { what: "an unknown lag", cure });
+            }
+            if self.coefficients.iter().any(|one| matches!(one, Parameter::Unknown(Kind::Varying))) {
+                let cure = "use Kind::Windowed, or leave the form out";
+                return Err(Error::NeedsWeakForm { what: "what varies slowly", cure });
+            }
+        }
         Ok(())
     }
 }
@@ -320,7 +334,7 @@ fn no_such_term(name: &str) -> Error {
 }
 
 /// The plan for the angle and its first two derivatives.
-fn plan(settings: &StrongSettings, delta: f64) -> Result<LocalPolynomials, Error> {
+fn plan(settings: &StrongSettings, quantisation: f64, delta: f64) -> Result<LocalPolynomials, Error> {
     LocalPolynomials::new(PolynomialOptions {
         window_length: settings.window_length,
         order: Order::Chosen { criterion: settings.criterion, highest: settings.max_order },
@@ -328,7 +342,7 @@ fn plan(settings: &StrongSettings, delta: f64) -> Result<LocalPolynomials, Error
         derivatives: vec![0, 1, 2],
         delta,
         noise: true,
-        quantisation: settings.quantisation,
+        quantisation,
         instructions: Instructions::current(),
     })
 }
@@ -350,6 +364,11 @@ mod tests {
         assert_eq!(refused(identify(&angle, &angle, 1e3).terms(&[("quartic", Kind::Constant)])), Some(quartic));
         let all_known = identify(&angle, &angle, 1e3).inertia(1.0).damping(1.0).stiffness(1.0).terms(&[]);
         assert_eq!(refused(all_known), Some(Error::NothingUnknown));
+        assert_eq!(refused(identify(&angle, &angle, 1e3).step(0)), Some(Error::StepTooSmall));
+        let strong = || identify(&angle, &angle, 1e3).strong_form(StrongSettings::default());
+        for wrong in [strong().estimate_lag(), strong().inertia(Kind::Varying)] {
+            assert!(matches!(refused(wrong), Some(Error::NeedsWeakForm { .. })));
+        }
     }
 
     #[test]
