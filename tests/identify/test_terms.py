@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from tvident._equation import BUILT_IN
 
 Array = npt.NDArray[np.float64]
 
-FUNCTIONS = {
+FUNCTIONS: dict[str, Callable[..., Any]] = {
     "offset": lambda _t, angle, _velocity: np.ones_like(angle),
     "coulomb": lambda _t, _angle, velocity: np.sign(velocity),
     "cubic": lambda _t, angle, _velocity: angle**3,
@@ -36,6 +37,13 @@ def swings(n: int = 8000) -> tuple[Array, Array]:
         acceleration -= amplitude * omega**2 * np.sin(omega * t + phase)
     torque = INERTIA * acceleration + DAMPING * velocity + GRAVITY * np.sin(angle) + OFFSET
     return angle, torque
+
+
+def test_the_table_here_holds_the_functions() -> None:
+    angle, velocity = np.random.default_rng(3).standard_normal((2, 50))
+    for name, function in FUNCTIONS.items():
+        known = velocity if BUILT_IN[name].needs_velocity else None
+        np.testing.assert_array_equal(BUILT_IN[name].function(np, angle, known), function(0.0, angle, velocity))
 
 
 def test_there_is_one_table_here_and_one_in_the_core() -> None:

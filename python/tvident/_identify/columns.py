@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
-from tvident._equation import FixedTerm, InnerParameter, Term, Unknown, expected_stribeck
+from tvident._equation import BUILT_IN, FixedTerm, InnerParameter, Term, Unknown, expected_stribeck
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -26,13 +26,6 @@ _WITHIN_NOISE = 2.0
 
 _SPECK = 1e-30
 """Values of a term smaller than this part of its largest are none."""
-
-_OF_ANGLE: dict[str, Callable[[Array], Array]] = {
-    "offset": np.ones_like,
-    "cubic": lambda angle: angle**3,
-    "gravity": np.sin,
-}
-"""Built-in terms that need no velocity."""
 
 WINDOW_OF_TERMS = 51
 """Samples of the polynomials that terms of one's own get angle and velocity from in weak form."""
@@ -181,10 +174,10 @@ class Columns:
                 found[term.name] = np.asarray(given, np.float64)
             elif given == "coulomb":
                 found[given] = self._direction
-            elif given == "viscous_asymmetric":
-                found[given] = np.abs(self._sliding[0]).reshape(self.angles.shape)
             else:
-                found[given] = _OF_ANGLE[given](np.asarray(self.angles, np.float64))
+                built_in, angles = BUILT_IN[given], np.asarray(self.angles, np.float64)
+                velocity = self._sliding[0].reshape(angles.shape) if built_in.needs_velocity else None
+                found[given] = built_in.function(np, angles, velocity)
         return found
 
     def slope(self, one: InnerParameter, ends: tuple[Array, Array], inner: Mapping[str, Array]) -> Array:

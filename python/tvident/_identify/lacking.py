@@ -116,7 +116,7 @@ def lacking_terms(
     if data.axis.system is not ROTARY:
         names = [name for name in names if name != "gravity"]
     angle, velocity = columns["stiffness"], columns["damping"]
-    candidates = {"cubic": angle**3, "gravity": np.sin(angle), "coulomb": np.sign(velocity)}
+    candidates = {name: BUILT_IN[name].function(np, angle, velocity) for name in names}
     every = [{**columns, **evaluated}[one.name] for one in unknowns] + [candidates[name] for name in names] + [side]
     rows = np.stack([np.broadcast_to(one, side.shape) for one in every], axis=-1)
     inside = slice(length // 2, rows.shape[-2] - length // 2)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from tvident._equation import COEFFICIENTS, FixedTerm
+from tvident._equation import BUILT_IN, COEFFICIENTS, FixedTerm
 from tvident._merged.elements import matrix_of
 from tvident._merged.mechanism import Mechanism, steps_of
 from tvident._merged.merging import Merging
@@ -18,13 +18,6 @@ from tvident._merged.response import LinearMasses
 from tvident._results import Model
 
 Array: TypeAlias = npt.NDArray[np.float64]
-
-_OF_MOTION: dict[str, Callable[[Array, Array], Array]] = {
-    "cubic": lambda q, _: q**3,
-    "gravity": lambda q, _: np.sin(q),
-    "viscous_asymmetric": lambda _, v: np.abs(v),
-}
-"""Built-in terms that are neither an offset nor dry friction."""
 
 
 class Responding(Protocol):
@@ -50,7 +43,7 @@ def model_of(merging: Merging, values: Mapping[str, Array], base: Array | None) 
     own = {} if merging.recorded is None else merging.recorded.own
     beside = [one for one in merging.elements if one.of not in COEFFICIENTS and one.name not in merging.factors]
     for one in beside:
-        if one.of not in own and one.of not in {*_OF_MOTION, "offset", "coulomb"}:
+        if one.of not in own and (one.of not in BUILT_IN or BUILT_IN[one.of].inner):
             raise ValueError(
                 f"terms must be there to be simulated; the function of {one.of!r} was not stored with the result; identify again"
             )
@@ -166,5 +159,5 @@ def _function(name: str, own: Mapping[str, Any]) -> Term:
     if name in own:
         given = own[name]
         return lambda time, q, v: np.asarray(given.values(time, q, v), np.float64)
-    built_in = _OF_MOTION[name]
-    return lambda _, q, v: built_in(q, v)
+    built_in = BUILT_IN[name]
+    return lambda _, q, v: np.asarray(built_in.function(np, q, v), np.float64)

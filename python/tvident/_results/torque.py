@@ -10,7 +10,7 @@ import numpy.typing as npt
 from numpy.polynomial import Polynomial
 
 from tvident._derivatives import fit_local_polynomials
-from tvident._equation import expected_stribeck
+from tvident._equation import BUILT_IN
 from tvident._results.response import Model, every_sample, without_gaps
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -20,14 +20,6 @@ _BLOCK = 1 << 14
 
 _TOUCHED = 1e-9
 """Averages of a mask above this hold a masked sample; below it they are rounding."""
-
-_FUNCTIONS: dict[str, Callable[[Array, Array], Array]] = {
-    "coulomb": lambda _, velocity: np.sign(velocity),
-    "cubic": lambda angle, _: angle**3,
-    "gravity": lambda angle, _: np.sin(angle),
-    "viscous_asymmetric": lambda _, velocity: np.abs(velocity),
-}
-"""What the factors of built-in terms multiply."""
 
 
 def compared(
@@ -79,10 +71,9 @@ def _sum(model: Model, motion: tuple[Array, Array, Array], averaged: Callable[[A
             regressor = known[name]
         elif name in model.own:
             regressor = _where_known(np.asarray(model.own[name].values(t, angle.copy(), velocity.copy())), averaged)
-        elif name == "stribeck":
-            regressor = averaged(expected_stribeck(velocity, np.zeros(angle.size), model.stribeck[0]))
         else:
-            regressor = averaged(_FUNCTIONS[name](angle, velocity))
+            inner = model.stribeck[:1] if name == "stribeck" else ()
+            regressor = averaged(BUILT_IN[name].function(np, angle, velocity, *inner))
         total = total + np.broadcast_to(every_sample(factor, angle.size, 1), angle.shape) * regressor
     return np.asarray(total)
 
