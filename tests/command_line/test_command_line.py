@@ -1,27 +1,15 @@
 from __future__ import annotations
 
 import csv
-import fcntl
 import json
-import os
-import pty
-import select
-import signal
-import struct
-import subprocess
-import sys
-import termios
-import textwrap
-import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import calls
 import tvident
-from commands import TVIDENT, run, run_program
+from commands import run, run_program
 from tvident import recordings
 
 
@@ -348,110 +336,3 @@ def test_a_channel_is_found_beside_a_file_of_its_name(recording: Path, tmp_path:
     (tmp_path / "angle").write_text("not a recording")
     done = run("identify", recording, *GOOD, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-
-
-def test_memory_that_runs_out_is_one_line(tmp_path: Path) -> None:
-    # An array of 800 MB in an address space of 1 GB.
-    command = f"ulimit -v 1000000; exec '{TVIDENT}' simulate rig.csv --duration 99999"
-    done = subprocess.run(["/bin/sh", "-c", command], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 1
-    assert "more memory than there is" in done.stderr
-    assert done.stderr.count("\n") == 1
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_reader_that_has_had_enough_is_no_error(recording: Path) -> None:
-    command = [TVIDENT, "identify", str(recording), *GOOD, "-o", "-"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        assert process.stdout is not None
-        assert process.stderr is not None
-        assert process.stdout.read(4) == b"time"
-        process.stdout.close()
-        errors = process.stderr.read().decode()
-    assert "Error" not in errors
-    assert "Traceback" not in errors
-
-
-def long_recording(folder: Path, samples: int) -> None:
-    t = np.arange(samples) / 1000
-    noise = np.random.default_rng(0).standard_normal((2, samples))
-    waves = [(0.3 * np.sin(w * t), w) for w in (9.0, 23.0, 41.0)]
-    np.save(folder / "a.npy", sum(wave for wave, _ in waves) + 1e-3 * noise[0])
-    np.save(folder / "t.npy", sum((13 - 0.0123 * w**2) * wave for wave, w in waves) + 0.1 * noise[1])
-
-
-def test_progress_is_shown_on_a_terminal_and_not_in_a_pipe(tmp_path: Path) -> None:
-    long_recording(tmp_path, 400_000)
-    command = [TVIDENT, "identify", "--angle", "a.npy", "--torque", "t.npy", "--sample-rate", "1000"]
-    command += ["--angle-unit", "rad", "--torque-unit", "N m"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert done.stderr == ""
-    parent, child = pty.openpty()
-    fcntl.ioctl(child, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
-    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=child)
-    os.close(child)
-    shown = b""
-    while True:
-        if select.select([parent], [], [], 0.2)[0]:
-            try:
-                shown += os.read(parent, 4096)
-            except OSError:
-                break
-        elif process.poll() is not None:
-            break
-    os.close(parent)
-    process.communicate()
-    assert b"identification" in shown
-    assert b"100%" in shown
-
-
-def test_an_interrupt_where_nothing_can_be_raised_is_heard(tmp_path: Path) -> None:
-    # What runs when an object goes cannot raise; every import ends with that, and the first two seconds of a command are imports.
-    script = """
-        import signal, time, weakref
-        from tvident._command_line import group
-
-        class Commands:
-            def info(self, *_, **__):
-                gone = set()
-                watched = weakref.ref(gone, lambda _: signal.raise_signal(signal.SIGINT))
-                del gone
-                time.sleep(20)
-                print("went on")
-
-        group.commands = Commands
-        group.main(["info", "a.csv"])
-    """
-    (tmp_path / "a.csv").write_text("a\n1\n")
-    command = [sys.executable, "-c", textwrap.dedent(script)]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=19)
-    assert (done.returncode, done.stdout, done.stderr.strip()) == (1, "", "Aborted!")
-
-
-def test_an_interrupt_stops_at_once_and_leaves_no_half_written_file(tmp_path: Path) -> None:
-    # Killed while it computes or writes: whichever, there is a whole file or none.
-    long_recording(tmp_path, 3_000_000)
-    command: list[Any] = [
-        TVIDENT,
-        "identify",
-        "--angle",
-        "a.npy",
-        "--torque",
-        "t.npy",
-        "--sample-rate",
-        "1000",
-        "--method",
-        "paper",
-        "-o",
-        "r.csv",
-    ]
-    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        time.sleep(2.5)
-        process.send_signal(signal.SIGINT)
-        started = time.perf_counter()
-        _, errors = process.communicate()
-    assert process.returncode == 1, errors
-    assert "Aborted" in errors
-    assert time.perf_counter() - started < 2
-    assert "Traceback" not in errors
-    assert {path.name for path in tmp_path.iterdir()} == {"a.npy", "t.npy"}

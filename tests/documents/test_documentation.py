@@ -26,6 +26,7 @@ from calls import paper
 from commands import run
 from tvident import Status, baselines, figures, recordings
 from tvident._command_line import main
+from tvident._status import DOUBTFUL, DOUBTFUL_RECORD
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "examples").glob("*.md")])
@@ -161,6 +162,15 @@ def test_the_table_of_statuses_has_every_flag() -> None:
     for row, flag in zip(rows, Status, strict=True):
         assert row.get("Bit", str(int(flag))) == str(int(flag))
         assert Status(flag).advice != "all is well"
+
+
+def test_what_is_trusted_is_what_the_page_says() -> None:
+    page = (ROOT / "docs" / "statuses.md").read_text(encoding="utf-8")
+    of_samples, of_records = re.findall(r"`result\.trusted` is .* none of (.*), in a record with none of (.*)\.", page)[
+        0
+    ]
+    for said, flags in ((of_samples, DOUBTFUL), (of_records, DOUBTFUL_RECORD)):
+        assert set(re.findall(r"`(\w+)`", said)) == {flag.name for flag in Status if flag in flags}
 
 
 def script(name: str) -> ModuleType:

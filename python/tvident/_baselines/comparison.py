@@ -54,6 +54,27 @@ class MethodComparison:
         within 1.96 standard errors; ``"seconds"``: processor time. NaN where there is no truth, no step or no standard error.
     results : dict of str to (ndarray, ndarray)
         Inertia, damping and stiffness, shape (3, n), and their standard errors.
+
+    See Also
+    --------
+    tvident.baselines.compare_methods : returns it.
+    tvident.ModelComparison : models of one record by what they predict.
+
+    References
+    ----------
+    docs/methods-before.md: the measures of every method on simulated and real recordings.
+
+    Examples
+    --------
+    >>> import tvident
+    >>> from tvident import baselines
+    >>> rig = tvident.simulate_torsional_rig(duration=3.0)
+    >>> compared = baselines.compare_methods(rig.angle, rig.torque, sample_rate=1000, methods=["forgetting"])
+    >>> values, stderr = compared.results["forgetting"]
+    >>> values.shape
+    (3, 3000)
+    >>> compared.summary().split("  ")[0]
+    'method'
     """
 
     table: dict[str, npt.NDArray[Any]]
@@ -108,6 +129,28 @@ def compare_methods(
     ------
     ValueError
         If there is no such method.
+
+    See Also
+    --------
+    tvident.identify : identifies without settings by hand.
+    tvident.compare_models : models of one record by what they predict.
+
+    References
+    ----------
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion: ``paper``.
+    The functions of :mod:`tvident.baselines` name the sources of the others; docs/methods-before.md has settings and tables.
+
+    Examples
+    --------
+    >>> import tvident
+    >>> from tvident import baselines
+    >>> rig = tvident.simulate_torsional_rig(duration=5.0, seed=1)
+    >>> truth = {"inertia": rig.inertia, "damping": rig.damping, "stiffness": rig.stiffness}
+    >>> methods = ["tvident", "forgetting"]
+    >>> compared = baselines.compare_methods(rig.angle, rig.torque, sample_rate=1000, truth=truth, methods=methods)
+    >>> ours, forgetting = compared.table["stiffness"]
+    >>> bool(ours < forgetting)
+    True
     """
     angles, torques = (np.asarray(one, np.float64) for one in arguments.channels(angle=angle, torque=torque))
     if angles.ndim != 1 or not (np.isfinite(angles).all() and np.isfinite(torques).all()):

@@ -38,6 +38,24 @@ def chebyshev_derivatives(samples: npt.ArrayLike, size: int, *, delta: float) ->
     ------
     ValueError
         If there are more polynomials than samples.
+
+    See Also
+    --------
+    lanczos_derivatives, savgol_derivatives : of windows, with a setting by hand too.
+    tvident.fit_local_polynomials : chooses what is set by hand here.
+
+    References
+    ----------
+    L. N. Trefethen: Approximation Theory and Approximation Practice, SIAM 2013.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tvident.baselines import chebyshev_derivatives
+    >>> t = np.arange(400) * 0.01
+    >>> found = chebyshev_derivatives(t**3, 4, delta=0.01)
+    >>> bool(np.allclose(found[2], 6 * t))
+    True
     """
     record = np.asarray(arguments.channel("samples", samples), np.float64)
     arguments.whole_number("size", size, least=1)
@@ -75,6 +93,27 @@ def lanczos_derivatives(samples: npt.ArrayLike, window_length: int, *, delta: fl
     ------
     ValueError
         If the window is even or longer than the record.
+
+    See Also
+    --------
+    chebyshev_derivatives, savgol_derivatives : with a setting by hand too.
+    tvident.fit_local_polynomials : chooses what is set by hand here.
+
+    References
+    ----------
+    C. Lanczos: Applied Analysis, Prentice Hall 1956.
+    C. W. Groetsch: Lanczos' generalized derivative, American Mathematical Monthly 105 (1998).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tvident.baselines import lanczos_derivatives
+    >>> t = np.arange(400) * 0.01
+    >>> found = lanczos_derivatives(t**2, 21, delta=0.01)
+    >>> bool(np.allclose(found[1, 10:-10], 2 * t[10:-10]))
+    True
+    >>> int(np.isnan(found[1]).sum())
+    20
     """
     record = np.asarray(arguments.channel("samples", samples), np.float64)
     period = arguments.positive_number("delta", delta)
@@ -111,5 +150,24 @@ def savgol_derivatives(samples: npt.ArrayLike, window_length: int, polyorder: in
     ------
     ValueError
         As :func:`tvident.savgol_filter`.
+
+    See Also
+    --------
+    tvident.savgol_filter : one derivative, with the order chosen in every window if asked for.
+    chebyshev_derivatives, lanczos_derivatives : with a setting by hand too.
+
+    References
+    ----------
+    A. Savitzky, M. J. E. Golay: Smoothing and differentiation of data by simplified least squares procedures, Analytical Chemistry 36
+    (1964).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tvident.baselines import savgol_derivatives
+    >>> t = np.arange(400) * 0.01
+    >>> found = savgol_derivatives(t**3, 31, 3, delta=0.01)
+    >>> bool(np.allclose(found[2], 6 * t))
+    True
     """
     return np.stack([savgol_filter(samples, window_length, polyorder, deriv=d, delta=delta) for d in range(_ORDERS)])

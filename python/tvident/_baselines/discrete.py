@@ -41,6 +41,26 @@ def tvarx(
     ------
     ValueError
         If the window is too short or longer than the record.
+
+    See Also
+    --------
+    expanded_least_squares : functions of time over the whole record, with derivatives.
+    tvident.identify : the equation of motion as it is, without poles.
+
+    References
+    ----------
+    L. Ljung: System Identification: Theory for the User, 2nd edition, Prentice Hall 1999: the model with constant factors, ARX.
+    Y. Li, H. L. Wei, S. A. Billings: Identification of time-varying systems using multi-wavelet basis functions, IEEE Transactions on
+    Control Systems Technology 19 (2011): TVARX, whose factors are sums of functions of time.
+
+    Examples
+    --------
+    >>> import tvident
+    >>> from tvident.baselines import tvarx
+    >>> rig = tvident.simulate_torsional_rig(duration=6.0, pattern="constant", torque_snr_db=100, angle_noise=1e-7)
+    >>> found = tvarx(rig.angle, rig.torque, 2000, delta=1e-3, degree=0, every=4)
+    >>> bool(abs(found.values[3000, 2] / rig.stiffness[0] - 1) < 1e-3)
+    True
     """
     period = arguments.positive_number("delta", delta) * arguments.whole_number("every", every, least=1)
     each = np.asarray(arguments.channel("angle", angle), np.float64)

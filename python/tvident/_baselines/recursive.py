@@ -21,6 +21,23 @@ class Tracked(NamedTuple):
     Attributes
     ----------
     values, stderr : ndarray, shape (n, p)
+
+    See Also
+    --------
+    recursive_least_squares, random_walk_smoother, expanded_least_squares, tvarx : return it.
+
+    References
+    ----------
+    L. Ljung: System Identification: Theory for the User, 2nd edition, Prentice Hall 1999.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tvident import baselines
+    >>> rows = np.random.default_rng(0).standard_normal((50, 2))
+    >>> values, stderr = baselines.recursive_least_squares(rows, rows @ [2.0, 3.0])
+    >>> values.shape == stderr.shape == (50, 2)
+    True
     """
 
     values: Array
@@ -46,6 +63,26 @@ def recursive_least_squares(regressors: npt.ArrayLike, rhs: npt.ArrayLike, *, fo
     ------
     ValueError
         If shapes do not fit, or the forgetting is not between 0 and 1.
+
+    See Also
+    --------
+    random_walk_smoother : looks both ways.
+    tvident.rolling_least_squares : windows, which look both ways too.
+
+    References
+    ----------
+    L. Ljung: System Identification: Theory for the User, 2nd edition, Prentice Hall 1999, section 11.2.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tvident.baselines import recursive_least_squares
+    >>> rows = np.random.default_rng(0).standard_normal((300, 2))
+    >>> changing = np.where(np.arange(300) < 150, 2.0, 5.0)
+    >>> found = recursive_least_squares(rows, rows[:, 0] * changing + 3 * rows[:, 1], forgetting=0.9)
+    >>> found.values[[149, 299]].round(2)
+    array([[2., 3.],
+           [5., 3.]])
     """
     design, right = _rows(regressors, rhs)
     forgetting = arguments.finite_number("forgetting", forgetting, least=1e-6, most=1)
@@ -92,6 +129,26 @@ def random_walk_smoother(
     ------
     ValueError
         If shapes do not fit, or the noise is not positive.
+
+    See Also
+    --------
+    recursive_least_squares : of the past alone.
+    tvident.rolling_least_squares : windows, which look both ways too.
+
+    References
+    ----------
+    R. E. Kalman: A new approach to linear filtering and prediction problems, Journal of Basic Engineering 82 (1960).
+    H. E. Rauch, F. Tung, C. T. Striebel: Maximum likelihood estimates of linear dynamic systems, AIAA Journal 3 (1965).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tvident.baselines import random_walk_smoother
+    >>> rows = np.random.default_rng(0).standard_normal((300, 2))
+    >>> changing = np.linspace(2, 5, 300)
+    >>> found = random_walk_smoother(rows, rows[:, 0] * changing + 3 * rows[:, 1], steps=[0.01, 0], noise=0.001)
+    >>> bool(np.abs(found.values[:, 0] - changing).max() < 0.05), found.values[0, 1].round(2).item()
+    (True, 3.0)
     """
     design, right = _rows(regressors, rhs)
     scale = _scales(design)

@@ -36,6 +36,26 @@ def expanded_least_squares(
     ------
     ValueError
         If a family is unknown, or shapes do not fit.
+
+    See Also
+    --------
+    tvident.Expansion : sums of functions whose sizes are chosen.
+    tvarx : polynomials of time within windows.
+
+    References
+    ----------
+    H. L. Wei, S. A. Billings: Identification of time-varying systems using multiresolution wavelet models, International Journal of
+    Systems Science 33 (2002): a factor that changes, as a sum of functions of time, makes a regression with constants.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tvident.baselines import expanded_least_squares
+    >>> rows = np.random.default_rng(0).standard_normal((500, 2))
+    >>> changing = 1 + 0.5 * np.linspace(-1, 1, 500) ** 2
+    >>> found = expanded_least_squares(rows, 3 * rows[:, 0] + changing * rows[:, 1], family="chebyshev", sizes=[1, 3])
+    >>> bool(np.allclose(found.values[:, 0], 3)), bool(np.allclose(found.values[:, 1], changing))
+    (True, True)
     """
     design, right = np.asarray(regressors, np.float64), np.asarray(rhs, np.float64)
     each = [int(one) for one in np.ravel(np.asarray(sizes))]

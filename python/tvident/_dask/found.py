@@ -35,6 +35,12 @@ class DaskIdentification:
     tvident.dask.identify : returns it.
     tvident.Identification : the same of arrays in memory, which says more.
 
+    References
+    ----------
+    M. Rocklin: Dask: parallel computation with blocked algorithms and task scheduling, Proceedings of the 14th Python in Science Conference
+    (2015).
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
+
     Examples
     --------
     >>> import dask.array as da

@@ -49,7 +49,7 @@ def identify(
         Samples per second, or seconds from one to the next.
     weights : dask.array.Array, shape (\*, n) or (n,), optional
         One over the variance of the noise at every sample, relative to the others, and 0 where it is not to be used.
-    angle_unit, torque_unit, method, inertia, damping, stiffness, terms, lag, quantisation, nan_policy, step, settings
+    angle_unit, torque_unit, method, inertia, damping, stiffness, terms, lag, quantisation, nan_policy, step, settings : optional
         As in :func:`tvident.identify`; parameters are kinds or numbers, terms are built-in ones.
 
     Returns

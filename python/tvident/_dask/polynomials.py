@@ -36,6 +36,12 @@ class DaskPolynomialFit:
     tvident.dask.fit_local_polynomials : returns it.
     tvident.LocalPolynomialFit : the same of arrays in memory, which says more of each.
 
+    References
+    ----------
+    M. Rocklin: Dask: parallel computation with blocked algorithms and task scheduling, Proceedings of the 14th Python in Science Conference
+    (2015).
+    M. Ruzek, S. Chesné, D. Rémond: Identification of a time-varying mechanical system using the Akaike information criterion.
+
     Examples
     --------
     >>> import dask.array as da
@@ -76,7 +82,7 @@ def fit_local_polynomials(
         Time is the last axis. Chunks may have any size; those shorter than three windows are worked on together.
     window_length : int or str
         Samples in a window, or a duration such as ``"0.2 s"``.
-    delta, sample_rate, max_order, order, criterion, selection, max_deriv, step, quantisation
+    delta, sample_rate, max_order, order, criterion, selection, max_deriv, step, quantisation : optional
         As in :func:`tvident.fit_local_polynomials`.
 
     Returns

@@ -12,6 +12,25 @@ from tvident._files.names import listed, printable
 from tvident._units import named_unit
 
 Channels = dict[str, npt.NDArray[Any]]
+"""Channels by name, in the order of the file: what :func:`read` returns.
+
+See Also
+--------
+read : reads them.
+channel : one of them by its name.
+
+References
+----------
+docs/files.md: what a channel is in every kind of file.
+
+Examples
+--------
+>>> import numpy as np
+>>> from tvident import recordings
+>>> channels: recordings.Channels = {"angle [rad]": np.zeros(3)}
+>>> recordings.channel(channels, "angle", "here").shape
+(3,)
+"""
 
 Say = Callable[[str], None]
 """Takes in what is not read, or not as it stands in the file."""
@@ -21,11 +40,53 @@ _NUMBER = re.compile(r"[0-9]{1,9}")
 
 
 class FileError(Exception):
-    """A file that cannot be used. The message says why and what to do."""
+    """A file that cannot be used. The message says why and what to do.
+
+    See Also
+    --------
+    read, tvident.read_recording, tvident.load : raise it.
+    FileWarning : of what is read in part.
+
+    References
+    ----------
+    docs/files.md, "What is refused, and what is dropped".
+
+    Examples
+    --------
+    >>> from tvident import recordings
+    >>> try:
+    ...     recordings.read("nowhere.csv")
+    ... except recordings.FileError as error:
+    ...     print(error)
+    nowhere.csv: there is no such file; check the name and the folder
+    """
 
 
 class FileWarning(UserWarning):
-    """Part of a file that is not read, or not as it stands there."""
+    r"""Part of a file that is not read, or not as it stands there.
+
+    See Also
+    --------
+    read, tvident.read_recording : warn of it.
+    FileError : of what cannot be read at all.
+
+    References
+    ----------
+    docs/files.md, "What is refused, and what is dropped".
+
+    Examples
+    --------
+    >>> import warnings
+    >>> from pathlib import Path
+    >>> from tvident import recordings
+    >>> _ = Path("notes.csv").write_text("angle,note\n1,calm\n2,loud\n")
+    >>> with warnings.catch_warnings(record=True) as said:
+    ...     warnings.simplefilter("always")
+    ...     list(recordings.read("notes.csv"))
+    ['angle']
+    >>> said[0].category.__name__
+    'FileWarning'
+    """
 
 
 MOST_CHANNELS = 10_000
@@ -65,6 +126,10 @@ def channel(channels: Mapping[str, npt.NDArray[Any]], name: str, source: str) ->
     See Also
     --------
     read : reads channels from a file.
+
+    References
+    ----------
+    docs/files.md: names of channels, and "Units".
 
     Examples
     --------

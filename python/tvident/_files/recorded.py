@@ -61,6 +61,10 @@ class FileRecording(Mapping[str, Channel]):
     read_recording : reads one.
     Channel : an array with its unit.
 
+    References
+    ----------
+    docs/files.md: what is read of every kind of file, and "Units".
+
     Examples
     --------
     >>> import numpy as np
@@ -253,6 +257,10 @@ def read_recording(path: str | Path) -> FileRecording:
     --------
     FileRecording : what is returned.
     identify : identifies a system from two of its channels.
+
+    References
+    ----------
+    docs/files.md: what is read of every kind of file, and "Units". :func:`tvident.recordings.read` names the specifications of formats.
 
     Examples
     --------

@@ -106,6 +106,13 @@ def read(path: str | Path) -> Channels:
     --------
     channel : a channel by its name.
 
+    References
+    ----------
+    Y. Shafranovich: Common format and MIME type for comma-separated values (CSV) files, RFC 4180, 2005.
+    NumPy: NEP 1, A simple file format for NumPy arrays: NPY and NPZ.
+    Apache Parquet and Apache Arrow: their format specifications. The HDF Group: HDF5 File Format Specification. MathWorks: MAT-File Format.
+    ECMA-376: Office Open XML File Formats, for xlsx. ASAM MDF. The others are read by libraries, which the extras in docs/files.md install.
+
     Examples
     --------
     >>> import tvident

@@ -48,6 +48,10 @@ def load(path: str | Path) -> Any:
     Identification.save, MergedIdentification.save : write it.
     recordings.read : reads the columns of any file.
 
+    References
+    ----------
+    NumPy: NEP 1, A simple file format for NumPy arrays: NPZ. Apache Parquet: its format specification.
+
     Examples
     --------
     >>> import tvident

@@ -26,6 +26,11 @@ class Channel(np.ndarray[Any, Any]):
     --------
     tvident.read_recording : returns recordings with such channels.
 
+    References
+    ----------
+    NumPy documentation, "Subclassing ndarray": how slices and copies keep what an array knows.
+    docs/files.md, "Units".
+
     Examples
     --------
     >>> import tvident
