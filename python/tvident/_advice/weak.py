@@ -329,15 +329,10 @@ class Explained:
         if self.found.pooling is not None:
             varying = [name for name, one in zip(self.names, self.found.unknowns, strict=True) if one.kind == "varying"]
             slow = varying or [name for name in ("inertia", "damping") if name in self._changing()]
-            why = (
-                "parts of the record differ by more than noise"
-                if set(slow) <= set(self.tested)
-                else "given as changing"
-            )
-            seconds = self.found.pooling * self.period
-            words.append(
-                f"{listed(slow)} varying: {why}; local quadratics in time over {seconds:.3g} s, the bandwidth that predicts best"
-            )
+            tested = set(slow) <= set(self.tested)
+            why = "parts of the record differ by more than noise" if tested else "given as changing"
+            over = f"local quadratics in time over {self.found.pooling * self.period:.3g} s"
+            words.append(f"{listed(slow)} varying: {why}; {over}, the bandwidth that predicts best")
         return words
 
     def _misfit(self, flags: Status) -> list[str]:
