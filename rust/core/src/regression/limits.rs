@@ -26,3 +26,33 @@ pub(crate) fn status_of(condition: f64) -> Status {
         Status::GOOD
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_condition_number_is_flagged_beyond_its_limit() {
+        for (condition, status) in [
+            (1.0, Status::GOOD),
+            (HARDLY_TOLD_APART, Status::GOOD),
+            (HARDLY_TOLD_APART.next_up(), Status::ILL_CONDITIONED),
+            (f64::MAX, Status::ILL_CONDITIONED),
+            (f64::INFINITY, Status::RANK_DEFICIENT),
+        ] {
+            assert_eq!(status_of(condition), status, "{condition}");
+        }
+    }
+
+    #[test]
+    fn windows_under_a_multisine_are_told_apart_and_those_under_a_single_sine_are_not() {
+        assert_eq!([10.0, 100.0, 1000.0].map(status_of), [Status::GOOD, Status::GOOD, Status::ILL_CONDITIONED]);
+    }
+
+    #[test]
+    fn what_is_left_of_the_torque_is_a_mean_square() {
+        // Two percent of an amplitude; the square rounds once, its root once more.
+        assert!((UNEXPLAINED.sqrt() - 0.02).abs() <= 0.02 * 2.0 * f64::EPSILON);
+        const { assert!(NEGLIGIBLE < UNEXPLAINED) };
+    }
+}

@@ -38,3 +38,67 @@ impl Table {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: usize = 3;
+
+    /// Entry `e` of window `w` is `100 e + w`.
+    fn summary(place: usize) -> [Packet; SIZE] {
+        std::array::from_fn(|entry| Packet(std::array::from_fn(|lane| (100 * entry + place + lane) as f64)))
+    }
+
+    fn filled(count: usize) -> Table {
+        let mut table = Table::default();
+        table.resize(SIZE, count);
+        for place in (0..count).step_by(WIDTH) {
+            table.store(place, &summary(place));
+        }
+        table
+    }
+
+    #[test]
+    fn windows_are_read_from_any_place_on() {
+        for count in [1, 7, 8, 9, 16, 21] {
+            let table = filled(count);
+            for place in 0..count {
+                let mut found = [Packet::ZERO; SIZE];
+                table.load(place, &mut found);
+                // A packet may reach beyond the last window: what is there says nothing.
+                let there = WIDTH.min(count - place);
+                for (found, expected) in found.iter().zip(summary(place)) {
+                    assert_eq!(found.0[..there], expected.0[..there], "{count} windows from {place} on");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn only_the_windows_of_a_packet_are_written() {
+        let mut table = filled(16);
+        table.store(3, &[Packet::splat(-1.0); SIZE]);
+        for place in [0, 8] {
+            let mut found = [Packet::ZERO; SIZE];
+            table.load(place, &mut found);
+            for (found, before) in found.iter().zip(summary(place)) {
+                for (lane, value) in found.0.into_iter().enumerate() {
+                    let expected = if (3..11).contains(&(place + lane)) { -1.0 } else { before.0[lane] };
+                    assert_eq!(value, expected, "window {}", place + lane);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn memory_grows_and_is_kept() {
+        let mut table = Table::default();
+        assert_eq!(table.len(), 0);
+        // Room for whole packets and one that begins at the last window.
+        for (size, count, length) in [(SIZE, 9, 3 * 24), (SIZE, 1, 3 * 24), (10, 8, 10 * 16), (SIZE, 17, 10 * 16)] {
+            table.resize(size, count);
+            assert_eq!(table.len(), length);
+        }
+    }
+}

@@ -55,3 +55,23 @@ impl JumpSearch<'_> {
 
 /// A line for every windowed coefficient: value at a row and growth per row.
 pub(crate) type Lines = Vec<[f64; 2]>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inference::jumps::simulated::{HALF, SAMPLES, searched, spring};
+
+    #[test]
+    fn rows_from_a_sample_on_are_those_whose_time_is_not_before_it() {
+        let spring = spring(|_| 10.0);
+        searched(&spring, |search| {
+            for (stride, group) in [(1, 1), (2, 1), (5, 1), (2, 3)] {
+                let search = JumpSearch { stride, group, ..*search };
+                let before = |sample: usize| (0..SAMPLES).take_while(|time| HALF + time * stride < sample).count();
+                for sample in 0..100 {
+                    assert_eq!(search.row_from(sample), group * before(sample), "sample {sample} of {stride}");
+                }
+            }
+        });
+    }
+}
