@@ -91,7 +91,7 @@ def arrows(file: str) -> set[str]:
     return {name for path in used(file) if (name := file_of(path)) is not None} - {file}
 
 
-ARROWS = {file: arrows(file) for file in FILES if file not in DOORS}
+ARROWS = {file: arrows(file) for file in FILES}
 
 
 def test_a_use_tree_has_all_its_leaves() -> None:

@@ -43,12 +43,13 @@ pub(crate) fn two_stage(columns: &[&[f64]], instruments: &[&[f64]], rhs: &[f64],
     let x = Mat::from_fn(rows, count, |row, column| columns[column][row] / scales[column]);
     let z = Mat::from_fn(rows, count, |row, column| instruments[column][row] / instrument_scales[column]);
     let b = Mat::from_fn(rows, 1, |row, _| rhs[row]);
-    let q = Qr::new(z.as_ref()).compute_thin_Q();
+    let instruments = Qr::new(z.as_ref());
+    let q = instruments.compute_thin_Q();
     let square = q.transpose() * &x;
-    let condition = condition(square.as_ref())?;
-    if condition.is_nan() || condition > MOST_CONDITION {
-        return None;
-    }
+    let condition_of = |matrix| condition(matrix).filter(|condition| *condition <= MOST_CONDITION);
+    // Instruments that are one leave a direction made of rounding, of which the products with regressors say nothing.
+    condition_of(instruments.thin_R())?;
+    let condition = condition_of(square.as_ref())?;
     let inverse = square.partial_piv_lu().inverse();
     let influence = &inverse * q.transpose();
     let beta = &influence * &b;
@@ -295,6 +296,8 @@ mod tests {
             assert!(solve(&with(&x, 1, vec![nothing; ROWS]), &z, &b, 1).is_none(), "a regressor of {nothing}");
             assert!(solve(&x, &with(&z, 1, vec![nothing; ROWS]), &b, 1).is_none(), "an instrument of {nothing}");
         }
+        let doubled = z[0].iter().map(|value| 2.0 * value).collect();
+        assert!(solve(&x, &with(&z, 1, doubled), &b, 1).is_none(), "two instruments are one");
         // More than two rows are needed for every unknown.
         let first = |count: usize| {
             let cut =
