@@ -212,7 +212,7 @@ def fit_local_polynomials(
     count = samples.shape[-1]
     if delta is None and sample_rate is None and t is None:
         t = arguments.implied_times(y)
-    seconds, times = period_or_times(count, delta=delta, sample_rate=sample_rate, t=t)
+    seconds, times = period_or_times(y, count, delta=delta, sample_rate=sample_rate, t=t)
     arguments.one_of("criterion", criterion, get_args(Criterion))
     arguments.one_of("selection", selection, get_args(Selection))
     arguments.check_nan("y", array, nan_policy, arguments.RowPolicy)

@@ -21,12 +21,15 @@ _FEWEST = 64
 """Samples of a record whose windows are chosen, at least."""
 
 
-def period_or_times(samples: int, **given: Any) -> tuple[float, npt.NDArray[np.float64] | None]:
+def period_or_times(values: Any, samples: int, **given: Any) -> tuple[float, npt.NDArray[np.float64] | None]:
     """Return the sample period, and the times where they are not uniform; the period is then their mean step."""
     try:
-        return arguments.sample_period(samples, **given), None
+        period = arguments.sample_period(samples, **given)
     except arguments.NotUniformError as error:
         return float(error.times[-1] - error.times[0]) / (samples - 1), error.times
+    if given["t"] is None:
+        arguments.check_against_labels(values, period)
+    return period, None
 
 
 def check_plain(*others: object, selection: str) -> None:

@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from tvident._units.names import named_unit
 from tvident._units.parse import unit_of
 from tvident._units.quantities import UnitError
 
@@ -89,13 +90,45 @@ class Channel(np.ndarray[Any, Any]):
 
 
 def unit_said(values: Any) -> str:
-    """Return the unit that an array says it has, of ours, of pint or in the attributes of xarray; nothing where it says none."""
+    """Return the unit that an array says it has; nothing where it says none.
+
+    Channels of ours say it, quantities of pint, astropy and unyt, and attributes of xarray and pandas.
+    """
     if isinstance(values, Channel):
         return values.unit
     if hasattr(values, "magnitude") and hasattr(values, "units"):
-        return str(values.units)
+        return _unit_of_pint(values.units)
+    if isinstance(values, np.ndarray):
+        said = getattr(values, "units", None) or getattr(values, "unit", None)
+        return "" if said is None else str(said)
     attributes = getattr(values, "attrs", None)
     if not isinstance(attributes, Mapping):
         return ""
     said = attributes.get("units") or attributes.get("unit")
     return said if isinstance(said, str) else ""
+
+
+def _unit_of_pint(unit: Any) -> str:
+    """Return the symbols of a unit, rather than its words."""
+    try:
+        return f"{unit:~}"
+    except (ValueError, TypeError):
+        return str(unit)
+
+
+def unit_named(values: Any) -> str:
+    """Return the unit in the name of a series, or that of all columns of a table: ``angle [deg]``; nothing where it is none that is known.
+
+    What is computed from a series keeps its name, so nobody knows whether the numbers are still in this unit.
+    """
+    # What is lazy may work long for its names, and is refused later.
+    columns = getattr(values, "columns", None) if hasattr(values, "to_numpy") else None
+    names = [getattr(values, "name", None)] if columns is None else list(columns)
+    units = {named_unit(name)[1] for name in names if isinstance(name, str)}
+    unit = units.pop() if len(units) == 1 else ""
+    return unit if unit_of(unit) is not None else ""
+
+
+def in_its_unit(values: Any) -> Any:
+    """Return the numbers of a quantity of pint; anything else as it is."""
+    return values.magnitude if hasattr(values, "magnitude") and hasattr(values, "units") else values
