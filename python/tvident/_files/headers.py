@@ -77,7 +77,7 @@ class Line:
             _WHOLE_BRACKETS.findall(self._text),
             _WITH_BRACKETS.findall(self._text),
         ):
-            if self._text and 1 < len(words) and least <= len(words) <= most:
+            if self._text and len(words) > 1 and least <= len(words) <= most:
                 return [word.strip().strip("\"'") for word in words]
         return []
 

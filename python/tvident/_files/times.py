@@ -16,7 +16,8 @@ _CLOCK = (
 )
 _ZONE = r"\s*(?P<zone>Z|UTC|GMT|[+-]\d\d(?::?\d\d)?)?"
 _YEAR_FIRST = r"(?P<y>\d{4})(?P<sign>[-/.])(?P<mo>\d{1,2})(?P=sign)(?P<d>\d{1,2})"
-_COMPACT = r"(?P<y>\d{4})(?P<mo>\d\d)(?P<d>\d\d)T(?P<h>\d\d)(?P<m>[0-5]\d)(?P<s>[0-5]\d)(?:[.,](?P<f>\d{1,12}))?(?P<zone>Z|[+-]\d\d(?::?\d\d)?)?"
+_COMPACT = r"(?P<y>\d{4})(?P<mo>\d\d)(?P<d>\d\d)T(?P<h>\d\d)(?P<m>[0-5]\d)(?P<s>[0-5]\d)(?:[.,](?P<f>\d{1,12}))?"
+_COMPACT_ZONE = r"(?P<zone>Z|[+-]\d\d(?::?\d\d)?)?"
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 _MONTH_NAMED = rf"(?P<d>\d{{1,2}})[- ](?P<name>(?i:{'|'.join(_MONTHS)}))[- ](?P<y>\d{{4}})"
 _SHORT_YEAR = r"(?P<d>\d{2})\.(?P<mo>\d{2})\.(?P<short>\d{2})"
@@ -28,7 +29,7 @@ _FORMS = tuple(
         rf"{_YEAR_FIRST}(?:{_CLOCK}{_ZONE})?",
         rf"{_YEAR_LAST}(?:{_CLOCK}{_ZONE})?",
         r"(?P<m>\d{1,3}):(?P<s>[0-5]\d)[.,](?P<f>\d{1,12})",
-        _COMPACT,
+        _COMPACT + _COMPACT_ZONE,
         rf"{_MONTH_NAMED}(?:{_CLOCK}{_ZONE})?",
         # A date alone in this form may be three numbers of a version.
         rf"{_SHORT_YEAR}{_CLOCK}{_ZONE}",
