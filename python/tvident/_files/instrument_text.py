@@ -21,7 +21,9 @@ _X = "X_Value"
 _HEADER_LINES = 100
 
 _LENGTHS = re.compile(r".*_(t[xyz]|p[xyz])|pelvis_t[xyz]")
-_FORCES, _TORQUES = re.compile(r".*_(v[xyz]|force)"), re.compile(r".*_(m[xyz]|moment|torque[xyz]?)")
+_FORCES, _TORQUES = re.compile(r".*_(v[xyz]|force)"), re.compile(r".*_(m[xyz]|moment|torque_?[xyz]?)")
+_STATE = re.compile(r"/jointset/(?:.*/)?(?P<name>[^/]+)/(?P<kind>value|speed)")
+"""A state of OpenSim 4: the value and the speed of a coordinate; degrees are those of coordinates alone."""
 
 
 def read_labview(path: Path, say: Say) -> Channels:
@@ -118,7 +120,19 @@ def read_opensim(path: Path, say: Say) -> Channels:
 def _unit(name: str, *, degrees: bool) -> str:
     if name == "time":
         return "s"
+    if name.startswith("/"):
+        return _unit_of_state(name, degrees=degrees)
     for names, unit in ((_LENGTHS, "m"), (_FORCES, "N"), (_TORQUES, "N m")):
         if names.fullmatch(name):
             return unit
     return "deg" if degrees else ""
+
+
+def _unit_of_state(name: str, *, degrees: bool) -> str:
+    """Return the unit of a value in a model's tree; nothing where the header does not say it."""
+    state = _STATE.fullmatch(name)
+    if state is None:
+        last = name.replace("/", "_")
+        return next((unit for names, unit in ((_FORCES, "N"), (_TORQUES, "N m")) if names.fullmatch(last)), "")
+    base = "m" if _LENGTHS.fullmatch(state["name"]) else "deg" if degrees else ""
+    return f"{base}/s" if base and state["kind"] == "speed" else base
