@@ -205,9 +205,9 @@ def test_the_ankle_obeys_the_model_only_before_the_reflex(folder_of_recordings: 
 def test_what_disagrees_with_what_is_said_of_this_record(folder_of_recordings: Path) -> None:
     """Widths from 11 to 191 samples agree, on another damping than short windows of a stiffness that is none leave."""
     channels = recordings.read(recording(folder_of_recordings, "emps.mat"))
-    units = {"angle_unit": "m", "torque_unit": "N"}
     force = channels["gtau"] * channels["vir"]
-    words = tvident.identify(channels["qm"], force, sample_rate=1000, **units).summary()
+    result = tvident.identify(channels["qm"], force, sample_rate=1000, angle_unit="m", torque_unit="N")
+    words = result.summary()
     assert re.search(
         r"test functions of 11 to \d+ samples all find damping 37\d\.\d ± 4\.4 N s/m, not the 193 ± 24 above", words
     )

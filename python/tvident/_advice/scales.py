@@ -27,7 +27,8 @@ def scales_compared(found: _core.Identification) -> list[str]:
         return ["the record is too short to compare test functions of different widths: nothing confirms these numbers"]
     narrowest, widest = scan.plateau
     only = "" if _is_wide(scan) else " alone"
-    agree = f"estimates are the same from {scan.window_length[narrowest]} to {scan.window_length[widest]} samples of the test function{only}"
+    samples = f"{scan.window_length[narrowest]} to {scan.window_length[widest]} samples"
+    agree = f"estimates are the same from {samples} of the test function{only}"
     if narrowest == 0 or not scan.moved:
         return [agree]
     return [
@@ -42,11 +43,12 @@ def disagreement(
     if Status.SCALES_DISAGREE not in flags:
         return []
     if found.scan is None or not _is_wide(found.scan):
-        return [
+        words = (
             "test functions of different widths find different parameters, and none can be believed: is a channel filtered, clipped, "
             "held or wrapped (give lag=, or make clipped samples NaN), is a term missing, or does a controller feed noise back into the "
             "torque? result.scan().plot() shows where they part; do not trust these numbers"
-        ]
+        )
+        return [words]
     narrowest, widest = (found.scan.window_length[place] for place in found.scan.plateau or (0, 0))
     others = _others(found, names, units)
     of_scan = f"test functions of {narrowest} to {widest} samples all find"
@@ -55,10 +57,11 @@ def disagreement(
         if others
         else f"{of_scan} the same, but not that of {found.window_length} samples, which is used"
     )
-    return [
+    words = (
         f"{what}; is a term missing, does something change that was taken as constant, or does a controller feed noise back into the "
         "torque? result.scan() lists what they find; do not trust these numbers"
-    ]
+    )
+    return [words]
 
 
 def _others(found: _core.Identification, names: Sequence[str], units: Mapping[str, str]) -> list[str]:
