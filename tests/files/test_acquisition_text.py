@@ -207,6 +207,7 @@ T0 = 05.01.2024 10:00:00
         ("t [s] angle [deg]\n0 1\n1 2\n", {"t [s]": [0, 1], "angle [deg]": [1, 2]}, "^$"),
         ("   t      x  \n  [ms]  [N m]\n 0  1\n 1  2\n", {"t [ms]": [0, 1], "x [N m]": [1, 2]}, "^$"),
         ("Time (s)   POS (ANAT) (deg)\n0  1\n1  2\n", {"Time (s)": [0, 1], "POS (ANAT) (deg)": [1, 2]}, "^$"),
+        ("t;x\n---;---\n0;1\n1;2\n", {"t": [0, 1], "x": [1, 2]}, ""),
         ("t;x\n0;1\n1;2\n;\n;\n", {"t": [0, 1], "x": [1, 2]}, "the last 2 rows hold nothing: not read"),
         (
             "t;x\n0;1\n1;2\n;\nSumme;3\n;\n",

@@ -182,6 +182,8 @@ def _back(lines: Sequence[str], index: int, separator: Separator) -> int:
     while index > 0 and separator in lines[index - 1] and not lines[index - 1].lstrip().startswith("#"):
         cells = split(lines[index - 1], separator)
         are_missing = all(number(cell, comma=True) is not None and not is_present(cell, comma=True) for cell in cells)
+        if any(cell and not cell.strip("-*") for cell in cells):
+            break  # a line drawn below the names, or units of which there are none
         if not are_missing and not _has_remark(cells, kinds):
             break
         index -= 1
