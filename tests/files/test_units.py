@@ -143,6 +143,8 @@ def test_words_are_no_units(text: str) -> None:
         ("[deg] angle", ("angle", "deg")),
         ("H(s) gain", ("H(s) gain", "")),
         ("Y[0]", ("Y[0]", "")),
+        ("Y[1]", ("Y[1]", "")),
+        ("ratio [1]", ("ratio", "1")),
         ("Angle deg", ("Angle", "deg")),
         ("Angle - deg", ("Angle", "deg")),
         ("Torque N m", ("Torque", "N m")),

@@ -14,15 +14,28 @@ from tvident._status import Status
 _LEAST_PLATEAU = 2.0
 """Widths that agree differ by this factor or more, or it may be chance. As in the core."""
 
+_FEWEST = 4
+"""Widths that determine the constants, at least, to be compared. As in the core."""
+
+_TOLD = 3.0
+"""Standard errors by which a number differs from zero, at least, to be told from it."""
+
 _BEYOND = 4.0
 """Standard errors beyond which a constant is another than that of the widths that agree. As in the core."""
 
 
-def scales_compared(found: _core.Identification) -> list[str]:
+def scales_compared(found: _core.Identification, flags: Status) -> list[str]:
     """Return over which widths of the test function the estimates agree."""
     scan = found.scan
     if scan is None:
         return []
+    if scan.plateau is None and Status.SCALES_DISAGREE in flags:
+        determined = len(scan.window_length)
+        return [
+            f"of {determined} widths of the test function, no neighbours agree"
+            if determined >= _FEWEST
+            else f"{scan.tried} widths of the test function were tried; {determined or 'none'} of them determined the constants"
+        ]
     if scan.plateau is None:
         return ["the record is too short to compare test functions of different widths: nothing confirms these numbers"]
     narrowest, widest = scan.plateau
@@ -42,6 +55,12 @@ def disagreement(
     """Return what disagrees with what, where the flags say that something does, and where to look."""
     if Status.SCALES_DISAGREE not in flags:
         return []
+    if found.scan is not None and len(found.scan.window_length) < _FEWEST:
+        words = (
+            f"{_none_of_stiffness(found, names)}test functions of other widths do not determine the parameters, and nothing confirms "
+            "these: noise, feedback or rest hides what they would show; excite more, or give what is known; do not trust these numbers"
+        )
+        return [words]
     if found.scan is None or not _is_wide(found.scan):
         words = (
             "test functions of different widths find different parameters, and none can be believed: is a channel filtered, clipped, "
@@ -62,6 +81,14 @@ def disagreement(
         "torque? result.scan() lists what they find; do not trust these numbers"
     )
     return [words]
+
+
+def _none_of_stiffness(found: _core.Identification, names: Sequence[str]) -> str:
+    """Return what to try first where the stiffness is not told from zero."""
+    for name, one in zip(names, found.unknowns, strict=True):
+        if name == "stiffness" and bool(np.nanmedian(np.abs(one.values) / one.stderr) < _TOLD):
+            return "the stiffness is not told from zero: try stiffness=0; "
+    return ""
 
 
 def _others(found: _core.Identification, names: Sequence[str], units: Mapping[str, str]) -> list[str]:

@@ -100,7 +100,7 @@ class Explained:
         reasons = (
             self._noise(),
             self._test_function(),
-            *scales_compared(self.found),
+            *scales_compared(self.found, flags),
             *lost_samples(self.found),
             *spikes(self.found),
             *self._rest(),

@@ -29,8 +29,8 @@ _TORQUES = {"nm": "Nm", "nmm": "Nmm", "mnm": "mNm", "knm": "kNm"}
 def named_unit(name: str) -> tuple[str, str]:
     """Return a channel's name without its unit, and the unit; nothing where it has none.
 
-    What stands in brackets at the end is the unit, whatever it is, unless it is a number, which tells channels apart; elsewhere only what
-    is known as one.
+    What stands in brackets at the end is the unit, whatever it is, unless it is a number, which tells channels apart (``Y[0]``; a ratio is
+    `` [1]``); elsewhere only what is known as one.
     """
     found = _IN_BRACKETS.fullmatch(name)
     if found and found[1]:
@@ -38,7 +38,7 @@ def named_unit(name: str) -> tuple[str, str]:
         inner, known = named_unit(found[1]) if unit_of(unit) is None else ("", "")
         if known and unit_of(known) is not None:
             return f"{inner} ({unit})", known
-        return (name, "") if unit.isdecimal() else (found[1], unit)
+        return (name, "") if unit.isdecimal() and not name.endswith(" [1]") else (found[1], unit)
     within = _WITHIN.fullmatch(name)
     if within:
         unit = next(one for one in within.groups()[1:4] if one is not None).strip()
