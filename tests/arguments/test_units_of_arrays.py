@@ -108,3 +108,52 @@ def test_a_derivative_has_another_unit() -> None:
     assert tvident.savgol_filter(angle, 21, 3).attrs == {"units": "rad", "lab": "A"}
     assert tvident.savgol_filter(angle, 21, 3, deriv=1).attrs == {"lab": "A"}
     assert angle.attrs["units"] == "rad"
+
+
+def test_records_of_a_list_have_the_unit_of_their_channels() -> None:
+    """They were stacked as plain numbers: degrees were rad."""
+    angle, torque = tvident.Channel(DEGREES, "deg"), tvident.Channel(MILLI, "N mm")
+    for both in (([angle, angle], [torque, torque]), (np.stack([angle, angle]), np.stack([torque, torque]))):
+        found = tvident.identify(*both, sample_rate=1000, **GIVEN)
+        assert_allclose(found.stiffness[1], PLAIN.stiffness, rtol=1e-9)
+    shared = tvident.identify(
+        [angle, angle], [torque, torque], sample_rate=1000, share="inertia", method=tvident.WeakForm(33, 9)
+    )
+    assert shared.constants["inertia"][0] == pytest.approx(0.0123, rel=0.05)
+    trials: list[dict[str, Any]] = [{}, {"ensemble_axis": 0}]
+    for options in trials:
+        with pytest.raises(ValueError, match=r"records of a list must have one unit; got 'deg', ''"):
+            tvident.identify([angle, ANGLE], [torque, torque], sample_rate=1000, **options)
+
+
+def test_joined_channels_keep_their_unit() -> None:
+    angle, other = tvident.Channel(DEGREES, "deg"), tvident.Channel(ANGLE, "rad")
+    for kept in (np.concatenate([angle[:5], angle[5:]]), np.stack([angle, angle])):
+        assert isinstance(kept, tvident.Channel)
+        assert kept.unit == "deg"
+    for joined in (
+        np.concatenate([angle, other]),
+        np.concatenate([angle, DEGREES]),
+        np.interp(RIG.time, RIG.time, angle),
+    ):
+        assert not isinstance(joined, tvident.Channel)
+
+
+def test_streams_and_comparisons_hear_units_too() -> None:
+    angle, torque = tvident.Channel(DEGREES, "deg"), tvident.Channel(MILLI, "N mm")
+    kinds = dict.fromkeys(("inertia", "damping", "stiffness"), "windowed")
+    settings: dict[str, Any] = {
+        "method": tvident.StrongForm(51, regression_window=50),
+        "sample_rate": 1000,
+        "terms": [],
+        **kinds,
+    }
+    stream, plain = (tvident.IdentificationStream(**settings) for _ in range(2))
+    assert_allclose(stream.push(angle, torque).stiffness, plain.push(ANGLE, TORQUE).stiffness, rtol=1e-6)
+    with pytest.raises(ValueError, match=r"name says 'deg'"):
+        stream.push(pd.Series(DEGREES, name="angle [deg]"), torque)
+    given = tvident.IdentificationStream(angle_unit="deg", torque_unit="N mm", **settings)
+    given.push(pd.Series(DEGREES, name="angle [deg]"), MILLI)
+    assert PLAIN.vaf(angle=angle, torque=torque) == pytest.approx(PLAIN.vaf(angle=ANGLE, torque=TORQUE), rel=1e-9)
+    with pytest.raises(ValueError, match=r"name says 'deg'.*pass \.to_numpy\(\) in rad"):
+        PLAIN.vaf(angle=pd.Series(DEGREES, name="angle [deg]"), torque=torque)

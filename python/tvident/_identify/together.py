@@ -274,9 +274,8 @@ def _weak(method: Any) -> WeakForm:
 
 
 def _axis(angle: Any, torque: Any, units: Mapping[str, str | None]) -> Axis:
-    """Return how channels are converted; those of a list are as the first of them."""
-    first = [one[0] if isinstance(one, list | tuple) and len(one) else one for one in (angle, torque)]
-    return axis_of(first[0], first[1], None, **units)
+    """Return how channels are converted; those of a list have one unit."""
+    return axis_of(angle, torque, None, **units)
 
 
 def sampled(

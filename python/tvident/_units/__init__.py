@@ -1,6 +1,6 @@
 """Reads units as headers of recordings write them, and converts to rad, N m and s."""
 
-from tvident._units.axis import Axis, axis_of, scaled, times_in_seconds
+from tvident._units.axis import Axis, axis_of, factor_said, scaled, times_in_seconds
 from tvident._units.channel import Channel, in_its_unit, unit_named, unit_said
 from tvident._units.names import derivative_units, named_unit, with_unit
 from tvident._units.parse import Unit, is_unit, unit_of
@@ -19,6 +19,7 @@ __all__ = [
     "axis_of",
     "derivative_units",
     "factor_between",
+    "factor_said",
     "factor_to",
     "in_its_unit",
     "in_words_of",

@@ -70,6 +70,23 @@ def axis_of(
     return Axis(system, **factors, assumed=frozenset(name for name, unit in units.items() if not unit))
 
 
+def factor_said(system: System, name: str, values: Any) -> float:
+    """Return what a channel is multiplied by to be in the unit of a system, by the unit that it says it has itself.
+
+    Raises
+    ------
+    UnitError
+        If it cannot be converted, or only a name says it.
+    """
+    unit = unit_said(values)
+    if unit:
+        return factor_to(system, name, unit, name=f"the {name}")
+    named = unit_named(values)
+    if is_convertible(system, name, named):
+        _check_unchanged(system, name, named)
+    return 1.0
+
+
 def _check_unchanged(system: System, name: str, unit: str) -> None:
     """Refuse a unit that only a name says, where the numbers may have been converted since."""
     wanted = system.units[name]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -12,11 +12,13 @@ from tvident._units.names import named_unit
 from tvident._units.parse import unit_of
 from tvident._units.quantities import UnitError
 
+_JOINED = (np.concatenate, np.stack, np.vstack, np.hstack, np.column_stack)
+
 
 class Channel(np.ndarray[Any, Any]):
     """Samples with their unit, as :func:`tvident.read_recording` gives them: an array in every other way.
 
-    Slices and copies keep the unit. What is computed from samples is a plain array, since its unit is another.
+    Slices, copies and what is joined of one unit keep the unit. What is computed from samples is a plain array, since its unit is another.
 
     Attributes
     ----------
@@ -61,6 +63,15 @@ class Channel(np.ndarray[Any, Any]):
         plain = (np.asarray(one) if isinstance(one, Channel) else one for one in inputs)
         return getattr(ufunc, method)(*plain, **kwargs)
 
+    def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
+        """Keep the unit where channels of one unit are joined: what was not computed has no other."""
+        made = super().__array_function__(func, types, args, kwargs)
+        if func in _JOINED and args and isinstance(args[0], list | tuple):
+            units = {one.unit if isinstance(one, Channel) else None for one in args[0]}
+            if len(units) == 1 and None not in units:
+                return Channel(made, self.unit)
+        return made
+
     def to(self, unit: str) -> Channel:
         """Return the samples in another unit.
 
@@ -92,8 +103,15 @@ class Channel(np.ndarray[Any, Any]):
 def unit_said(values: Any) -> str:
     """Return the unit that an array says it has; nothing where it says none.
 
-    Channels of ours say it, quantities of pint, astropy and unyt, and attributes of xarray and pandas.
+    Channels of ours say it, quantities of pint, astropy and unyt, and attributes of xarray and pandas; of a list all that it holds.
+
+    Raises
+    ------
+    UnitError
+        If what a list holds has several.
     """
+    if isinstance(values, list | tuple):
+        return _common(unit_said, values)
     if isinstance(values, Channel):
         return values.unit
     if hasattr(values, "magnitude") and hasattr(values, "units"):
@@ -106,6 +124,18 @@ def unit_said(values: Any) -> str:
         return ""
     said = attributes.get("units") or attributes.get("unit")
     return said if isinstance(said, str) else ""
+
+
+def _common(unit: Callable[[Any], str], values: Sequence[Any]) -> str:
+    """Return the unit of all records of a list; plain numbers have none."""
+    if not values or isinstance(values[0], int | float):
+        return ""
+    units = list(dict.fromkeys(unit(one) for one in values))
+    if len(units) > 1:
+        raise UnitError(
+            f"records of a list must have one unit; got {', '.join(repr(one) for one in units)}; convert them with Channel.to"
+        )
+    return units[0]
 
 
 def _unit_of_pint(unit: Any) -> str:
@@ -122,6 +152,8 @@ def unit_named(values: Any) -> str:
     What is computed from a series keeps its name, so nobody knows whether the numbers are still in this unit.
     """
     # What is lazy may work long for its names, and is refused later.
+    if isinstance(values, list | tuple):
+        return _common(unit_named, values)
     columns = getattr(values, "columns", None) if hasattr(values, "to_numpy") else None
     names = [getattr(values, "name", None)] if columns is None else list(columns)
     units = {named_unit(name)[1] for name in names if isinstance(name, str)}
