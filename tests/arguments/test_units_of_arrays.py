@@ -157,3 +157,15 @@ def test_streams_and_comparisons_hear_units_too() -> None:
     assert PLAIN.vaf(angle=angle, torque=torque) == pytest.approx(PLAIN.vaf(angle=ANGLE, torque=TORQUE), rel=1e-9)
     with pytest.raises(ValueError, match=r"name says 'deg'.*pass \.to_numpy\(\) in rad"):
         PLAIN.vaf(angle=pd.Series(DEGREES, name="angle [deg]"), torque=torque)
+
+
+def test_derivatives_say_their_unit_where_time_has_one() -> None:
+    angle = tvident.Channel(DEGREES, "deg")
+    fit = tvident.fit_local_polynomials(angle, 51, sample_rate=1000)
+    expected = {"value": "deg", "derivative_1": "deg/s", "derivative_2_stderr": "deg/s^2", "sigma": "deg"}
+    assert expected.items() <= fit.to_pandas().attrs["units"].items()
+    assert fit.to_xarray().derivative_1.attrs["units"] == "deg/s"
+    assert not tvident.fit_local_polynomials(angle, 51).to_pandas().attrs["units"]
+    late = tvident.fit_local_polynomials(angle, 51, t=tvident.Channel(1000 * np.asarray(RIG.time) + 500, "ms"))
+    assert_allclose(late.time, np.asarray(RIG.time) + 0.5, rtol=1e-12)
+    assert_allclose(late.derivatives, fit.derivatives, rtol=1e-6, atol=1e-6 * np.abs(fit.derivatives).max())
