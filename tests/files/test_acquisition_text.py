@@ -289,6 +289,35 @@ def test_measurements_of_labview(tmp_path: Path) -> None:
         recordings.read(path)
 
 
+@pytest.mark.parametrize("first", ["X_Value", ""])
+def test_measurements_of_labview_without_the_cells_of_comments(tmp_path: Path, first: str) -> None:
+    """Rows end with their last number, and the first column may have neither a name nor times: names moved by one column."""
+    path = tmp_path / "x.lvm"
+    head = LABVIEW.partition("X_Value")[0] + f"{first}\tAngle\tTorque\tComment\n"
+    expected = {"X_Value [s]": [0, 0.001, 0.002], "Angle [deg]": [1.5, 2.5, 3.5], "Torque [N·m]": [2, 3, 4]}
+    rows = ["\t1.5\t2", "\t2.5\t3", "\t3.5\t4"]
+    path.write_text(head + "\n".join(rows) + "\n")
+    assert read(path) == (expected, "")
+    path.write_text(head + "\n".join([rows[0] + "\tbegun", *rows[1:]]) + "\n")
+    found, said = read(path)
+    assert found == expected
+    assert "'Comment': not read, it holds words" in said
+    path.write_text((head + "\n".join(rows) + "\n").replace("\t", ","))
+    assert read(path) == (expected, "")
+
+
+def test_measurements_of_labview_with_times_for_each_channel(tmp_path: Path) -> None:
+    path = tmp_path / "x.lvm"
+    head, _, _ = LABVIEW.replace("X_Columns\tOne", "X_Columns\tMulti").partition("X_Value")
+    head = head.replace("Y_Unit_Label\tdeg\tN·m", "Y_Unit_Label\tdeg\t\tN·m")
+    rows = "".join(f"{t}\t{t + 1}\t{t}\t{t + 2}\n" for t in range(3))
+    path.write_text(f"{head}X_Value\tAngle\tX_Value\tTorque\tComment\n{rows}")
+    names = ["X_Value [s]", "Angle [deg]", "X_Value_2 [s]", "Torque [N·m]"]
+    found, _ = read(path)
+    assert list(found) == names
+    assert found["Torque [N·m]"] == [2, 3, 4]
+
+
 def test_measurements_of_labview_that_lost_rows_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.lvm"
     rows = LABVIEW.rstrip("\n").split("\n")
