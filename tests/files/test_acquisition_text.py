@@ -348,11 +348,11 @@ def test_motions_and_storages_of_opensim(tmp_path: Path, ending: str) -> None:
     # A storage of states: degrees are those of coordinates alone.
     tree = (
         "/jointset/knee/knee_r/value\t/jointset/knee/knee_r/speed\t/jointset/pelvis/pelvis_tx/value\t"
-        "/forceset/soleus_r/activation\tground_torque_x\n"
+        "/forceset/soleus_r/activation\tground_torque_x\ttorque\n"
     )
-    path.write_text(f"inDegrees=yes\nendheader\ntime\t{tree}0.0\t1\t2\t3\t4\t5\n0.1\t1\t2\t3\t4\t5\n")
+    path.write_text(f"inDegrees=yes\nendheader\ntime\t{tree}0.0\t1\t2\t3\t4\t5\t6\n0.1\t1\t2\t3\t4\t5\t6\n")
     units = [name.rpartition("[")[2] if "[" in name else "" for name in read(path)[0]]
-    assert units == ["s]", "deg]", "deg/s]", "m]", "", "N m]"]
+    assert units == ["s]", "deg]", "deg/s]", "m]", "", "N m]", "N m]"]
     path.write_text(OPENSIM.replace("nRows=2", "nRows=3"))
     with pytest.raises(recordings.FileError, match="it says nrows=3, and there are 2; copy it again"):
         recordings.read(path)

@@ -23,7 +23,8 @@ _BY_COMMAS = re.compile(r"^Separator,", re.MULTILINE)
 _HEADER_LINES = 100
 
 _LENGTHS = re.compile(r".*_(t[xyz]|p[xyz])|pelvis_t[xyz]")
-_FORCES, _TORQUES = re.compile(r".*_(v[xyz]|force)"), re.compile(r".*_(m[xyz]|moment|torque_?[xyz]?)")
+_FORCES = re.compile(r".*_v[xyz]|(.*_)?force")
+_TORQUES = re.compile(r".*_m[xyz]|(.*_)?(moment|torque_?[xyz]?)")
 _STATE = re.compile(r"/jointset/(?:.*/)?(?P<name>[^/]+)/(?P<kind>value|speed)")
 """A state of OpenSim 4: the value and the speed of a coordinate; degrees are those of coordinates alone."""
 
