@@ -207,6 +207,11 @@ T0 = 05.01.2024 10:00:00
         ("t [s] angle [deg]\n0 1\n1 2\n", {"t [s]": [0, 1], "angle [deg]": [1, 2]}, "^$"),
         ("   t      x  \n  [ms]  [N m]\n 0  1\n 1  2\n", {"t [ms]": [0, 1], "x [N m]": [1, 2]}, "^$"),
         ("Time (s)   POS (ANAT) (deg)\n0  1\n1  2\n", {"Time (s)": [0, 1], "POS (ANAT) (deg)": [1, 2]}, "^$"),
+        (
+            ",A,B,Note\n0,1,2\n1,2,3\n",
+            {"A": [0, 1], "B": [1, 2], "Note": [2, 3]},
+            "line 1 has 4 cells, .* 3: its names are taken one",
+        ),
         ("t;x\n---;---\n0;1\n1;2\n", {"t": [0, 1], "x": [1, 2]}, ""),
         ("t;x\n0;1\n1;2\n;\n;\n", {"t": [0, 1], "x": [1, 2]}, "the last 2 rows hold nothing: not read"),
         (

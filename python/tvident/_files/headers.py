@@ -146,6 +146,13 @@ class Names:
         named = [one for one in rest if not all(_TYPE.fullmatch(cell) for cell in one[1] if cell)] or rest
         differing = [one for one in named if _differ(one[1])]
         line, names = (differing or named)[0]
+        # Several tabs may align a name with its column.
+        is_doubtful = self.separator != "\t" or not line.cells[0]
+        if is_doubtful and len(line.cells) > self.most and sum(map(bool, line.cells)) == len(names):
+            self.say(
+                f"line {line.place} has {len(line.cells)} cells, and the lines of numbers {self.most}: its names are taken one after the "
+                f"other, for columns from the first on: {listed(names)}"
+            )
         names, groups = self._grouped(line, names)
         names = _completed(names, [cells for other, cells in rest if other is not line])
         for other, cells in rest:
