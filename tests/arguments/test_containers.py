@@ -159,6 +159,27 @@ def test_an_index_of_dates_is_the_time_and_comes_back() -> None:
         tvident.identify(pd.Series(ANGLE), TORQUE)
 
 
+def test_a_part_is_found_by_dates() -> None:
+    result = tvident.identify(pd.Series(ANGLE, index=DATES), TORQUE, **GIVEN)
+    expected = result.between(0.2, 0.6)
+    # Summer time began in between: 01:59:59.7 + 0.4 s.
+    for first, last in (
+        ("2024-03-31 01:59:59.7", "2024-03-31 03:00:00.1"),
+        (DATES[200], DATES[600].tz_convert("UTC")),
+        (DATES[200].to_pydatetime(), 0.6),
+    ):
+        assert_array_equal(result.between(first, last).time, expected.time)
+    with pytest.raises(ValueError, match=r"begin must be a date as the samples have, or seconds; got 'monday'"):
+        result.between("monday")
+    with pytest.raises(TypeError, match=r"begin must be a number; got '2024-03-31'"):
+        PLAIN.between("2024-03-31")
+    trial = tvident.identify(
+        xr.DataArray(ANGLE, {"time": UTC}, ("time",), attrs={"units": "rad", "lab": "A"}), TORQUE, **GIVEN
+    )
+    assert_array_equal(trial.between(UTC[200], UTC[600]).time, expected.time)
+    assert "units" not in trial.to_xarray().attrs
+
+
 def test_coordinates_and_attributes_of_xarray_come_back() -> None:
     angle = xr.DataArray(
         ANGLE, {"time": ("time", PLAIN.time, {"units": "s"}), "joint": "elbow"}, "time", attrs={"lab": "A"}

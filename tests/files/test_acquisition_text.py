@@ -76,6 +76,25 @@ def read(path: Path) -> tuple[dict[str, list[float]], str]:
 
 NAN = float("nan")
 
+BIODEX = """Biodex System
+Date:  1/5/2024
+
+  Time   Torque  Position
+ (mSec)  (FT-LBS) (DEG)
+  0    0.5   1
+  10   1.5   2
+"""
+
+CATMAN = """Messreihe: Test
+T0 = 05.01.2024 10:00:00
+
+"Zeit"	"Winkel"	"Drehmoment"
+"s"	"Grad"	"Nm"
+"Samplerate: 600 Hz"	"Samplerate: 600 Hz"	"Samplerate: 600 Hz"
+0,00	1,5	2
+0,01	2,5	3
+"""
+
 
 @pytest.mark.parametrize(
     ("content", "expected", "said"),
@@ -152,6 +171,63 @@ NAN = float("nan")
             {"angle.x": [1, 1], "angle.y": [2, 2], "torque.x": [3, 3], "torque.y": [4, 4]},
             "^$",
         ),
+        (BIODEX, {"Time [mSec]": [0, 10], "Torque [FT-LBS]": [0.5, 1.5], "Position [DEG]": [1, 2]}, "^$"),
+        (
+            CATMAN,
+            {"Zeit [s]": [0, 0.01], "Winkel [Grad]": [1.5, 2.5], "Drehmoment [Nm]": [2, 3]},
+            "line 6 is not read as names",
+        ),
+        (
+            "Time,A,B\nSEC,Deg,state\n0,1,1\n1,2,1\n",
+            {"Time [SEC]": [0, 1], "A [Deg]": [1, 2], "B [state]": [1, 1]},
+            "^$",
+        ),
+        ("unit,ms,deg\nname,Time,A\n,1,2\n,2,3\n", {"name": [NAN, NAN], "Time [ms]": [1, 2], "A [deg]": [2, 3]}, "^$"),
+        (
+            "x-axis,1,2\nsecond,Volt,Volt\n0,1,2\n1,2,3\n",
+            {"x-axis [second]": [0, 1], "1 [Volt]": [1, 2], "2 [Volt]": [2, 3]},
+            "^$",
+        ),
+        (
+            "t,left,left\n,angle,torque\n0,1,2\n1,2,3\n",
+            {"t": [0, 1], "angle": [1, 2], "torque": [2, 3]},
+            "line 1 is not",
+        ),
+        (
+            "Angle\tTorque\nx [s]\ty [deg]\tx [s]\ty [Nm]\n0\t1\t0\t2\n1\t2\t1\t3\n",
+            {"Angle.x [s]": [0, 1], "Angle.y [deg]": [1, 2], "Torque.x [s]": [0, 1], "Torque.y [Nm]": [2, 3]},
+            "^$",
+        ),
+        *(
+            (f"{mark} t a b\n0 1 2\n1 2 3\n", {"t": [0, 1], "a": [1, 2], "b": [2, 3]}, "^$")
+            for mark in ("%", "!", "//", "#")
+        ),
+        ("%Time\tA\n%s\tdeg\n0\t1\n1\t2\n", {"Time [s]": [0, 1], "A [deg]": [1, 2]}, "^$"),
+        ("Load A B\n% deg Nm\n0 1 2\n1 2 3\n", {"Load [%]": [0, 1], "A [deg]": [1, 2], "B [Nm]": [2, 3]}, "^$"),
+        ("t [s] angle [deg]\n0 1\n1 2\n", {"t [s]": [0, 1], "angle [deg]": [1, 2]}, "^$"),
+        ("   t      x  \n  [ms]  [N m]\n 0  1\n 1  2\n", {"t [ms]": [0, 1], "x [N m]": [1, 2]}, "^$"),
+        ("Time (s)   POS (ANAT) (deg)\n0  1\n1  2\n", {"Time (s)": [0, 1], "POS (ANAT) (deg)": [1, 2]}, "^$"),
+        (
+            ",A,B,Note\n0,1,2\n1,2,3\n",
+            {"A": [0, 1], "B": [1, 2], "Note": [2, 3]},
+            "line 1 has 4 cells, .* 3: its names are taken one",
+        ),
+        ("t;x\n---;---\n0;1\n1;2\n", {"t": [0, 1], "x": [1, 2]}, ""),
+        ("t;x\n0;1\n1;2\n;\n;\n", {"t": [0, 1], "x": [1, 2]}, "the last 2 rows hold nothing: not read"),
+        (
+            "t;x\n0;1\n1;2\n;\nSumme;3\n;\n",
+            {"t": [0, 1], "x": [1, 2]},
+            "the last row holds nothing: not read.*line 5 below",
+        ),
+        ("t,x\n0,---\n1,2\n2,-\n3,****\n", {"t": [0, 1, 2, 3], "x": [NAN, 2, NAN, NAN]}, "^$"),
+        (
+            "t;x\n10:00:00.123;1\n10:00:00.124;2\n",
+            {"t [s]": [36000.123, 36000.124], "x": [1, 2]},
+            "^.*: column 't' holds times[^;]*$",
+        ),
+        ("t,x\n05-Jan-2024 12:00:00.5,1\n05-Jan-2024 12:00:01,2\n", {"t [s]": [0, 0.5], "x": [1, 2]}, "since"),
+        ("t,x\n20240105T120000.5+0100,1\n20240105T110001Z,2\n", {"t [s]": [0, 0.5], "x": [1, 2]}, "since"),
+        ("t;x\n05.01.24 12:00:00,5;1,5\n05.01.24 12:00:01,0;2\n", {"t [s]": [0, 0.5], "x": [1.5, 2]}, "since"),
         (LABCHART, {"time [s]": [0, 0.001], "Angle [deg]": [1, 2], "Torque [N·m]": [2, 3]}, "^$"),
         (
             LABCHART.replace("UnitName=\tdeg\tN·m\n", "").replace("0\t1", "1").replace("0.001\t", ""),
@@ -175,6 +251,10 @@ def test_nothing_is_lost_and_what_is_dropped_is_said(
 @pytest.mark.parametrize(
     ("content", "message"),
     [
+        (
+            "t,x\n2024-01-05 12:00:00 CET,1\n2024-01-05 12:00:01 CET,2\n",
+            "CET' in line 2 is no number, nor a time that is known",
+        ),
         ("t,x\n0,1.5 V\n1,1.6 V\n", "'1.5 V' in line 2 is no number"),
         ("t,x\n01/05/2024,1\n01/06/2024,2\n", "must say what is the day and what the month"),
         ("t,x\n12:00:00,1\n12,2\n", "line 3 must hold a time in column 't'"),
@@ -188,6 +268,11 @@ def test_what_may_mean_two_things_is_refused(tmp_path: Path, content: str, messa
     (tmp_path / "x.csv").write_text(content)
     with pytest.raises(recordings.FileError, match=message):
         recordings.read(tmp_path / "x.csv")
+
+
+def test_minus_signs_of_word_processors(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text("t;x\n0;\N{MINUS SIGN}1,5\n1;2e\N{MINUS SIGN}1\n", encoding="utf-8")
+    assert read(tmp_path / "x.csv") == ({"t": [0, 1], "x": [-1.5, 0.2]}, "")
 
 
 def test_measurements_of_labview(tmp_path: Path) -> None:
@@ -207,6 +292,35 @@ def test_measurements_of_labview(tmp_path: Path) -> None:
     path.write_text(LABVIEW[: LABVIEW.index("X0")])
     with pytest.raises(recordings.FileError, match="must have two headers"):
         recordings.read(path)
+
+
+@pytest.mark.parametrize("first", ["X_Value", ""])
+def test_measurements_of_labview_without_the_cells_of_comments(tmp_path: Path, first: str) -> None:
+    """Rows end with their last number, and the first column may have neither a name nor times: names moved by one column."""
+    path = tmp_path / "x.lvm"
+    head = LABVIEW.partition("X_Value")[0] + f"{first}\tAngle\tTorque\tComment\n"
+    expected = {"X_Value [s]": [0, 0.001, 0.002], "Angle [deg]": [1.5, 2.5, 3.5], "Torque [N·m]": [2, 3, 4]}
+    rows = ["\t1.5\t2", "\t2.5\t3", "\t3.5\t4"]
+    path.write_text(head + "\n".join(rows) + "\n")
+    assert read(path) == (expected, "")
+    path.write_text(head + "\n".join([rows[0] + "\tbegun", *rows[1:]]) + "\n")
+    found, said = read(path)
+    assert found == expected
+    assert "'Comment': not read, it holds words" in said
+    path.write_text((head + "\n".join(rows) + "\n").replace("\t", ","))
+    assert read(path) == (expected, "")
+
+
+def test_measurements_of_labview_with_times_for_each_channel(tmp_path: Path) -> None:
+    path = tmp_path / "x.lvm"
+    head, _, _ = LABVIEW.replace("X_Columns\tOne", "X_Columns\tMulti").partition("X_Value")
+    head = head.replace("Y_Unit_Label\tdeg\tN·m", "Y_Unit_Label\tdeg\t\tN·m")
+    rows = "".join(f"{t}\t{t + 1}\t{t}\t{t + 2}\n" for t in range(3))
+    path.write_text(f"{head}X_Value\tAngle\tX_Value\tTorque\tComment\n{rows}")
+    names = ["X_Value [s]", "Angle [deg]", "X_Value_2 [s]", "Torque [N·m]"]
+    found, _ = read(path)
+    assert list(found) == names
+    assert found["Torque [N·m]"] == [2, 3, 4]
 
 
 def test_measurements_of_labview_that_lost_rows_are_refused(tmp_path: Path) -> None:
@@ -236,6 +350,14 @@ def test_motions_and_storages_of_opensim(tmp_path: Path, ending: str) -> None:
     found, _ = read(path)
     assert list(found) == ["time [s]", "knee_angle_r [deg]", "pelvis_tx [m]", "knee_moment [N m]"]
     assert found["knee_angle_r [deg]"] == [10, 11]
+    # A storage of states: degrees are those of coordinates alone.
+    tree = (
+        "/jointset/knee/knee_r/value\t/jointset/knee/knee_r/speed\t/jointset/pelvis/pelvis_tx/value\t"
+        "/forceset/soleus_r/activation\tground_torque_x\ttorque\n"
+    )
+    path.write_text(f"inDegrees=yes\nendheader\ntime\t{tree}0.0\t1\t2\t3\t4\t5\t6\n0.1\t1\t2\t3\t4\t5\t6\n")
+    units = [name.rpartition("[")[2] if "[" in name else "" for name in read(path)[0]]
+    assert units == ["s]", "deg]", "deg/s]", "m]", "", "N m]", "N m]"]
     path.write_text(OPENSIM.replace("nRows=2", "nRows=3"))
     with pytest.raises(recordings.FileError, match="it says nrows=3, and there are 2; copy it again"):
         recordings.read(path)

@@ -54,3 +54,39 @@ def test_a_sample_rate_is_what_the_file_says_or_an_error(tmp_path: Path) -> None
         _ = tvident.FileRecording({"angle": T}).sample_rate
     with pytest.raises(ValueError, match="uniform to a thousandth"):
         _ = tvident.FileRecording({"t": T**2, "angle": T}).sample_rate
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "rate"),
+    [
+        ("fs [kHz]", 0.25, 250),
+        ("Ts", 0.004, 250),
+        ("dt [ms]", 4.0, 250),
+        ("rig.sample_rate", 250.0, 250),
+        ("daq.t", T, 250),
+    ],
+)
+def test_what_says_the_rate_has_a_unit_and_may_be_a_period(name: str, value: float, rate: float) -> None:
+    assert tvident.FileRecording({name: value, "angle": T}).sample_rate == pytest.approx(rate, rel=1e-12)
+
+
+def test_the_only_channel_of_seconds_that_increases_is_the_time(tmp_path: Path) -> None:
+    """Whatever it is called: stamps of an index of pandas, a clock of a recorder."""
+    path = written(tmp_path / "x.csv", "Pruefzeit [ms],lag [s],angle [deg]", 1000 * T, 0 * T, T**2)
+    recording = tvident.read_recording(path)
+    assert recording.sample_rate == 250
+    assert recording.time is not None
+    np.testing.assert_allclose(recording.time, T, rtol=1e-12)
+    two = tvident.FileRecording({"a.time [s]": T, "b.time [s]": T + 1, "angle": T})
+    assert two.time is None
+    with pytest.raises(ValueError, match=r"has several: a\.time, b\.time; give sample_rate="):
+        _ = two.sample_rate
+
+
+def test_names_that_matlab_does_not_allow_are_said(tmp_path: Path) -> None:
+    pytest.importorskip("scipy")
+    with pytest.warns(
+        UserWarning,
+        match="variables of MATLAB have letters, digits and _ in their names: rig.angle is called rig_angle",
+    ):
+        tvident.FileRecording({"rig.angle [deg]": T}).write(tmp_path / "x.mat")

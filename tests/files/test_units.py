@@ -83,6 +83,12 @@ def test_every_symbol_means_what_pint_says(symbol: str) -> None:
         ("1/s", "1/s"),
         ("µrad", "urad"),
         ("Nm/A", "N*m/A"),
+        *((text, "degree") for text in ("DEG", "Deg", "Degrees", "deg.")),
+        *((text, "N*m") for text in ("NM", "N-M", "N\N{NON-BREAKING HYPHEN}m", "N\N{MINUS SIGN}m", "NEWTON-METERS")),
+        ("FT-LBF", "ft*lbf"),
+        ("DEG/SEC", "degree/s"),
+        ("mSec", "ms"),
+        ("hrs", "hour"),
     ],
 )
 def test_units_as_headers_write_them(text: str, pints: str) -> None:
@@ -92,7 +98,26 @@ def test_units_as_headers_write_them(text: str, pints: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["", "x", "angle", "Time", "t", "abs", "hh:mm:ss", "N m/", "N/(m", "m^", "raw", "N" * 70]
+    "text",
+    [
+        "",
+        "x",
+        "angle",
+        "Time",
+        "t",
+        "abs",
+        "hh:mm:ss",
+        "N m/",
+        "N/(m",
+        "m^",
+        "raw",
+        "N" * 70,
+        "M",
+        "S",
+        "Min",
+        "Grad",
+        "grad",
+    ],
 )
 def test_words_are_no_units(text: str) -> None:
     assert unit_of(text) is None
@@ -113,6 +138,26 @@ def test_words_are_no_units(text: str) -> None:
         ("L/R", ("L/R", "")),
         ("m/s", ("m/s", "")),
         ("angle (tics)", ("angle", "tics")),
+        ("Angle [deg] - AVE", ("Angle - AVE", "deg")),
+        ("Torque (Nmm) raw", ("Torque raw", "Nmm")),
+        ("[deg] angle", ("angle", "deg")),
+        ("H(s) gain", ("H(s) gain", "")),
+        ("Y[0]", ("Y[0]", "")),
+        ("Y[1]", ("Y[1]", "")),
+        ("ratio [1]", ("ratio", "1")),
+        ("Angle deg", ("Angle", "deg")),
+        ("Angle - deg", ("Angle", "deg")),
+        ("Torque N m", ("Torque", "N m")),
+        ("torque_N_m", ("torque", "N-m")),
+        ("torque_nmm", ("torque", "Nmm")),
+        ("position_nm", ("position_nm", "")),
+        ("angle_deg_filtered", ("angle_filtered", "deg")),
+        ("kneeAngleDeg", ("kneeAngle", "Deg")),
+        ("timestamp_ns", ("timestamp", "ns")),
+        ("force_kN", ("force", "kN")),
+        ("torque_ft_lb", ("torque", "ft-lb")),
+        ("angle_min", ("angle_min", "")),
+        ("hip_rms", ("hip_rms", "")),
     ],
 )
 def test_names_and_units_are_told_apart(name: str, expected: tuple[str, str]) -> None:

@@ -200,3 +200,30 @@ def test_the_ankle_obeys_the_model_only_before_the_reflex(folder_of_recordings: 
     # The torque comes late, and the record itself says so.
     late = tvident.identify(angle, torque, mask=mask, lag="auto", **call, **ALL_CONSTANT).settings
     assert 0.5e-3 < late["lag"] < 1.5e-3
+
+
+def test_what_disagrees_with_what_is_said_of_this_record(folder_of_recordings: Path) -> None:
+    """Widths from 11 to 191 samples agree, on another damping than short windows of a stiffness that is none leave."""
+    channels = recordings.read(recording(folder_of_recordings, "emps.mat"))
+    force = channels["gtau"] * channels["vir"]
+    result = tvident.identify(channels["qm"], force, sample_rate=1000, angle_unit="m", torque_unit="N")
+    words = result.summary()
+    assert re.search(
+        r"test functions of 11 to \d+ samples all find damping 37\d\.\d ± 4\.4 N s/m, not the 193 ± 24 above", words
+    )
+    assert "none can be believed" not in words
+
+
+def test_a_servo_whose_stiffness_is_none_hears_so(folder_of_recordings: Path) -> None:
+    """Where no other width determines anything, no line says that widths find different parameters, nor that 20 s are too short."""
+    channels = recordings.read(recording(folder_of_recordings, "servo.mat"))
+    angle, torque = channels["data.2"], channels["data.5"]
+    alone = tvident.identify(angle, torque, sample_rate=1000, angle_unit="rad")
+    assert alone.record_status & Status.SCALES_DISAGREE
+    assert alone.advice[0].startswith("the stiffness is not told from zero: try stiffness=0")
+    assert "23 widths of the test function were tried; none of them determined the constants" in alone.reasons
+    assert "different parameters" not in alone.summary()
+    # The catalogue's numbers.
+    found = tvident.identify(angle, torque, sample_rate=1000, stiffness=0)
+    assert found.value("inertia").value == pytest.approx(1.2e-4, rel=0.2)
+    assert found.value("damping").value == pytest.approx(7.03e-5, rel=0.05)

@@ -20,6 +20,7 @@ from tvident._advice.events import (
     unexplained_here,
 )
 from tvident._advice.lists import listed
+from tvident._advice.scales import disagreement, scales_compared
 from tvident._equation import BUILT_IN, COEFFICIENTS, UNITS
 from tvident._results import Words
 from tvident._status import Status
@@ -99,7 +100,7 @@ class Explained:
         reasons = (
             self._noise(),
             self._test_function(),
-            *self._scales(),
+            *scales_compared(self.found, flags),
             *lost_samples(self.found),
             *spikes(self.found),
             *self._rest(),
@@ -116,7 +117,7 @@ class Explained:
             return Words(reasons, tuple(self._defects()))
         advice = (
             *self._feedback(),
-            *self._disagreement(flags),
+            *disagreement(self.found, self.names, self.units, flags),
             *self._misfit(flags),
             *unexplained_here(self.found, self.period, self.step),
             *one_factor(dict(zip(self.names, self.found.unknowns, strict=True))),
@@ -162,23 +163,6 @@ class Explained:
             return f"{words}: the one that the spectra suggest finds other parameters, or leaves what the noise does not explain"
         return f"{words}: smallest expected errors, given the angle's spectrum and this noise"
 
-    def _scales(self) -> list[str]:
-        """Return over which widths of the test function the estimates agree."""
-        scan = self.found.scan
-        if scan is None:
-            return []
-        if scan.plateau is None:
-            return [
-                "the record is too short to compare test functions of different widths: nothing confirms these numbers"
-            ]
-        narrowest, widest = scan.plateau
-        agree = f"estimates are the same from {scan.window_length[narrowest]} to {scan.window_length[widest]} samples of the test function"
-        if narrowest == 0 or not scan.moved:
-            return [agree]
-        return [
-            f"{agree}: above {scan.band[narrowest]:.2g} Hz the recording does not obey the equation; only slower motion was used"
-        ]
-
     def _rest(self) -> list[str]:
         if not self.found.resting:
             return []
@@ -210,16 +194,6 @@ class Explained:
                 cure = f"jumps by {amount:.4g} rad: it is wrapped, give period={_period(amount):.8g}, or the period that it has"
             words.append(f"the {name} {cure}")
         return words
-
-    def _disagreement(self, flags: Status) -> list[str]:
-        if Status.SCALES_DISAGREE not in flags:
-            return []
-        words = (
-            "test functions of different widths find different parameters, and none can be believed: is a channel filtered, clipped, "
-            "held or wrapped (give lag=, or make clipped samples NaN), is a term missing, or does a controller feed noise back into the "
-            "torque? result.scan().plot() shows where they part; do not trust these numbers"
-        )
-        return [words]
 
     def _lag(self) -> list[str]:
         if "lag" not in self.chosen:

@@ -18,7 +18,15 @@ from tvident._arguments.numbers import (
 from tvident._arguments.progress import Progress, reporter
 from tvident._arguments.sampling import check_power, check_window, length_given, sample_period, seconds, window_length
 from tvident._arguments.shown import shown
-from tvident._arguments.times import NotUniformError, begin_of, implied_times, printed_step, times_of
+from tvident._arguments.times import (
+    NotUniformError,
+    begin_of,
+    check_against_labels,
+    clock_changed,
+    implied_times,
+    printed_step,
+    times_of,
+)
 from tvident._arguments.workers import worker_count
 from tvident._arguments.wrapped import Unwrapped, unwrapped
 from tvident._choices import NanPolicy, RowPolicy
@@ -37,9 +45,11 @@ __all__ = [
     "begin_of",
     "channel",
     "channels",
+    "check_against_labels",
     "check_nan",
     "check_power",
     "check_window",
+    "clock_changed",
     "explained_in_words",
     "fields_of",
     "finite_number",

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._arguments.shown import shown
+from tvident._units import in_its_unit
 
 _MOST_NAMES = 6
 """Fields that a message lists."""
@@ -48,6 +49,7 @@ def plain(name: str, values: Any) -> Any:
         return values.to_numpy()
     if package == "xarray":
         return _of_xarray(name, values)
+    values = in_its_unit(values)
     fields = fields_of(values)
     if fields:
         listed = ", ".join(map(str, fields[:_MOST_NAMES])) + (" …" if len(fields) > _MOST_NAMES else "")

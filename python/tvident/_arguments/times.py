@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from tvident._arguments.arrays import real_array
 from tvident._arguments.containers import package_of, plain
+from tvident._units import Unit, times_in_seconds, unit_of, unit_said
 
 Seconds = npt.NDArray[np.float64]
 
@@ -34,8 +35,17 @@ _FEW_SHARED = 0.01
 
 _HALVINGS = 50
 
+_OTHER_RATE = 0.1
+"""Times of few digits and gaps move steps by less than this part; a wrong rate is off by more."""
+
+_NOT_AN_HOUR = 60.0
+"""Seconds by which a step may differ from an hour and still be that of summer time."""
+
 _SEARCHED = 1e-6
 """How closely the period is found, as a part of what times may be off."""
+
+
+_TIME = unit_of("s") or Unit(1.0, ())
 
 
 class NotUniformError(ValueError):
@@ -103,18 +113,45 @@ def begin_of(t: npt.ArrayLike | None) -> float:
 def implied_times(values: Any) -> Any:
     """Return the times that a container says its samples have: an index of dates or durations; None where it has none.
 
-    Plain numbers are none: nobody says whether they are seconds. With xarray the attribute ``units`` may say so.
+    Plain numbers are none, since nobody says whether they are seconds. With xarray the attribute ``units`` may say so.
     """
     if package_of(values) == "pandas" and hasattr(values, "index"):
-        return values.index if getattr(values.index, "dtype", np.dtype(object)).kind in "mM" else None
+        return values.index if _says_times(values.index) else None
     if package_of(values) == "xarray" and hasattr(values, "dims"):
         for dim in values.dims:
             coordinate = values.coords.get(dim)
-            if coordinate is not None and (
-                coordinate.dtype.kind in "mM" or coordinate.attrs.get("units") in {"s", "second", "seconds"}
-            ):
+            if coordinate is not None and _says_times(coordinate):
                 return coordinate
     return None
+
+
+def _says_times(labels: Any) -> bool:
+    """Return whether labels are dates or durations, or numbers in a unit of time."""
+    kind = getattr(getattr(labels, "dtype", None), "kind", "O")
+    if kind in "mM":
+        return True
+    unit = unit_of(unit_said(labels)) if kind in "iuf" else None
+    return unit is not None and unit.dimension == _TIME.dimension
+
+
+def check_against_labels(values: Any, period: float) -> None:
+    """Refuse a sample period that is another than what a container says its samples have.
+
+    Raises
+    ------
+    ValueError
+        If both the mean and the median step of the labels are far from it.
+    """
+    implied = implied_times(values)
+    if implied is None or len(implied) < 2:  # noqa: PLR2004 - a step
+        return
+    seconds = np.asarray(times_of(times_in_seconds(implied)), dtype=np.float64)
+    steps = (float(np.median(np.diff(seconds))), float(seconds[-1] - seconds[0]) / (seconds.size - 1))
+    if all(step > 0 and abs(period / step - 1) > _OTHER_RATE for step in steps):
+        raise ValueError(
+            f"the sample period must be that of the times that the samples are labelled with; got {period:.6g} s ({1 / period:.6g} Hz), "
+            f"and labels {steps[0]:.6g} s apart ({1 / steps[0]:.6g} Hz); leave it out, or pass .to_numpy() if the labels are wrong"
+        )
 
 
 def period_of_times(t: npt.ArrayLike, samples: int) -> float:
@@ -184,7 +221,7 @@ def _not_uniform(seconds: Seconds, distance: Seconds, period: float) -> ValueErr
     # The widest step tells where; the farthest sample may be an innocent one.
     usual = float(np.median(np.diff(seconds)))
     place = int(np.abs(np.diff(seconds) - usual).argmax()) + 1
-    cure = "resample the record onto a uniform grid"
+    cure = "resample the record onto a uniform grid" + clock_changed(seconds[place] - seconds[place - 1])
     if float(distance.max()) < period / 2:
         count = np.arange(seconds.size) - (seconds.size - 1) / 2
         rate = float(count @ count / (count @ (seconds - seconds[0])))
@@ -207,8 +244,16 @@ def _not_increasing(seconds: Seconds) -> ValueError:
         )
     return ValueError(
         f"t must increase; t[{place}] = {now!r} comes after t[{place - 1}] = {before!r}; sort the samples by time, or cut the record where "
-        "its clock was set back"
+        f"its clock was set back{clock_changed(now - before)}"
     )
+
+
+def clock_changed(step: float) -> str:
+    """Return the cure where a step of time is that of a clock between summer and winter time."""
+    hours = round(step / 3600)
+    if abs(hours) != 1 or abs(step - 3600 * hours) > _NOT_AN_HOUR:
+        return ""
+    return "; a step of an hour is that of summer time: give times in UTC, in pandas .dt.tz_localize('Europe/Berlin', ambiguous='infer')"
 
 
 def printed_step(seconds: Seconds) -> float:

@@ -99,7 +99,7 @@ def grid_of(times: Numbers) -> Grid:
         place = int(steps.argmax()) + 1
         raise ValueError(
             f"t must have no gaps that take nine tenths of the time; steps are {usual:g} s mostly, but the one to t[{place}] is "
-            f"{steps[place - 1]:g} s; identify the parts before and after it on their own"
+            f"{steps[place - 1]:g} s; identify the parts before and after it on their own{arguments.clock_changed(float(steps[place - 1]))}"
         )
     return Grid(float(times[0]), period, samples, places, longest / period, jitter)
 

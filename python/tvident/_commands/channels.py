@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import recordings
-from tvident._files import full_name, listed, printable, time_channels
+from tvident._files import full_name, increasing_times, listed, printable, time_channels
 from tvident._units import Channel, UnitError, factor_between, named_unit
 
 _RATES = {"fs", "fsamp", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency"}
@@ -78,7 +78,7 @@ def check_has_times(who: str, given: bool, channels: recordings.Channels) -> Non
     """Refuse to begin without a sample period, and name the channel that may hold the times."""
     if given:
         return
-    found = time_channels(channels)
+    found = time_channels(channels) or [named_unit(name)[0] for name in increasing_times(channels)]
     known = f"; it may be --time {shlex.quote(printable(found[0]))}" if found else _rate_in(channels)
     raise click.UsageError(f"{who} the sample period; got none; give --sample-rate, --delta or --time{known}")
 

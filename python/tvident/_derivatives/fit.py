@@ -13,6 +13,7 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident._derivatives.found import Found
 from tvident._tables import Table, Tabular
+from tvident._units import derivative_units, unit_named, unit_said
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,8 @@ class Sampled:
         Those of the container that the samples came in.
     times : ndarray, optional
         Time of every sample in seconds where the period does not tell it.
+    unit : str
+        Of the samples; nothing where it, or the unit of time, is not known.
     """
 
     step: int = 1
@@ -36,12 +39,18 @@ class Sampled:
     start: float = 0.0
     labels: arguments.Labels | None = None
     times: npt.NDArray[np.float64] | None = None
+    unit: str = ""
 
     def at(self, samples: int) -> npt.NDArray[np.float64]:
         """Return the time of every result of so many samples in seconds."""
         if self.times is not None:
             return self.times[:: self.step]
         return self.start + np.arange(0, samples, self.step, dtype=np.float64) * self.period
+
+
+def unit_of_samples(samples: Any, *, is_timed: bool) -> str:
+    """Return the unit that samples or their name say, which derivatives by seconds have, too; nothing where time is counted in samples."""
+    return unit_said(samples) or unit_named(samples) if is_timed else ""
 
 
 class LocalPolynomialFit(Tabular):
@@ -201,9 +210,12 @@ class LocalPolynomialFit(Tabular):
         rest: dict[str, npt.NDArray[Any]] = {"sigma": self.sigma, "order": self.order, "status": self.status}
         columns |= {name: np.moveaxis(each, last, -1) for name, each in rest.items()}
         every, labels = sampled.step, sampled.labels
+        units = derivative_units(sampled.unit, len(values))
+        names = ["value", *(f"derivative_{place}" for place in range(1, len(values)))]
         return Table(
             time=self.time,
             columns=columns,
+            units=dict(zip(names, units, strict=True)) | {"sigma": sampled.unit} if sampled.unit else {},
             settings=json.loads(json.dumps(self.settings, default=np.ndarray.tolist)),
             labels=None if labels is None else labels.at(slice(None, None, every)),
         )

@@ -12,7 +12,7 @@ from tvident import _core
 from tvident._choices import Criterion, Loss, Selection
 from tvident._derivatives.automatic import choose
 from tvident._derivatives.automatic_gaps import choose_beside_gaps
-from tvident._derivatives.fit import LocalPolynomialFit, Sampled
+from tvident._derivatives.fit import LocalPolynomialFit, Sampled, unit_of_samples
 from tvident._derivatives.found import Found
 from tvident._derivatives.incomplete import check_weighted, filled, incomplete_given, left_out, longest_gap
 from tvident._derivatives.own_times import at_own_times, check_plain, period_or_times
@@ -210,9 +210,7 @@ def fit_local_polynomials(
     array, axis = given.array, given.axis
     samples = arguments.along_axis("y", array, axis)
     count = samples.shape[-1]
-    if delta is None and sample_rate is None and t is None:
-        t = arguments.implied_times(y)
-    seconds, times = period_or_times(count, delta=delta, sample_rate=sample_rate, t=t)
+    t, seconds, times = period_or_times(y, count, delta=delta, sample_rate=sample_rate, t=t)
     arguments.one_of("criterion", criterion, get_args(Criterion))
     arguments.one_of("selection", selection, get_args(Selection))
     arguments.check_nan("y", array, nan_policy, arguments.RowPolicy)
@@ -226,7 +224,10 @@ def fit_local_polynomials(
     step_of_rounding = quantisation_step(samples, quantisation)
     turned = None if period is None else arguments.unwrapped("y", samples, period)
     samples = samples if turned is None else turned.values
-    sampled = Sampled(every, seconds, arguments.begin_of(t), arguments.labels_of(y), times)
+    is_timed = any(one is not None for one in (delta, sample_rate, t))
+    sampled = Sampled(
+        every, seconds, arguments.begin_of(t), arguments.labels_of(y), times, unit_of_samples(y, is_timed=is_timed)
+    )
     automatic = isinstance(window_length, str) and window_length.strip() == "auto"
     if automatic:
         _check_left_to_the_rule(criterion, selection)

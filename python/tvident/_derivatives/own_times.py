@@ -16,17 +16,28 @@ from tvident._derivatives.found import CHOSEN, Found, Scored, together
 from tvident._derivatives.plans import SHORTEST_WINDOW
 from tvident._derivatives.robust import with_clipped_residuals
 from tvident._status import Status
+from tvident._units import times_in_seconds
 
 _FEWEST = 64
 """Samples of a record whose windows are chosen, at least."""
 
 
-def period_or_times(samples: int, **given: Any) -> tuple[float, npt.NDArray[np.float64] | None]:
-    """Return the sample period, and the times where they are not uniform; the period is then their mean step."""
+def period_or_times(values: Any, samples: int, **given: Any) -> tuple[Any, float, npt.NDArray[np.float64] | None]:
+    """Return times in seconds where samples have any, the sample period, and the times again where they are not uniform.
+
+    The period is then their mean step. Where nothing is given, times are those that the container says its samples have.
+    """
+    if all(one is None for one in given.values()):
+        given["t"] = arguments.implied_times(values)
+    if given["t"] is not None:
+        given["t"] = times_in_seconds(given["t"])
     try:
-        return arguments.sample_period(samples, **given), None
+        period = arguments.sample_period(samples, **given)
     except arguments.NotUniformError as error:
-        return float(error.times[-1] - error.times[0]) / (samples - 1), error.times
+        return given["t"], float(error.times[-1] - error.times[0]) / (samples - 1), error.times
+    if given["t"] is None:
+        arguments.check_against_labels(values, period)
+    return given["t"], period, None
 
 
 def check_plain(*others: object, selection: str) -> None:

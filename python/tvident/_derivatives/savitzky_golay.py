@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._derivatives.plans import HIGHEST_ORDER, plan
-from tvident._tables import shaped
+from tvident._tables import shaped, without_unit
 
 Mode: TypeAlias = Literal["interp", "mirror", "constant", "nearest", "wrap"]
 
@@ -151,7 +151,8 @@ def savgol_filter(
     if array.dtype == np.float32:
         with np.errstate(all="ignore"):
             filtered = filtered.astype(np.float32)
-    return given.again(filtered)
+    made = given.again(filtered)
+    return without_unit(made) if derivative > 0 else made
 
 
 def _derivative(deriv: int, delta: float, order: int) -> tuple[int, float]:

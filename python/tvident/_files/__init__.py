@@ -5,7 +5,7 @@ from tvident._files.channels import Channels, FileError, FileWarning, channel, f
 from tvident._files.names import listed, printable
 from tvident._files.places import ENDINGS as TABLE_ENDINGS
 from tvident._files.places import check_apart, check_folder, check_place
-from tvident._files.recorded import FileRecording, is_time, read_recording, time_channels
+from tvident._files.recorded import FileRecording, increasing_times, is_time, read_recording, time_channels
 from tvident._files.recordings import read
 from tvident._files.replacement import put_in_place, replaced
 from tvident._files.results import ENDINGS as RESULT_ENDINGS
@@ -27,6 +27,7 @@ __all__ = [
     "check_place",
     "copy_text",
     "full_name",
+    "increasing_times",
     "is_time",
     "listed",
     "place_beside",

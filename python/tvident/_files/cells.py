@@ -9,6 +9,9 @@ import re
 Separator = str | None
 """What stands between cells; None: blanks."""
 
+_MINUS = re.compile("^[\N{MINUS SIGN}\N{EN DASH}](?=[\\d.,])|(?<=[eE])\N{MINUS SIGN}")
+"""What word processors and some programs write for it."""
+
 _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
 _GROUPS = re.compile(
@@ -22,7 +25,7 @@ _BLANKS = re.compile("[ '\u2019\u00a0\u2009\u202f]")
 
 _ONE_GROUP = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)
 _INFINITE = re.compile(r"([+-]?)(inf|infinity|1\.#inf)", re.IGNORECASE)
-_MISSING = re.compile(r"([+-]?nan|n/?a|#n/a|null|none|[+-]?1\.#(qnan|snan|ind))?", re.IGNORECASE)
+_MISSING = re.compile(r"([+-]?nan|n/?a|-{1,3}|\*{1,12}|#n/a|null|none|[+-]?1\.#(qnan|snan|ind))?", re.IGNORECASE)
 _NOT_A_COMMENT = re.compile(r"#(?=(n/a|div/0|ref!|value!|num!|name\?|null!|qnan|snan|ind|inf)\b)", re.IGNORECASE)
 _IN_QUOTES = re.compile(r'"[^"]*"|[^\s"]+')
 
@@ -64,6 +67,8 @@ def number(cell: str, *, comma: bool, decimal: str | None = None) -> float | Non
     """
     if not cell:
         return math.nan
+    if not cell.isascii():
+        cell = _MINUS.sub("-", cell)
     plain = _plain(cell, comma=comma, decimal=decimal)
     if plain is not None:
         value = float(plain)

@@ -24,6 +24,9 @@ _SEARCHED, _SEARCHED_FOR_WORDS = 100, 2000
 
 _BEGINS_AS_NUMBER = re.compile(r"[+-]?[.,]?[0-9]")
 
+_HOLDS_CELLS = re.compile(r"[,;]\s*[+-]?\d")
+"""Words that hold cells: what separates these is no blank."""
+
 Kind = Literal["number", "time", "words", "nothing"]
 """What a column holds in the first lines."""
 
@@ -93,7 +96,7 @@ def mixed_line(lines: Sequence[str]) -> str:
             cells = split(line, separator)
             words = [cell for cell in cells if not _is_number(cell)]
             if words and all(_BEGINS_AS_NUMBER.match(cell) for cell in cells if cell):
-                return f"'{printable(words[0], 40)}' in line {index + 1} is no number; "
+                return f"'{printable(words[0], 40)}' in line {index + 1} is no number, nor a time that is known; "
     return ""
 
 
@@ -179,6 +182,8 @@ def _back(lines: Sequence[str], index: int, separator: Separator) -> int:
     while index > 0 and separator in lines[index - 1] and not lines[index - 1].lstrip().startswith("#"):
         cells = split(lines[index - 1], separator)
         are_missing = all(number(cell, comma=True) is not None and not is_present(cell, comma=True) for cell in cells)
+        if any(cell and not cell.strip("-*") for cell in cells):
+            break  # a line drawn below the names, or units of which there are none
         if not are_missing and not _has_remark(cells, kinds):
             break
         index -= 1
@@ -228,6 +233,8 @@ def _start_with_words(lines: Sequence[str], index: int, separator: Separator) ->
     for column, kind in enumerate(kinds):
         present = [row[column] for row in rows if row[column]]
         if kind == "words" and (any(map(_is_number, present)) or all(map(_BEGINS_AS_NUMBER.match, present))):
+            return None
+        if kind == "words" and separator is None and any(map(_HOLDS_CELLS.search, present)):
             return None
     return _Start(separator, index, cells, len(rows))
 

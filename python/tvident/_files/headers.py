@@ -30,6 +30,20 @@ _TYPE = re.compile(r"(u?int|float|single|double|real|bool|byte|word|string|str|t
 _KEY = re.compile(r"[A-Za-z][A-Za-z ]*=")
 """How LabChart begins a line that says one thing of every channel."""
 
+_MARK = re.compile(r"\s*(?:#+|[%!]+(?=[\s\w\"])|//+)\s*")
+"""What other programs begin a line with that holds no numbers."""
+
+_UNITS_KEY = re.compile(r"(units?|einheit(en)?|unit[ée]s?|unidad(es)?)[. ]*[:=]?", re.IGNORECASE)
+"""What may stand before units, in place of one."""
+
+_MOSTLY = 0.5
+"""Part of a line's cells that are units which are known, where the others are units, too."""
+
+_APART = re.compile(r"\t|\s{2,}")
+_WHOLE_BRACKETS = re.compile(r'"[^"]*"|(?:\[[^\]]*\]|\([^)]*\)|[^\s"])+')
+_WITH_BRACKETS = re.compile(r'(?:"[^"]*"|[^\s"]+)(?:\s(?:\[[^\]]*\]|\([^)]*\)))?')
+"""How words that blanks separate belong together where there are more than columns."""
+
 _RANGE = re.compile(r"[+-]?[\d.,]+\s+(\S.*)")
 
 
@@ -39,9 +53,12 @@ class Line:
     def __init__(self, index: int, text: str, separator: Separator) -> None:
         self.place = index + 1
         self.is_comment = not without_comment(text).strip()
-        bare = text.lstrip("# ") if self.is_comment else text
+        whole = split(text, separator)
+        mark = None if bool(whole) and whole[0] == "%" and _are_units(whole) else _MARK.match(text)
+        bare = text if mark is None else text[mark.end() :]
         self.says_something = any(one.isalnum() for one in bare) and not _HINT.fullmatch(bare.strip())
         self.cells = split(bare, separator)
+        self._text = bare.strip() if separator is None else ""
         self.width = len(self.cells)
         """With empty cells at its end."""
         while self.cells and not self.cells[-1]:
@@ -51,14 +68,27 @@ class Line:
         """Return its cells if they are as many as columns: with, or without empty ones."""
         every = self.cells
         present = [cell for cell in every if cell]
-        if least <= len(every) <= most or (self.width >= least and _are_units(every)):
+        if least <= len(every) <= most or (len(every) <= most and self.width >= least and _are_units(every)):
             return every  # the last columns may have no unit
-        return present if least <= len(present) <= most else []
+        if least <= len(present) <= most:
+            return present
+        for words in (
+            _APART.split(self._text),
+            _WHOLE_BRACKETS.findall(self._text),
+            _WITH_BRACKETS.findall(self._text),
+        ):
+            if self._text and len(words) > 1 and least <= len(words) <= most:
+                return [word.strip().strip("\"'") for word in words]
+        return []
 
     def groups(self, columns: int) -> list[str]:
         """Return to which group each column belongs, where a name stands above the first of its columns alone, or above each."""
         if not 1 < self.width <= columns + 1 or len(self.cells) > columns:
             return []
+        if self.width < columns and all(self.cells):
+            # Without empty cells between, each stands above as many columns, or nobody knows.
+            each = columns // self.width
+            return [cell for cell in self.cells for _ in range(each)] if each * self.width == columns else []
         cells = self.cells + [""] * (columns - len(self.cells))
         groups = [""]
         for cell in cells:
@@ -104,17 +134,27 @@ class Names:
         block = [(self.above[last], nearest)]
         for line in reversed(self.above[:last]):
             cells = line.names(self.most, self.least)
-            if not cells or any(is_present(one, comma=self.separator != ",") for one in cells):
+            numbers = [is_present(one, comma=self.separator != ",") for one in cells]
+            # Channels may be called 1 and 2, where their units stand below.
+            if not cells or all(numbers) or (any(numbers) and not (len(block) == 1 and _are_units(nearest))):
                 break
             block.append((line, cells))
         width = max(len(cells) for _, cells in block)
         block = [(line, cells + [""] * (width - len(cells))) for line, cells in block]
-        units = next((one for one in block if _are_units(one[1])), None) if len(block) > 1 else None
-        rest = [one for one in block if one is not units]
+        units = self._units(block)
+        rest = [one for one in block if units is None or one[0] is not units[0]]
         named = [one for one in rest if not all(_TYPE.fullmatch(cell) for cell in one[1] if cell)] or rest
         differing = [one for one in named if _differ(one[1])]
         line, names = (differing or named)[0]
+        # Several tabs may align a name with its column.
+        is_doubtful = self.separator != "\t" or not line.cells[0]
+        if is_doubtful and len(line.cells) > self.most and sum(map(bool, line.cells)) == len(names):
+            self.say(
+                f"line {line.place} has {len(line.cells)} cells, and the lines of numbers {self.most}: its names are taken one after the "
+                f"other, for columns from the first on: {listed(names)}"
+            )
         names, groups = self._grouped(line, names)
+        names = _completed(names, [cells for other, cells in rest if other is not line])
         for other, cells in rest:
             if other not in {line, *groups} and abs(other.place - line.place) <= len(block):
                 why = "" if units else ", and it holds no known units"
@@ -124,6 +164,21 @@ class Names:
         if units is None:
             return names
         return [_with_unit(name, unit) for name, unit in zip(names, units[1], strict=True)]
+
+    def _units(self, block: list[tuple[Line, list[str]]]) -> tuple[Line, list[str]] | None:
+        """Return the line that holds units: all its cells do, or, where others are unknown, most."""
+        if len(block) < 2:  # noqa: PLR2004 - names and units
+            return None
+        known = next((one for one in block if _are_units(one[1])), None)
+        if known is not None:
+            return known
+        shares = [_share_of_units(cells) for _, cells in block]
+        share = max(shares)
+        if share < _MOSTLY or shares.count(share) > 1:
+            return None
+        line, cells = block[shares.index(share)]
+        is_keyed = _UNITS_KEY.fullmatch(cells[0]) is not None
+        return line, ["" if is_keyed and not place else cell for place, cell in enumerate(cells)]
 
     def _grouped(self, line: Line, names: list[str]) -> tuple[list[str], list[Line]]:
         """Return names with the groups of columns that lines above them name, and these lines.
@@ -218,6 +273,23 @@ def _without_keys(above: Sequence[Line], most: int) -> list[Line]:
             of_channels = [_RANGE.sub(r"\1", cell) if line is units else cell for cell in line.cells[1:]]
             line.cells = [of_times, *of_channels] if has_times else of_channels
     return [line for line in above if line not in keyed.values() or line in {titles, units}]
+
+
+def _share_of_units(cells: Sequence[str]) -> float:
+    """Return the part of the cells that are units, without one that says that units follow."""
+    present = [cell for place, cell in enumerate(cells) if cell and not (place == 0 and _UNITS_KEY.fullmatch(cell))]
+    units = [cell for cell in present if is_unit(cell) and (cell.strip("[](){}<> ").isalpha() or len(cell) > 1)]
+    return len(units) / len(present) if present else 0.0
+
+
+def _completed(names: list[str], others: Sequence[Sequence[str]]) -> list[str]:
+    """Return names, those that are empty from the nearest other line that has one."""
+    found = list(names)
+    for cells in others:
+        for place, cell in enumerate(cells[: len(found)]):
+            if not found[place] and cell and sum(one == cell for one in cells) == 1 and not _UNITS_KEY.fullmatch(cell):
+                found[place] = cell
+    return found
 
 
 def _differ(cells: Sequence[str]) -> bool:

@@ -18,10 +18,15 @@ _END = re.compile(r"^\*\*\*End_of_Header\*\*\*[^\n]*\n", re.MULTILINE)
 
 _X = "X_Value"
 
+_BY_COMMAS = re.compile(r"^Separator,", re.MULTILINE)
+
 _HEADER_LINES = 100
 
 _LENGTHS = re.compile(r".*_(t[xyz]|p[xyz])|pelvis_t[xyz]")
-_FORCES, _TORQUES = re.compile(r".*_(v[xyz]|force)"), re.compile(r".*_(m[xyz]|moment|torque[xyz]?)")
+_FORCES = re.compile(r".*_v[xyz]|(.*_)?force")
+_TORQUES = re.compile(r".*_m[xyz]|(.*_)?(moment|torque_?[xyz]?)")
+_STATE = re.compile(r"/jointset/(?:.*/)?(?P<name>[^/]+)/(?P<kind>value|speed)")
+"""A state of OpenSim 4: the value and the speed of a coordinate; degrees are those of coordinates alone."""
 
 
 def read_labview(path: Path, say: Say) -> Channels:
@@ -54,11 +59,17 @@ def _nothing(_: str) -> None:
 
 def _segment(text: str, places: tuple[int, int, int], say: Say) -> Channels:
     header, start, stop = places
-    keys = {line.split("\t")[0]: line.rstrip("\n\t ").split("\t")[1:] for line in text[header:start].split("\n")}
+    between = "," if _BY_COMMAS.search(text, 0, header) else "\t"
+    lines = text[header:start].split("\n")
+    keys = {line.split(between)[0]: line.rstrip(f"\n{between} ").split(between)[1:] for line in lines}
     # Empty lines above keep the numbers of lines in messages.
-    found = read_columns(io.StringIO("\n" * text.count("\n", 0, start) + text[start:stop]), say)
+    found = read_columns(
+        io.StringIO("\n" * text.count("\n", 0, start) + _with_every_cell(text[start:stop], between)), say
+    )
     _check_rows(keys.get("Samples", []), next((values.size for values in found.values()), 0))
     units = keys.get("Y_Unit_Label", [])
+    if sum(name.startswith(_X) for name in found) > 1:
+        units = units[::2]  # each stands above the times of its channel
     channels: Channels = {}
     of_channels = 0
     for column, (name, values) in enumerate(found.items()):
@@ -73,6 +84,24 @@ def _segment(text: str, places: tuple[int, int, int], say: Say) -> Channels:
             channels[with_unit(name, units[of_channels] if of_channels < len(units) else "")] = values
             of_channels += 1
     return channels
+
+
+def _with_every_cell(text: str, between: str) -> str:
+    """Return a segment whose lines have the cells that its names say: the first may have no name, and few lines have a comment."""
+    names, newline, rows = text.partition("\n")
+    cells = names.rstrip("\r").split(between)
+    while cells and not cells[-1].strip():
+        cells.pop()
+    if len(cells) < 2 or "Comment" not in cells[-1]:  # noqa: PLR2004 - a channel and its comments
+        return text
+    if not cells[0].strip():
+        cells[0] = _X
+    width = len(cells)
+    lines = [line.rstrip("\r") for line in rows.split("\n")]
+    counts = {line.count(between) + 1 for line in lines if line.strip()}
+    if counts != {width}:
+        lines = [line + between if line.count(between) + 2 == width else line for line in lines]
+    return between.join(cells) + newline + "\n".join(lines)
 
 
 def _check_rows(said: list[str], rows: int) -> None:
@@ -118,7 +147,19 @@ def read_opensim(path: Path, say: Say) -> Channels:
 def _unit(name: str, *, degrees: bool) -> str:
     if name == "time":
         return "s"
+    if name.startswith("/"):
+        return _unit_of_state(name, degrees=degrees)
     for names, unit in ((_LENGTHS, "m"), (_FORCES, "N"), (_TORQUES, "N m")):
         if names.fullmatch(name):
             return unit
     return "deg" if degrees else ""
+
+
+def _unit_of_state(name: str, *, degrees: bool) -> str:
+    """Return the unit of a value in a model's tree; nothing where the header does not say it."""
+    state = _STATE.fullmatch(name)
+    if state is None:
+        last = name.replace("/", "_")
+        return next((unit for names, unit in ((_FORCES, "N"), (_TORQUES, "N m")) if names.fullmatch(last)), "")
+    base = "m" if _LENGTHS.fullmatch(state["name"]) else "deg" if degrees else ""
+    return f"{base}/s" if base and state["kind"] == "speed" else base

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +15,17 @@ from tvident._files.channels import Channels, full_name
 from tvident._files.names import listed, printable
 from tvident._files.recordings import read
 from tvident._files.table import write_table
-from tvident._units import ROTARY, Channel, named_unit, times_in_seconds, unit_of, with_unit
+from tvident._units import (
+    ROTARY,
+    Channel,
+    UnitError,
+    factor_between,
+    named_unit,
+    times_in_seconds,
+    unit_of,
+    unit_said,
+    with_unit,
+)
 
 _TIME = re.compile(
     r"(t|time|times|zeit|temps|tiempo|tempo|x_value|timestamps?|elapsed( time)?|time_?stamp)([ _.-]?\d+)?",
@@ -23,6 +35,9 @@ _TIME = re.compile(
 
 _RATE = re.compile(r"(fs|f_s|fsamp|sample_?rate|sampling_?(rate|frequency)|samplerate|fsample|rate)", re.IGNORECASE)
 
+_PERIOD = re.compile(r"(ts|dt|delta_?t|t_?sample|t_?samp|sampl(e|ing)_?(time|period|interval))", re.IGNORECASE)
+"""What single numbers are called that are samples per second, and seconds per sample."""
+
 _JITTER = 1e-3
 """Of the sample period: how far times may lie from a uniform grid, as where arrays are taken."""
 
@@ -31,6 +46,17 @@ def time_channels(names: Iterable[str]) -> list[str]:
     """Return the names, without units and groups, of channels that are called as times are."""
     bare = (named_unit(name)[0].rpartition(".")[2] for name in names)
     return [name for name in bare if _TIME.fullmatch(name)]
+
+
+def increasing_times(channels: Mapping[str, npt.NDArray[Any]]) -> list[str]:
+    """Return the names of channels in a unit of time that increase from sample to sample, whatever they are called."""
+    found = []
+    for name, values in channels.items():
+        unit = unit_of(named_unit(name)[1] or unit_said(values))
+        is_duration = unit is not None and unit.dimension == ROTARY.dimensions["time"]
+        if is_duration and values.ndim == 1 and values.size > 1 and bool((np.diff(np.asarray(values)) > 0).all()):
+            found.append(name)
+    return found
 
 
 class FileRecording(Mapping[str, Channel]):
@@ -127,12 +153,15 @@ class FileRecording(Mapping[str, Channel]):
         if self._rate is not None:
             return float(self._rate)
         for name, values in self._channels.items():
-            if values.size == 1 and _RATE.fullmatch(name) and float(values.reshape(-1)[0]) > 0:
-                return float(values.reshape(-1)[0])
+            rate = _rate_of(name, values) if values.size == 1 else None
+            if rate is not None:
+                return rate
         time = self.time
         if time is None or time.size < 2:  # noqa: PLR2004 - a period has two ends
+            several = increasing_times(self._channels)
+            had = f"several: {listed(several)}" if len(several) > 1 else listed(self)
             raise ValueError(
-                f"a sample rate needs a channel of times; {self._source} has {listed(self)}; give sample_rate= where it is needed"
+                f"a sample rate needs a channel of times; {self._source} has {had}; give sample_rate= where it is needed"
             )
         period = float(time[-1] - time[0]) / (time.size - 1)
         grid = time[0] + period * np.arange(time.size)
@@ -147,11 +176,13 @@ class FileRecording(Mapping[str, Channel]):
 
     @property
     def time(self) -> npt.NDArray[np.float64] | None:
-        """Time of every sample in seconds, shape (n,); None where the file has no channel of times."""
-        for name, values in self._channels.items():
-            if values.ndim == 1 and values.size > 1 and is_time(name, values.unit):
-                return np.asarray(times_in_seconds(values), dtype=np.float64)
-        return None
+        """Time of every sample in seconds, shape (n,); None where the file has no channel of times, or one in each of several groups."""
+        long = {name: values for name, values in self._channels.items() if values.ndim == 1 and values.size > 1}
+        found = [name for name, values in long.items() if is_time(name, values.unit)]
+        # Structures and groups put their names before those of their channels.
+        grouped = [name for name, values in long.items() if is_time(name.rpartition(".")[2], values.unit)]
+        called = found[:1] or (grouped if len(grouped) == 1 else increasing_times(long))
+        return np.asarray(times_in_seconds(long[called[0]]), dtype=np.float64) if len(called) == 1 else None
 
     def select(self, t0: float, t1: float) -> FileRecording:
         """Return the samples from one time to another.
@@ -214,6 +245,19 @@ class FileRecording(Mapping[str, Channel]):
             name if named_unit(name)[1] else with_unit(name, values.unit): values
             for name, values in self._channels.items()
         }
+
+
+def _rate_of(name: str, value: Channel) -> float | None:
+    """Return the samples per second that a single number says, None where it is called otherwise or cannot be one."""
+    bare, number = name.rpartition(".")[2], float(value.reshape(-1)[0])
+    for pattern, unit, is_rate in ((_RATE, "Hz", True), (_PERIOD, "s", False)):
+        if pattern.fullmatch(bare) and math.isfinite(number) and number > 0:
+            try:
+                scaled = number * (factor_between(value.unit, unit, name=name) if value.unit else 1.0)
+            except UnitError:
+                continue
+            return scaled if is_rate else 1 / scaled
+    return None
 
 
 def is_time(name: str, unit: str) -> bool:

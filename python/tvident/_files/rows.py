@@ -72,6 +72,8 @@ class Rows:
         """Where columns of words have their first, and the word."""
         self._numbers: set[int] = set()
         """Columns without anything in the first lines that have numbers further below."""
+        self.hollow = 0
+        """Rows at the end that hold separators alone."""
         self.times = {column: TimeColumn(cells) for column, cells in dialect.times.items()}
 
     def skip(self, lines: int) -> None:
@@ -87,8 +89,22 @@ class Rows:
         lines = text.count("\n")
         if found is None:
             found = self._line_by_line(text.split("\n")[: lines + 1])
+        self._count_hollow(text, found.shape[0])
         self._line += lines
         return found
+
+    def _count_hollow(self, text: str, rows: int) -> None:
+        """Count the rows at the end so far that hold separators alone: a sheet may write many below its last number."""
+        separator = self._dialect.separator
+        if separator is None or self._width == 1:
+            return
+        lines = text.split("\n") if self._words is None else text.split("\n")[: max(0, self._words[0] - self._line - 1)]
+        hollow = 0
+        for line in reversed(lines):
+            if line.replace(separator, "").strip():
+                break
+            hollow += separator in line
+        self.hollow = self.hollow + rows if hollow >= rows else hollow
 
     @property
     def dropped(self) -> set[int]:
@@ -109,6 +125,8 @@ class Rows:
             self._say(
                 f"column '{printable(self._dialect.names[column], 40)}': not read, it holds words{remark and ': ' + remark}"
             )
+        if self.hollow:
+            self._say(f"the last {'row holds' if self.hollow == 1 else f'{self.hollow} rows hold'} nothing: not read")
         if self._words is not None:
             first, words = self._words
             where = f"line {first}" if first == self._words_end else f"lines {first} to {self._words_end}"
@@ -117,11 +135,11 @@ class Rows:
     def _in_bulk(self, text: str) -> Numbers | None:
         """Return the rows of a text that holds nothing but numbers, None where something else may be in it."""
         d = self._dialect
-        has = {".": "." in text, ",": d.comma and "," in text}
+        bare = text if d.is_plain else _TIMES.sub("", text)
+        has = {".": "." in bare, ",": d.comma and "," in bare}
         was = {sign: bool(self._signs[sign] or self._doubtful[sign]) for sign in ".,"}
         if any((has[one] or was[one]) and (has[other] or d.decimal == other) for one, other in (".,", ",.")):
             return None  # to find the lines
-        bare = text if d.is_plain else _TIMES.sub("", text)
         found = self._without_empty_cells(text.replace(",", ".") if has[","] else text)
         # A number too large for 64 bits becomes infinite there.
         if found is None or np.isinf(found).any():
@@ -192,6 +210,8 @@ class Rows:
         cells = split(line, d.separator)
         while len(cells) > self._width and not cells[-1]:
             cells.pop()
+        if self._words is not None and not any(cells):
+            return None
         values = self._plain(line, cells)
         if values is None:
             if self._is_end(cells):

@@ -5,12 +5,16 @@ from __future__ import annotations
 import io
 import math
 import re
+import warnings
 from collections.abc import Mapping
 from importlib.util import find_spec
 from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
+
+from tvident._files.channels import FileWarning
+from tvident._files.names import listed, printable
 
 Columns = Mapping[str, npt.NDArray[Any]]
 
@@ -84,6 +88,13 @@ def write_mat(file: IO[bytes], columns: Columns, units: Mapping[str, str]) -> No
     names = _variables(list(columns))
     content: dict[str, Any] = {names[name]: np.ascontiguousarray(values)[:, None] for name, values in columns.items()}
     known = {names[name]: units[name] for name in columns if units.get(name)}
+    renamed = [f"{printable(name, 40)} is called {names[name]}" for name in columns if names[name] != name]
+    if renamed:
+        warnings.warn(
+            f"variables of MATLAB have letters, digits and _ in their names: {listed(renamed)}",
+            FileWarning,
+            stacklevel=2,
+        )
     savemat(file, content | ({"units": known} if known else {}), do_compression=True, long_field_names=True)
 
 

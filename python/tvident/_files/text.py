@@ -117,6 +117,7 @@ def _copied(file: TextIO, copy: IO[bytes], decimal: str | None, say: Say) -> lis
     for part in parts:
         copy.write(np.ascontiguousarray(part).tobytes())
     rows.finish()
+    copy.seek(-8 * len(dialect.names) * rows.hollow, 1)
     for column in rows.times:
         say(
             f"column '{printable(dialect.names[column], 40)}' holds times of a clock: not read piece by piece; give sample_rate="
@@ -190,6 +191,8 @@ def _columns(dialect: Dialect, parts: list[Numbers], rows: Rows, say: Say) -> Ch
         part = parts.pop(0)
         columns[:, start : start + len(part)] = part.T
         start += len(part)
+    if rows.hollow:
+        columns = columns[:, : -rows.hollow]
     if not dialect.named:
         # A separator at the end of every line makes no column.
         while width > 1 and np.isnan(columns[width - 1]).all():

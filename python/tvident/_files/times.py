@@ -14,8 +14,13 @@ import numpy.typing as npt
 _CLOCK = (
     r"(?:T|\s+)?(?P<h>\d{1,3}):(?P<m>[0-5]\d):(?P<s>[0-5]\d)(?:[.,:](?P<f>\d{1,12}))?\s*(?:(?P<half>[AaPp])\.?[Mm]\.?)?"
 )
-_ZONE = r"\s*(?P<zone>Z|UTC|[+-]\d\d:?\d\d)?"
+_ZONE = r"\s*(?P<zone>Z|UTC|GMT|[+-]\d\d(?::?\d\d)?)?"
 _YEAR_FIRST = r"(?P<y>\d{4})(?P<sign>[-/.])(?P<mo>\d{1,2})(?P=sign)(?P<d>\d{1,2})"
+_COMPACT = r"(?P<y>\d{4})(?P<mo>\d\d)(?P<d>\d\d)T(?P<h>\d\d)(?P<m>[0-5]\d)(?P<s>[0-5]\d)(?:[.,](?P<f>\d{1,12}))?"
+_COMPACT_ZONE = r"(?P<zone>Z|[+-]\d\d(?::?\d\d)?)?"
+_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+_MONTH_NAMED = rf"(?P<d>\d{{1,2}})[- ](?P<name>(?i:{'|'.join(_MONTHS)}))[- ](?P<y>\d{{4}})"
+_SHORT_YEAR = r"(?P<d>\d{2})\.(?P<mo>\d{2})\.(?P<short>\d{2})"
 _YEAR_LAST = r"(?P<a>\d{1,2})(?P<sign>[-/.])(?P<b>\d{1,2})(?P=sign)(?P<y>\d{4})"
 _FORMS = tuple(
     re.compile(form, re.ASCII)
@@ -24,6 +29,10 @@ _FORMS = tuple(
         rf"{_YEAR_FIRST}(?:{_CLOCK}{_ZONE})?",
         rf"{_YEAR_LAST}(?:{_CLOCK}{_ZONE})?",
         r"(?P<m>\d{1,3}):(?P<s>[0-5]\d)[.,](?P<f>\d{1,12})",
+        _COMPACT + _COMPACT_ZONE,
+        rf"{_MONTH_NAMED}(?:{_CLOCK}{_ZONE})?",
+        # A date alone in this form may be three numbers of a version.
+        rf"{_SHORT_YEAR}{_CLOCK}{_ZONE}",
     )
 )
 _DAY, _HOUR = 86_400, 3600
@@ -64,6 +73,8 @@ def _instant(part: dict[str, str | None], order: Order) -> Instant | None:
     if part.get("half"):
         hours = hours % 12 + (12 if part["half"] in {"p", "P"} else 0)
     seconds = _HOUR * hours + 60 * int(part.get("m") or 0) + int(part.get("s") or 0)
+    if part.get("short") is not None:
+        part = {**part, "y": f"20{part['short']}"}
     if part.get("y") is None:
         wraps = _DAY if "h" in part else _HOUR
         return Instant(10**9 * seconds + within, is_dated=False, wraps=wraps)
@@ -75,14 +86,17 @@ def _instant(part: dict[str, str | None], order: Order) -> Instant | None:
         is_month = order == "month" or (order is None and part["sign"] == "/" and second > 12)  # noqa: PLR2004 - months
         month, day = (first, second) if is_month else (second, first)
     else:
-        month, day = int(part["mo"] or 0), int(part["d"] or 0)
+        name = part.get("name")
+        month = _MONTHS.index(name.lower()) + 1 if name else int(part["mo"] or 0)
+        day = int(part["d"] or 0)
     try:
         days = date(int(part["y"] or 0), month, day).toordinal()
     except ValueError:
         return None
     zone = part.get("zone") or "Z"
-    if zone not in {"Z", "UTC"}:
-        seconds -= (1 if zone[0] == "+" else -1) * (_HOUR * int(zone[1:3]) + 60 * int(zone[-2:]))
+    if zone not in {"Z", "UTC", "GMT"}:
+        minutes = int(zone[-2:]) if len(zone) > len("+01") else 0
+        seconds -= (1 if zone[0] == "+" else -1) * (_HOUR * int(zone[1:3]) + 60 * minutes)
     return Instant(10**9 * (_DAY * days + seconds) + within, is_dated=True, wraps=0, doubtful=doubtful)
 
 

@@ -68,7 +68,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
     *arrays, torques = arguments.channels(**measured, torque=torque)
     channels = dict(zip(measured, arrays, strict=True))
     samples = torques.shape[-1]
-    channels = {name: scaled(values, axis.angle) if name == "angle" else values for name, values in channels.items()}
+    channels = {name: scaled(values, _factor_of(name, call[name], axis)) for name, values in channels.items()}
     torques = scaled(torques, axis.torque)
     seconds, grid, begin = _sampling(sampling, samples, axis, call["time_unit"], first)
     if clocks is None:
@@ -179,6 +179,15 @@ def _sampling(
         grid = grid_of(error.times)
         return arguments.sample_period(samples, delta=grid.period), grid, grid.start
     return seconds, None, arguments.begin_of(times)
+
+
+def _factor_of(name: str, values: Any, axis: Axis) -> float:
+    """Return what a channel of the motion is multiplied by: the angle's factor, or that of the unit which a derivative says."""
+    if name == "angle":
+        return axis.angle
+    said = unit_said(values)
+    per_second = {"velocity": "/s", "acceleration": "/s^2"}[name]
+    return factor_between(said, axis.system.units["angle"] + per_second, name=f"the {name}") if said else 1.0
 
 
 def _in_units_of_results(name: str, value: float | None, factor: float) -> float | None:

@@ -274,9 +274,8 @@ def _weak(method: Any) -> WeakForm:
 
 
 def _axis(angle: Any, torque: Any, units: Mapping[str, str | None]) -> Axis:
-    """Return how channels are converted; those of a list are as the first of them."""
-    first = [one[0] if isinstance(one, list | tuple) and len(one) else one for one in (angle, torque)]
-    return axis_of(first[0], first[1], None, **units)
+    """Return how channels are converted; those of a list have one unit."""
+    return axis_of(angle, torque, None, **units)
 
 
 def sampled(
@@ -294,12 +293,16 @@ def sampled(
         implied = None if channel is None else arguments.implied_times(channel)
         if implied is None:
             raise TypeError("identify needs the sample period; got none; give sample_rate=, delta= or t=")
+        implied = times_in_seconds(implied)
         return arguments.sample_period(samples, t=implied), implied
     if time["t"] is not None:
         time["t"] = times_in_seconds(time["t"], time_unit)
     if time["delta"] is not None and axis.time != 1:
         time["delta"] = arguments.positive_number("delta", time["delta"]) * axis.time
-    return arguments.sample_period(samples, **time), time["t"]
+    period = arguments.sample_period(samples, **time)
+    if time["t"] is None:
+        arguments.check_against_labels(channel, period)
+    return period, time["t"]
 
 
 def _lengths(form: WeakForm, period: float, samples: int) -> dict[str, int | None]:

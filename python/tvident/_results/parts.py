@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import datetime as dt
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,9 @@ from tvident import _arguments as arguments
 from tvident._results.estimates import Estimates
 from tvident._status import Status
 
+At: TypeAlias = float | str | dt.date | np.datetime64 | None
+"""When a part of a result begins or ends: seconds, or a date."""
+
 _LISTS = ("lag_samples", "shown_noise")
 _ONE_EACH = ("window_length", "exponent", "regression_window", "lag", "lag_stderr", "angle_zero")
 _BY_RECORD = (*_ONE_EACH, *_LISTS)
@@ -20,7 +24,7 @@ _BY_RECORD = (*_ONE_EACH, *_LISTS)
 
 
 def samples_between(
-    time: npt.NDArray[np.float64], begin: float | None, end: float | None
+    time: npt.NDArray[np.float64], begin: At, end: At, labels: arguments.Labels | None = None
 ) -> tuple[slice, float, float]:
     """Return the samples from one time to another, both included, and these times; infinite where none was given.
 
@@ -30,7 +34,7 @@ def samples_between(
         If nothing lies in between.
     """
     first, last = (
-        fallback if at is None else arguments.finite_number(name, at)
+        fallback if at is None else arguments.finite_number(name, _in_seconds(name, at, time, labels))
         for name, at, fallback in (("begin", begin, -np.inf), ("end", end, np.inf))
     )
     samples = slice(int(np.searchsorted(time, first)), int(np.searchsorted(time, last, side="right")))
@@ -38,6 +42,27 @@ def samples_between(
         ends = f"{time[0]:g} to {time[-1]:g} s" if time.size else "no samples"
         raise ValueError(f"a part must hold samples; got {begin} to {end} s; the result has {ends}")
     return samples, first, last
+
+
+def _in_seconds(name: str, at: Any, time: npt.NDArray[np.float64], labels: arguments.Labels | None) -> Any:
+    """Return a date in the seconds of a result whose samples have dates, anything else as it is."""
+    if not isinstance(at, str | dt.date | np.datetime64) or labels is None or not time.size:
+        return at
+    index = (
+        labels.index if labels.index is not None else labels.coordinates.get(labels.dims[-1] if labels.dims else None)
+    )
+    if index is None or index.dtype.kind != "M":
+        return at
+    try:
+        if labels.index is None:
+            return float(time[0]) + float((np.datetime64(at) - np.asarray(index)[0]) / np.timedelta64(1, "s"))
+        stamp = type(index[0])(at)
+        stamp = stamp.tz_localize(index.tz) if index.tz is not None and stamp.tz is None else stamp
+        return float(time[0]) + float((stamp - index[0]).total_seconds())
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"{name} must be a date as the samples have, or seconds; got {arguments.shown(at)}; the first sample is that of {index[0]}"
+        ) from None
 
 
 def of_samples(found: Estimates, samples: slice) -> Estimates:

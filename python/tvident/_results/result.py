@@ -17,7 +17,7 @@ from tvident._results.curve import ExpandedParameter
 from tvident._results.estimates import Estimates
 from tvident._results.held_back import HeldBack
 from tvident._results.oscillator import Oscillator
-from tvident._results.parts import chosen, of_records, of_samples, samples_between, settings_of
+from tvident._results.parts import At, chosen, of_records, of_samples, samples_between, settings_of
 from tvident._results.recorded import Recorded
 from tvident._results.scan import Scan
 from tvident._results.short import as_html, short
@@ -282,13 +282,13 @@ class Identification(Simulated, Telling, Valued):
             write_table(path, self.columns(), self.units)
             write_settings(Path(path), self.settings)
 
-    def between(self, begin: float | None = None, end: float | None = None) -> Identification:
+    def between(self, begin: At = None, end: At = None) -> Identification:
         """Return the part of the result from one time to another.
 
         Parameters
         ----------
-        begin, end : float, optional
-            Seconds, as in ``time``; both belong to the part. By default the first and the last.
+        begin, end : float or date, optional
+            Seconds, as in ``time``, or dates where the samples have these; both belong to the part. By default the first and the last.
 
         Returns
         -------
@@ -300,7 +300,7 @@ class Identification(Simulated, Telling, Valued):
         ValueError
             If nothing lies in between.
         """
-        samples, first, last = samples_between(self.time, begin, end)
+        samples, first, last = samples_between(self.time, begin, end, self._found.labels)
         jumps = [
             tuple(jump for jump in one if first <= jump <= last)
             for one in (self.jumps if self.inertia.ndim > 1 else [self.jumps])

@@ -97,7 +97,7 @@ class Scan:
         str
         """
         if not self.window_length.size:
-            return "the record is too short to compare different widths"
+            return "there is nothing to compare: the record is too short, or no other width determines the constants"
         units = [f"{name} ({self.units[name]})" if self.units.get(name) else name for name in self.estimates]
         cells = [("", "samples", "band (Hz)", *units)]
         for place, length in enumerate(self.window_length):

@@ -14,7 +14,7 @@ from tvident._results.recorded import Recorded, begins_once, both_or_none, still
 from tvident._results.response import Model, accounted_for, every_sample
 from tvident._results.torque import compared
 from tvident._status import Status
-from tvident._units import LINEAR, ROTARY, factor_to, scaled, unit_said
+from tvident._units import LINEAR, ROTARY, factor_said, scaled
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -294,8 +294,7 @@ def predicted_at_samples(result: Simulated) -> Array:
 def in_units_of(units: Mapping[str, str], name: str, values: npt.ArrayLike) -> npt.NDArray[np.number]:
     """Return a channel in the unit of a result, by the unit that it says it has."""
     system = ROTARY if units["angle"] == ROTARY.units["angle"] else LINEAR
-    factor = factor_to(system, name, unit_said(values), name=f"the {name}")
-    return scaled(arguments.channel(name, values), factor)
+    return scaled(arguments.channel(name, values), factor_said(system, name, values))
 
 
 def _like_torque(name: str, array: npt.NDArray[np.number], torque: npt.NDArray[np.number]) -> npt.NDArray[np.number]:

@@ -138,7 +138,7 @@ def why_not(result: Any, sign: Callable[[], str | None], share: Callable[[], flo
     if reason:
         return reason
     if result.record_status & Status.SCALES_DISAGREE:
-        return "slow and fast motion give different parameters"
+        return "test functions or windows of other lengths do not find these parameters"
     explains = share()
     if explains is not None and explains < _LITTLE:
         return f"the model explains {explained_in_words(explains)} of the torque"

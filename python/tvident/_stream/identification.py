@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ from tvident._status import DOUBTFUL, Status
 from tvident._stream.asked import Work, asked_of
 from tvident._stream.pieces import SampleStream
 from tvident._stream.weak import WeakStream
-from tvident._units import ROTARY, axis_of, scaled
+from tvident._units import ROTARY, axis_of, factor_said, scaled
 
 Numbers = npt.NDArray[np.float64]
 
@@ -296,7 +296,13 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
             raise ValueError(
                 f"angle and torque must have as many samples as each other; got {angles.size} and {torques.size}; push them together"
             )
-        return self._given(self._stream.push(scaled(angles, self._axis.angle), scaled(torques, self._axis.torque)))
+        by_angle, by_torque = self._factor("angle", angle), self._factor("torque", torque)
+        return self._given(self._stream.push(scaled(angles, by_angle), scaled(torques, by_torque)))
+
+    def _factor(self, name: Literal["angle", "torque"], values: Any) -> float:
+        """Return what a piece is multiplied by: by the unit that was given, or else the one that it says."""
+        given = self._axis.angle if name == "angle" else self._axis.torque
+        return factor_said(self._axis.system, name, values) if name in self._axis.assumed else given
 
     def _given(self, found: Any) -> StreamedIdentification:
         count = found.status.size

@@ -67,6 +67,15 @@ def shaped(name: str, values: Any, axis: int) -> Shaped:
     return Shaped(array, axis, lambda array: array)
 
 
+def without_unit(made: Any) -> Any:
+    """Return a container without the attributes that say the unit: what was computed has another."""
+    attributes = getattr(made, "attrs", None)
+    for name in ("units", "unit"):
+        if isinstance(attributes, dict):
+            attributes.pop(name, None)
+    return made
+
+
 def _are_numbers(values: npt.NDArray[Any]) -> bool:
     return values.ndim == 1 and all(values.dtype[field].kind in "biuf" for field in values.dtype.names or ())
 

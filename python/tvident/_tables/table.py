@@ -66,7 +66,10 @@ class Table:
 
     def attributes(self) -> dict[Any, Any]:
         """Return what is said beside the numbers."""
-        return {**({} if self.labels is None else self.labels.attributes), "settings": json.dumps(self.settings)}
+        said = {} if self.labels is None else dict(self.labels.attributes)
+        for name in ("unit", "units"):
+            said.pop(name, None)  # of the samples: every column has its own
+        return {**said, "settings": json.dumps(self.settings)}
 
 
 class Tabular:

@@ -1,7 +1,7 @@
 """Reads units as headers of recordings write them, and converts to rad, N m and s."""
 
-from tvident._units.axis import Axis, axis_of, scaled, times_in_seconds
-from tvident._units.channel import Channel, unit_said
+from tvident._units.axis import Axis, axis_of, factor_said, scaled, times_in_seconds
+from tvident._units.channel import Channel, in_its_unit, unit_named, unit_said
 from tvident._units.names import derivative_units, named_unit, with_unit
 from tvident._units.parse import Unit, is_unit, unit_of
 from tvident._units.quantities import LINEAR, ROTARY, System, UnitError, factor_between, factor_to, system_of
@@ -19,13 +19,16 @@ __all__ = [
     "axis_of",
     "derivative_units",
     "factor_between",
+    "factor_said",
     "factor_to",
+    "in_its_unit",
     "in_words_of",
     "is_unit",
     "named_unit",
     "scaled",
     "system_of",
     "times_in_seconds",
+    "unit_named",
     "unit_of",
     "unit_said",
     "with_unit",

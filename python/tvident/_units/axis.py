@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tvident._units.channel import unit_said
-from tvident._units.quantities import ROTARY, System, UnitError, factor_to, system_of
+from tvident._units.channel import in_its_unit, unit_named, unit_said
+from tvident._units.quantities import LINEAR, ROTARY, System, UnitError, factor_to, is_convertible, system_of
 
 
 @dataclass(frozen=True)
@@ -57,16 +57,55 @@ def axis_of(
             raise TypeError(f"{name}_unit must be text; got {type(unit).__name__}; write 'deg', 'N m' or 'ms', say")
     values = {"angle": angle, "torque": torque, "time": t}
     units = {name: unit or unit_said(values[name]) for name, unit in given.items()}
+    named = {name: unit_named(values[name]) for name, unit in units.items() if not unit}
+    # A name that a product kept, as that of a current times a constant, says nothing.
+    units |= {
+        name: unit for name, unit in named.items() if any(is_convertible(one, name, unit) for one in (ROTARY, LINEAR))
+    }
     system = system_of(units["angle"], units["torque"])
+    for name in named:
+        if units[name]:
+            _check_unchanged(system, name, units[name])
     factors = {name: factor_to(system, name, unit, name=f"the {name}") for name, unit in units.items()}
     return Axis(system, **factors, assumed=frozenset(name for name, unit in units.items() if not unit))
+
+
+def factor_said(system: System, name: str, values: Any) -> float:
+    """Return what a channel is multiplied by to be in the unit of a system, by the unit that it says it has itself.
+
+    Raises
+    ------
+    UnitError
+        If it cannot be converted, or only a name says it.
+    """
+    unit = unit_said(values)
+    if unit:
+        return factor_to(system, name, unit, name=f"the {name}")
+    named = unit_named(values)
+    if is_convertible(system, name, named):
+        _check_unchanged(system, name, named)
+    return 1.0
+
+
+def _check_unchanged(system: System, name: str, unit: str) -> None:
+    """Refuse a unit that only a name says, where the numbers may have been converted since."""
+    wanted = system.units[name]
+    if factor_to(system, name, unit, name=f"the {name}") != 1:
+        raise UnitError(
+            f"the {name} must say its unit where its name says {unit!r}: what is computed from a series keeps the name, so nobody knows "
+            f"whether the numbers still are; give {name}_unit={unit!r}, or {name}_unit={wanted!r} if they were converted, or pass "
+            f".to_numpy() in {wanted}"
+        )
 
 
 def times_in_seconds(t: Any, time_unit: str | None = None) -> Any:
     """Return times in seconds where they have another unit, and otherwise as they are."""
     unit = time_unit or unit_said(t)
+    named = "" if unit or getattr(getattr(t, "dtype", None), "kind", "") in "mM" else unit_named(t)
+    if is_convertible(ROTARY, "time", named):
+        _check_unchanged(ROTARY, "time", named)
     factor = factor_to(ROTARY, "time", unit, name="the time")
-    return t if factor == 1 else scaled(np.asarray(t), factor)
+    return t if factor == 1 else scaled(np.asarray(in_its_unit(t)), factor)
 
 
 def scaled(array: npt.NDArray[Any], factor: float) -> npt.NDArray[Any]:

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
+from tvident._units.names import named_unit
 from tvident._units.parse import unit_of
 from tvident._units.quantities import UnitError
+
+_JOINED = (np.concatenate, np.stack, np.vstack, np.hstack, np.column_stack)
 
 
 class Channel(np.ndarray[Any, Any]):
     """Samples with their unit, as :func:`tvident.read_recording` gives them: an array in every other way.
 
-    Slices and copies keep the unit. What is computed from samples is a plain array, since its unit is another.
+    Slices, copies and what is joined of one unit keep the unit. What is computed from samples is a plain array, since its unit is another.
 
     Attributes
     ----------
@@ -60,6 +63,15 @@ class Channel(np.ndarray[Any, Any]):
         plain = (np.asarray(one) if isinstance(one, Channel) else one for one in inputs)
         return getattr(ufunc, method)(*plain, **kwargs)
 
+    def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
+        """Keep the unit where channels of one unit are joined: what was not computed has no other."""
+        made = super().__array_function__(func, types, args, kwargs)
+        if func in _JOINED and args and isinstance(args[0], list | tuple):
+            units = {one.unit if isinstance(one, Channel) else None for one in args[0]}
+            if len(units) == 1 and None not in units:
+                return Channel(made, self.unit)
+        return made
+
     def to(self, unit: str) -> Channel:
         """Return the samples in another unit.
 
@@ -89,13 +101,66 @@ class Channel(np.ndarray[Any, Any]):
 
 
 def unit_said(values: Any) -> str:
-    """Return the unit that an array says it has, of ours, of pint or in the attributes of xarray; nothing where it says none."""
+    """Return the unit that an array says it has; nothing where it says none.
+
+    Channels of ours say it, quantities of pint, astropy and unyt, and attributes of xarray and pandas; of a list all that it holds.
+
+    Raises
+    ------
+    UnitError
+        If what a list holds has several.
+    """
+    if isinstance(values, list | tuple):
+        return _common(unit_said, values)
     if isinstance(values, Channel):
         return values.unit
     if hasattr(values, "magnitude") and hasattr(values, "units"):
-        return str(values.units)
+        return _unit_of_pint(values.units)
+    if isinstance(values, np.ndarray):
+        said = getattr(values, "units", None) or getattr(values, "unit", None)
+        return "" if said is None else str(said)
     attributes = getattr(values, "attrs", None)
     if not isinstance(attributes, Mapping):
         return ""
     said = attributes.get("units") or attributes.get("unit")
     return said if isinstance(said, str) else ""
+
+
+def _common(unit: Callable[[Any], str], values: Sequence[Any]) -> str:
+    """Return the unit of all records of a list; plain numbers have none."""
+    if not values or isinstance(values[0], int | float):
+        return ""
+    units = list(dict.fromkeys(unit(one) for one in values))
+    if len(units) > 1:
+        raise UnitError(
+            f"records of a list must have one unit; got {', '.join(repr(one) for one in units)}; convert them with Channel.to"
+        )
+    return units[0]
+
+
+def _unit_of_pint(unit: Any) -> str:
+    """Return the symbols of a unit, rather than its words."""
+    try:
+        return f"{unit:~}"
+    except (ValueError, TypeError):
+        return str(unit)
+
+
+def unit_named(values: Any) -> str:
+    """Return the unit in the name of a series, or that of all columns of a table: ``angle [deg]``; nothing where it is none that is known.
+
+    What is computed from a series keeps its name, so nobody knows whether the numbers are still in this unit.
+    """
+    # What is lazy may work long for its names, and is refused later.
+    if isinstance(values, list | tuple):
+        return _common(unit_named, values)
+    columns = getattr(values, "columns", None) if hasattr(values, "to_numpy") else None
+    names = [getattr(values, "name", None)] if columns is None else list(columns)
+    units = {named_unit(name)[1] for name in names if isinstance(name, str)}
+    unit = units.pop() if len(units) == 1 else ""
+    return unit if unit_of(unit) is not None else ""
+
+
+def in_its_unit(values: Any) -> Any:
+    """Return the numbers of a quantity of pint; anything else as it is."""
+    return values.magnitude if hasattr(values, "magnitude") and hasattr(values, "units") else values

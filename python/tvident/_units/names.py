@@ -9,26 +9,58 @@ from tvident._units.parse import unit_of
 _IN_BRACKETS = re.compile(
     r"(.*?)[\s_/]*(?:\[([^\[\]]*)\]|\(([^()]*(?:\([^()]*\))?[^()]*)\)|\{([^{}]*)\}|<([^<>]*)>)\s*", re.DOTALL
 )
+_WITHIN = re.compile(r"(.*?)[\s_]*(?:\[([^\[\]]*)\]|(?<=[\s_])\(([^()]*)\)|\(([^()]{2,})\))[\s_]*(.*)", re.DOTALL)
+"""A unit before or amid words. Without a blank before it, what stands in parentheses may be the argument of a function."""
 _BEHIND_A_SIGN = re.compile(r"(.+?)\s*(?:(?<![/\s])\s*/\s*|,\s*|\s+in\s+)([^,]+)", re.DOTALL)
-_BEHIND_A_LINE = re.compile(r"(.+)_(deg|degrees|rad|mrad|Nm|Nmm|mNm|ms|us|sec|mm|rpm)")
-"""Of units that are written behind a line, those that are no name of anything else."""
+_LONG = (
+    "deg|degrees?|rad|radians?|mrad|urad|Nm|Nmm|Ncm|mNm|cNm|kNm|N[ _·*.-]mm?|kN|mN|lbf|(?:in|ft)[ _-]?lbf?|lbf?[ _-]?(?:in|ft)"
+    "|ms|msecs?|milliseconds?|us|usecs?|microseconds?|ns|nsecs?|nanoseconds?|secs?|seconds?|mm|um|µm|rpm|°"
+)
+_BEHIND_A_LINE = re.compile(rf"(.+?)(?:_|\s+-\s+|\s+)({_LONG})", re.DOTALL)
+"""Units that are no name of anything else, behind a line or a blank."""
+_AMID_LINES = re.compile(r"(.+?)_(deg|degrees|rad|mrad|Nm|Nmm|mNm|kNm|kN)_(.+)", re.DOTALL)
+_BEHIND_A_WORD = re.compile(r"(.*[a-z])(Deg|Degrees|Rad|Radians|MRad|Nm|Nmm|Ms|Msec|Sec)")
+"""The same at the end of a name that capitals divide into words."""
+_OF_TORQUES = re.compile(r"(.*(?:torque|moment|effort|tau).*?)[_\s]+(nmm?|mnm|knm)", re.IGNORECASE | re.DOTALL)
+"""Units that would be lengths elsewhere."""
+_TORQUES = {"nm": "Nm", "nmm": "Nmm", "mnm": "mNm", "knm": "kNm"}
 
 
 def named_unit(name: str) -> tuple[str, str]:
     """Return a channel's name without its unit, and the unit; nothing where it has none.
 
-    What stands in brackets is the unit, whatever it is; behind a slash, a comma or a line only what is known as one.
+    What stands in brackets at the end is the unit, whatever it is, unless it is a number, which tells channels apart (``Y[0]``; a ratio is
+    `` [1]``); elsewhere only what is known as one.
     """
     found = _IN_BRACKETS.fullmatch(name)
     if found and found[1]:
         unit = next(one for one in found.groups()[1:] if one is not None).strip()
         inner, known = named_unit(found[1]) if unit_of(unit) is None else ("", "")
-        return (f"{inner} ({unit})", known) if unit_of(known) is not None else (found[1], unit)
-    for pattern in (_BEHIND_A_SIGN, _BEHIND_A_LINE):
+        if known and unit_of(known) is not None:
+            return f"{inner} ({unit})", known
+        return (name, "") if unit.isdecimal() and not name.endswith(" [1]") else (found[1], unit)
+    within = _WITHIN.fullmatch(name)
+    if within:
+        unit = next(one for one in within.groups()[1:4] if one is not None).strip()
+        words = " ".join(one for one in (within[1], within[5]) if one)
+        return (words, unit) if words and unit_of(unit) is not None else _without_brackets(name)
+    return _without_brackets(name)
+
+
+def _without_brackets(name: str) -> tuple[str, str]:
+    found = _BEHIND_A_SIGN.fullmatch(name)
+    if found and unit_of(found[2]) is not None and unit_of(name) is None:
+        return found[1], found[2].strip()
+    found = _OF_TORQUES.fullmatch(name)
+    if found:
+        return found[1], _TORQUES[found[2].lower()]
+    for pattern in (_BEHIND_A_LINE, _BEHIND_A_WORD):
         found = pattern.fullmatch(name)
-        if found and unit_of(found[2]) is not None and unit_of(name) is None:
-            return found[1], found[2].strip()
-    return name, ""
+        unit = found[2].replace("_", "-") if found else ""
+        if found and unit_of(unit) is not None and unit_of(name) is None:
+            return found[1], unit
+    found = _AMID_LINES.fullmatch(name)
+    return (f"{found[1]}_{found[3]}", found[2]) if found else (name, "")
 
 
 def derivative_units(unit: str, count: int) -> list[str]:

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 
-from tvident._units.symbols import LONGEST, NONE, SYMBOLS, Dimension
+from tvident._units.symbols import ALONE_IN_CAPITALS, IN_CAPITALS, LONGEST, NONE, SYMBOLS, Dimension
 
 _LONGEST_TEXT = 60
 
@@ -14,8 +14,10 @@ _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _RAISED = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+")
 _SAME = str.maketrans(
     {"µ": "u", "μ": "u", "·": " ", "⋅": " ", "∙": " ", "•": " ", "\u00d7": " ", "*": " ", "º": "°", "˚": "°"}
+    | dict.fromkeys("\u2010\u2011\u2012\u2013\u2212", "-")
 )
 
+_WORD = re.compile(r"[A-Za-z]+")
 _FACTOR = re.compile(r"([A-Za-z°%]+)(?:\^?\(?([+-]?[1-9])\)?)?")
 _BETWEEN = re.compile(r"\s*([/.]|-(?=[A-Za-z]))?\s*")
 
@@ -45,7 +47,17 @@ def unit_of(text: str) -> Unit | None:
     plain = raised.replace("**", "^").translate(_SAME).strip().strip("[]{}<>").strip()
     if plain.startswith("(") and plain.endswith(")"):
         plain = plain[1:-1].strip()
-    return _product(plain)
+    plain = plain.removesuffix(".")
+    if "grad" in plain.lower():
+        return None  # degrees in German, gon in French, and no gram
+    exact = _product(plain)
+    return _product(_in_usual_letters(plain)) if exact is None else exact
+
+
+def _in_usual_letters(text: str) -> str:
+    """Return a unit as it is written usually, where another program wrote DEG, Sec or FT-LBS."""
+    known = IN_CAPITALS if len(_WORD.findall(text)) > 1 else ALONE_IN_CAPITALS
+    return _WORD.sub(lambda found: known.get(found[0].lower(), found[0]), text)
 
 
 def _product(text: str) -> Unit | None:

@@ -80,6 +80,12 @@ def _system(text: str | None, quantity: str) -> str:
     return next(found, "")
 
 
+def is_convertible(system: System, quantity: str, text: str) -> bool:
+    """Return whether a channel in this unit can be converted to that of a system."""
+    unit = unit_of(text) if text else None
+    return unit is not None and math.isfinite(_in(unit, system.dimensions[quantity]))
+
+
 def factor_to(system: System, quantity: str, text: str | None, *, name: str) -> float:
     """Return what a channel is multiplied by to be in the unit of a system.
 

@@ -20,6 +20,27 @@ GRAVITY = 9.80665
 
 _POUND, _INCH = 0.45359237, 0.0254
 
+_SAME_IN_CAPITALS = (
+    *("deg", "degree", "degrees", "rad", "radian", "radians", "mrad", "revolution", "revolutions", "rpm"),
+    *(
+        "sec",
+        "secs",
+        "second",
+        "seconds",
+        "ms",
+        "msec",
+        "msecs",
+        "millisecond",
+        "milliseconds",
+        "usec",
+        "minutes",
+        "hours",
+    ),
+    *("mm", "inch", "inches", "ft", "feet", "meter", "meters", "metre", "metres"),
+    *("newton", "newtons", "lbs", "lbf", "ozf", "kgf"),
+)
+"""Words that mean the same in capitals, which some programs write."""
+
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6}
 
 _WITH_PREFIX: dict[str, tuple[float, Dimension]] = {
@@ -55,7 +76,7 @@ _ALONE: dict[tuple[str, ...], tuple[float, Dimension]] = {
     ("microsecond", "microseconds"): (1e-6, _TIME),
     ("nanosecond", "nanoseconds"): (1e-9, _TIME),
     ("min", "minute", "minutes"): (60.0, _TIME),
-    ("h", "hr", "hour", "hours"): (3600.0, _TIME),
+    ("h", "hr", "hrs", "hour", "hours"): (3600.0, _TIME),
     ("lb", "lbs", "lbm"): (_POUND, _MASS),
     ("oz",): (_POUND / 16, _MASS),
     ("newton", "newtons", "Newton", "Newtons"): (1.0, _FORCE),
@@ -85,5 +106,10 @@ SYMBOLS: dict[str, tuple[float, Dimension]] = {
 """Factor to kg, m, s, rad, and powers of these, by symbol. The tests compare every factor with Pint's."""
 for _odd in ("dN", "dA", "cs", "ds", "ks", "Ms", "csec", "dsec", "ksec", "Msec", "Mm", "crad", "drad", "krad", "Mrad"):
     del SYMBOLS[_odd]  # nobody measures in these, and words would be read as them
+
+ALONE_IN_CAPITALS = {word: word for word in _SAME_IN_CAPITALS} | {"nm": "Nm", "nmm": "Nmm", "knm": "kNm", "kn": "kN"}
+"""Symbols in small letters, and what they mean where capitals were written; where they alone are the unit, no short names of channels."""
+
+IN_CAPITALS = ALONE_IN_CAPITALS | {word: word for word in ("s", "m", "cm", "lb", "oz", "in", "kg")} | {"n": "N"}
 
 LONGEST = max(map(len, SYMBOLS))
