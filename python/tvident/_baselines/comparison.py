@@ -86,6 +86,10 @@ class MethodComparison:
         Returns
         -------
         str
+
+        See Also
+        --------
+        tvident.baselines : the methods that are compared.
         """
         heads = ("method", "I %", "C %", "K %", "bias %", "random %", "VAF %", "rise s", "coverage", "time s")
         numbers = [name for name in self.table if name != "method"]

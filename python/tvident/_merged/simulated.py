@@ -85,6 +85,15 @@ class Simulated:
         ValueError
             If something cannot be known, shapes do not match, the record is not there to tell the state, or the response leaves the
             range of numbers or depends on the steps.
+
+        See Also
+        --------
+        vaf : compares it with recorded angles.
+        Identification.simulate : of one record.
+
+        References
+        ----------
+        C. Moler, C. Van Loan: Nineteen dubious ways to compute the exponential of a matrix, SIAM Review 45 (2003), for linear equations.
         """
         several = self._trials("torque", torque)
         angles = None if angle is None else self._trials("angle", angle)
@@ -133,6 +142,16 @@ class Simulated:
         ------
         ValueError
             As in :meth:`simulate`, and if only one of the channels is given.
+
+        See Also
+        --------
+        simulate : the angles that are compared.
+        Identification.vaf : of one record, with the equation.
+        held_back : of parts that were not used to identify.
+
+        References
+        ----------
+        L. Ljung: System identification, theory for the user (1999), on comparing simulated and recorded outputs.
         """
         both_or_none(angle, torque)
         seen: Any = angle

@@ -188,7 +188,12 @@ class IdentifiedRecords(Sequence[Identification]):
 
     @property
     def advice(self) -> tuple[str, ...]:
-        """What to do about what looks wrong in what is shared."""
+        """What to do about what looks wrong in what is shared: a tuple of sentences.
+
+        See Also
+        --------
+        Identification.advice : what to do about one of the records.
+        """
         shared = self._shared
         if shared is None:
             return ()
@@ -207,6 +212,10 @@ class IdentifiedRecords(Sequence[Identification]):
         Returns
         -------
         str
+
+        See Also
+        --------
+        Identification.summary : of one of the records.
         """
         lines = [f"{name}, shared by {len(self)} records: {with_error(*one)}" for name, one in self.constants.items()]
         lines += [f"  {line}" for line in self.advice]

@@ -185,6 +185,15 @@ class LocalPolynomialStream(SampleStream[StreamedDerivatives]):
             If the stream has ended, `y` has more than one axis, or holds what is no number where `nan_policy` is ``"raise"``.
         TypeError
             If `y` is complex or holds no numbers.
+
+        See Also
+        --------
+        finish : what is left at the end.
+        fit_local_polynomials : the same numbers of a whole record.
+
+        References
+        ----------
+        Equations (2), (8) and (9) of docs/mathematics.md; the delay is explained in docs/real-time.md.
         """
         self._check_open()
         return self._given(self._stream.push(self._piece("y", y)))

@@ -103,12 +103,22 @@ class RollingStream(Stream[StreamedRegression]):
 
     @property
     def delay(self) -> int:
-        """Rows from one to its window."""
+        """Rows from one to its window.
+
+        See Also
+        --------
+        push : gives windows that late.
+        """
         return self._window - 1 - self._window // 2
 
     @property
     def rows(self) -> int:
-        """Rows that have come so far."""
+        """Rows that have come so far: an int.
+
+        See Also
+        --------
+        delay : how far behind results are.
+        """
         return 0 if self._stream is None else self._stream.rows
 
     def push(self, A: npt.ArrayLike, b: npt.ArrayLike) -> StreamedRegression:
@@ -132,6 +142,16 @@ class RollingStream(Stream[StreamedRegression]):
             If the stream has ended, lengths differ, or there are other columns than before.
         TypeError
             If an array is complex or holds no numbers.
+
+        See Also
+        --------
+        finish : what is left at the end.
+        rolling_least_squares : the same numbers of all rows at once.
+
+        References
+        ----------
+        Equation (4) of docs/mathematics.md; W. M. Gentleman: Least squares computations by Givens transformations without square roots,
+        Journal of the Institute of Mathematics and its Applications 12 (1973).
         """
         self._check_open()
         sides = arguments.any_array("b", b)

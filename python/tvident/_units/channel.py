@@ -76,6 +76,10 @@ class Channel(np.ndarray[Any, Any]):
         ------
         ValueError
             If one of the units is unknown, or they measure different quantities.
+
+        See Also
+        --------
+        tvident.identify : converts channels by itself.
         """
         here, there = unit_of(self.unit), unit_of(unit)
         if here is None or there is None or here.dimension != there.dimension or not here.factor > 0 < there.factor:
