@@ -38,7 +38,7 @@ CLASSES = [one for one in PUBLIC if inspect.isclass(one)]
 
 def members() -> dict[str, tuple[Callable[..., Any], str]]:
     """Give methods and properties of public classes, inherited ones too: by name, with the annotation of what they return."""
-    found = {}
+    found: dict[str, tuple[Callable[..., Any], str]] = {}
     for one in CLASSES:
         for name in dir(one):
             member = inspect.getattr_static(one, name)

@@ -20,7 +20,7 @@ from tvident._advice.events import (
     unexplained_here,
 )
 from tvident._advice.lists import listed
-from tvident._equation import BUILT_IN, COEFFICIENTS, UNITS
+from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, UNITS
 from tvident._results import Words
 from tvident._status import Status
 
@@ -354,7 +354,7 @@ class Explained:
     def suspects(self) -> list[Any]:
         """What seems to be missing, the surest first; friction that drives the motion is no friction."""
         suspects = [one for one in self.found.suspects if one.conspicuous]
-        found = [one for one in suspects if one.name != "coulomb" or one.value > 0]
+        found = [one for one in suspects if one.value > 0 or one.name == "lag" or not BUILT_IN[one.name].dissipates]
         return sorted(
             found, key=lambda suspect: -abs(suspect.value) / suspect.stderr if suspect.stderr > 0 else -math.inf
         )
@@ -404,10 +404,10 @@ class Explained:
         if self.found.free_offset is None:
             return []
         error, free = self.found.free_offset
-        others = [name for name in self.names if name not in {*COEFFICIENTS, "offset"}]
+        others = [name for name in self.names if name not in {*COEFFICIENTS, OFFSET}]
         words = (
             f"an offset that is free in every window predicts better: its cross-validation error is {free:.2f} times the variance of the "
-            f"noise, not {error:.2f}: give terms={[*others, ('offset', 'windowed')]}"
+            f"noise, not {error:.2f}: give terms={[*others, (OFFSET, 'windowed')]}"
         )
         return [words]
 

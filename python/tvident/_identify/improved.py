@@ -12,7 +12,7 @@ import numpy as np
 from tvident import _core
 from tvident._advice import Explained
 from tvident._arguments import percent
-from tvident._equation import BUILT_IN, COEFFICIENTS, Unknown
+from tvident._equation import BUILT_IN, COEFFICIENTS, FRICTION, OFFSET, Unknown
 from tvident._identify.data import Data
 from tvident._identify.methods import StrongForm, WeakForm
 from tvident._identify.remedies import BEYOND_CHANCE, NEXT_TO_NOTHING, Trial, unexplained
@@ -205,7 +205,7 @@ class Improvement(_Asked):
         data = self.data
         if data.motion.recorded or not all(isinstance(kind, str) for kind in self.given.values()):
             return None
-        asked = {"inertia": "constant", "damping": "constant", "stiffness": "windowed", "terms": ["offset"], "lag": 0.0}
+        asked = {"inertia": "constant", "damping": "constant", "stiffness": "windowed", "terms": [OFFSET], "lag": 0.0}
         exchanged = replace(
             data, angles=data.torques, torques=data.angles, passed=data.passed[::-1], labels=None, doubts=()
         )
@@ -236,11 +236,12 @@ class Improvement(_Asked):
     def _suspects(self) -> list[str]:
         """What may be missing: what the core suspects, friction and a lag, and anything where the equations of no scale can be believed."""
         suspects = [one.name for one in self._explained.suspects]
-        others = ["lag", "coulomb"]
+        others = ["lag", FRICTION]
         angles = without_spikes(self.data, [self.found]).angles
         is_large = float(np.nanmax(np.abs(angles), initial=0.0)) > _LARGE
-        if self.data.axis.system is ROTARY and ("cubic" in suspects or is_large):
-            others.append("gravity")
+        hardens = any(one in BUILT_IN and BUILT_IN[one].spring == "beside" for one in suspects)
+        if self.data.axis.system is ROTARY and (hardens or is_large):
+            others += [name for name, term in BUILT_IN.items() if term.spring == "instead"]
         if self.found.record_status & Status.SCALES_DISAGREE:
             others += [name for name, term in BUILT_IN.items() if not getattr(term, "inner", ())]
         present = {*suspects, *(one.name for one in self.terms)}

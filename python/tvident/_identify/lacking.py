@@ -110,11 +110,11 @@ def lacking_terms(
     side = data.torques[..., some].astype(np.float64)
     for name, value in known.items():
         side = side - (value if isinstance(value, float) else value[..., some]) * columns[name]
-    names = [name for name in ("cubic", "gravity", "coulomb") if name not in evaluated]
+    names = [name for name, term in BUILT_IN.items() if term.is_sought and name not in evaluated]
     if not any(one.name == "stiffness" for one in unknowns):
-        names = [name for name in names if name != "cubic"]
+        names = [name for name in names if BUILT_IN[name].spring != "beside"]
     if data.axis.system is not ROTARY:
-        names = [name for name in names if name != "gravity"]
+        names = [name for name in names if not BUILT_IN[name].angle_period]
     angle, velocity = columns["stiffness"], columns["damping"]
     candidates = {name: BUILT_IN[name].function(np, angle, velocity) for name in names}
     every = [{**columns, **evaluated}[one.name] for one in unknowns] + [candidates[name] for name in names] + [side]
@@ -204,15 +204,17 @@ class _Test:
                 if self.spring in self.constant
                 else np.inf
             )
-            alone = name == "gravity" and bool(abs(spring) < _NO_SPRING * abs(value) / self.norms[place])
-            is_there = abs(value) > _CONSPICUOUS * error and (name == "cubic" or value > 0)
+            term = BUILT_IN[name]
+            alone = term.spring == "instead" and bool(abs(spring) < _NO_SPRING * abs(value) / self.norms[place])
+            is_there = abs(value) > _CONSPICUOUS * error and (term.spring == "beside" or value > 0)
             if is_there and rest <= _EXPLAINED * base:
                 tried[name] = (rest, Lacking(name, value * unit, error * unit, alone))
         if not tried:
             return None
         best = min(tried, key=lambda name: tried[name][0])
-        if best == "cubic" and "gravity" in tried and tried["gravity"][0] <= _AS_GOOD * tried["cubic"][0]:
-            best = "gravity"
+        if BUILT_IN[best].spring == "beside":
+            instead = [name for name in tried if BUILT_IN[name].spring == "instead"]
+            best = next((name for name in instead if tried[name][0] <= _AS_GOOD * tried[best][0]), best)
         return tried[best][1]
 
     def _without_windowed(self) -> Array:

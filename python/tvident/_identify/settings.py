@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from tvident import _arguments as arguments
-from tvident._equation import BUILT_IN, COEFFICIENTS, Term
+from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, Term
 from tvident._identify.methods import Form, Method, StrongForm, WeakForm
 
 _OF_METHOD: dict[str, dict[str, Any]] = {
@@ -26,7 +26,7 @@ _OF_METHOD: dict[str, dict[str, Any]] = {
         "inertia": "auto",
         "damping": "auto",
         "stiffness": "windowed",
-        "terms": (("offset", "constant"),),
+        "terms": ((OFFSET, "constant"),),
         "lag": 0.0,
         "quantisation": None,
         "period": None,
@@ -95,12 +95,9 @@ class Request:
     @property
     def counts_turns(self) -> bool:
         """Whether the equation is another one after a whole period of the angle."""
-        turns = (self.period or 0.0) / (2 * math.pi)
         names = [term[0] if isinstance(term, tuple | list) else term for term in self.terms]
-        periodic = {"offset", "coulomb", "viscous_asymmetric", "stribeck"} | (
-            {"gravity"} if turns and turns.is_integer() else set()
-        )
-        return self.has_spring or not all(isinstance(name, str) and name in periodic for name in names)
+        built_in = [BUILT_IN.get(name) if isinstance(name, str) else None for name in names]
+        return self.has_spring or not all(one and one.repeats_after(self.period or 0.0) for one in built_in)
 
     def noise_of_equations(self, records: int) -> Sequence[float] | None:
         """Return the variances that an earlier result of as many records showed."""
@@ -212,7 +209,7 @@ def _without_angle(asked: dict[str, Any], given: Mapping[str, Any]) -> dict[str,
         )
     terms = [term if isinstance(term, tuple | list) else (term, None) for term in asked["terms"]]
     for term, _ in terms:
-        if isinstance(term, Term) or term in {"cubic", "gravity"}:
+        if isinstance(term, Term) or (isinstance(term, str) and term in BUILT_IN and BUILT_IN[term].is_of_angle):
             raise ValueError(
                 f"terms of the angle need the angle; got term {getattr(term, 'name', term)!r} and angle=None; give the angle, or leave the "
                 "term out"
@@ -220,11 +217,11 @@ def _without_angle(asked: dict[str, Any], given: Mapping[str, Any]) -> dict[str,
     if not _has_spring(asked):
         return asked
     if "terms" not in given:
-        return {**asked, "terms": (("offset", "windowed"),)}
+        return {**asked, "terms": ((OFFSET, "windowed"),)}
     return {
         **asked,
         "terms": [
-            ("offset", "windowed") if pair == ("offset", None) else term
+            (OFFSET, "windowed") if pair == (OFFSET, None) else term
             for term, pair in zip(asked["terms"], terms, strict=True)
         ],
     }

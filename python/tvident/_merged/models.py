@@ -9,7 +9,7 @@ from typing import Any, Protocol, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from tvident._equation import BUILT_IN, COEFFICIENTS, FixedTerm
+from tvident._equation import BUILT_IN, COEFFICIENTS, FRICTION, OFFSET, FixedTerm
 from tvident._merged.elements import matrix_of
 from tvident._merged.mechanism import Mechanism, steps_of
 from tvident._merged.merging import Merging
@@ -67,11 +67,11 @@ def model_of(merging: Merging, values: Mapping[str, Array], base: Array | None) 
     terms: list[tuple[int, Array, Term]] = []
     for one in beside:
         mass, along = one.entries[0][0], values[one.name]
-        if one.of == "offset":
+        if one.of == OFFSET:
             offsets[mass] += along
-        elif one.of == "coulomb" and (along >= 0).all():
+        elif one.of == FRICTION and (along >= 0).all():
             friction[mass] += along
-        elif one.of == "coulomb":
+        elif one.of == FRICTION:
             # What drives, be it by chance, does not stick.
             terms.append((mass, along, lambda _time, _q, v: np.sign(v)))
         else:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident._equation import OFFSET
 from tvident._results.held_back import HeldBack, evaluated, parts_of
 from tvident._results.recorded import Recorded, begins_once, both_or_none, still_there
 from tvident._results.response import Model, accounted_for, every_sample
@@ -277,8 +278,8 @@ class Simulated:
         if "angle_zero" in self.constants:
             # K (θ - θ₀): the spring's torque at the encoder's zero is one more offset, which changes as the stiffness does.
             zero = np.asarray(self.constants["angle_zero"][0])[..., np.newaxis]
-            values["offset"] = values["offset"] - zero * self.stiffness
-            alone.discard("offset")
+            values[OFFSET] = values[OFFSET] - zero * self.stiffness
+            alone.discard(OFFSET)
 
         def prepared(name: str, value: Array) -> Array:
             if name in alone or isinstance(s["known"].get(name), int | float):
