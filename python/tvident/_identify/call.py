@@ -226,7 +226,7 @@ def identify(
     settings : mapping, optional
         Settings of an earlier result, as they are or read from JSON: its choices are used again. Other arguments override them, a
         `method` other than ``"auto"`` as a whole. They do not contain `mask`, `weights`, `step`, parameters known at every sample and
-        functions of your own terms.
+        functions of your own terms. A name that no result has is refused.
     workers : int, optional
         Threads; by default ``TVIDENT_WORKERS`` or all processors that this process may use. The numbers do not depend on it.
     progress : bool or callable, optional

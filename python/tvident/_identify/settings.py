@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from difflib import get_close_matches
 from typing import Any
 
 from tvident import _arguments as arguments
@@ -36,6 +37,35 @@ _OF_METHOD: dict[str, dict[str, Any]] = {
 
 
 _FORMS: dict[str, type[Form]] = {"weak": WeakForm, "strong": StrongForm}
+
+_BESIDE_FORM = frozenset(
+    (
+        *("method", "form", "chosen", "kinds", "known", "terms", "own_terms", "inner", "earned", "expansions"),
+        *(
+            "lag",
+            "lag_stderr",
+            "lag_samples",
+            "angle_zero",
+            "shown_noise",
+            "stderr_factors",
+            "quantisation",
+            "loss",
+            "period",
+        ),
+        *(
+            "instrument",
+            "weights",
+            "sample_rate",
+            "step",
+            "times",
+            "spline_order",
+            "bridged",
+            "clock_offset",
+            "clock_drift",
+        ),
+    )
+)
+"""What settings of results hold beside those of their form."""
 
 
 @dataclass(frozen=True)
@@ -309,6 +339,7 @@ def _of_result(earlier: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str
         raise TypeError(
             f"settings must be those of an earlier result; got {arguments.shown(earlier)}; pass result.settings"
         )
+    _check_names(earlier, kinds, known)
     for name in COEFFICIENTS:
         asked[name] = known[name] if kinds[name] == "known" else kinds[name]
         if asked[name] == "expanded" and name not in given:
@@ -326,6 +357,35 @@ def _of_result(earlier: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str
             f"with all of {', '.join(name for name, _ in terms)}"
         )
     return asked | {"terms": terms}
+
+
+def _check_names(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Mapping[str, Any]) -> None:
+    """Refuse names that no result has: what is misspelled would be ignored.
+
+    Raises
+    ------
+    TypeError
+        With the name that comes nearest.
+    """
+    of_form = {form: {one.name for one in fields(kind)} for form, kind in _FORMS.items()}
+    names = _BESIDE_FORM | of_form[earlier["form"]]
+    unknowns = {*COEFFICIENTS, *(name for name, _ in earlier["terms"]), *(earlier.get("inner") or {})}
+    for within, has, may in (("", earlier, names), (" kinds", kinds, unknowns), (" known", known, unknowns)):
+        foreign = [name for name in has if name not in may]
+        if not foreign:
+            continue
+        other = next((form for form in of_form if foreign[0] in of_form[form]), None)
+        near = get_close_matches(str(foreign[0]), may, n=1)
+        cure = (
+            f"it belongs to the {other} form"
+            if other and not within
+            else f"did you mean {near[0]!r}?"
+            if near
+            else "leave it out"
+        )
+        raise TypeError(
+            f"settings{within} must hold names that a result of the {earlier['form']} form has; got {arguments.shown(foreign[0])}; {cure}"
+        )
 
 
 def _is_whole(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Mapping[str, Any]) -> bool:
