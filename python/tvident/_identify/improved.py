@@ -89,7 +89,7 @@ def of_one(
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _AskedOfRecord:
     """A single record, and what was asked of it.
 
     Parameters
@@ -116,7 +116,7 @@ class _Asked:
 
 
 @dataclass(frozen=True)
-class InWeakForm(_Asked):
+class TriedInWeakForm(_AskedOfRecord):
     """A single record in strong form, of which the weak form tells what to change: its windows follow whatever is missing."""
 
     def words(self, _: Identification, words: Words) -> Words:
@@ -170,7 +170,7 @@ def _some(value: Any, some: slice) -> Any:
 
 
 @dataclass(frozen=True)
-class Improvement(_Asked):
+class Improvement(_AskedOfRecord):
     """A single record, and how to identify it with another equation.
 
     Parameters
@@ -234,7 +234,7 @@ class Improvement(_Asked):
 
     @cached_property
     def _suspects(self) -> list[str]:
-        """What may be missing: what the core suspects, friction and a lag, and anything where the equations of no scale can be believed."""
+        """What may be missing: what the core suspects, friction and a lag, and anything where no widths of the test function agree."""
         suspects = [one.name for one in self._explained.suspects]
         others = ["lag", FRICTION]
         angles = without_spikes(self.data, [self.found]).angles

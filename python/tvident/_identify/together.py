@@ -16,7 +16,7 @@ from tvident._equation import LINEAR_UNITS, OFFSET, UNITS, Unknown, all_terms
 from tvident._identify.columns import WINDOW_OF_TERMS, Columns
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, WeakForm, exponent_of
 from tvident._merged import (
-    Asked,
+    AskedTogether,
     MergedIdentification,
     Sampling,
     identify_masses,
@@ -169,7 +169,7 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
     )
     sampling = _sampling(options, axis, *recorded)
     with arguments.reporter(options.progress, "identification") as report:
-        asked = Asked(
+        asked = AskedTogether(
             sampling=sampling,
             parameters={name: value for name, value in options.parameters.items() if value is not None},
             terms=[(one.name, one.kind) for one in terms],

@@ -68,7 +68,7 @@ class Oscillating:
         names = [one.name for one in merging.elements if any(one.name in pattern for pattern in patterns)]
         nothing = np.zeros((masses, masses))
         elements = [
-            modal.Element(tuple(pattern.get(name, nothing) for pattern in patterns), self.elements[name])  # type: ignore[arg-type] # three of them
+            modal.ModalElement(tuple(pattern.get(name, nothing) for pattern in patterns), self.elements[name])  # type: ignore[arg-type] # three of them
             for name in names
         ]
         times = modal.times_of(self.time.size)

@@ -17,7 +17,7 @@ from tvident._merged.drawn import drawn
 from tvident._merged.held_back import HeldBackTorque, held_back
 from tvident._merged.merging import Identifiable, Merging
 from tvident._merged.predicted import predicted
-from tvident._merged.simulated import Simulated
+from tvident._merged.simulated import MergedSimulated
 from tvident._merged.stored import store
 from tvident._merged.verdict import verdict_of
 from tvident._merged.words import summary_of, words_of
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
-Picture: TypeAlias = Literal["parameters", "torque", "scan"]
+MergedPicture: TypeAlias = Literal["parameters", "torque", "scan"]
 
 
-class Reported(Simulated, Telling, Tabular):
+class Reported(MergedSimulated, Telling, Tabular):
     """The part of a result that is shown.
 
     Attributes
@@ -231,7 +231,12 @@ class Reported(Simulated, Telling, Tabular):
         return summary_of(self, verdict_of(self, self._merging))
 
     def plot(
-        self, what: Picture = "parameters", *, mass: int = 0, trial: int = 0, ax: Axes | Sequence[Axes] | None = None
+        self,
+        what: MergedPicture = "parameters",
+        *,
+        mass: int = 0,
+        trial: int = 0,
+        ax: Axes | Sequence[Axes] | None = None,
     ) -> Figure:
         """Draw the result, on axes of your own or in a new figure.
 
@@ -264,7 +269,7 @@ class Reported(Simulated, Telling, Tabular):
         """
         from tvident import _figures  # noqa: PLC0415 - matplotlib is optional
 
-        arguments.one_of("what", what, get_args(Picture))
+        arguments.one_of("what", what, get_args(MergedPicture))
         if what == "scan":
             return self.scan().plot(ax=ax)
         if what == "parameters":

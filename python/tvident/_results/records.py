@@ -124,7 +124,7 @@ def with_shared(result: Identification, shared: Shared, changes: Mapping[str, Id
 
 
 def _change(result: Identification, other: Identification, name: str, deviation: float) -> Array:
-    """Return by how much something moves with what is shared; nothing where either has no number."""
+    """Return by how much something moves with what is shared; zero if either has no number."""
     moved = other._found.values[name] - result._found.values[name]  # noqa: SLF001 - of this room
     return np.nan_to_num(moved) if deviation > 0 else np.zeros_like(moved)
 

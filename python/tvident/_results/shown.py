@@ -150,7 +150,7 @@ class Shown(Simulated, Telling, Valued):
         Parameters
         ----------
         what : str, optional
-            ``"parameters"``: what changes, with bands of two standard errors, and in a line what is constant (``truth=`` draws a simulated
+            ``"parameters"``: time-varying ones with bands of two standard errors, and constants in one line (``truth=`` draws a simulated
             truth and the error). ``"torque"``: recorded, predicted and what is left. ``"status"``: order and flags over time.
             ``"poles"``: poles, natural frequency and damping ratio. ``"scan"``: estimates by the width of the test function, or of windows.
             ``"over"``: a parameter over the channel ``position=`` (``name=``, ``label=``).

@@ -198,8 +198,8 @@ class LocalPolynomialStream(SampleStream[StreamedDerivatives]):
         self._check_open()
         return self._given(self._stream.push(self._piece("y", y)))
 
-    def _given(self, found: tuple[int, _core.LocalEstimates, npt.NDArray[np.float64]]) -> StreamedDerivatives:
-        first, estimates, errors = found
+    def _given(self, found: _core.StreamedEstimates) -> StreamedDerivatives:
+        first, estimates, errors = found.first, found.estimates, found.stderr
         return StreamedDerivatives(
             self._times(first, estimates.status.size),
             estimates.derivatives,

@@ -14,7 +14,7 @@ from tvident._equation import COEFFICIENTS, LINEAR_UNITS, UNITS, GivenTerm, Para
 from tvident._identify import Method
 from tvident._pieces import Given
 from tvident._status import DOUBTFUL, Status
-from tvident._stream.asked import Work, asked_of
+from tvident._stream.asked import StreamWork, asked_of
 from tvident._stream.pieces import SampleStream
 from tvident._stream.weak import WeakStream
 from tvident._units import ROTARY, axis_of, scaled
@@ -234,7 +234,7 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         self._hold = False
         self._stream = self._begun(None)
 
-    def _begun(self, state: Any) -> Work:
+    def _begun(self, state: Any) -> StreamWork:
         """Return a stream that begins, or goes on from a state."""
         stream = self._asked.begun(self._step, state)
         stream.hold(self._hold)

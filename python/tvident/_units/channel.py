@@ -93,7 +93,7 @@ class Channel(np.ndarray[Any, Any]):
 
 
 def unit_said(values: Any) -> str:
-    """Return the unit that an array says it has, of ours, of pint or in the attributes of xarray; nothing where it says none."""
+    """Return the unit that an array says it has, of ours, of pint or in the attributes of xarray; an empty string if it says none."""
     if isinstance(values, Channel):
         return values.unit
     if hasattr(values, "magnitude") and hasattr(values, "units"):

@@ -15,7 +15,7 @@ _BEHIND_A_LINE = re.compile(r"(.+)_(deg|degrees|rad|mrad|Nm|Nmm|mNm|ms|us|sec|mm
 
 
 def named_unit(name: str) -> tuple[str, str]:
-    """Return a channel's name without its unit, and the unit; nothing where it has none.
+    """Return a channel's name without its unit, and the unit; an empty string if it has none.
 
     What stands in brackets is the unit, whatever it is; behind a slash, a comma or a line only what is known as one.
     """
@@ -32,7 +32,7 @@ def named_unit(name: str) -> tuple[str, str]:
 
 
 def derivative_units(unit: str, count: int) -> list[str]:
-    """Return the units of a channel and its derivatives by time in seconds; nothing where the channel has none."""
+    """Return the units of a channel and its derivatives by time in seconds; empty strings if the channel has none."""
     base = f"({unit})" if "/" in unit else unit
     powers = ["", "/s", *(f"/s^{order}" for order in range(2, count))]
     return [base + power if unit and power else unit for power in powers[:count]]
