@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tvident import _core
+from tvident._advice.collinear import collinear
 from tvident._advice.events import (
     comes_late,
     jumps_beside_pulses,
@@ -29,9 +30,6 @@ _SHOWN = 6
 
 _BEYOND_CHANCE = 4.0
 """A parameter jumps where it differs by more than so many standard errors of the difference: one of 16 000 does so by chance."""
-
-_TAKES_PART = 0.3
-"""A constant that has at least this share in the worst determined combination is named."""
 
 _PERIODS = (2 * math.pi, math.pi, 360.0, 180.0, 1.0, *(2.0**bits for bits in range(8, 25)))
 """Periods of wrapped angles: a turn or half of one in rad, degrees and turns, and encoders' counts."""
@@ -123,11 +121,11 @@ class Explained:
             *self._outside(),
             *self._contradictions(),
             *self._free_offset(),
-            *self._told_apart(flags),
+            *self._chance(),
             *self._limits(flags),
         )
-        # What can be typed comes before what is to be looked for.
-        return Words(reasons, (*self._defects(), *self.suspicions(), *advice))
+        # Where unknowns are collinear the rest may follow from it. Else what can be typed comes before what is to be looked for.
+        return Words(reasons, (*self._defects(), *collinear(self.found, self.names), *self.suspicions(), *advice))
 
     def _constants(self) -> list[tuple[str, _core.Unknown]]:
         """Return the constants by name."""
@@ -215,7 +213,7 @@ class Explained:
         if Status.SCALES_DISAGREE not in flags:
             return []
         words = (
-            "test functions of different widths find different parameters, and none can be believed: is a channel filtered, clipped, "
+            "test functions of different widths find different parameters, so none can be trusted: is a channel filtered, clipped, "
             "held or wrapped (give lag=, or make clipped samples NaN), is a term missing, or does a controller feed noise back into the "
             "torque? result.scan().plot() shows where they part; do not trust these numbers"
         )
@@ -411,24 +409,8 @@ class Explained:
         )
         return [words]
 
-    def _told_apart(self, flags: Status) -> list[str]:
-        if self.found.unexplained:
-            return [f"do not trust these numbers: {self._unexplained()}"]
-        if Status.ILL_CONDITIONED not in flags:
-            return []
-        constants = [name for name, _ in self._constants()]
-        # Varying parameters come first among the shares.
-        shares = self.found.weakest[len(self.found.weakest) - len(constants) :]
-        parts = [name for name, part in zip(constants, shares, strict=True) if abs(part) > _TAKES_PART]
-        if len(parts) == 1 and "stiffness" in self._changing():
-            parts.append("stiffness")
-        told = listed(parts) if len(parts) > 1 else "the parameters"
-        noise = ", and what separates them is mostly noise of the angle" if self.found.mostly_noise else ""
-        words = (
-            f"{told} are nearly collinear{noise} (condition {self.found.constants_condition:.0f}): a single frequency does not "
-            "separate them; excite two or more, or give one of them as known"
-        )
-        return [words]
+    def _chance(self) -> list[str]:
+        return [f"do not trust these numbers: {self._unexplained()}"] if self.found.unexplained else []
 
     def _limits(self, flags: Status) -> list[str]:
         if Status.WINDOW_LIMIT not in flags:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tvident import _core
-from tvident._advice import Explained
+from tvident._advice import NOT_TOLD_APART, Explained
 from tvident._arguments import percent
 from tvident._equation import BUILT_IN, COEFFICIENTS, FRICTION, OFFSET, Unknown
 from tvident._identify.data import Data
@@ -195,7 +195,9 @@ class Improvement(_AskedOfRecord):
         )
         dropped += hidden[-1:]  # that nothing is explained, which it is with what is advised
         rest = [line for line in words.advice if line not in dropped and not line.startswith(starts)]
-        return replace(words, advice=tuple(rest if advice is None else (advice, *rest)))
+        # What is tried differs little from what it is compared with where unknowns cannot be told apart.
+        before = next((place + 1 for place, line in enumerate(rest) if NOT_TOLD_APART in line), 0)
+        return replace(words, advice=(*rest[:before], *([] if advice is None else [advice]), *rest[before:]))
 
     def _exchanged(self, result: Identification) -> str | None:
         """Return the question whether channels are swapped, where that explains next to everything with positive parameters.
