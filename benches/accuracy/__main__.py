@@ -17,6 +17,7 @@ _SECTIONS = sections()
 _MEASUREMENTS = (*_SECTIONS, "signals", "cost")
 
 
+# Options of the command.
 @click.command()
 @click.argument("measurements", nargs=-1, type=click.Choice(_MEASUREMENTS))
 @click.option("--recordings", type=click.IntRange(min=1), help="Recordings of every case; by default 12 to 400.")

@@ -1,5 +1,5 @@
 from collections.abc import Callable, Mapping, Sequence
-from typing import Literal, final
+from typing import Literal, TypeAlias, final
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,10 @@ __all__ = [
     "NO_CHANCE",
     "WEAK_INSTRUMENT",
     "AutomaticEstimates",
+    "ConstantsOfRows",
+    "FactoredRows",
     "Identification",
+    "IncompleteEstimates",
     "LocalEstimates",
     "LocalPolynomials",
     "MergedElement",
@@ -28,11 +31,14 @@ __all__ = [
     "RollingRegressions",
     "RollingStream",
     "Scan",
+    "StreamedEstimates",
     "StreamedParameters",
+    "StreamedRegressions",
     "StrongForm",
     "Suspect",
     "Unknown",
     "WeakForm",
+    "WindowEstimates",
     "WindowFit",
     "available_instructions",
     "built_in_terms",
@@ -53,6 +59,10 @@ __all__ = [
     "spike_counts",
     "status_flags",
 ]
+
+# What pickling a stream keeps: plain, so that it can be read wherever the stream goes on. The core alone looks into it.
+_StreamState: TypeAlias = tuple[int, npt.NDArray[np.float64], int, bool]
+_ParameterState: TypeAlias = tuple[list[int], list[npt.NDArray[np.float64]]]
 
 CORRELATED_NOISE: float
 FEWEST_SAMPLES: int
@@ -97,13 +107,7 @@ class LocalPolynomials:
         weights: Sequence[float] | None = None,
         workers: int | None = None,
         progress: Callable[[int, int], object] | None = None,
-    ) -> tuple[
-        npt.NDArray[np.float64],
-        npt.NDArray[np.float64],
-        npt.NDArray[np.uintp],
-        npt.NDArray[np.uint16],
-        npt.NDArray[np.float64],
-    ]: ...
+    ) -> IncompleteEstimates: ...
     def errors(
         self,
         samples: npt.NDArray[np.number],
@@ -162,6 +166,26 @@ class LocalEstimates:
     def sigma(self) -> npt.NDArray[np.float64]: ...
 
 @final
+class IncompleteEstimates:
+    @property
+    def derivatives(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def stderr(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def order(self) -> npt.NDArray[np.uintp]: ...
+    @property
+    def status(self) -> npt.NDArray[np.uint16]: ...
+    @property
+    def sigma(self) -> npt.NDArray[np.float64]: ...
+
+@final
+class WindowEstimates:
+    @property
+    def estimates(self) -> LocalEstimates: ...
+    @property
+    def stderr(self) -> npt.NDArray[np.float64]: ...
+
+@final
 class ParameterStream:
     def __new__(
         cls,
@@ -173,13 +197,13 @@ class ParameterStream:
         step: int = 1,
         factors: Sequence[float] | None = None,
         forgetting: float = 1.0,
-        state: tuple[list[int], list[npt.NDArray[np.float64]]] | None = None,
+        state: _ParameterState | None = None,
     ) -> ParameterStream: ...
     @property
     def delay(self) -> int: ...
     @property
     def samples(self) -> int: ...
-    def state(self) -> tuple[list[int], list[npt.NDArray[np.float64]]]: ...
+    def state(self) -> _ParameterState: ...
     def hold(self, hold: bool) -> None: ...
     def reset(self) -> None: ...
     def push(self, angle: npt.NDArray[np.number], torque: npt.NDArray[np.number]) -> StreamedParameters: ...
@@ -203,6 +227,22 @@ class StreamedParameters:
     def order(self) -> npt.NDArray[np.uint8]: ...
 
 @final
+class StreamedEstimates:
+    @property
+    def first(self) -> int: ...
+    @property
+    def estimates(self) -> LocalEstimates: ...
+    @property
+    def stderr(self) -> npt.NDArray[np.float64]: ...
+
+@final
+class StreamedRegressions:
+    @property
+    def first(self) -> int: ...
+    @property
+    def regressions(self) -> RollingRegressions: ...
+
+@final
 class PolynomialStream:
     def __new__(
         cls,
@@ -210,15 +250,15 @@ class PolynomialStream:
         *,
         step: int = 1,
         errors: bool = False,
-        state: tuple[int, npt.NDArray[np.float64], int, bool] | None = None,
+        state: _StreamState | None = None,
     ) -> PolynomialStream: ...
     @property
     def delay(self) -> int: ...
     @property
     def samples(self) -> int: ...
-    def state(self) -> tuple[int, npt.NDArray[np.float64], int, bool]: ...
-    def push(self, samples: npt.NDArray[np.number]) -> tuple[int, LocalEstimates, npt.NDArray[np.float64]]: ...
-    def finish(self) -> tuple[int, LocalEstimates, npt.NDArray[np.float64]]: ...
+    def state(self) -> _StreamState: ...
+    def push(self, samples: npt.NDArray[np.number]) -> StreamedEstimates: ...
+    def finish(self) -> StreamedEstimates: ...
 
 @final
 class RollingStream:
@@ -229,17 +269,15 @@ class RollingStream:
         rhs_count: int,
         *,
         step: int = 1,
-        state: tuple[int, npt.NDArray[np.float64], int, bool] | None = None,
+        state: _StreamState | None = None,
     ) -> RollingStream: ...
     @property
     def delay(self) -> int: ...
     @property
     def rows(self) -> int: ...
-    def state(self) -> tuple[int, npt.NDArray[np.float64], int, bool]: ...
-    def push(
-        self, regressors: npt.NDArray[np.number], rhs: npt.NDArray[np.number]
-    ) -> tuple[int, RollingRegressions]: ...
-    def finish(self) -> tuple[int, RollingRegressions]: ...
+    def state(self) -> _StreamState: ...
+    def push(self, regressors: npt.NDArray[np.number], rhs: npt.NDArray[np.number]) -> StreamedRegressions: ...
+    def finish(self) -> StreamedRegressions: ...
 
 @final
 class AutomaticEstimates:
@@ -276,7 +314,7 @@ class WindowFit:
         step: int = 1,
         workers: int | None = None,
         progress: Callable[[int, int], object] | None = None,
-    ) -> tuple[LocalEstimates, npt.NDArray[np.float64]]: ...
+    ) -> WindowEstimates: ...
     def scores(self, samples: npt.NDArray[np.number], sample: int) -> npt.NDArray[np.float64]: ...
 
 @final
@@ -346,12 +384,32 @@ class StrongForm:
         weights: npt.NDArray[np.float64] | None = None,
         workers: int | None = None,
     ) -> list[Scan]: ...
-    def rows(
-        self, motions: Motions, wanted: tuple[int, int], *, workers: int | None = None
-    ) -> tuple[list[float], int, int]: ...
+    def rows(self, motions: Motions, wanted: tuple[int, int], *, workers: int | None = None) -> FactoredRows: ...
     def constants(
-        self, motions: Motions, rows: tuple[list[float], int, int], *, workers: int | None = None
-    ) -> tuple[list[float], list[float], float, float] | None: ...
+        self, motions: Motions, rows: FactoredRows, *, workers: int | None = None
+    ) -> ConstantsOfRows | None: ...
+
+@final
+class FactoredRows:
+    def __new__(cls, factor: list[float], columns: int, rows: int) -> FactoredRows: ...
+    def __getnewargs__(self) -> tuple[list[float], int, int]: ...
+    @property
+    def factor(self) -> list[float]: ...
+    @property
+    def columns(self) -> int: ...
+    @property
+    def rows(self) -> int: ...
+
+@final
+class ConstantsOfRows:
+    @property
+    def values(self) -> list[float]: ...
+    @property
+    def covariance(self) -> list[float]: ...
+    @property
+    def residual(self) -> float: ...
+    @property
+    def condition(self) -> float: ...
 
 @final
 class Unknown:
@@ -498,9 +556,7 @@ def fuse(
 ) -> npt.NDArray[np.float64]: ...
 def spike_counts(angle: npt.NDArray[np.number], torque: npt.NDArray[np.number]) -> list[list[int]]: ...
 def parts_of_quantisation(samples: int) -> list[tuple[int, int]]: ...
-def merged_rows(
-    one: tuple[list[float], int, int], other: tuple[list[float], int, int]
-) -> tuple[list[float], int, int]: ...
+def merged_rows(one: FactoredRows, other: FactoredRows) -> FactoredRows: ...
 def quantisation_step(
     samples: npt.NDArray[np.number], *, parts: Sequence[tuple[int, int]] | None = None, of: int = 0
 ) -> float: ...

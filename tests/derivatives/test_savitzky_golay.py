@@ -20,6 +20,7 @@ import tvident
 SCIPY = 1e-9
 
 
+# What hypothesis draws.
 @given(
     seed=st.integers(0, 2**32),
     length=st.integers(1, 101),

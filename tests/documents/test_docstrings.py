@@ -36,6 +36,28 @@ FUNCTIONS = [one for one in PUBLIC if inspect.isfunction(one)]
 CLASSES = [one for one in PUBLIC if inspect.isclass(one)]
 
 
+def members() -> dict[str, tuple[Callable[..., Any], str]]:
+    """Give methods and properties of public classes, inherited ones too: by name, with the annotation of what they return."""
+    found: dict[str, tuple[Callable[..., Any], str]] = {}
+    for one in CLASSES:
+        for name in dir(one):
+            member = inspect.getattr_static(one, name)
+            function = getattr(member, "fget", None) or getattr(member, "func", None) or member
+            function = getattr(function, "__func__", function)
+            if not name.startswith("_") and inspect.isfunction(function) and function.__module__.startswith("tvident"):
+                found[f"{one.__qualname__}.{name}"] = function, str(function.__annotations__.get("return", ""))
+    return found
+
+
+MEMBERS = members()
+COMPUTING = {
+    *("at", "stderr_at", "excitation", "simulate", "vaf", "predicted_torque", "held_back", "scan", "value", "trusted"),
+    *("natural_frequency", "damping_ratio", "modes", "stderr", "scores", "push", "regressors", "dynamics", "values"),
+}
+"""Methods and properties that compute something, and so have a source."""
+UNIT = re.compile(r"\b(Hz|rad|N|N m|seconds|percent|without unit|unit|units)\b")
+
+
 def examples() -> Iterator[doctest.DocTest]:
     for module in MODULES:
         yield from (test for test in doctest.DocTestFinder(exclude_empty=True).find(module) if test.examples)
@@ -72,6 +94,31 @@ def test_everything_public_has_an_example(documented: Any) -> None:
 @named(PUBLIC)
 def test_everything_public_says_what_else_to_see(documented: Any) -> None:
     assert section(documented, "See Also")
+
+
+@pytest.mark.parametrize("member", MEMBERS)
+def test_methods_and_properties_say_what_they_are_and_what_else_to_see(member: str) -> None:
+    function, _ = MEMBERS[member]
+    text = inspect.getdoc(function) or ""
+    assert re.match(r"[A-Z].{10,}[.:]$", text.split("\n\n")[0], re.DOTALL), "begin with a sentence"
+    assert section(function, "See Also")
+
+
+@pytest.mark.parametrize(
+    "member", [one for one in MEMBERS if one.split(".")[1] in COMPUTING and one.split(".")[0] != "DaskIdentification"]
+)
+def test_methods_and_properties_that_compute_name_their_source(member: str) -> None:
+    assert section(MEMBERS[member][0], "References")
+
+
+@pytest.mark.parametrize("member", [one for one, (_, returned) in MEMBERS.items() if "Array" in returned])
+def test_methods_and_properties_say_the_shape_of_arrays(member: str) -> None:
+    assert "shape" in (inspect.getdoc(MEMBERS[member][0]) or "")
+
+
+@pytest.mark.parametrize("member", [one for one, (_, returned) in MEMBERS.items() if re.search(r"\bfloat\b", returned)])
+def test_methods_and_properties_say_the_unit_of_numbers(member: str) -> None:
+    assert UNIT.search(inspect.getdoc(MEMBERS[member][0]) or "")
 
 
 @named(PUBLIC)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
 from reference.expansion import generalised, product_column
-from tvident._expansion import Basis, Coordinate, Linearised, Record, Unknown
+from tvident._expansion import Basis, Coordinate, ExpandedRecord, ExpandedUnknown, Linearised
 from tvident._expansion.covariance import RIDGE, Whitening
 from tvident._expansion.families import FAMILIES, family_of
 
@@ -20,11 +20,11 @@ ROUNDING = 1e-9
 PERIOD = 0.01
 
 
-def record(seed: int, samples: int, half: int, exponent: int) -> Record:
+def record(seed: int, samples: int, half: int, exponent: int) -> ExpandedRecord:
     generator = np.random.default_rng(seed)
     there = np.ones(samples, bool)
     angle, torque = generator.standard_normal((2, samples))
-    return Record(angle, torque, there, there, PERIOD, half, exponent)
+    return ExpandedRecord(angle, torque, there, there, PERIOD, half, exponent)
 
 
 def of_time(family: str, size: int, samples: int) -> Basis:
@@ -42,7 +42,7 @@ def test_columns_are_the_integrals_of_products(
 ) -> None:
     samples = 90
     one = record(seed, samples, half, exponent)
-    unknown = Unknown(role, role, of_time("legendre", size, samples))
+    unknown = ExpandedUnknown(role, role, of_time("legendre", size, samples))
     found = one.columns([unknown], one.angle, slice(0, (one.rows - 1) * one.stride + one.length))
     for number in range(size):
         # A Legendre polynomial of time in seconds.
@@ -64,12 +64,13 @@ def test_momentum_is_inertia_and_its_rate() -> None:
     everything = slice(0, (one.rows - 1) * one.stride + one.length)
     basis = of_time("chebyshev", 4, samples)
     columns = {
-        role: one.columns([Unknown(role, role, basis)], one.angle, everything) for role in ("inertia", "momentum")
+        role: one.columns([ExpandedUnknown(role, role, basis)], one.angle, everything)
+        for role in ("inertia", "momentum")
     }
     factors = np.array([1.0, 0.3, -0.2, 0.1])
     rate = np.polynomial.Chebyshev(factors).deriv() * (2 / ((samples - 1) * PERIOD))
     damping = rate.convert(kind=np.polynomial.Chebyshev)
-    more = one.columns([Unknown("damping", "damping", of_time("chebyshev", 3, samples))], one.angle, everything)
+    more = one.columns([ExpandedUnknown("damping", "damping", of_time("chebyshev", 3, samples))], one.angle, everything)
     found = columns["momentum"] @ factors - columns["inertia"] @ factors
     np.testing.assert_allclose(
         found, more @ np.asarray(damping.coef, np.float64), atol=ROUNDING * np.abs(columns["inertia"]).max()
@@ -110,7 +111,7 @@ def test_least_squares_are_those_of_dense_matrices_with_the_noise_of_the_angle_t
     curves = [(role, [level, nothing, nothing])]
     noise = (0.04, 0.3)
     around = Linearised(one, curves, nothing, noise, [])
-    unknowns = [Unknown(role, role, basis), Unknown("offset", "term", None, np.ones(samples))]
+    unknowns = [ExpandedUnknown(role, role, basis), ExpandedUnknown("offset", "term", None, np.ones(samples))]
     found = around.solve(unknowns)
 
     everything = slice(0, (one.rows - 1) * one.stride + one.length)
@@ -157,11 +158,13 @@ def test_blocks_are_summed_and_sizes_compared_as_if_each_were_solved(
     both = Basis([channel, of_time("legendre", 1, samples).coordinates[0]], [pulse, pulse], sizes)
     # The same functions without their blocks.
     plain = Basis(both.coordinates, [replace(pulse, block=None)] * 2, sizes)
-    found, expected = (one.columns([Unknown("k", "stiffness", each)], one.angle, slice(None)) for each in (both, plain))
+    found, expected = (
+        one.columns([ExpandedUnknown("k", "stiffness", each)], one.angle, slice(None)) for each in (both, plain)
+    )
     np.testing.assert_allclose(found, expected, atol=ROUNDING * np.abs(expected).max())
-    unknowns = [Unknown("k", "stiffness", both), Unknown("c", "damping")]
+    unknowns = [ExpandedUnknown("k", "stiffness", both), ExpandedUnknown("c", "damping")]
     # Columns that are made of others are left to decompositions.
-    unknowns += [Unknown("again", "damping")] if same else []
+    unknowns += [ExpandedUnknown("again", "damping")] if same else []
     nothing = ("stiffness", [np.zeros(samples)])
     around = Linearised(one, [nothing], np.zeros(samples), (1e-6, 1.0), [])
     scored, fitted = around.score(unknowns), around.solve(unknowns)

@@ -162,6 +162,7 @@ CELLS = st.one_of(
 """Small integers, numbers with few digits, any numbers, none."""
 
 
+# What hypothesis draws.
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.lists(st.lists(CELLS, min_size=3, max_size=3), min_size=2, max_size=12),

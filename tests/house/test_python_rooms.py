@@ -55,6 +55,13 @@ ROOMS = (
 )
 """Every room may import from those above it."""
 
+TESTS = HOUSE.parents[1] / "tests"
+ELSEWHERE = {
+    "_dask": "dask_arrays",  # a folder `dask` would be found in the place of the library
+    "_commands": "command_line",  # what a command does is tested as users call it
+}
+"""Rooms whose tests stand in a folder of another name."""
+
 FILES = {
     ".".join(("tvident", *path.relative_to(HOUSE).with_suffix("").parts)).removesuffix(".__init__"): path
     for path in sorted(HOUSE.rglob("*.py"))
@@ -116,3 +123,19 @@ def test_the_design_names_every_room_in_this_order() -> None:
     design = (HOUSE.parents[1] / "DESIGN.md").read_text(encoding="utf-8")
     named = [name for line in design.splitlines() for name in re.findall(r"^\| `(_\w+)/` \|", line)]
     assert named == [name for name in ROOMS if name.startswith("_") and name != "__main__"]
+
+
+@pytest.mark.parametrize("name", [name for name in ROOMS if name.startswith("_") and name != "__main__"])
+def test_every_room_has_a_folder_of_tests(name: str) -> None:
+    folder = TESTS / ELSEWHERE.get(name, name.removeprefix("_"))
+    assert list(folder.glob("test_*.py"))
+
+
+def test_every_folder_of_tests_is_that_of_a_room_or_said_to_be_none() -> None:
+    rooms = {ELSEWHERE.get(name, name.removeprefix("_")) for name in ROOMS}
+    others = {"reference", "house", "hostile", "documents"}
+    folders = {path.name for path in TESTS.iterdir() if path.is_dir() and path.name != "__pycache__"}
+    assert folders <= rooms | others
+    design = (HOUSE.parents[1] / "DESIGN.md").read_text(encoding="utf-8")
+    table = design.partition("### Rooms of the tests")[2].partition("###")[0]
+    assert set(re.findall(r"`(\w+)/`", table.split("\n`")[0])) >= folders

@@ -35,6 +35,13 @@ ROOMS = (
 )
 """Every room may use those above it. The first two are single files, which everything uses."""
 
+TESTED = ("regression", "inference")
+"""Rooms every file of which has unit tests."""
+UNTESTED = {
+    "regression::simulated": "rows and slow solutions that the tests of others compare with",
+    "inference::jumps::simulated": "a spring that jumps, for the tests of others",
+}
+
 LONGEST_FILE = 450
 MEDIAN_FILE = 200
 
@@ -158,6 +165,15 @@ def test_every_file_begins_with_its_purpose(file: str) -> None:
     words = re.match(r"(?://! .*\n)+", FILES[file].read_text(encoding="utf-8"))
     purpose = words[0].replace("\n//!", "").removeprefix("//! ") if words else ""
     assert re.match(r"[A-Z`].{15,}?[.:?]", purpose), "a sentence that says what the file is for"
+
+
+@pytest.mark.parametrize("file", [file for file in FILES if room(file) in TESTED and file not in DOORS])
+def test_every_file_that_decides_or_estimates_has_unit_tests(file: str) -> None:
+    text = FILES[file].read_text(encoding="utf-8")
+    tests = re.search(
+        r"^#\[cfg\(test\)\]\n(?:pub\(crate\) )?mod tests \{\n.*#\[test\]", text, flags=re.MULTILINE | re.DOTALL
+    )
+    assert (tests is not None) != (file in UNTESTED)
 
 
 def test_files_are_short() -> None:

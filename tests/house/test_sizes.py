@@ -23,6 +23,11 @@ SOURCES = {
 FILES = [path for paths in SOURCES.values() for path in paths]
 SHORT = SOURCES | {"tests": sorted((ROOT / "tests").rglob("*.py"))}
 """Tests are read as the package is; what they are given and check may take more lines of a function."""
+STUBS = {
+    "_core.pyi": "a list of the compiled module's names, in one file as they are in one module: stub files of its parts would name "
+    "modules that are not there when the program runs, which stubtest refuses",
+}
+"""Stubs that may be longer, and why."""
 
 
 def lines(path: Path) -> list[str]:
@@ -59,6 +64,30 @@ def test_files_are_short(sources: str) -> None:
     counts = {path: len(lines(path)) for path in SHORT[sources]}
     assert not {str(path): count for path, count in counts.items() if count > LONGEST_FILE}
     assert median(counts.values()) <= MEDIAN_FILE
+
+
+def test_stubs_are_short_or_said_to_be_lists() -> None:
+    long = {path.name for path in (ROOT / "python").rglob("*.pyi") if len(lines(path)) > LONGEST_FILE}
+    assert long == set(STUBS)
+
+
+@pytest.mark.parametrize("folder", ["tests", "benches", "docs", "examples"])
+def test_functions_beside_the_package_have_few_parameters_or_say_why_not(folder: str) -> None:
+    for path in sorted((ROOT / folder).rglob("*.py")):
+        many = [one for one in functions(path) if parameters(one) > MOST_PARAMETERS]
+        assert not [one.name for one in many if not has_reason(path, one)], path
+
+
+def test_no_two_types_have_one_name() -> None:
+    found: dict[str, set[str]] = {}
+    for path in FILES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            alias = isinstance(node, ast.AnnAssign) and ast.unparse(node.annotation) == "TypeAlias"
+            name = node.name if isinstance(node, ast.ClassDef) else ast.unparse(node.target) if alias else ""  # type: ignore[attr-defined] # an alias has one
+            # Arrays of numbers are the same everywhere: each file says which numbers.
+            if name.strip("_") not in {"", "Array", "Numbers"}:
+                found.setdefault(name.strip("_"), set()).add(str(path.relative_to(ROOT)))
+    assert not {name: places for name, places in found.items() if len(places) > 1}
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))

@@ -243,7 +243,7 @@ def test_friction_that_fades_too_fast_for_the_samples_is_said() -> None:
     """With 90 rad/s² the velocity crosses twice 0.25 rad/s within three samples."""
     angle, torque = one_record(lambda t, _, velocity: np.sign(velocity(t)) * 0.2 + 0.5 * stribeck(velocity(t), 0.25))
     result = tvident.identify(angle, torque, terms=["coulomb", "stribeck", "offset"], **CONSTANT)
-    assert any("samples of a turn, so stribeck.velocity and its factor hang" in line for line in result.advice)
+    assert any("samples of a turn, so stribeck.velocity and its factor depend" in line for line in result.advice)
     assert not any("negative" in line for line in result.advice)
 
 

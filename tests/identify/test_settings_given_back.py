@@ -94,3 +94,25 @@ def test_what_is_no_settings_is_refused(settings: Any) -> None:
 def test_settings_that_were_changed_are_checked_as_arguments_are(changed: Any) -> None:
     with pytest.raises((ValueError, TypeError), match=r" must .*; got .*; "):
         tvident.identify(ANGLE, TORQUE, sample_rate=1000, settings=RESULT | changed)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"window_lenght": 31}, r"got 'window_lenght'; did you mean 'window_length'\?"),
+        ({"regression": 31}, r"got 'regression'; did you mean 'regression_window'\?"),
+        ({"max_order": 7}, r"got 'max_order'; it belongs to the strong form"),
+        ({"comment": "second trial"}, r"got 'comment'; "),
+        (
+            {"kinds": RESULT["kinds"] | {"inertai": "constant"}},
+            r"settings kinds .* got 'inertai'; did you mean 'inertia'\?",
+        ),
+        ({"known": {"stifness": 3.0}}, r"settings known .* got 'stifness'; did you mean 'stiffness'\?"),
+    ],
+)
+def test_names_that_no_result_has_are_refused(more: dict[str, Any], words: str) -> None:
+    settings = RESULT | more
+    with pytest.raises(TypeError, match=words):
+        tvident.identify(ANGLE, TORQUE, sample_rate=1000, settings=settings)
+    with pytest.raises(TypeError, match=words):
+        tvident.IdentificationStream(sample_rate=1000, settings=settings)

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import tvident
-from tvident._live import Clock, Inlet, Outlet
+from tvident._live import Inlet, LiveClock, Outlet
 
 SECONDS = float(os.environ.get("TVIDENT_LIVE", "4"))
 """Of the test with a real outlet at 1 kHz; a minute in ``make test-live``."""
@@ -114,9 +114,9 @@ def test_a_table_and_a_counter() -> None:
     assert "samples: 2000 taken in" in done.stderr
 
 
-def clocked(stamps: Sequence[float], period: float = 1e-3) -> tuple[Clock, list[float]]:
+def clocked(stamps: Sequence[float], period: float = 1e-3) -> tuple[LiveClock, list[float]]:
     """Give a clock that saw these stamps, and which samples came out: NaN for lost ones."""
-    clock = Clock(period)
+    clock = LiveClock(period)
     rows = [row for number, stamp in enumerate(stamps) for row in clock.rows((stamp, float(number), 0.0))]
     return clock, [row[1] for row in [*rows, *clock.rest()]]
 

@@ -134,6 +134,7 @@ class Coupled:
     stiffness: Array
 
 
+# All that records of masses may differ in.
 def coupled(
     stiffness: Callable[[Array], Array],
     inertia: Array,

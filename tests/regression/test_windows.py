@@ -21,6 +21,7 @@ ROUNDING = 1e-13
 Alignment = Literal["centre", "trailing", "leading"]
 
 
+# What hypothesis draws.
 @given(
     seed=st.integers(0, 2**32),
     n=st.integers(20, 120),

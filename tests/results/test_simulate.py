@@ -189,9 +189,10 @@ def test_what_cannot_be_simulated_is_refused_with_the_rule(
     with pytest.raises(ValueError, match=r"is lost after .* s, since the identified system is unstable"):
         unstable.simulate(rig.torque, (1.0, 0.0))
     light: dict[str, Any] = {"sample_rate": 1000, "inertia": 0, "stiffness": "constant"}
-    friction = tvident.identify(rig.angle, rig.torque, damping="constant", terms=["coulomb"], **light)
-    with pytest.raises(ValueError, match=r"without inertia must be linear.*got coulomb; give it an inertia"):
-        friction.simulate(rig.torque)
+    for term in ("coulomb", "viscous_asymmetric"):
+        friction = tvident.identify(rig.angle, rig.torque, damping="constant", terms=[term], **light)
+        with pytest.raises(ValueError, match=rf"without inertia must be linear.*got {term}; give it an inertia"):
+            friction.simulate(rig.torque)
     spring = tvident.identify(rig.angle, rig.torque, damping=0, terms=(), **light)
     np.testing.assert_allclose(spring.simulate(rig.torque), rig.torque / spring.stiffness[0], rtol=1e-12)
 

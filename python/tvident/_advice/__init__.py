@@ -1,5 +1,6 @@
 """Puts into words what was chosen, why, and what to do next."""
 
+from tvident._advice.collinear import NOT_TOLD_APART
 from tvident._advice.events import spikes_that_stay
 from tvident._advice.expansion import FoundExpansion, words_of_expansions
 from tvident._advice.instrument import words_with_instrument
@@ -9,6 +10,7 @@ from tvident._advice.strong import ExplainedStrong
 from tvident._advice.weak import Explained
 
 __all__ = [
+    "NOT_TOLD_APART",
     "Explained",
     "ExplainedStrong",
     "FoundBySearch",

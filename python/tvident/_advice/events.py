@@ -66,7 +66,9 @@ def spikes_that_stay(angles: npt.NDArray[np.number], torques: npt.NDArray[np.num
 
 def _out_of_neighbours(count: int, name: str) -> str:
     many, stand = ("1 sample", "stands") if count == 1 else (f"{count} samples", "stand")
-    return f"{many} of the {name} {stand} far out of the neighbours on both sides, as spikes of a disturbed line do"
+    return (
+        f"{many} of the {name} {stand} far out of the neighbours on both sides: spikes, as electrical disturbances make"
+    )
 
 
 def pulses(found: _core.Identification, period: float) -> list[str]:
@@ -115,9 +117,9 @@ def unexplained_here(found: _core.Identification, period: float, step: int) -> l
     shown = ", ".join(f"{a * seconds:.4g}-{b * seconds:.4g}" for a, b in list(zip(begins, ends, strict=True))[:_SHOWN])
     more = " …" if begins.size > _SHOWN else ""
     words = (
-        f"in {flagged.mean():.1%} of the record (at {shown}{more} s) more is left than the noise explains: was the machine touched, "
-        "does something change there that no window follows, or is the noise larger? Errors are larger there, and values not trusted: "
-        "mask these samples, or give weights="
+        f"in {flagged.mean():.1%} of the record (at {shown}{more} s) the residual exceeds what the noise explains: was the machine "
+        "touched, does something change there that no window follows, or is the noise larger? Errors are larger there, and values not "
+        "trusted: mask these samples, or give weights="
     )
     return [words]
 
@@ -138,7 +140,7 @@ def one_factor(unknowns: Mapping[str, _core.Unknown]) -> list[str]:
     what, rather = ("inertia, damping and stiffness", "all three") if follows else ("inertia and stiffness", "both")
     words = (
         f"{what} change by one factor ({np.nanmin(inertia):+.0%} to {np.nanmax(inertia):+.0%}): the gain of the torque or of the angle "
-        f"seems to drift, rather than {rather}: calibrate the channels; only ratios can be believed, such as the natural frequency"
+        f"seems to drift, rather than {rather}: calibrate the channels; only ratios can be trusted, such as the natural frequency"
     )
     return [words]
 

@@ -79,7 +79,7 @@ def words_of_expansions(
         )
     if ratio > _core.NOISE_MODEL_FAILS:
         advice.append(
-            "the equations leave more than the noise of the channels: a term may be missing, or parameters change otherwise; "
+            "the equations leave more than the noise of the channels: a term may be missing, or parameters change in another way; "
             "standard errors follow from what is left"
         )
     if changing:

@@ -30,7 +30,7 @@ class FoundBySearch:
     tried : int
         Identifications; 0 where an earlier result tells the value.
     gain : float
-        By how much the term lowers the criterion, its inner parameters paid for.
+        By how much the term lowers the criterion, its inner parameters counted.
     chance : float
         How likely noise makes the term as significant, at any value of the range; NaN where its factor changes.
     at_end : bool
@@ -72,14 +72,14 @@ class FoundBySearch:
         """Return whether the term earns its place."""
         term = self.parameter.term
         if self.earned:
-            return f"with {term} the criterion is lower by {self.gain:.3g}, its inner parameters paid for"
+            return f"with {term} the criterion is lower by {self.gain:.3g}, its inner parameters counted"
         how = f"higher by {-self.gain:.3g}" if self.gain <= 0 else f"lower by {self.gain:.3g} only"
         chance = (
             ""
             if math.isnan(self.chance)
             else f"; noise does as much somewhere in the range with probability {self.chance:.2g}"
         )
-        return f"with {term} the criterion is {how}, its inner parameters paid for{chance}"
+        return f"with {term} the criterion is {how}, its inner parameters counted{chance}"
 
     def advice(self) -> list[str]:
         """Return what to do."""
@@ -105,8 +105,8 @@ class FoundBySearch:
             )
         if self.earned and self.lasts < _FEWEST_SAMPLES:
             words.append(
-                f"{term} fades within {self.lasts:.2g} samples of a turn, so {name} and its factor hang on how the velocity was smoothed, "
-                "by more than their errors: record at a higher rate, or turn more slowly"
+                f"{term} fades within {self.lasts:.2g} samples of a turn, so {name} and its factor depend on how the velocity was "
+                "smoothed, by more than their errors: record at a higher rate, or turn more slowly"
             )
         if self.earned and self.parameter.limits is None and self.factor < 0:
             words.append(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tvident import _core
+from tvident._advice.collinear import collinear
 from tvident._advice.events import (
     comes_late,
     jumps_beside_pulses,
@@ -21,7 +22,7 @@ from tvident._advice.events import (
 )
 from tvident._advice.lists import listed
 from tvident._advice.scales import disagreement, scales_compared
-from tvident._equation import BUILT_IN, COEFFICIENTS, UNITS
+from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, UNITS
 from tvident._results import Words
 from tvident._status import Status
 
@@ -30,9 +31,6 @@ _SHOWN = 6
 
 _BEYOND_CHANCE = 4.0
 """A parameter jumps where it differs by more than so many standard errors of the difference: one of 16 000 does so by chance."""
-
-_TAKES_PART = 0.3
-"""A constant that has at least this share in the worst determined combination is named."""
 
 _PERIODS = (2 * math.pi, math.pi, 360.0, 180.0, 1.0, *(2.0**bits for bits in range(8, 25)))
 """Periods of wrapped angles: a turn or half of one in rad, degrees and turns, and encoders' counts."""
@@ -124,11 +122,11 @@ class Explained:
             *self._outside(),
             *self._contradictions(),
             *self._free_offset(),
-            *self._told_apart(flags),
+            *self._chance(),
             *self._limits(flags),
         )
-        # What can be typed comes before what is to be looked for.
-        return Words(reasons, (*self._defects(), *self.suspicions(), *advice))
+        # Where unknowns are collinear the rest may follow from it. Else what can be typed comes before what is to be looked for.
+        return Words(reasons, (*self._defects(), *collinear(self.found, self.names), *self.suspicions(), *advice))
 
     def _constants(self) -> list[tuple[str, _core.Unknown]]:
         """Return the constants by name."""
@@ -328,7 +326,7 @@ class Explained:
     def suspects(self) -> list[Any]:
         """What seems to be missing, the surest first; friction that drives the motion is no friction."""
         suspects = [one for one in self.found.suspects if one.conspicuous]
-        found = [one for one in suspects if one.name != "coulomb" or one.value > 0]
+        found = [one for one in suspects if one.value > 0 or one.name == "lag" or not BUILT_IN[one.name].dissipates]
         return sorted(
             found, key=lambda suspect: -abs(suspect.value) / suspect.stderr if suspect.stderr > 0 else -math.inf
         )
@@ -378,31 +376,15 @@ class Explained:
         if self.found.free_offset is None:
             return []
         error, free = self.found.free_offset
-        others = [name for name in self.names if name not in {*COEFFICIENTS, "offset"}]
+        others = [name for name in self.names if name not in {*COEFFICIENTS, OFFSET}]
         words = (
             f"an offset that is free in every window predicts better: its cross-validation error is {free:.2f} times the variance of the "
-            f"noise, not {error:.2f}: give terms={[*others, ('offset', 'windowed')]}"
+            f"noise, not {error:.2f}: give terms={[*others, (OFFSET, 'windowed')]}"
         )
         return [words]
 
-    def _told_apart(self, flags: Status) -> list[str]:
-        if self.found.unexplained:
-            return [f"do not trust these numbers: {self._unexplained()}"]
-        if Status.ILL_CONDITIONED not in flags:
-            return []
-        constants = [name for name, _ in self._constants()]
-        # Varying parameters come first among the shares.
-        shares = self.found.weakest[len(self.found.weakest) - len(constants) :]
-        parts = [name for name, part in zip(constants, shares, strict=True) if abs(part) > _TAKES_PART]
-        if len(parts) == 1 and "stiffness" in self._changing():
-            parts.append("stiffness")
-        told = listed(parts) if len(parts) > 1 else "the parameters"
-        noise = ", and what separates them is mostly noise of the angle" if self.found.mostly_noise else ""
-        words = (
-            f"{told} are nearly collinear{noise} (condition {self.found.constants_condition:.0f}): a single frequency does not "
-            "separate them; excite two or more, or give one of them as known"
-        )
-        return [words]
+    def _chance(self) -> list[str]:
+        return [f"do not trust these numbers: {self._unexplained()}"] if self.found.unexplained else []
 
     def _limits(self, flags: Status) -> list[str]:
         if Status.WINDOW_LIMIT not in flags:

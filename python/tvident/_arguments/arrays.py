@@ -100,7 +100,7 @@ def check_nan(name: str, array: npt.NDArray[Any], policy: str, policies: Any = N
 
 
 def mask(name: str, values: npt.ArrayLike | None, shape: tuple[int, ...]) -> npt.NDArray[np.bool_] | None:
-    """Return a mask of the given shape, or nothing; what is masked in the mask itself is False."""
+    """Return a mask of the given shape, or None; what is masked in the mask itself is False."""
     if values is None:
         return None
     array = _as_array(name, values)
@@ -118,7 +118,7 @@ def mask(name: str, values: npt.ArrayLike | None, shape: tuple[int, ...]) -> npt
 
 
 def weights(name: str, values: npt.ArrayLike | None, shape: tuple[int, ...]) -> npt.NDArray[np.float64] | None:
-    """Return weights, one for every sample, or nothing; a masked one is zero."""
+    """Return weights, one for every sample, or None; a masked one is zero."""
     if values is None:
         return None
     array = np.array(

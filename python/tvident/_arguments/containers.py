@@ -17,7 +17,7 @@ _MOST_NAMES = 6
 
 
 def package_of(values: object) -> str:
-    """Return the package that the type of a value, or one that it is derived from, is of: pandas, polars, xarray, dask; or nothing."""
+    """Return the package that the type of a value, or of a base of it, belongs to: pandas, polars, xarray, dask; or None."""
     kind: Any = type(values)
     return _package_of(kind)
 
@@ -64,7 +64,7 @@ def plain(name: str, values: Any) -> Any:
 
 
 def fields_of(values: Any) -> list[Any]:
-    """Return the names of what a structure holds: of NumPy, of MATLAB, or a dictionary; nothing where it is none."""
+    """Return the names of what a structure holds: of NumPy, of MATLAB, or a dictionary; an empty list if it is none."""
     if isinstance(values, dict):
         return list(values)
     if isinstance(values, np.ndarray) and values.dtype.names is not None:

@@ -161,7 +161,7 @@ class _Parts:
         self._worst: dict[int, tuple[float, float]] = {}
 
     def step_to(self, part: int, period: float) -> float | None:
-        """Return what is to be added to a part beside what is added to the one before, or nothing if that cannot be known."""
+        """Return what is to be added to a part beside what is added to the one before, or None if that cannot be known."""
         end, begin = self.ends[part - 1], self.begins[part]
         gap = begin - end
         if gap not in self._worst:

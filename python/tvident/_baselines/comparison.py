@@ -16,14 +16,14 @@ from tvident._baselines.discrete import tvarx
 from tvident._baselines.recursive import random_walk_smoother, recursive_least_squares
 from tvident._baselines.sums import expanded_least_squares
 from tvident._equation import COEFFICIENTS
-from tvident._expansion import Expansion, Record
+from tvident._expansion import ExpandedRecord, Expansion
 from tvident._files import aligned
 from tvident._identify import identify
 from tvident._regression import rolling_least_squares
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
-Found: TypeAlias = tuple[Array, Array]
+ValueAndError: TypeAlias = tuple[Array, Array]
 """Inertia, damping and stiffness at every sample and their errors, shape (3, n)."""
 
 _WINDOW, _ORDER = 0.151, 9
@@ -78,7 +78,7 @@ class MethodComparison:
     """
 
     table: dict[str, npt.NDArray[Any]]
-    results: Mapping[str, Found]
+    results: Mapping[str, ValueAndError]
 
     def summary(self) -> str:
         """Return the table as text.
@@ -86,6 +86,10 @@ class MethodComparison:
         Returns
         -------
         str
+
+        See Also
+        --------
+        tvident.baselines : the methods that are compared.
         """
         heads = ("method", "I %", "C %", "K %", "bias %", "random %", "VAF %", "rise s", "coverage", "time s")
         numbers = [name for name in self.table if name != "method"]
@@ -174,7 +178,7 @@ def compare_methods(
     return MethodComparison(table | {name: np.array([row[name] for row in rows]) for name in order}, results)
 
 
-def _measures(found: Found, truth: Array | None, rate: float) -> dict[str, float]:
+def _measures(found: ValueAndError, truth: Array | None, rate: float) -> dict[str, float]:
     names = ("inertia", "damping", "stiffness", "bias", "random", "rise_time", "coverage")
     if truth is None:
         return dict.fromkeys(names, float("nan"))
@@ -216,10 +220,10 @@ def _rise_time(value: Array, truth: Array, rate: float) -> float:
     return float(np.median(found)) if found else float("nan")
 
 
-def _explained(found: Found, angle: Array, torque: Array, rate: float) -> dict[str, float]:
+def _explained(found: ValueAndError, angle: Array, torque: Array, rate: float) -> dict[str, float]:
     """Return how much of the torque's variance the parameters account for, in averages over a test function of a tenth of a second."""
     values, there = found[0], np.ones(angle.size, bool)
-    record = Record(angle, torque, there, there, 1 / rate, max(4, int(0.05 * rate)), 7)
+    record = ExpandedRecord(angle, torque, there, there, 1 / rate, max(4, int(0.05 * rate)), 7)
     everything = slice(0, (record.rows - 1) * record.stride + record.length)
     curves = [(name, [np.nan_to_num(one)]) for name, one in zip(COEFFICIENTS, values, strict=True)]
     predicted = np.einsum("ij,ij->i", record.noise_kernels(curves, everything), record.windows(angle[everything]))
@@ -231,14 +235,14 @@ def _explained(found: Found, angle: Array, torque: Array, rate: float) -> dict[s
     return {"vaf": 100 * (1 - float(np.var((measured - predicted)[usable]) / np.var(measured[usable])))}
 
 
-def _ours(angle: Array, torque: Array, rate: float, **given: Any) -> Found:
+def _ours(angle: Array, torque: Array, rate: float, **given: Any) -> ValueAndError:
     found = identify(angle, torque, sample_rate=rate, **given)
     return np.stack([getattr(found, name) for name in COEFFICIENTS]), np.stack(
         [found.stderr[name] for name in COEFFICIENTS]
     )
 
 
-def _expanded(angle: Array, torque: Array, rate: float) -> Found:
+def _expanded(angle: Array, torque: Array, rate: float) -> ValueAndError:
     given = {"inertia": "constant", "damping": "constant", "stiffness": Expansion("bspline")}
     return _ours(angle, torque, rate, **given)
 
@@ -250,7 +254,7 @@ def _regression(derivatives: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
     return rows, np.isfinite(rows).all(axis=1)
 
 
-def _spread(tracked: Any, there: npt.NDArray[np.bool_]) -> Found:
+def _spread(tracked: Any, there: npt.NDArray[np.bool_]) -> ValueAndError:
     """Return what was tracked in some rows, at every sample."""
     values, errors = np.full((2, 3, there.size), np.nan)
     values[:, there], errors[:, there] = tracked.values[:, :3].T, tracked.stderr[:, :3].T
@@ -262,7 +266,7 @@ def _odd(seconds: float, angle: Array, rate: float) -> int:
     return int(np.clip(round(seconds * rate) // 2 * 2 + 1, _ORDER + 2, (angle.size - 1) // 2 * 2 + 1))
 
 
-def _windows(derivatives: Array, torque: Array, rate: float) -> Found:
+def _windows(derivatives: Array, torque: Array, rate: float) -> ValueAndError:
     rows, there = _regression(derivatives)
     found = rolling_least_squares(rows[there], torque[there], max(8, round(_REGRESSION * rate)))
     values, errors = np.full((2, 3, torque.size), np.nan)
@@ -274,18 +278,18 @@ def _savgol(angle: Array, rate: float) -> Array:
     return savgol_derivatives(angle, _odd(_WINDOW, angle, rate), _ORDER, delta=1 / rate)
 
 
-def _sums(angle: Array, torque: Array, rate: float) -> Found:
+def _sums(angle: Array, torque: Array, rate: float) -> ValueAndError:
     rows, there = _regression(_savgol(angle, rate))
     tracked = expanded_least_squares(rows[there], torque[there], family="chebyshev", sizes=[1, 1, _SIZE, 1])
     return _spread(tracked, there)
 
 
-def _forgetting(angle: Array, torque: Array, rate: float) -> Found:
+def _forgetting(angle: Array, torque: Array, rate: float) -> ValueAndError:
     rows, there = _regression(_savgol(angle, rate))
     return _spread(recursive_least_squares(rows[there], torque[there], forgetting=1 - 1 / (_AVERAGED * rate)), there)
 
 
-def _walk(angle: Array, torque: Array, rate: float) -> Found:
+def _walk(angle: Array, torque: Array, rate: float) -> ValueAndError:
     rows, there = _regression(_savgol(angle, rate))
     noise = float(np.std(np.diff(torque)) / np.sqrt(2))
     # A stiffness that changes by about its size within ten seconds.
@@ -294,13 +298,13 @@ def _walk(angle: Array, torque: Array, rate: float) -> Found:
     return _spread(random_walk_smoother(rows[there], torque[there], steps=steps, noise=noise), there)
 
 
-def _discrete(angle: Array, torque: Array, rate: float) -> Found:
+def _discrete(angle: Array, torque: Array, rate: float) -> ValueAndError:
     every = max(1, round(rate / 100))
     tracked = tvarx(angle, torque, int(2 * rate), delta=1 / rate, every=every)
     return tracked.values.T, tracked.stderr.T
 
 
-METHODS: dict[str, Callable[[Array, Array, float], Found]] = {
+METHODS: dict[str, Callable[[Array, Array, float], ValueAndError]] = {
     "tvident": _ours,
     "tvident expansion": _expanded,
     "paper": lambda angle, torque, rate: _ours(angle, torque, rate, method="paper"),

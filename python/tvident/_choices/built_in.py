@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,15 @@ class BuiltIn:
         Units of inner parameters, which a search finds, by name.
     needs_velocity : bool
         Whether the velocity is asked for.
+    angle_period : float, optional
+        Angle in rad after which the function repeats itself: 0 where it does not depend on the angle, None where it never does. Only an
+        axis that turns has terms with a period.
+    spring : {"beside", "instead"}, optional
+        Whether it goes beside a stiffness, as a spring that hardens does, or may take its place, as a pendulum does.
+    dissipates : bool
+        Whether a negative factor would drive the motion, which friction does not.
+    is_sought : bool
+        Whether it is looked for in strong form where it is left out; in weak form the core's table says it.
     """
 
     name: str
@@ -37,13 +47,32 @@ class BuiltIn:
     function: Callable[..., Any]
     inner: Mapping[str, str] = field(default_factory=dict)
     needs_velocity: bool = True
+    angle_period: float | None = 0.0
+    spring: Literal["beside", "instead"] | None = None
+    dissipates: bool = False
+    is_sought: bool = False
+
+    @property
+    def is_of_angle(self) -> bool:
+        """Whether the function depends on the angle."""
+        return self.angle_period != 0
+
+    def repeats_after(self, angle: float) -> bool:
+        """Return whether the function is the same where the angle is larger by so many rad; no period is 0."""
+        if not self.angle_period:
+            return not self.is_of_angle
+        return angle != 0 and (angle / self.angle_period).is_integer()
+
+
+OFFSET, FRICTION = "offset", "coulomb"
+"""A constant torque, of which every equation has one by default, and dry friction, at which machines stick."""
 
 
 BUILT_IN = {
     term.name: term
     for term in (
         BuiltIn(
-            "offset",
+            OFFSET,
             "N m",
             "1: a constant torque",
             "a constant torque of {amount} seems to act",
@@ -51,11 +80,13 @@ BUILT_IN = {
             needs_velocity=False,
         ),
         BuiltIn(
-            "coulomb",
+            FRICTION,
             "N m",
             "the sign of the velocity: dry friction",
             "dry friction of {amount} seems to act",
             lambda numpy, _, velocity: numpy.sign(velocity),
+            dissipates=True,
+            is_sought=True,
         ),
         BuiltIn(
             "cubic",
@@ -64,6 +95,9 @@ BUILT_IN = {
             "the spring seems to harden or soften, by {amount}",
             lambda _, angle, __: angle**3,
             needs_velocity=False,
+            angle_period=None,
+            spring="beside",
+            is_sought=True,
         ),
         BuiltIn(
             "gravity",
@@ -72,6 +106,9 @@ BUILT_IN = {
             "gravity of {amount} seems to act",
             lambda numpy, angle, _: numpy.sin(angle),
             needs_velocity=False,
+            angle_period=2 * math.pi,
+            spring="instead",
+            is_sought=True,
         ),
         BuiltIn(
             "viscous_asymmetric",

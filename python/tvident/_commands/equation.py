@@ -25,7 +25,7 @@ def parameter_of(value: str, channels: recordings.Channels, file: str | None) ->
 
 
 def terms_of(texts: tuple[str, ...]) -> list[Any] | None:
-    """Return terms from ``name`` or ``name:kind``; nothing where none are given, none where ``none`` is."""
+    """Return terms from ``name`` or ``name:kind``; None if none are given, an empty list for ``none``."""
     if texts == ("none",):
         return []
     parts = [text.partition(":") for text in texts]

@@ -17,7 +17,7 @@ from tvident._commands.given import given, length
 from tvident._commands.method import NAMES, method_of
 from tvident._commands.settings import read_settings
 from tvident._equation import COEFFICIENTS
-from tvident._live import Inlet, JsonLines, Lines, Outlet, Session, Table, Udp
+from tvident._live import Inlet, JsonLines, Lines, LiveTable, Outlet, Session, Udp
 from tvident._units import ROTARY, factor_to
 
 _WAIT = 0.05
@@ -80,7 +80,7 @@ def live(
     shows: list[Any] = []
     kind = shown or ("table" if sys.stdout.isatty() else "json")
     if kind != "nothing":
-        shows.append((Table(sys.stdout, every, unknown) if kind == "table" else JsonLines(sys.stdout)).show)
+        shows.append((LiveTable(sys.stdout, every, unknown) if kind == "table" else JsonLines(sys.stdout)).show)
     if udp is not None:
         shows.append(Udp(udp).show)
     outlet: Outlet | None = None

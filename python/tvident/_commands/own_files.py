@@ -50,7 +50,7 @@ def _digest(place: Path) -> str:
 
 
 def _written(folder: Path) -> dict[str, str]:
-    """Return what the record says, and nothing where it is no record."""
+    """Return what the record says, an empty dictionary if it is no record."""
     try:
         content = json.loads((folder / _RECORD).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):

@@ -116,6 +116,11 @@ class ModelComparison:
         -------
         str
             One line a model, the best first; one line a parameter; which models the record hardly tells apart.
+
+        See Also
+        --------
+        plot : the weights as a picture.
+        Identification.summary : of one model.
         """
         head = ("model", "", "parameters", "residual std.", "AICc", "difference", "weight", "")
         rows: list[tuple[str, ...]] = [head]
@@ -190,6 +195,10 @@ class ModelComparison:
         ------
         ValueError
             If the ending is another one.
+
+        See Also
+        --------
+        to_pandas : the same table in memory.
         """
         write_table(path, self.table, {"residual_std": "N m"})
 
@@ -204,6 +213,10 @@ class ModelComparison:
         ------
         ImportError
             If pandas is missing.
+
+        See Also
+        --------
+        save : the same table in a file.
         """
         try:
             import pandas as pd  # type: ignore[import-not-found,import-untyped,unused-ignore] # noqa: PLC0415 - optional
@@ -229,6 +242,10 @@ class ModelComparison:
         ------
         ImportError
             If matplotlib is missing: install ``tvident[plot]``.
+
+        See Also
+        --------
+        summary : the numbers.
         """
         from tvident import _figures  # noqa: PLC0415 - matplotlib is optional
 

@@ -13,7 +13,7 @@ Array: TypeAlias = npt.NDArray[np.float64]
 
 
 def effective_parameters(result: Identification, samples: int) -> float:
-    """Return how many parameters were estimated: one a constant; of what changes as many as windows have coefficients."""
+    """Return how many parameters were estimated: one for a constant; for a windowed one as many as windows have coefficients."""
     settings, count = result.settings, float("angle_zero" in result.constants)
     known = settings["known"]
     for name in ("inertia", "damping", "stiffness", *result.terms):

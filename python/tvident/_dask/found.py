@@ -61,50 +61,127 @@ class DaskIdentification:
 
     @cached_property
     def settings(self) -> dict[str, Any]:
+        """What was given and chosen, as plain JSON; asking computes it.
+
+        See Also
+        --------
+        tvident.dask.identify : `settings=` repeats it.
+        """
         return dict(self.chosen.compute())
 
     @property
     def inertia(self) -> Any:
+        r"""Inertia, dask array of float64, shape (\*, n), in kg m².
+
+        See Also
+        --------
+        stderr : its error.
+        tvident.Identification : the same in memory.
+        """
         return self.columns["inertia"]
 
     @property
     def damping(self) -> Any:
+        r"""Damping, dask array of float64, shape (\*, n), in N m s/rad.
+
+        See Also
+        --------
+        stderr : its error.
+        tvident.Identification : the same in memory.
+        """
         return self.columns["damping"]
 
     @property
     def stiffness(self) -> Any:
+        r"""Stiffness, dask array of float64, shape (\*, n), in N m/rad.
+
+        See Also
+        --------
+        stderr : its error.
+        tvident.Identification : the same in memory.
+        """
         return self.columns["stiffness"]
 
     @property
     def terms(self) -> dict[str, Any]:
+        r"""Factors of further terms by name, dask arrays of float64, shape (\*, n).
+
+        See Also
+        --------
+        stderr : their errors.
+        """
         return {name: self.columns[name] for name in self._names if name not in COEFFICIENTS}
 
     @property
     def stderr(self) -> dict[str, Any]:
+        r"""Standard errors by name, dask arrays of float64, shape (\*, n), in the parameters' units.
+
+        See Also
+        --------
+        tvident.Identification : says what they contain.
+        """
         return {name: self.columns[f"{name}_stderr"] for name in self._names}
 
     @property
     def condition(self) -> Any:
+        r"""Condition numbers of the equations, dask array of float64, shape (\*, n).
+
+        See Also
+        --------
+        tvident.Identification : the same in memory.
+        """
         return self.columns["condition"]
 
     @property
     def residual_std(self) -> Any:
+        r"""Standard deviation of the residuals of the torque in N m, dask array of float64, shape (\*, n).
+
+        See Also
+        --------
+        tvident.Identification : the same in memory.
+        """
         return self.columns["residual_std"]
 
     @property
     def order(self) -> Any:
+        r"""Orders of the polynomials, dask array of uint8, shape (\*, n).
+
+        See Also
+        --------
+        tvident.fit_local_polynomials : says how they are chosen.
+        """
         return self.columns["order"]
 
     @property
     def status(self) -> Any:
+        r"""Flags of samples, dask array of uint16, shape (\*, n).
+
+        See Also
+        --------
+        record_status : flags of the record.
+        tvident.Status : what flags mean.
+        """
         return self.columns["status"]
 
     @property
     def constants(self) -> dict[str, tuple[Any, Any]]:
+        """What is constant over a record, by name: value and standard error. Asking computes them.
+
+        See Also
+        --------
+        tvident.Identification : the same in memory.
+        """
         return dict(self._computed[0])
 
     @property
     def record_status(self) -> Any:
+        """Flags of the whole record, int or ndarray of uint16 in the shape of the batch. Asking computes them.
+
+        See Also
+        --------
+        status : flags of samples.
+        tvident.Status : what flags mean.
+        """
         return self._computed[1]
 
     @property

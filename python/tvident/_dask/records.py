@@ -37,7 +37,7 @@ _NEIGHBOURS = 4
 
 
 @dataclass(frozen=True)
-class Identified:
+class IdentifiedBlocks:
     """What is to be computed of one record.
 
     Parameters
@@ -54,7 +54,7 @@ class Identified:
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _AskedOfDask:
     """What a task makes a long record of: little, and it goes to every worker."""
 
     request: Request
@@ -78,10 +78,10 @@ class _Asked:
         )
 
 
-class _Record:
+class _DaskRecord:
     """Angle, torque and maybe weights of one record, and what is asked for."""
 
-    def __init__(self, channels: Sequence[Any], asked: _Asked) -> None:
+    def __init__(self, channels: Sequence[Any], asked: _AskedOfDask) -> None:
         self.dask, _ = imported()
         self.channels, self.angle, self.asked = channels, channels[0], asked
         self.quantisation = asked.request.quantisation
@@ -110,10 +110,10 @@ class _Record:
         return {name: joined([part[name] for part in parts], counts, kind) for name, kind in kinds.items()}
 
 
-def record_of(channels: Sequence[Any], given: Given, step: int) -> Identified:
+def record_of(channels: Sequence[Any], given: Given, step: int) -> IdentifiedBlocks:
     """Return what is to be computed of one record."""
     request = requested(given.method, given.equation, given.settings, 1 / given.period)
-    record = _Record(channels, _Asked(request, channels[0].shape[-1], given, step))
+    record = _DaskRecord(channels, _AskedOfDask(request, channels[0].shape[-1], given, step))
     if not isinstance(request.form, WeakForm) and record.plain.is_windowed:
         return _windowed(record)
     if not isinstance(request.form, WeakForm) and record.plain.is_constant:
@@ -121,7 +121,7 @@ def record_of(channels: Sequence[Any], given: Given, step: int) -> Identified:
     return _alone(record)
 
 
-def _windowed(record: _Record) -> Identified:
+def _windowed(record: _DaskRecord) -> IdentifiedBlocks:
     """Windows of the strong form: blocks have the bits of the whole record."""
     dask, plain, asked = record.dask, record.plain, record.asked
     spans = plain.spans_of_scatter()
@@ -133,7 +133,7 @@ def _windowed(record: _Record) -> Identified:
         span = plain.around(block)
         parts.append(work(record.held([span]), (span, block), factors, asked, record.quantisation))
     settings = dask.delayed(_with_factors, pure=True)(factors, asked, record.quantisation)
-    return Identified(record.columns(parts, found), settings, dask.delayed(({}, 0)))
+    return IdentifiedBlocks(record.columns(parts, found), settings, dask.delayed(({}, 0)))
 
 
 def _reach(plain: Long, samples: int) -> int:
@@ -141,11 +141,11 @@ def _reach(plain: Long, samples: int) -> int:
     return end - first
 
 
-def _factors(channels: Sequence[Any], spans: Sequence[Span], asked: _Asked, quantisation: float) -> list[float]:
+def _factors(channels: Sequence[Any], spans: Sequence[Span], asked: _AskedOfDask, quantisation: float) -> list[float]:
     return asked.long(quantisation).factors(_held(channels, spans), 1)
 
 
-def _with_factors(factors: Sequence[float], asked: _Asked, quantisation: float) -> dict[str, Any]:
+def _with_factors(factors: Sequence[float], asked: _AskedOfDask, quantisation: float) -> dict[str, Any]:
     return asked.long(quantisation).settings(factors)
 
 
@@ -155,7 +155,11 @@ def _held(channels: Sequence[Any], spans: Sequence[Span]) -> Held:
 
 
 def _windows(
-    channels: Sequence[Any], places: tuple[Span, Span], factors: Sequence[float], asked: _Asked, quantisation: float
+    channels: Sequence[Any],
+    places: tuple[Span, Span],
+    factors: Sequence[float],
+    asked: _AskedOfDask,
+    quantisation: float,
 ) -> Columns:
     """Return the columns of one block, on one thread: dask has others."""
     span, block = places
@@ -170,7 +174,7 @@ def _windows(
     return columns_of(long.windows(held, block, factors, 1))
 
 
-def _constant(record: _Record) -> Identified:
+def _constant(record: _DaskRecord) -> IdentifiedBlocks:
     """Constants of the strong form: the equations of blocks add up, in a tree."""
     dask, plain, asked = record.dask, record.plain, record.asked
     found = record.blocks(_reach(plain, asked.samples))
@@ -184,16 +188,16 @@ def _constant(record: _Record) -> Identified:
     told = dask.delayed(_constants, pure=True)(record.held(spans), spans, total, asked, record.quantisation)
     everywhere = dask.delayed(_everywhere, pure=True)
     columns = record.columns([everywhere(*part, told) for part in parts], found)
-    return Identified(columns, plain.settings(), told[:2])
+    return IdentifiedBlocks(columns, plain.settings(), told[:2])
 
 
-def _rows(channels: Sequence[Any], places: tuple[Span, Span], asked: _Asked, quantisation: float) -> Any:
+def _rows(channels: Sequence[Any], places: tuple[Span, Span], asked: _AskedOfDask, quantisation: float) -> Any:
     span, block = places
     return asked.long(quantisation).rows(_held(channels, [span]), block, 1)
 
 
 def _constants(
-    channels: Sequence[Any], spans: Sequence[Span], total: Any, asked: _Asked, quantisation: float
+    channels: Sequence[Any], spans: Sequence[Span], total: Any, asked: _AskedOfDask, quantisation: float
 ) -> tuple[dict[str, tuple[float, float]], int, float, float]:
     """Return the constants of the record, its flags, the condition number and the standard deviation of the residuals."""
     long = asked.long(quantisation)
@@ -201,7 +205,7 @@ def _constants(
 
 
 def _everywhere(
-    channels: Sequence[Any], places: tuple[Span, Span], asked: _Asked, quantisation: float, told: Any
+    channels: Sequence[Any], places: tuple[Span, Span], asked: _AskedOfDask, quantisation: float, told: Any
 ) -> Columns:
     """Return the columns of a block whose parameters are those of the record."""
     span, block = places
@@ -219,7 +223,7 @@ def _everywhere(
     return columns | {"order": polynomials.order, "status": status}
 
 
-def _alone(record: _Record) -> Identified:
+def _alone(record: _DaskRecord) -> IdentifiedBlocks:
     """Blocks that are records of their own; constants are put together in a tree, and windows corrected for them."""
     dask, asked = record.dask, record.asked
     given = asked.given
@@ -245,7 +249,7 @@ def _alone(record: _Record) -> Identified:
     columns = record.columns([finish(part, means) for part in parts], found)
     told = dask.delayed(_told, pure=True)(notes, means, choices)
     settings = dask.delayed(_settings, pure=True)(notes if choices is None else [], choices)
-    return Identified(columns, settings, told)
+    return IdentifiedBlocks(columns, settings, told)
 
 
 def _choices(each: Sequence[Sequence[Any]], spans: Sequence[Span], given: Given) -> Choices:

@@ -31,7 +31,7 @@ _MOST_SCATTER = 1.5
 
 
 @dataclass(frozen=True)
-class _Estimates:
+class _TimedEstimates:
     """One derivative at every sample of a record, and what else is known of its windows."""
 
     value: Numbers
@@ -41,19 +41,19 @@ class _Estimates:
     sigma: Numbers
 
     @classmethod
-    def none(cls, shape: tuple[int, ...]) -> _Estimates:
+    def none(cls, shape: tuple[int, ...]) -> _TimedEstimates:
         """Return arrays in which nothing is known yet."""
         value, error, sigma = (np.full(shape, np.nan) for _ in range(3))
         return cls(value, error, np.zeros(shape, np.uint8), np.full(shape, Status.INVALID, np.uint16), sigma)
 
-    def take(self, some: Any, other: _Estimates, places: Any) -> None:
+    def take(self, some: Any, other: _TimedEstimates, places: Any) -> None:
         """Take over some places from another."""
         for name, values in vars(self).items():
             values[some] = getattr(other, name)[places]
 
 
 @dataclass(frozen=True)
-class _Windows:
+class _TimedWindows:
     """Windows with polynomials of one order, at the times of a record.
 
     Parameters
@@ -86,7 +86,7 @@ class _Windows:
             quantisation=self.quantisation,
         )
 
-    def of(self, record: npt.NDArray[np.number], workers: int | None) -> _Estimates:
+    def of(self, record: npt.NDArray[np.number], workers: int | None) -> _TimedEstimates:
         """Return the estimates of a record without gaps: with the order of the whole record, but near its ends."""
         found = self._fitted(record, workers)
         seconds = self.length * self.period
@@ -103,10 +103,10 @@ class _Windows:
             found.take(lost, self._fitted(record, workers, by_count=True), lost)
         return found
 
-    def between_gaps(self, record: npt.NDArray[np.number], workers: int | None) -> _Estimates:
+    def between_gaps(self, record: npt.NDArray[np.number], workers: int | None) -> _TimedEstimates:
         """Return the estimates of all parts of a record between steps that are longer than half a window."""
         samples = self.times.size
-        found = _Estimates.none((samples,))
+        found = _TimedEstimates.none((samples,))
         borders = [0, *(np.flatnonzero(np.diff(self.times) > self.length // 2 * self.period) + 1).tolist(), samples]
         for first, end in pairwise(borders):
             length = min(self.length, (end - first - 1) // 2 * 2 + 1)
@@ -116,10 +116,10 @@ class _Windows:
             found.take(slice(first, end), part, slice(None))
         return found
 
-    def _fitted(self, record: npt.NDArray[np.number], workers: int | None, **how: bool) -> _Estimates:
-        found, errors = self.plan(**how).estimate(record, workers=workers)
-        last = self.derivative
-        return _Estimates(found.derivatives[last], errors[last], found.order, found.status, found.sigma)
+    def _fitted(self, record: npt.NDArray[np.number], workers: int | None, **how: bool) -> _TimedEstimates:
+        fitted = self.plan(**how).estimate(record, workers=workers)
+        found, last = fitted.estimates, self.derivative
+        return _TimedEstimates(found.derivatives[last], fitted.stderr[last], found.order, found.status, found.sigma)
 
 
 def choose_at_own_times(
@@ -155,14 +155,14 @@ def choose_at_own_times(
     lengths = np.asarray(chosen.window_length)
     orders = np.array(chosen.settings["order"]).reshape(lengths.shape)
 
-    def windows(derivative: int, index: tuple[int, ...]) -> _Windows:
+    def windows(derivative: int, index: tuple[int, ...]) -> _TimedWindows:
         at = (derivative, *index)
         # A record of nothing but missing values has no window; any will do to say so.
         length = min(int(lengths[at]) or SHORTEST_WINDOW, (times.size - 1) // 2 * 2 + 1)
-        return _Windows(times, grid.period, length, int(orders[at]), derivative, quantisation)
+        return _TimedWindows(times, grid.period, length, int(orders[at]), derivative, quantisation)
 
     shape = (len(lengths), *samples.shape)
-    found = _Estimates.none(shape)
+    found = _TimedEstimates.none(shape)
     with arguments.reporter(progress, "local polynomials") as report:
         for done, at in enumerate(np.ndindex(shape[:-1])):
             one = windows(at[0], at[1:]).between_gaps(samples[at[1:]], workers)

@@ -117,7 +117,12 @@ class LocalPolynomialFit(Tabular):
 
     @property
     def time(self) -> npt.NDArray[np.float64]:
-        """Time of every result in seconds, along the axis of time."""
+        """Time of every result in seconds, along the axis of time, shape (n,).
+
+        See Also
+        --------
+        derivatives : the results.
+        """
         return self._sampled.at(self._samples.shape[-1])
 
     def _in_place(self, array: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -138,6 +143,15 @@ class LocalPolynomialFit(Tabular):
         window of the ends they are those of the order that was taken there.
 
         The cost is about 300 ns a sample; that of the fit if the order is fixed; nothing if windows were chosen.
+
+        See Also
+        --------
+        sigma : the noise that it follows from.
+        scores : the criterion behind the weights.
+
+        References
+        ----------
+        K. P. Burnham, D. R. Anderson: Model selection and multimodel inference (2002), section 4.3.2; equation (d) of docs/mathematics.md.
 
         Examples
         --------
@@ -171,9 +185,18 @@ class LocalPolynomialFit(Tabular):
         TypeError
             If `i` is not a whole number.
 
+        See Also
+        --------
+        order : the order that was taken.
+        fit_local_polynomials : `criterion=` chooses it.
+
         Notes
         -----
         The cost is that of projecting one window: O(window · orders).
+
+        References
+        ----------
+        C. M. Hurvich, C.-L. Tsai: Regression and time series model selection in small samples, Biometrika 76 (1989).
 
         Examples
         --------

@@ -145,11 +145,12 @@ def filled(
             weights=None if weight is None else weight.tolist(),
             workers=workers,
         )
-        derivatives[(slice(None), *index, places)] = found[0]
-        order[(*index, places)], status[(*index, places)], sigma[(*index, places)] = found[2], found[3], found[4]
+        derivatives[(slice(None), *index, places)] = found.derivatives
+        order[(*index, places)], status[(*index, places)] = found.order, found.status
+        sigma[(*index, places)] = found.sigma
         # A polynomial of a lower order has no such derivative: zero without an error is no estimate of it.
-        unknown = np.arange(derivatives.shape[0])[:, None] > found[2]
-        errors.append(((slice(None), *index, places), np.where(unknown, np.nan, found[1])))
+        unknown = np.arange(derivatives.shape[0])[:, None] > found.order
+        errors.append(((slice(None), *index, places), np.where(unknown, np.nan, found.stderr)))
 
     def standard_errors() -> Array:
         computed = core_plan.errors(incomplete.plain(samples), step=step, workers=workers)

@@ -156,7 +156,8 @@ class _Fit:
             length = self.length
             rows = length if isinstance(length, int) else max(1, round(length / float(np.median(np.diff(times)))))
             records = self._clipped(records, plan, rows)
-        found, errors = plan.estimate(records, step=step, workers=self.workers, progress=report)
+        fitted = plan.estimate(records, step=step, workers=self.workers, progress=report)
+        found, errors = fitted.estimates, fitted.stderr
         return Found(
             derivatives=found.derivatives,
             order=found.order,
@@ -179,7 +180,7 @@ class _Fit:
         """Return records whose residuals are clipped, in windows of about so many rows."""
 
         def value(some: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-            return np.asarray(plan.estimate(some, step=1, workers=self.workers)[0].derivatives[0])
+            return np.asarray(plan.estimate(some, step=1, workers=self.workers).estimates.derivatives[0])
 
         return with_clipped_residuals(records, value, rows, omit=False)
 

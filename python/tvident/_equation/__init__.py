@@ -1,6 +1,6 @@
 """Describes the equation of motion: kinds of parameters, terms with a name, terms of one's own, units."""
 
-from tvident._choices import BUILT_IN, TERM_NAMES, Kind
+from tvident._choices import BUILT_IN, FRICTION, OFFSET, TERM_NAMES, Kind
 from tvident._equation.inner import InnerParameter, expected_stribeck
 from tvident._equation.kinds import COEFFICIENTS, Parameter, parameter
 from tvident._equation.names import name_of_term
@@ -10,7 +10,9 @@ from tvident._equation.units import LINEAR_UNITS, UNITS
 __all__ = [
     "BUILT_IN",
     "COEFFICIENTS",
+    "FRICTION",
     "LINEAR_UNITS",
+    "OFFSET",
     "TERM_NAMES",
     "UNITS",
     "FixedTerm",

@@ -98,6 +98,14 @@ class Term:
             If the function returns another shape.
         TypeError
             If it returns no real numbers.
+
+        See Also
+        --------
+        tvident.identify : takes terms.
+
+        References
+        ----------
+        Equation (1) of docs/mathematics.md: a term is one of its functions g.
         """
         # The result's time and the angle of the next term are not for this function to change.
         returned = self.function(t.copy(), angle.copy(), velocity.copy(), **inner)

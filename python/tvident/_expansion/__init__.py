@@ -4,8 +4,17 @@ from tvident._expansion.basis import Basis, Coordinate
 from tvident._expansion.expansion import Expansion
 from tvident._expansion.fit import Curves, Fitted, Linearised
 from tvident._expansion.rivals import Rival, scatter
-from tvident._expansion.rows import Record, Unknown
-from tvident._expansion.search import DERIVATIVES, SLACK, Part, Search, Tried, along_record, curves_of, errors_along
+from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown
+from tvident._expansion.search import (
+    DERIVATIVES,
+    SLACK,
+    RecordPart,
+    SizeSearch,
+    Tried,
+    along_record,
+    curves_of,
+    errors_along,
+)
 
 __all__ = [
     "DERIVATIVES",
@@ -13,15 +22,15 @@ __all__ = [
     "Basis",
     "Coordinate",
     "Curves",
+    "ExpandedRecord",
+    "ExpandedUnknown",
     "Expansion",
     "Fitted",
     "Linearised",
-    "Part",
-    "Record",
+    "RecordPart",
     "Rival",
-    "Search",
+    "SizeSearch",
     "Tried",
-    "Unknown",
     "along_record",
     "curves_of",
     "errors_along",

@@ -123,12 +123,22 @@ class Expansion:
 
     @property
     def is_of_time(self) -> bool:
-        """Whether it is a function of time."""
+        """True where it is a function of time, False of a channel.
+
+        See Also
+        --------
+        channels : what it is a function of.
+        """
         return self.of is None
 
     @property
     def channels(self) -> tuple[npt.NDArray[np.float64], ...]:
-        """The channels that it is a function of."""
+        """The channels that it is a function of, as a tuple of arrays, shape (n,); empty where it is one of time.
+
+        See Also
+        --------
+        is_of_time : whether it is a function of time.
+        """
         if self.of is None:
             return ()
         pair = isinstance(self.of, tuple | list) and len(self.of) == _TWO and np.ndim(self.of[0]) > 0
@@ -137,12 +147,22 @@ class Expansion:
 
     @property
     def dimensions(self) -> int:
-        """How many coordinates there are."""
+        """How many coordinates there are: 1 or 2.
+
+        See Also
+        --------
+        channels : what they are.
+        """
         return max(1, len(self.channels))
 
     @property
     def families(self) -> tuple[Family, ...]:
-        """The functions of every coordinate, of places from 0 to 1."""
+        """The functions of every coordinate, of places from 0 to 1, as a tuple.
+
+        See Also
+        --------
+        families_within : the same between limits.
+        """
         return self.families_within([(0.0, 1.0)] * self.dimensions)
 
     def families_within(self, limits: Sequence[tuple[float, float]]) -> tuple[Family, ...]:
@@ -156,13 +176,23 @@ class Expansion:
         Returns
         -------
         tuple of Family
+
+        See Also
+        --------
+        families : the same of places from 0 to 1.
         """
         each = self.family if isinstance(self.family, tuple | list) else [self.family] * self.dimensions
         return tuple(self._family(one, within) for one, within in zip(each, limits, strict=True))
 
     @property
     def given_sizes(self) -> tuple[int | None, ...]:
-        """The size of every coordinate; None where the record chooses."""
+        """The size of every coordinate, as a tuple of int; None where the record chooses.
+
+        See Also
+        --------
+        given_limits : the ranges.
+        ExpandedParameter.size : what was chosen.
+        """
         each: Sequence[Any] = self.size if isinstance(self.size, tuple | list) else [self.size] * self.dimensions
         if len(each) != self.dimensions:
             raise ValueError(
@@ -172,7 +202,12 @@ class Expansion:
 
     @property
     def given_limits(self) -> tuple[tuple[float, float] | None, ...]:
-        """The range of every coordinate, where it was given."""
+        """The range of every coordinate in the channel's unit, or in seconds, where it was given.
+
+        See Also
+        --------
+        given_sizes : the sizes.
+        """
         if self.limits is None:
             return (None,) * self.dimensions
         each: Sequence[Any] = self.limits if np.ndim(self.limits[0]) > 0 else [self.limits] * self.dimensions
@@ -188,13 +223,23 @@ class Expansion:
 
     @property
     def called(self) -> str:
-        """What it is called in a sentence."""
+        """What it is called in a sentence.
+
+        See Also
+        --------
+        channels : what it is a function of.
+        """
         names = self.family if isinstance(self.family, tuple | list) else [self.family]
         return " x ".join(one if isinstance(one, str) else getattr(one, "__name__", "own") for one in names)
 
     @property
     def is_of_powers(self) -> bool:
-        """Whether factors are those of powers."""
+        """True where the functions are powers of the channel: the family ``"powers"``.
+
+        See Also
+        --------
+        families : the functions.
+        """
         return self.family == "powers"
 
     def _family(self, one: Any, limits: tuple[float, float]) -> Family:

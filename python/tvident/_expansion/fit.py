@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._expansion.covariance import Whitening
-from tvident._expansion.rows import Record, Unknown
+from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -37,7 +37,7 @@ _TO_COMPARE, _TO_SOLVE = 1e-4, 1e-2
 
 
 @dataclass(frozen=True)
-class Scored:
+class ScoredSize:
     """How well some columns explain a record.
 
     Attributes
@@ -91,9 +91,9 @@ class Fitted:
         return float("inf") if self.factor is None else float(np.linalg.cond(self.factor))
 
     @property
-    def scored(self) -> Scored:
+    def scored(self) -> ScoredSize:
         """How well it explains the record."""
-        return Scored(self.values.size, np.nan if self.factor is None else self.misfit, self.observations)
+        return ScoredSize(self.values.size, np.nan if self.factor is None else self.misfit, self.observations)
 
 
 class Linearised:
@@ -101,7 +101,7 @@ class Linearised:
 
     Parameters
     ----------
-    record : Record
+    record : ExpandedRecord
     curves : Curves
         Inertia, damping and stiffness, about.
     terms : Array
@@ -112,7 +112,9 @@ class Linearised:
         Those of the curves that are known beforehand.
     """
 
-    def __init__(self, record: Record, curves: Curves, terms: Array, noise: tuple[float, float], known: Curves) -> None:
+    def __init__(
+        self, record: ExpandedRecord, curves: Curves, terms: Array, noise: tuple[float, float], known: Curves
+    ) -> None:
         self.record = record
         usable = record.usable_rows()
         torque, late = record.late()
@@ -155,7 +157,7 @@ class Linearised:
         self.rhs[~usable] = 0.0
         self.angle = record.angle - shown
 
-    def solve(self, unknowns: Sequence[Unknown]) -> Fitted:
+    def solve(self, unknowns: Sequence[ExpandedUnknown]) -> Fitted:
         """Return the least-squares solution for some unknowns: by QR decompositions of blocks of whitened rows where these need them."""
         size = sum(one.size for one in unknowns)
         factor = _factor(self._products(unknowns, size), _TO_SOLVE)
@@ -166,19 +168,19 @@ class Linearised:
                 factor = np.asarray(np.linalg.qr(np.concatenate([factor, white]), mode="r"), np.float64)
         return solved(factor, self.observations, is_well=is_well)
 
-    def score(self, unknowns: Sequence[Unknown]) -> Scored:
+    def score(self, unknowns: Sequence[ExpandedUnknown]) -> ScoredSize:
         """Return how well some unknowns explain the record, as their solution says."""
         size = sum(one.size for one in unknowns)
         factor = _factor(self._products(unknowns, size), _TO_COMPARE)
         if factor is None:
             return self.solve(unknowns).scored
-        return Scored(size, float(factor[size, size] ** 2), self.observations)
+        return ScoredSize(size, float(factor[size, size] ** 2), self.observations)
 
-    def _products(self, unknowns: Sequence[Unknown], size: int) -> Array:
+    def _products(self, unknowns: Sequence[ExpandedUnknown], size: int) -> Array:
         """Return the products of whitened columns, the right-hand side last."""
         return sum(map(_products, self.whitened(unknowns)), np.zeros((size + 1, size + 1)))
 
-    def whitened(self, unknowns: Sequence[Unknown]) -> Iterator[Array]:
+    def whitened(self, unknowns: Sequence[ExpandedUnknown]) -> Iterator[Array]:
         """Give pieces of whitened rows, the right-hand side last."""
         record, before = self.record, None
         for some, samples in record.pieces():
@@ -187,7 +189,7 @@ class Linearised:
             white, before = self.whitening.whiten(design, some.start, before)
             yield white
 
-    def covariance_of_residuals(self, unknowns: Sequence[Unknown], fitted: Fitted) -> Array:
+    def covariance_of_residuals(self, unknowns: Sequence[ExpandedUnknown], fitted: Fitted) -> Array:
         """Return a covariance that follows from the whitened residuals and their correlation (Newey and West), not from the noise."""
         record = self.record
         reach = int(np.ceil(4 * (max(1, record.rows) / 100) ** (2 / 9))) + record.lags

@@ -50,7 +50,7 @@ class Kernels:
 
 
 @dataclass(frozen=True)
-class Unknown:
+class ExpandedUnknown:
     """One unknown of the equation: a factor, or the factors of an expansion.
 
     Parameters
@@ -87,7 +87,7 @@ def parts(role: str, kernels: Kernels) -> list[Array]:
 
 
 @dataclass(frozen=True)
-class Record:
+class ExpandedRecord:
     """A record as rows are made of it.
 
     Parameters
@@ -171,7 +171,7 @@ class Record:
         """Return the windows of the rows in a stretch of a channel, shape (rows, 2h + 1): a view."""
         return np.lib.stride_tricks.sliding_window_view(channel, self.length)[:: self.stride]
 
-    def columns(self, unknowns: Sequence[Unknown], angle: Array, samples: slice) -> Array:
+    def columns(self, unknowns: Sequence[ExpandedUnknown], angle: Array, samples: slice) -> Array:
         """Return the columns of a stretch's rows, shape (rows, columns)."""
         kernels, windows = self.kernels, self.windows(angle[samples])
         found = []

@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from tvident._expansion.basis import Basis, Coordinate
 from tvident._expansion.families import Family
-from tvident._expansion.fit import Curves, Fitted, Linearised, Scored
+from tvident._expansion.fit import Curves, Fitted, Linearised, ScoredSize
 from tvident._expansion.rivals import Rival, scatter
-from tvident._expansion.rows import Record, Unknown
+from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -46,7 +46,7 @@ DERIVATIVES = {"inertia": 2, "momentum": 1, "damping": 1}
 
 
 @dataclass(frozen=True)
-class Part:
+class RecordPart:
     """An unknown of the equation before it has a size.
 
     Parameters
@@ -70,10 +70,10 @@ class Part:
     largest: int = 1
     samples: Array | None = None
 
-    def of(self, sizes: Sequence[int]) -> Unknown:
+    def of(self, sizes: Sequence[int]) -> ExpandedUnknown:
         """Return it with sizes."""
         basis = Basis(self.coordinates, self.families, sizes) if self.coordinates else None
-        return Unknown(self.name, self.role, basis, self.samples)
+        return ExpandedUnknown(self.name, self.role, basis, self.samples)
 
 
 @dataclass(frozen=True)
@@ -97,28 +97,28 @@ class Tried:
 
 
 @dataclass
-class Search:
+class SizeSearch:
     """The search for sizes and factors in one record.
 
     Parameters
     ----------
-    record : Record
-    parts : sequence of Part
+    record : ExpandedRecord
+    parts : sequence of RecordPart
     noise : (float, float)
         Variances of angle and torque.
     known : Curves
         Coefficients that are known.
     """
 
-    record: Record
-    parts: Sequence[Part]
+    record: ExpandedRecord
+    parts: Sequence[RecordPart]
     noise: tuple[float, float]
     known: Curves
     tried: dict[tuple[int, ...], Tried] = field(default_factory=dict)
     rivals: dict[str, list[Rival]] = field(default_factory=dict)
-    _scores: dict[tuple[int, ...], tuple[list[Unknown], Scored]] = field(default_factory=dict)
+    _scores: dict[tuple[int, ...], tuple[list[ExpandedUnknown], ScoredSize]] = field(default_factory=dict)
 
-    def run(self, curves: Curves, terms: Array) -> tuple[list[Unknown], Fitted, Linearised]:
+    def run(self, curves: Curves, terms: Array) -> tuple[list[ExpandedUnknown], Fitted, Linearised]:
         """Return the unknowns with their sizes, their factors, and the rows around them.
 
         Parameters
@@ -192,7 +192,7 @@ class Search:
             yield size
 
     @staticmethod
-    def _near(part: Part, place: int) -> int:
+    def _near(part: RecordPart, place: int) -> int:
         """Return a size to begin with."""
         found = 1
         for size in part.families[place].sizes():
@@ -203,7 +203,7 @@ class Search:
                 break
         return found
 
-    def _unknowns(self, sizes: Sequence[Sequence[int]]) -> list[Unknown]:
+    def _unknowns(self, sizes: Sequence[Sequence[int]]) -> list[ExpandedUnknown]:
         return [part.of(tuple(one)) for part, one in zip(self.parts, sizes, strict=True)]
 
     def _solved(self, around: Linearised, sizes: Sequence[Sequence[int]]) -> Fitted:
@@ -212,13 +212,13 @@ class Search:
         self._keep(sizes, unknowns, fitted.scored)
         return fitted
 
-    def _score(self, around: Linearised, sizes: Sequence[Sequence[int]]) -> Scored:
+    def _score(self, around: Linearised, sizes: Sequence[Sequence[int]]) -> ScoredSize:
         unknowns = self._unknowns(sizes)
         found = around.score(unknowns)
         self._keep(sizes, unknowns, found)
         return found
 
-    def _keep(self, sizes: Sequence[Sequence[int]], unknowns: list[Unknown], scored: Scored) -> None:
+    def _keep(self, sizes: Sequence[Sequence[int]], unknowns: list[ExpandedUnknown], scored: ScoredSize) -> None:
         """Keep what sizes gave."""
         expanded = {one.name: tuple(size) for one, size in zip(self.parts, sizes, strict=True) if size}
         residual = scored.misfit / scored.observations if scored.observations else float("nan")
@@ -258,7 +258,7 @@ def _key(sizes: Sequence[Sequence[int]]) -> tuple[int, ...]:
     return tuple(size for one in sizes for size in one)
 
 
-def curves_of(unknowns: Sequence[Unknown], values: Array, samples: int) -> tuple[Curves, Array]:
+def curves_of(unknowns: Sequence[ExpandedUnknown], values: Array, samples: int) -> tuple[Curves, Array]:
     """Return coefficients with their derivatives, and the torque of further terms, at every sample."""
     curves: Curves = []
     terms, first = np.zeros(samples), 0

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tvident._arguments import whole_number
-from tvident._figures.parameters import Identified, check_single, draw_parameters, unknowns
+from tvident._figures.parameters import DrawableResult, check_single, draw_parameters, unknowns
 from tvident._figures.recording import plot_recording
 from tvident._figures.style import Place
 from tvident._figures.window import plot_window
@@ -142,7 +142,7 @@ def _window(
     return plot_window(recording.angle + noise, middle, sample_rate=recording.sample_rate, ax=ax)
 
 
-def paper_figure_6(result: Identified, truth: Recording | None = None, ax: Place = None) -> Figure:
+def paper_figure_6(result: DrawableResult, truth: Recording | None = None, ax: Place = None) -> Figure:
     """Draw inertia, damping and stiffness over time in a panel each, whatever is constant: figure 6 of the paper.
 
     Parameters
@@ -165,7 +165,7 @@ def paper_figure_6(result: Identified, truth: Recording | None = None, ax: Place
 
     See Also
     --------
-    plot_identification : draws what changes, and says what is constant.
+    plot_identification : draws time-varying parameters, and names constants.
 
     References
     ----------

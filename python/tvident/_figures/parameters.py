@@ -43,7 +43,7 @@ _POINTS = 72.0
 """Of an inch."""
 
 
-class Identified(Protocol):
+class DrawableResult(Protocol):
     """What is drawn of an identification: see :class:`tvident.Identification`."""
 
     time: Array
@@ -61,7 +61,7 @@ class Identified(Protocol):
         """Standard errors by name."""
 
 
-def check_single(result: Identified) -> None:
+def check_single(result: DrawableResult) -> None:
     """Refuse several records."""
     if result.inertia.ndim != 1:
         raise ValueError(
@@ -69,8 +69,8 @@ def check_single(result: Identified) -> None:
         )
 
 
-def plot_identification(result: Identified, truth: Recording | None = None, ax: Place = None) -> Figure:
-    """Draw what changes with time, with bands of two standard errors; what is constant is one line of text.
+def plot_identification(result: DrawableResult, truth: Recording | None = None, ax: Place = None) -> Figure:
+    """Draw time-varying parameters with bands of two standard errors; constants are one line of text.
 
     Scales leave out a hundredth of the values on each side, so that a spike does not hide the rest. Grey stretches have flags, as many
     as their samples' status says; what is flagged over the whole record is named below the last panel instead.
@@ -116,12 +116,12 @@ def plot_identification(result: Identified, truth: Recording | None = None, ax: 
     return draw_parameters(result, shown, truth, ax)
 
 
-def unknowns(result: Identified) -> list[str]:
+def unknowns(result: DrawableResult) -> list[str]:
     """Return the parameters that were not known."""
     return [name for name in (*_SYMBOLS, *result.terms) if result.settings["kinds"][name] != "known"]
 
 
-def draw_parameters(result: Identified, shown: list[str], truth: Recording | None, ax: Place) -> Figure:
+def draw_parameters(result: DrawableResult, shown: list[str], truth: Recording | None, ax: Place) -> Figure:
     """Draw parameters over time in panels of their own, and those that are constant as text above."""
     of_truth = {name: getattr(truth, name) for name in shown if truth is not None and hasattr(truth, name)}
     constants = _constants(result, truth)
@@ -156,7 +156,7 @@ def draw_parameters(result: Identified, shown: list[str], truth: Recording | Non
         return figure
 
 
-def value_of(result: Identified, name: str) -> Array:
+def value_of(result: DrawableResult, name: str) -> Array:
     """Return a parameter or the factor of a term."""
     return result.terms[name] if name in result.terms else np.asarray(getattr(result, name))
 
@@ -166,7 +166,7 @@ def title_of(name: str) -> str:
     return _SYMBOLS.get(name, plain(name.replace("_", " ").capitalize()))
 
 
-def _constants(result: Identified, truth: Recording | None) -> list[str]:
+def _constants(result: DrawableResult, truth: Recording | None) -> list[str]:
     """Return what is constant, in words."""
     words = []
     for name, (value, error) in result.constants.items():
@@ -204,7 +204,7 @@ def _draw_constants_alone(ax: Axes, constants: list[str]) -> None:
     ax.text(0, 0.96, "\n".join(constants) or "nothing unknown", transform=ax.transAxes, va="top", linespacing=1.8)
 
 
-def _draw_error(ax: Axes, result: Identified, name: str, error: Array) -> None:
+def _draw_error(ax: Axes, result: DrawableResult, name: str, error: Array) -> None:
     """Draw the error beside two standard errors, which should hold 95 % of it."""
     reach = 2 * result.stderr[name]
     ax.fill_between(result.time, -reach, reach, color=FOUND, alpha=0.25, linewidth=0)
@@ -214,13 +214,13 @@ def _draw_error(ax: Axes, result: Identified, name: str, error: Array) -> None:
     ax.set_ylabel("error")
 
 
-def flagged_everywhere(result: Identified) -> list[Status]:
+def flagged_everywhere(result: DrawableResult) -> list[Status]:
     """Return the flags of the record, and those that all samples have."""
     common = int(np.bitwise_and.reduce(result.status)) if result.status.size else 0
     return [flag for flag in Status if (common | int(result.record_status)) & flag]
 
 
-def draw_flags(ax: Axes, result: Identified) -> None:
+def draw_flags(ax: Axes, result: DrawableResult) -> None:
     """Shade samples whose numbers deserve a second look; what holds at all samples is said elsewhere."""
     time, doubtful = result.time, DOUBTFUL | Status.GAP
     for flag in flagged_everywhere(result):
@@ -237,7 +237,7 @@ def draw_flags(ax: Axes, result: Identified) -> None:
 
 
 def plot_over_position(
-    result: Identified,
+    result: DrawableResult,
     position: npt.ArrayLike,
     *,
     name: str = "stiffness",

@@ -7,14 +7,14 @@ from typing import Protocol
 import numpy as np
 from matplotlib.figure import Figure
 
-from tvident._figures.parameters import Array, Identified, check_single, draw_flags
+from tvident._figures.parameters import Array, DrawableResult, check_single, draw_flags
 from tvident._figures.style import MUTED, TIME_MAP, Place, draw_parameter, legend, panels, style
 from tvident._status import DOUBTFUL
 
 _MOST_DOTS = 4000
 
 
-class Oscillating(Identified, Protocol):
+class DrawablePoles(DrawableResult, Protocol):
     """A result with a natural frequency."""
 
     damping: Array
@@ -29,7 +29,7 @@ class Oscillating(Identified, Protocol):
         """Without unit."""
 
 
-def plot_poles(result: Oscillating, ax: Place = None) -> Figure:
+def plot_poles(result: DrawablePoles, ax: Place = None) -> Figure:
     """Draw natural frequency and damping ratio over time, with bands of two standard errors, and the poles.
 
     The poles are the roots of I s² + C s + K: each sample's system as if it stayed as it is then. One that grows has poles right of zero.

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from tvident._figures.parameters import Identified, check_single, flagged_everywhere
+from tvident._figures.parameters import DrawableResult, check_single, flagged_everywhere
 from tvident._figures.style import FOUND, TRUTH, Place, panels, style
 from tvident._status import DOUBTFUL, Status, stretches_of
 
@@ -14,7 +14,7 @@ _MOST_STRETCHES = 2000
 """Of a flag that are drawn one by one; more are drawn as they look: joined where they are closer than a line is wide."""
 
 
-def plot_status(result: Identified, ax: Place = None) -> Figure:
+def plot_status(result: DrawableResult, ax: Place = None) -> Figure:
     """Draw where each flag of the status is set, and the order of the polynomials where there are any.
 
     Flags of samples that are not to be trusted are vermilion, others blue; what holds for the whole record is named below.

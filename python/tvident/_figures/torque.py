@@ -8,12 +8,12 @@ from typing import Protocol
 import numpy as np
 from matplotlib.figure import Figure
 
-from tvident._figures.parameters import Array, Identified, check_single, draw_flags
+from tvident._figures.parameters import Array, DrawableResult, check_single, draw_flags
 from tvident._figures.style import ACCENT, FOUND, MUTED, Place, draw_line, legend, panels, scale, style, unit_of
 from tvident._units import in_words_of
 
 
-class Predicting(Identified, Protocol):
+class Predicting(DrawableResult, Protocol):
     """A result that predicts the torque."""
 
     def predicted_torque(self) -> tuple[Array, Array, Array]:

@@ -143,12 +143,17 @@ class FileRecording(Mapping[str, Channel]):
 
     @property
     def sample_rate(self) -> float:
-        """Samples per second: as the file says, or from its channel of times.
+        """Samples per second (Hz), float: as the file says, or from its channel of times.
 
         Raises
         ------
         ValueError
             If the file says nothing, or its times are not uniform: the message says how to go on.
+
+        See Also
+        --------
+        time : the times themselves.
+        tvident.identify : takes it as `sample_rate=`.
         """
         if self._rate is not None:
             return float(self._rate)
@@ -176,7 +181,13 @@ class FileRecording(Mapping[str, Channel]):
 
     @property
     def time(self) -> npt.NDArray[np.float64] | None:
-        """Time of every sample in seconds, shape (n,); None where the file has no channel of times, or one in each of several groups."""
+        """Time of every sample in seconds, shape (n,); None where the file has no channel of times, or one in each of several groups.
+
+        See Also
+        --------
+        sample_rate : where they are uniform.
+        select : a part by time.
+        """
         long = {name: values for name, values in self._channels.items() if values.ndim == 1 and values.size > 1}
         found = [name for name, values in long.items() if is_time(name, values.unit)]
         # Structures and groups put their names before those of their channels.
@@ -201,6 +212,11 @@ class FileRecording(Mapping[str, Channel]):
         ------
         ValueError
             If no sample lies between, or nothing says when samples were taken.
+
+        See Also
+        --------
+        Identification.between : the same of a result.
+        write : writes the part to a file.
         """
         sizes = [values.size for values in self._channels.values() if values.ndim]
         time = self.time
@@ -234,6 +250,10 @@ class FileRecording(Mapping[str, Channel]):
             If the ending is unknown, or channels have different lengths and the file holds a table.
         OSError
             If there is no such folder, or the file cannot be written.
+
+        See Also
+        --------
+        tvident.read_recording : reads it back.
         """
         write_table(
             path, self._channels, {name: "" if named_unit(name)[1] else unit for name, unit in self.units.items()}

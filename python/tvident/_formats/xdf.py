@@ -15,7 +15,7 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     import numpy as np  # noqa: PLC0415 - within the limits
     import pyxdf  # noqa: PLC0415 - an extra
 
-    logging.getLogger("pyxdf").addHandler(_Told(skipped))
+    logging.getLogger("pyxdf").addHandler(_ToldOfStream(skipped))
     streams, _ = pyxdf.load_xdf(path, synchronize_clocks=True, dejitter_timestamps=True, verbose=False)
     groups: list[Group] = []
     for stream in streams:
@@ -39,7 +39,7 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     yield from named(groups)
 
 
-class _Told(logging.Handler):
+class _ToldOfStream(logging.Handler):
     """Takes in what the library warns of: a damaged file is read up to the damage."""
 
     def __init__(self, skipped: list[str]) -> None:

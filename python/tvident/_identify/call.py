@@ -14,7 +14,7 @@ from tvident._identify.keywords import explained
 from tvident._identify.methods import Method
 from tvident._identify.prepared import prepared
 from tvident._identify.records import calls_of_records, identify_records, names_shared
-from tvident._identify.robust import Loss
+from tvident._identify.robust import LossAsked
 from tvident._identify.together import Options, identify_together
 from tvident._identify.typed import Entries, OfMasses, OfOne
 from tvident._merged import Chain, Mechanism, MergedIdentification
@@ -78,7 +78,7 @@ def identify(
     quantisation: float | None = None,
     mask: npt.ArrayLike | None = None,
     weights: npt.ArrayLike | None = None,
-    loss: Loss | None = None,
+    loss: LossAsked | None = None,
     period: float | None = None,
     share: str | Sequence[str] = (),
     dof_axis: int | None = None,
@@ -226,7 +226,7 @@ def identify(
     settings : mapping, optional
         Settings of an earlier result, as they are or read from JSON: its choices are used again. Other arguments override them, a
         `method` other than ``"auto"`` as a whole. They do not contain `mask`, `weights`, `step`, parameters known at every sample and
-        functions of your own terms.
+        functions of your own terms. A name that no result has is refused.
     workers : int, optional
         Threads; by default ``TVIDENT_WORKERS`` or all processors that this process may use. The numbers do not depend on it.
     progress : bool or callable, optional

@@ -301,17 +301,17 @@ class _Pair:
                 break
             window, derivative = _bell(width, self.order, self.period)
             pieces = self.channel.size // width
-            seen = self.channel[: pieces * width].reshape(pieces, width) @ window - bias * window.sum()
+            measured = self.channel[: pieces * width].reshape(pieces, width) @ window - bias * window.sum()
             known = self.reference[: pieces * width].reshape(pieces, width)
             known = (known - known[:, :1]) @ derivative
-            there = np.isfinite(known) & np.isfinite(seen)
-            known, seen = known[there], seen[there]
+            there = np.isfinite(known) & np.isfinite(measured)
+            known, measured = known[there], measured[there]
             noise = noises[0] ** 2 * float(derivative @ derivative)
             power = float(known @ known) - known.size * noise
             if known.size < _FEWEST or power <= known.size * noise:
                 continue
-            factor = float(known @ seen) / power
-            left = seen - factor * known
+            factor = float(known @ measured) / power
+            left = measured - factor * known
             error = math.sqrt(float(left @ left) / (known.size - 1) / power)
             if best is None or error < best[1]:
                 best = (factor, error)

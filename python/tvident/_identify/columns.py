@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
-from tvident._equation import BUILT_IN, FixedTerm, InnerParameter, Term, Unknown, expected_stribeck
+from tvident._equation import BUILT_IN, FRICTION, FixedTerm, InnerParameter, Term, Unknown, expected_stribeck
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -162,7 +162,7 @@ class Columns:
         """
         columns = [self._term(term, inner) for term in self.terms]
         if repeated and self.weak and any(term.inner and term.own is None for term in self.terms):
-            columns = [self._direction if isinstance(one, str) and one == "coulomb" else one for one in columns]
+            columns = [self._direction if isinstance(one, str) and one == FRICTION else one for one in columns]
         return columns
 
     def all_samples(self, inner: Mapping[str, Array]) -> dict[str, Array]:
@@ -172,7 +172,7 @@ class Columns:
             given = self._term(term, inner)
             if not isinstance(given, str):
                 found[term.name] = np.asarray(given, np.float64)
-            elif given == "coulomb":
+            elif given == FRICTION:
                 found[given] = self._direction
             else:
                 built_in, angles = BUILT_IN[given], np.asarray(self.angles, np.float64)

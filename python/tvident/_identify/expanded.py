@@ -12,7 +12,7 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident._advice import FoundExpansion, words_of_expansions
 from tvident._equation import Term
-from tvident._expansion import DERIVATIVES, Expansion, Search
+from tvident._expansion import DERIVATIVES, Expansion, SizeSearch
 from tvident._identify.data import Data
 from tvident._identify.expanded_inputs import ExpandedInputs, role_of
 from tvident._identify.expanded_result import ExpandedOutcome
@@ -58,7 +58,7 @@ class ExpandedTask:
         if not isinstance(pilot.settings["window_length"], int) or not isinstance(pilot.settings["exponent"], int):
             return pilot  # nothing could be determined, and its status says so
         given = ExpandedInputs(self._data, self._request, self._expansions, task, pilot)
-        search = Search(given.record, given.parts, given.noise, given.known)
+        search = SizeSearch(given.record, given.parts, given.noise, given.known)
         unknowns, fitted, around = search.run(given.start, given.start_of_terms)
         tried = sorted(search.tried.values(), key=lambda one: one.parameters)
         outcome = ExpandedOutcome(given, unknowns, fitted, around, tried, search.rivals)

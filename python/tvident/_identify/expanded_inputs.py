@@ -12,7 +12,7 @@ import numpy.typing as npt
 from tvident import _core
 from tvident._derivatives import fit_local_polynomials
 from tvident._equation import COEFFICIENTS, parameter
-from tvident._expansion import DERIVATIVES, Coordinate, Curves, Expansion, Part, Record
+from tvident._expansion import DERIVATIVES, Coordinate, Curves, ExpandedRecord, Expansion, RecordPart
 from tvident._identify.data import Data
 from tvident._identify.settings import Request
 from tvident._identify.task import Task
@@ -98,7 +98,7 @@ class ExpandedInputs:
         return found
 
     @cached_property
-    def record(self) -> Record:
+    def record(self) -> ExpandedRecord:
         """The record as rows are made of it."""
         data, settings = self.data, self.pilot.settings
         torque = np.asarray(data.torques, np.float64)
@@ -109,7 +109,7 @@ class ExpandedInputs:
         for samples in self.terms.values():
             usable &= np.isfinite(samples)
         late = settings.get("lag_samples") or [settings["lag"] / data.period]
-        return Record(
+        return ExpandedRecord(
             angle=np.where(usable, self.angle, 0.0),
             torque=np.where(usable, torque, 0.0),
             usable=usable,
@@ -127,7 +127,7 @@ class ExpandedInputs:
         return self.task.columns.all_samples(inner)
 
     @cached_property
-    def parts(self) -> list[Part]:
+    def parts(self) -> list[RecordPart]:
         """The unknowns, still without sizes."""
         found = []
         for name in (*COEFFICIENTS, *self.terms):
@@ -136,14 +136,14 @@ class ExpandedInputs:
             filled = None if samples is None else np.where(self.record.usable, samples, 0.0)
             if expansion is None:
                 if name in self.terms or name not in self.known_values:
-                    found.append(Part(name, role_of(name, None), samples=filled))
+                    found.append(RecordPart(name, role_of(name, None), samples=filled))
                 continue
             role, places = role_of(name, expansion), self.coordinates[name]
             families = expansion.families_within([one.limits for one in places])
             sizes = expansion.given_sizes
-            found.append(Part(name, role, places, families, sizes, expansion.largest, filled))
+            found.append(RecordPart(name, role, places, families, sizes, expansion.largest, filled))
         if self.zero:
-            found.append(Part("angle_zero", "term", samples=-np.nan_to_num(self.pilot.stiffness)))
+            found.append(RecordPart("angle_zero", "term", samples=-np.nan_to_num(self.pilot.stiffness)))
         return found
 
     @cached_property

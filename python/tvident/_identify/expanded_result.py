@@ -14,11 +14,11 @@ import numpy.typing as npt
 from tvident import _core
 from tvident._equation import COEFFICIENTS
 from tvident._expansion import (
+    ExpandedUnknown,
     Fitted,
     Linearised,
     Rival,
     Tried,
-    Unknown,
     along_record,
     errors_along,
 )
@@ -40,7 +40,7 @@ class ExpandedOutcome:
     Parameters
     ----------
     given : ExpandedInputs
-    unknowns : sequence of Unknown
+    unknowns : sequence of ExpandedUnknown
     fitted : Fitted
     around : Linearised
         The rows around what was found.
@@ -50,7 +50,7 @@ class ExpandedOutcome:
     """
 
     given: ExpandedInputs
-    unknowns: Sequence[Unknown]
+    unknowns: Sequence[ExpandedUnknown]
     fitted: Fitted
     around: Linearised
     tried: Sequence[Tried]
@@ -181,7 +181,7 @@ class ExpandedOutcome:
         squares = ((value[apart] - found.values[name][apart]) ** 2 / variance)[there]
         return float(np.mean(squares)), int(there.sum())
 
-    def _placed(self) -> Iterator[tuple[Unknown, slice]]:
+    def _placed(self) -> Iterator[tuple[ExpandedUnknown, slice]]:
         """Give every unknown and the place of its factors."""
         first = 0
         for one in self.unknowns:

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from tvident import _core
-from tvident._advice import Explained
+from tvident._advice import NOT_TOLD_APART, Explained
 from tvident._arguments import percent
-from tvident._equation import BUILT_IN, COEFFICIENTS, Unknown
+from tvident._equation import BUILT_IN, COEFFICIENTS, FRICTION, OFFSET, Unknown
 from tvident._identify.data import Data
 from tvident._identify.methods import StrongForm, WeakForm
 from tvident._identify.remedies import BEYOND_CHANCE, NEXT_TO_NOTHING, Trial, unexplained
@@ -89,7 +89,7 @@ def of_one(
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _AskedOfRecord:
     """A single record, and what was asked of it.
 
     Parameters
@@ -116,7 +116,7 @@ class _Asked:
 
 
 @dataclass(frozen=True)
-class InWeakForm(_Asked):
+class TriedInWeakForm(_AskedOfRecord):
     """A single record in strong form, of which the weak form tells what to change: its windows follow whatever is missing."""
 
     def words(self, _: Identification, words: Words) -> Words:
@@ -170,7 +170,7 @@ def _some(value: Any, some: slice) -> Any:
 
 
 @dataclass(frozen=True)
-class Improvement(_Asked):
+class Improvement(_AskedOfRecord):
     """A single record, and how to identify it with another equation.
 
     Parameters
@@ -195,7 +195,9 @@ class Improvement(_Asked):
         )
         dropped += hidden[-1:]  # that nothing is explained, which it is with what is advised
         rest = [line for line in words.advice if line not in dropped and not line.startswith(starts)]
-        return replace(words, advice=tuple(rest if advice is None else (advice, *rest)))
+        # What is tried differs little from what it is compared with where unknowns cannot be told apart.
+        before = next((place + 1 for place, line in enumerate(rest) if NOT_TOLD_APART in line), 0)
+        return replace(words, advice=(*rest[:before], *([] if advice is None else [advice]), *rest[before:]))
 
     def _exchanged(self, result: Identification) -> str | None:
         """Return the question whether channels are swapped, where that explains next to everything with positive parameters.
@@ -205,7 +207,7 @@ class Improvement(_Asked):
         data = self.data
         if data.motion.recorded or not all(isinstance(kind, str) for kind in self.given.values()):
             return None
-        asked = {"inertia": "constant", "damping": "constant", "stiffness": "windowed", "terms": ["offset"], "lag": 0.0}
+        asked = {"inertia": "constant", "damping": "constant", "stiffness": "windowed", "terms": [OFFSET], "lag": 0.0}
         exchanged = replace(
             data, angles=data.torques, torques=data.angles, passed=data.passed[::-1], labels=None, doubts=()
         )
@@ -234,13 +236,14 @@ class Improvement(_Asked):
 
     @cached_property
     def _suspects(self) -> list[str]:
-        """What may be missing: what the core suspects, friction and a lag, and anything where the equations of no scale can be believed."""
+        """What may be missing: what the core suspects, friction and a lag, and anything where no widths of the test function agree."""
         suspects = [one.name for one in self._explained.suspects]
-        others = ["lag", "coulomb"]
+        others = ["lag", FRICTION]
         angles = without_spikes(self.data, [self.found]).angles
         is_large = float(np.nanmax(np.abs(angles), initial=0.0)) > _LARGE
-        if self.data.axis.system is ROTARY and ("cubic" in suspects or is_large):
-            others.append("gravity")
+        hardens = any(one in BUILT_IN and BUILT_IN[one].spring == "beside" for one in suspects)
+        if self.data.axis.system is ROTARY and (hardens or is_large):
+            others += [name for name, term in BUILT_IN.items() if term.spring == "instead"]
         if self.found.record_status & Status.SCALES_DISAGREE:
             others += [name for name, term in BUILT_IN.items() if not getattr(term, "inner", ())]
         present = {*suspects, *(one.name for one in self.terms)}

@@ -107,18 +107,18 @@ def lacking_terms(
     derivatives = made.estimate(data.angles[..., some], workers=data.workers).derivatives
     columns = dict(zip(("stiffness", "damping", "inertia"), derivatives, strict=True))
     evaluated = Columns(terms, data.angles[..., some], data.time[some], data.period, plan, weak=False).all_samples({})
-    side = data.torques[..., some].astype(np.float64)
+    rhs = data.torques[..., some].astype(np.float64)
     for name, value in known.items():
-        side = side - (value if isinstance(value, float) else value[..., some]) * columns[name]
-    names = [name for name in ("cubic", "gravity", "coulomb") if name not in evaluated]
+        rhs = rhs - (value if isinstance(value, float) else value[..., some]) * columns[name]
+    names = [name for name, term in BUILT_IN.items() if term.is_sought and name not in evaluated]
     if not any(one.name == "stiffness" for one in unknowns):
-        names = [name for name in names if name != "cubic"]
+        names = [name for name in names if BUILT_IN[name].spring != "beside"]
     if data.axis.system is not ROTARY:
-        names = [name for name in names if name != "gravity"]
+        names = [name for name in names if not BUILT_IN[name].angle_period]
     angle, velocity = columns["stiffness"], columns["damping"]
     candidates = {name: BUILT_IN[name].function(np, angle, velocity) for name in names}
-    every = [{**columns, **evaluated}[one.name] for one in unknowns] + [candidates[name] for name in names] + [side]
-    rows = np.stack([np.broadcast_to(one, side.shape) for one in every], axis=-1)
+    every = [{**columns, **evaluated}[one.name] for one in unknowns] + [candidates[name] for name in names] + [rhs]
+    rows = np.stack([np.broadcast_to(one, rhs.shape) for one in every], axis=-1)
     inside = slice(length // 2, rows.shape[-2] - length // 2)
     rows = rows[..., inside, :].reshape(data.records, -1, len(every))
     usable = np.isfinite(rows).all(axis=-1)
@@ -181,22 +181,22 @@ class _Test:
     def result(self) -> Lacking | None:
         """Return the term that explains most of what is left, if it explains enough."""
         left = self._without_windowed()
-        total, side = left.sum(axis=0), left.shape[-1] - 1
+        total, rhs = left.sum(axis=0), left.shape[-1] - 1
         base, _ = _solved(total, self.constant)
-        if not base > _ROUNDING * total[side, side]:
+        if not base > _ROUNDING * total[rhs, rhs]:
             return None
         tried: dict[str, tuple[float, Lacking]] = {}
         for number, name in enumerate(self.names):
             place = len(self.windowed) + len(self.constant) + number
             rest, values = _solved(total, [*self.constant, place])
-            own = np.zeros(side + 1)
+            own = np.zeros(rhs + 1)
             own[self.constant], own[place] = -_solved(total, self.constant, place)[1], 1.0
-            errors = np.zeros(side + 1)
-            errors[[*self.constant, place]], errors[side] = -values, 1.0
+            errors = np.zeros(rhs + 1)
+            errors[[*self.constant, place]], errors[rhs] = -values, 1.0
             scores, square = np.einsum("i,bij,j->b", own, left, errors), own @ total @ own
             if not square > _ROUNDING:
                 continue
-            unit = self.norms[side] / self.norms[place]
+            unit = self.norms[rhs] / self.norms[place]
             error = float(np.sqrt(np.sum(scores**2))) / square
             value = float(values[-1])
             spring = (
@@ -204,15 +204,17 @@ class _Test:
                 if self.spring in self.constant
                 else np.inf
             )
-            alone = name == "gravity" and bool(abs(spring) < _NO_SPRING * abs(value) / self.norms[place])
-            is_there = abs(value) > _CONSPICUOUS * error and (name == "cubic" or value > 0)
+            term = BUILT_IN[name]
+            alone = term.spring == "instead" and bool(abs(spring) < _NO_SPRING * abs(value) / self.norms[place])
+            is_there = abs(value) > _CONSPICUOUS * error and (term.spring == "beside" or value > 0)
             if is_there and rest <= _EXPLAINED * base:
                 tried[name] = (rest, Lacking(name, value * unit, error * unit, alone))
         if not tried:
             return None
         best = min(tried, key=lambda name: tried[name][0])
-        if best == "cubic" and "gravity" in tried and tried["gravity"][0] <= _AS_GOOD * tried["cubic"][0]:
-            best = "gravity"
+        if BUILT_IN[best].spring == "beside":
+            instead = [name for name in tried if BUILT_IN[name].spring == "instead"]
+            best = next((name for name in instead if tried[name][0] <= _AS_GOOD * tried[best][0]), best)
         return tried[best][1]
 
     def _without_windowed(self) -> Array:
@@ -226,8 +228,8 @@ class _Test:
         return np.asarray(self.products - np.swapaxes(across, 1, 2) @ np.linalg.solve(inner, across))
 
 
-def _solved(total: Array, places: list[int], side: int = -1) -> tuple[float, Array]:
+def _solved(total: Array, places: list[int], rhs: int = -1) -> tuple[float, Array]:
     """Return what columns leave of the squares of another, and their factors."""
-    normal, product = total[np.ix_(places, places)], total[places, side]
+    normal, product = total[np.ix_(places, places)], total[places, rhs]
     values = np.linalg.lstsq(normal, product, rcond=1e-13)[0]
-    return float(total[side, side] - product @ values), np.asarray(values, np.float64)
+    return float(total[rhs, rhs] - product @ values), np.asarray(values, np.float64)

@@ -26,7 +26,7 @@ _FEWEST = 16
 
 
 @dataclass(frozen=True)
-class Alignment:
+class ClockAlignment:
     """What settings and words say of two clocks.
 
     Parameters
@@ -122,7 +122,7 @@ class OwnClocks:
             return np.asarray(later.torques - final.torques, dtype=np.float64)
 
         moved = [partial(change, move) for move in found.moves]
-        return replace(final, motion=motion, doubts=doubts, clock=Alignment(self.clocks, found.late), moved=moved)
+        return replace(final, motion=motion, doubts=doubts, clock=ClockAlignment(self.clocks, found.late), moved=moved)
 
     def _angle(self) -> tuple[npt.NDArray[np.float64], _core.PassedNoise | None]:
         return self.clocks.on_grid(self.clocks.angle, self.recorded[0], propagate=self.propagate)

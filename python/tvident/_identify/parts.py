@@ -32,7 +32,7 @@ from tvident._units import Axis
 Span = tuple[int, int]
 """The first of some samples, and the one after the last."""
 
-Rows = tuple[list[float], int, int]
+Rows = _core.FactoredRows
 """The triangular factor of some equations: its numbers row by row, its columns, and how many equations it stands for."""
 
 
@@ -78,7 +78,7 @@ class _NothingFound:
 
 
 @dataclass(frozen=True)
-class _Kind:
+class _KindFound:
     kind: str
     factor: float | None = None
 
@@ -235,7 +235,7 @@ class Long(Task):
         rows = arguments.window_length("regression_window", form.regression_window, self._data.period, odd=False)
         known = factors if factors is not None else [None] * len(self._unknowns)
         each = zip(self._unknowns, known, strict=True)
-        kinds = [_Kind("constant" if one.kind == "auto" else one.kind, factor) for one, factor in each]
+        kinds = [_KindFound("constant" if one.kind == "auto" else one.kind, factor) for one, factor in each]
         found: Any = _NothingFound(length, rows, kinds)
         return plain(self._settings([found], Searched({})))
 
@@ -275,8 +275,11 @@ class Long(Task):
         """
         count = len(self._names)
         found = self._strong.constants(self._of(held), rows, workers=workers)
-        values, numbers, residual, condition = found or ([np.nan] * count, [np.nan] * count**2, np.nan, np.inf)
-        errors = np.sqrt(np.reshape(numbers, (count, count)).diagonal())
+        values, covariance = (
+            ([np.nan] * count, [np.nan] * count**2) if found is None else (found.values, found.covariance)
+        )
+        residual, condition = (np.nan, np.inf) if found is None else (found.residual, found.condition)
+        errors = np.sqrt(np.reshape(covariance, (count, count)).diagonal())
         flags = Status(0)
         if not condition < np.inf:
             flags = Status.RANK_DEFICIENT

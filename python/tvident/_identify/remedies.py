@@ -210,7 +210,8 @@ def _is_there(name: str, found: Identification) -> bool:
         value, error = found.settings["lag"], found.settings.get("lag_stderr") or 0.0
     else:
         value, error, *_ = found.value(name)
-    return bool(abs(value) > BEYOND_CHANCE * error and (value > 0 or name != "coulomb"))
+    drives = value <= 0 and name in BUILT_IN and BUILT_IN[name].dissipates
+    return bool(abs(value) > BEYOND_CHANCE * error and not drives)
 
 
 def _holds(share: float, again: Callable[[], Identification]) -> bool:

@@ -13,20 +13,20 @@ from tvident._huber import clip_residuals, has_heavy_tails
 from tvident._identify.data import Data
 from tvident._results import Identification, predicted_at_samples
 
-Loss: TypeAlias = Literal["squares", "huber", "auto"]
+LossAsked: TypeAlias = Literal["squares", "huber", "auto"]
 
 _ROUNDS = 10
 _SETTLED = 0.02
 """Rounds end where what was clipped moves by no more than this part of the scale: far below any standard error."""
 
 
-def loss_of(given: Loss | None, settings: Mapping[str, Any] | None) -> Loss:
+def loss_of(given: LossAsked | None, settings: Mapping[str, Any] | None) -> LossAsked:
     """Return the loss that was given, that of an earlier result, or that of least squares."""
-    word = arguments.one_of("loss", given or (settings or {}).get("loss") or "squares", get_args(Loss))
-    return cast("Loss", word)
+    word = arguments.one_of("loss", given or (settings or {}).get("loss") or "squares", get_args(LossAsked))
+    return cast("LossAsked", word)
 
 
-def with_clipped_torque(data: Data, loss: Loss, identified: Callable[[Data], Identification]) -> Data:
+def with_clipped_torque(data: Data, loss: LossAsked, identified: Callable[[Data], Identification]) -> Data:
     """Return the records with a torque whose least squares are those of Huber's loss.
 
     Parameters

@@ -6,10 +6,11 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from difflib import get_close_matches
 from typing import Any
 
 from tvident import _arguments as arguments
-from tvident._equation import BUILT_IN, COEFFICIENTS, Term
+from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, Term
 from tvident._identify.methods import Form, Method, StrongForm, WeakForm
 
 _OF_METHOD: dict[str, dict[str, Any]] = {
@@ -26,7 +27,7 @@ _OF_METHOD: dict[str, dict[str, Any]] = {
         "inertia": "auto",
         "damping": "auto",
         "stiffness": "windowed",
-        "terms": (("offset", "constant"),),
+        "terms": ((OFFSET, "constant"),),
         "lag": 0.0,
         "quantisation": None,
         "period": None,
@@ -36,6 +37,35 @@ _OF_METHOD: dict[str, dict[str, Any]] = {
 
 
 _FORMS: dict[str, type[Form]] = {"weak": WeakForm, "strong": StrongForm}
+
+_BESIDE_FORM = frozenset(
+    (
+        *("method", "form", "chosen", "kinds", "known", "terms", "own_terms", "inner", "earned", "expansions"),
+        *(
+            "lag",
+            "lag_stderr",
+            "lag_samples",
+            "angle_zero",
+            "shown_noise",
+            "stderr_factors",
+            "quantisation",
+            "loss",
+            "period",
+        ),
+        *(
+            "instrument",
+            "weights",
+            "sample_rate",
+            "step",
+            "times",
+            "spline_order",
+            "bridged",
+            "clock_offset",
+            "clock_drift",
+        ),
+    )
+)
+"""What settings of results hold beside those of their form."""
 
 
 @dataclass(frozen=True)
@@ -95,12 +125,9 @@ class Request:
     @property
     def counts_turns(self) -> bool:
         """Whether the equation is another one after a whole period of the angle."""
-        turns = (self.period or 0.0) / (2 * math.pi)
         names = [term[0] if isinstance(term, tuple | list) else term for term in self.terms]
-        periodic = {"offset", "coulomb", "viscous_asymmetric", "stribeck"} | (
-            {"gravity"} if turns and turns.is_integer() else set()
-        )
-        return self.has_spring or not all(isinstance(name, str) and name in periodic for name in names)
+        built_in = [BUILT_IN.get(name) if isinstance(name, str) else None for name in names]
+        return self.has_spring or not all(one and one.repeats_after(self.period or 0.0) for one in built_in)
 
     def noise_of_equations(self, records: int) -> Sequence[float] | None:
         """Return the variances that an earlier result of as many records showed."""
@@ -212,7 +239,7 @@ def _without_angle(asked: dict[str, Any], given: Mapping[str, Any]) -> dict[str,
         )
     terms = [term if isinstance(term, tuple | list) else (term, None) for term in asked["terms"]]
     for term, _ in terms:
-        if isinstance(term, Term) or term in {"cubic", "gravity"}:
+        if isinstance(term, Term) or (isinstance(term, str) and term in BUILT_IN and BUILT_IN[term].is_of_angle):
             raise ValueError(
                 f"terms of the angle need the angle; got term {getattr(term, 'name', term)!r} and angle=None; give the angle, or leave the "
                 "term out"
@@ -220,11 +247,11 @@ def _without_angle(asked: dict[str, Any], given: Mapping[str, Any]) -> dict[str,
     if not _has_spring(asked):
         return asked
     if "terms" not in given:
-        return {**asked, "terms": (("offset", "windowed"),)}
+        return {**asked, "terms": ((OFFSET, "windowed"),)}
     return {
         **asked,
         "terms": [
-            ("offset", "windowed") if pair == ("offset", None) else term
+            (OFFSET, "windowed") if pair == (OFFSET, None) else term
             for term, pair in zip(asked["terms"], terms, strict=True)
         ],
     }
@@ -312,6 +339,7 @@ def _of_result(earlier: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str
         raise TypeError(
             f"settings must be those of an earlier result; got {arguments.shown(earlier)}; pass result.settings"
         )
+    _check_names(earlier, kinds, known)
     for name in COEFFICIENTS:
         asked[name] = known[name] if kinds[name] == "known" else kinds[name]
         if asked[name] == "expanded" and name not in given:
@@ -329,6 +357,35 @@ def _of_result(earlier: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str
             f"with all of {', '.join(name for name, _ in terms)}"
         )
     return asked | {"terms": terms}
+
+
+def _check_names(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Mapping[str, Any]) -> None:
+    """Refuse names that no result has: what is misspelled would be ignored.
+
+    Raises
+    ------
+    TypeError
+        With the name that comes nearest.
+    """
+    of_form = {form: {one.name for one in fields(kind)} for form, kind in _FORMS.items()}
+    names = _BESIDE_FORM | of_form[earlier["form"]]
+    unknowns = {*COEFFICIENTS, *(name for name, _ in earlier["terms"]), *(earlier.get("inner") or {})}
+    for within, has, may in (("", earlier, names), (" kinds", kinds, unknowns), (" known", known, unknowns)):
+        foreign = [name for name in has if name not in may]
+        if not foreign:
+            continue
+        other = next((form for form in of_form if foreign[0] in of_form[form]), None)
+        near = get_close_matches(str(foreign[0]), may, n=1)
+        cure = (
+            f"it belongs to the {other} form"
+            if other and not within
+            else f"did you mean {near[0]!r}?"
+            if near
+            else "leave it out"
+        )
+        raise TypeError(
+            f"settings{within} must hold names that a result of the {earlier['form']} form has; got {arguments.shown(foreign[0])}; {cure}"
+        )
 
 
 def _is_whole(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Mapping[str, Any]) -> bool:

@@ -84,7 +84,7 @@ class Signals:
 
 
 def with_own_step(request: Request, channels: _Channels) -> Request:
-    """Return a request that knows the step to which the angle was rounded, before that cannot be seen any more."""
+    """Return a request that knows the step to which the angle was rounded, before it cannot be found any more."""
     if "angle" not in channels:
         return request
     return replace(request, quantisation=quantisation_step(channels["angle"], request.quantisation))

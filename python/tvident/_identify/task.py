@@ -20,7 +20,7 @@ from tvident._identify.channels import constants_of
 from tvident._identify.columns import Columns, Range, fixed, secant
 from tvident._identify.criterion import criterion_of
 from tvident._identify.data import Data
-from tvident._identify.improved import Improvement, InWeakForm, is_to_be_tried, is_told_by_weak_form, of_one
+from tvident._identify.improved import Improvement, TriedInWeakForm, is_to_be_tried, is_told_by_weak_form, of_one
 from tvident._identify.lacking import lacking_terms
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm, exponent_of
 from tvident._identify.polynomials import Polynomials, odd_window
@@ -235,7 +235,7 @@ class Task:
             return Task(data, request).run(progress=None, diagnose=diagnose)
 
         if is_strong:
-            return InWeakForm(self._data, self._request, given, self._terms, run).words
+            return TriedInWeakForm(self._data, self._request, given, self._terms, run).words
         return Improvement(replace(self._data, moved=()), self._request, given, self._terms, run, found[0]).words
 
     def _recorded(self, settings: dict[str, Any], found: Estimates, used: Data) -> Recorded:

@@ -12,11 +12,11 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident._clocks import grid_of
 from tvident._derivatives import plan
-from tvident._equation import LINEAR_UNITS, UNITS, Unknown, all_terms
+from tvident._equation import LINEAR_UNITS, OFFSET, UNITS, Unknown, all_terms
 from tvident._identify.columns import WINDOW_OF_TERMS, Columns
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, WeakForm, exponent_of
 from tvident._merged import (
-    Asked,
+    AskedTogether,
     MergedIdentification,
     Sampling,
     identify_masses,
@@ -137,7 +137,7 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
     _check(angle, options)
     axis = _axis(angle, torque, options.units)
     form = _weak(options.method)
-    terms = all_terms((("offset", "constant"),) if options.terms is None else options.terms, "constant")
+    terms = all_terms(((OFFSET, "constant"),) if options.terms is None else options.terms, "constant")
     for term in terms:
         if term.inner:
             raise ValueError(
@@ -169,7 +169,7 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
     )
     sampling = _sampling(options, axis, *recorded)
     with arguments.reporter(options.progress, "identification") as report:
-        asked = Asked(
+        asked = AskedTogether(
             sampling=sampling,
             parameters={name: value for name, value in options.parameters.items() if value is not None},
             terms=[(one.name, one.kind) for one in terms],

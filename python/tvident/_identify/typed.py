@@ -11,11 +11,11 @@ from tvident import _arguments as arguments
 from tvident._equation import GivenTerm, Parameter
 from tvident._identify.aligned import Align
 from tvident._identify.methods import Method
-from tvident._identify.robust import Loss
+from tvident._identify.robust import LossAsked
 from tvident._merged import Matrix
 
 
-class Given(TypedDict, total=False):
+class GivenArguments(TypedDict, total=False):
     """Options of :func:`tvident.identify`; what decides of which class the result is stands in its overloads."""
 
     sample_rate: float | tuple[float, float] | None
@@ -33,7 +33,7 @@ class Given(TypedDict, total=False):
     quantisation: float | None
     mask: npt.ArrayLike | None
     weights: npt.ArrayLike | None
-    loss: Loss | None
+    loss: LossAsked | None
     period: float | None
     align: Align
     nan_policy: arguments.RowPolicy
@@ -43,7 +43,7 @@ class Given(TypedDict, total=False):
     progress: arguments.Progress
 
 
-class OfOne(Given, total=False):
+class OfOne(GivenArguments, total=False):
     """Those of one mass."""
 
     inertia: Parameter | None
@@ -54,7 +54,7 @@ class OfOne(Given, total=False):
 Entries = Parameter | Matrix | Sequence[Any] | Mapping[Any, Any] | None
 
 
-class OfMasses(Given, total=False):
+class OfMasses(GivenArguments, total=False):
     """Those of several masses: a parameter may have a kind or a number for every entry or element."""
 
     inertia: Entries

@@ -43,7 +43,7 @@ class Weights:
 
 
 def weights_of(given: npt.ArrayLike | None, shape: tuple[int, ...], beside: Mapping[str, Any]) -> Weights | None:
-    """Return weights of records of some shape, or nothing.
+    """Return weights of records of some shape, or None.
 
     Parameters
     ----------

@@ -20,9 +20,9 @@ from tvident._in_pieces.copied import copied
 from tvident._in_pieces.found import FileIdentification
 from tvident._in_pieces.kept import Kept, mark_of
 from tvident._in_pieces.outputs import check_output
-from tvident._in_pieces.recorded import Recording, uniform, units_of
-from tvident._in_pieces.run import Asked, Run
-from tvident._in_pieces.sources import TEXT, Channel, Source, opened
+from tvident._in_pieces.recorded import RecordingOfFile, uniform, units_of
+from tvident._in_pieces.run import AskedOfFile, Run
+from tvident._in_pieces.sources import TEXT, Source, SourceChannel, opened
 from tvident._pieces import Given
 from tvident._units import Channel as Said
 from tvident._units import named_unit, times_in_seconds
@@ -179,7 +179,7 @@ def identify_file(
             if weights is not None:
                 recording = replace(recording, weights=_of_length(source, "weights", weights, recording.samples)[0])
             call = Given(method, given, settings, nan_policy, recording.period, recording.axis, threads, weighted)
-            asked = Asked(recording, call, every)
+            asked = AskedOfFile(recording, call, every)
             return Run(asked, kept, LONG_PIECE if asked.is_narrow else PIECE, place, report).all()
         except BaseException:
             if kept.is_empty:
@@ -200,7 +200,7 @@ def _recording(
     names: tuple[str, str, str | None],
     units: tuple[str | None, str | None],
     rates: tuple[float | None, float | None],
-) -> Recording:
+) -> RecordingOfFile:
     """Return the two channels of a recording and their times."""
     (angle, samples, angle_says), (torque, others, torque_says) = (
         source.channel(name) for name in names[:2] if name is not None
@@ -216,7 +216,7 @@ def _recording(
     if delta is not None or rate is not None:
         if names[2] is not None:
             raise TypeError("give only one of delta, sample_rate and t; got t too; drop all but one")
-        return Recording(
+        return RecordingOfFile(
             angle, torque, samples, 0.0, arguments.sample_period(samples, delta=delta, sample_rate=rate), axis
         )
     name = names[2]
@@ -230,10 +230,10 @@ def _recording(
     times, unit = _of_length(source, "times", name, samples)
     factor = float(times_in_seconds(Said(np.ones(1), unit))[0])
     begin, period = uniform(times, samples, factor, full_name(source.channels, name, source.place))
-    return Recording(angle, torque, samples, begin, period, axis)
+    return RecordingOfFile(angle, torque, samples, begin, period, axis)
 
 
-def _of_length(source: Source, what: str, name: str, samples: int) -> tuple[Channel, str]:
+def _of_length(source: Source, what: str, name: str, samples: int) -> tuple[SourceChannel, str]:
     """Return a channel beside angle and torque, and its unit."""
     channel, count, unit = source.channel(name)
     if count != samples:

@@ -68,6 +68,11 @@ class FileIdentification:
         Returns
         -------
         str
+
+        See Also
+        --------
+        Identification.summary : of a recording in memory.
+        identify_file : writes the numbers.
         """
         lines = [f"{self.samples} samples, {self.rows} rows in {self.path}"]
         lines += [

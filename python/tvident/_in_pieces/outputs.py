@@ -32,7 +32,7 @@ _KEY = "tvident"
 """Where settings and constants are, in files that hold more than columns."""
 
 
-class Table:
+class OutputTable:
     """What is to be written.
 
     Parameters
@@ -70,7 +70,7 @@ def head_of_rows(row: np.dtype[Any], rows: int) -> bytes:
 
 
 @contextmanager
-def _npy(file: IO[bytes], table: Table) -> Iterator[Put]:
+def _npy(file: IO[bytes], table: OutputTable) -> Iterator[Put]:
     row = np.dtype(list(table.kinds.items()))
     file.write(head_of_rows(row, table.rows))
 
@@ -78,7 +78,7 @@ def _npy(file: IO[bytes], table: Table) -> Iterator[Put]:
 
 
 @contextmanager
-def _csv(file: IO[bytes], table: Table) -> Iterator[Put]:
+def _csv(file: IO[bytes], table: OutputTable) -> Iterator[Put]:
     text = io.BytesIO()
     write_csv(text, {name: np.empty(0, kind) for name, kind in table.kinds.items()}, table.units)
     file.write(text.getvalue())
@@ -93,7 +93,7 @@ def _csv(file: IO[bytes], table: Table) -> Iterator[Put]:
 
 
 @contextmanager
-def _parquet(file: IO[bytes], table: Table) -> Iterator[Put]:
+def _parquet(file: IO[bytes], table: OutputTable) -> Iterator[Put]:
     import pyarrow as pa  # noqa: PLC0415 - an extra
     from pyarrow import parquet  # noqa: PLC0415 - likewise
 
@@ -120,7 +120,7 @@ def _parquet(file: IO[bytes], table: Table) -> Iterator[Put]:
 
 
 @contextmanager
-def _hdf5(path: Path, table: Table) -> Iterator[Put]:
+def _hdf5(path: Path, table: OutputTable) -> Iterator[Put]:
     import h5py  # noqa: PLC0415 - an extra
 
     with h5py.File(path, "w", track_order=True) as file:
@@ -134,7 +134,7 @@ def _hdf5(path: Path, table: Table) -> Iterator[Put]:
 
 
 @contextmanager
-def _zarr(path: Path, table: Table) -> Iterator[Put]:
+def _zarr(path: Path, table: OutputTable) -> Iterator[Put]:
     import zarr  # noqa: PLC0415 - an extra
 
     group = zarr.open_group(str(path), mode="w")
@@ -167,8 +167,8 @@ def _by_places(made: Mapping[str, Any]) -> Put:
     return put
 
 
-_IN_FILES: Mapping[str, Callable[[IO[bytes], Table], Any]] = {".npy": _npy, ".csv": _csv, ".parquet": _parquet}
-_AT_PLACES: Mapping[str, Callable[[Path, Table], Any]] = {".h5": _hdf5, ".hdf5": _hdf5, ".zarr": _zarr}
+_IN_FILES: Mapping[str, Callable[[IO[bytes], OutputTable], Any]] = {".npy": _npy, ".csv": _csv, ".parquet": _parquet}
+_AT_PLACES: Mapping[str, Callable[[Path, OutputTable], Any]] = {".h5": _hdf5, ".hdf5": _hdf5, ".zarr": _zarr}
 
 ENDINGS = (*_IN_FILES, *_AT_PLACES)
 """Kinds of files that are written piece by piece."""
@@ -213,7 +213,7 @@ def _is_zarr(path: Path) -> bool:
 
 
 @contextmanager
-def writer(path: Path, table: Table) -> Iterator[Put]:
+def writer(path: Path, table: OutputTable) -> Iterator[Put]:
     """Give what takes rows, which are at `path` when all went well; nothing is there otherwise but what was."""
     ending = path.suffix.lower()
     if ending in _IN_FILES:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._identify import Held, Span
-from tvident._in_pieces.sources import Channel
+from tvident._in_pieces.sources import SourceChannel
 from tvident._units import Axis, axis_of
 from tvident._units import Channel as Said
 
@@ -22,28 +22,28 @@ _JITTER = 1e-3
 
 
 @dataclass(frozen=True)
-class Recording:
+class RecordingOfFile:
     """Angle and torque of a record that is not in memory.
 
     Parameters
     ----------
-    angle, torque : Channel
+    angle, torque : SourceChannel
     samples : int
     begin, period : float
         Seconds: of the first sample, and from one to the next.
     axis : Axis
         What the channels are multiplied by.
-    weights : Channel, optional
+    weights : SourceChannel, optional
         Of the samples.
     """
 
-    angle: Channel
-    torque: Channel
+    angle: SourceChannel
+    torque: SourceChannel
     samples: int
     begin: float
     period: float
     axis: Axis
-    weights: Channel | None = None
+    weights: SourceChannel | None = None
 
     def held(self, spans: Sequence[Span]) -> Held:
         """Read some parts."""
@@ -73,7 +73,7 @@ def units_of(angle: str, torque: str, angle_unit: str | None, torque_unit: str |
     return axis_of(Said(nothing, angle), Said(nothing, torque), angle_unit=angle_unit, torque_unit=torque_unit)
 
 
-def uniform(times: Channel, samples: int, factor: float, name: str) -> tuple[float, float]:
+def uniform(times: SourceChannel, samples: int, factor: float, name: str) -> tuple[float, float]:
     """Return the first of the times of a record and their step, in seconds.
 
     Raises

@@ -16,21 +16,21 @@ from tvident._identify import Long, Span, WeakForm, requested
 from tvident._in_pieces.choices import chosen, stretches
 from tvident._in_pieces.found import FileIdentification
 from tvident._in_pieces.kept import Kept
-from tvident._in_pieces.outputs import CHUNK, Table, head_of_rows, holds_rows, writer
-from tvident._in_pieces.recorded import Recording
+from tvident._in_pieces.outputs import CHUNK, OutputTable, head_of_rows, holds_rows, writer
+from tvident._in_pieces.recorded import RecordingOfFile
 from tvident._in_pieces.rows import row_of
-from tvident._in_pieces.work import Alone, Windows, Work
+from tvident._in_pieces.work import Alone, WindowsWork, Work
 from tvident._pieces import SHARED, Columns, Given, Mean, means_of, reach_of
 from tvident._status import Status
 from tvident._units import ROTARY
 
 
-class Asked:
+class AskedOfFile:
     """What is asked for of a recording.
 
     Parameters
     ----------
-    recording : Recording
+    recording : RecordingOfFile
     given : Given
     step : int
         Every how many samples a row is wanted.
@@ -43,7 +43,7 @@ class Asked:
         Whether equations are of the weak form, with one unknown at most that changes: rows of others hold several times as many numbers.
     """
 
-    def __init__(self, recording: Recording, given: Given, step: int) -> None:
+    def __init__(self, recording: RecordingOfFile, given: Given, step: int) -> None:
         self.recording, self.given, self.step = recording, given, step
         rate = 1 / recording.period
         request = requested(given.method, given.equation, given.settings, rate)
@@ -96,7 +96,7 @@ class Run:
 
     Parameters
     ----------
-    asked : Asked
+    asked : AskedOfFile
     kept : Kept
     piece : int
         Samples of a piece, about.
@@ -104,7 +104,7 @@ class Run:
     report : callable, optional
     """
 
-    def __init__(self, asked: Asked, kept: Kept, piece: int, output: Path, report: Any) -> None:
+    def __init__(self, asked: AskedOfFile, kept: Kept, piece: int, output: Path, report: Any) -> None:
         self._asked, self._kept, self._output, self._report = asked, kept, output, report
         self._pieces: list[Span] = list(pairwise(asked.borders(piece)))
         self._samples = asked.recording.samples
@@ -142,7 +142,7 @@ class Run:
                 self._kept.note_fact("factors", long.factors(held, asked.given.workers))
             alone = None if asked.given.nan_policy == "propagate" else asked.in_pieces(None)
             factors = self._kept.facts["factors"]
-            return long.settings(factors), Windows(
+            return long.settings(factors), WindowsWork(
                 asked.recording, long, factors, alone, asked.step, asked.given.workers
             )
         if long is not None:
@@ -204,7 +204,7 @@ class Run:
         notes = self._kept.notes
         some = self._finished(work, notes[0], (0, min(1, self._kept.count)), means)
         kinds = {name: values.dtype for name, values in some.items()}
-        with writer(self._output, Table(kinds, self._kept.count, self._asked.units, told)) as put:
+        with writer(self._output, OutputTable(kinds, self._kept.count, self._asked.units, told)) as put:
             done = 0
             for note, piece in zip(notes, self._pieces, strict=True):
                 last = done + len(range(piece[0] + -piece[0] % self._asked.step, piece[1], self._asked.step))

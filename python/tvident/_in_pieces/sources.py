@@ -16,7 +16,7 @@ from tvident._units import named_unit
 _UNITS = ("unit", "units", "Unit", "Units", "UNITS")
 
 
-class Channel(Protocol):
+class SourceChannel(Protocol):
     """Samples of one channel, wherever they are."""
 
     def read(self, first: int, end: int) -> npt.NDArray[Any]:
@@ -37,11 +37,11 @@ class Source:
         What messages call it.
     """
 
-    channels: Mapping[str, tuple[Channel, int]]
+    channels: Mapping[str, tuple[SourceChannel, int]]
     close: Callable[[], object]
     place: str
 
-    def channel(self, name: str) -> tuple[Channel, int, str]:
+    def channel(self, name: str) -> tuple[SourceChannel, int, str]:
         """Return a channel by its name, how many samples it has, and its unit.
 
         Raises
@@ -187,9 +187,9 @@ def _zarr(path: Path) -> Source:
     return _source(path, _of_arrays({name.replace("/", "."): one for name, one in opened.arrays()}))
 
 
-def _of_arrays(found: Mapping[str, Any]) -> dict[str, tuple[Channel, int]]:
+def _of_arrays(found: Mapping[str, Any]) -> dict[str, tuple[SourceChannel, int]]:
     """Return the channels of arrays with attributes: vectors, and columns of matrices."""
-    channels: dict[str, tuple[Channel, int]] = {}
+    channels: dict[str, tuple[SourceChannel, int]] = {}
     for name, array in found.items():
         if array.dtype.kind not in "iuf" or not array.shape:
             continue
@@ -205,7 +205,7 @@ def _of_arrays(found: Mapping[str, Any]) -> dict[str, tuple[Channel, int]]:
 
 
 def _source(
-    path: Path, channels: Mapping[str, tuple[Channel, int]], close: Callable[[], object] = lambda: None
+    path: Path, channels: Mapping[str, tuple[SourceChannel, int]], close: Callable[[], object] = lambda: None
 ) -> Source:
     return Source(channels, close, printable(path))
 

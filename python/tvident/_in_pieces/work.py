@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 from tvident._identify import Held, Long, Span
-from tvident._in_pieces.recorded import Recording
+from tvident._in_pieces.recorded import RecordingOfFile
 from tvident._pieces import Columns, Mean, columns_of, finished, part_alone, with_neighbours
 from tvident._results import Identification
 
@@ -35,12 +35,12 @@ class Work(Protocol):
 
 
 @dataclass(frozen=True)
-class Windows:
+class WindowsWork:
     """Windows of the strong form: every piece has the bits that it has in the whole record.
 
     Parameters
     ----------
-    recording : Recording
+    recording : RecordingOfFile
     long : Long
     factors : sequence of float
         Of standard errors, one an unknown.
@@ -52,7 +52,7 @@ class Windows:
 
     is_final: ClassVar[bool] = True
 
-    recording: Recording
+    recording: RecordingOfFile
     long: Long
     factors: Sequence[float]
     alone: Alone | None
@@ -79,7 +79,7 @@ class Alone:
 
     Parameters
     ----------
-    recording : Recording
+    recording : RecordingOfFile
     identified : callable
         Identifies some samples with settings that do not depend on the piece.
     reach : int
@@ -89,7 +89,7 @@ class Alone:
 
     is_final: ClassVar[bool] = False
 
-    recording: Recording
+    recording: RecordingOfFile
     identified: Identify
     reach: int
     step: int

@@ -62,7 +62,7 @@ class Rate:
         return math.sqrt(left / (self.count - 2) / self.squares)
 
 
-class Clock:
+class LiveClock:
     """Puts samples in order by their stamps, and what was lost between them as NaN.
 
     A stamp that is late alone, since a driver held it back, is followed by ones that are not; after a loss all are late. So a late stamp

@@ -116,7 +116,7 @@ class Lines:
         return next((place for place in range(begin, len(self._early)) if _says_something(self._early[place])), None)
 
     def _row(self, line: str) -> list[float] | None:
-        """Return the numbers of a line; nothing where it has none."""
+        """Return the numbers of a line; None if it has none."""
         if not _says_something(line) or self._cells is None:
             return None
         try:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tvident._live.clock import Clock, Row
+from tvident._live.clock import LiveClock, Row
 from tvident._stream import IdentificationStream, StreamedIdentification
 
 Show = Callable[[Sequence[float], dict[str, npt.NDArray[Any]]], None]
@@ -33,7 +33,7 @@ class Session:
         self._shows = shows
         self._stamps: list[float] = []
         self._first = 0
-        self.clock = Clock(period)
+        self.clock = LiveClock(period)
         self.given = 0
 
     def take(self, rows: Sequence[Sequence[float]], *, has_counter: bool) -> None:

@@ -11,7 +11,7 @@ from typing import IO, Any
 Columns = Mapping[str, Sequence[float]]
 
 
-class Table:
+class LiveTable:
     """One line of a table every so many seconds of the recording.
 
     Parameters

@@ -1,6 +1,6 @@
 """Identifies what repeated trials or coupled masses share, from rows that are merged."""
 
-from tvident._merged.call import Asked, identify_trials
+from tvident._merged.call import AskedTogether, identify_trials
 from tvident._merged.loaded import load
 from tvident._merged.masses import Masses, identify_masses, masses_of
 from tvident._merged.mechanism import Mechanism
@@ -11,7 +11,7 @@ from tvident._merged.structure import Chain, Matrix
 from tvident._merged.trials import Trials, trials_of
 
 __all__ = [
-    "Asked",
+    "AskedTogether",
     "Chain",
     "Identifiable",
     "Masses",

@@ -14,7 +14,7 @@ from tvident._equation import COEFFICIENTS, Term
 from tvident._merged.elements import Element, kind_or_number
 from tvident._merged.merging import Merging, Part
 from tvident._merged.predicted import Equations
-from tvident._merged.recorded import Recorded
+from tvident._merged.recorded import MergedRecorded
 from tvident._merged.result import MergedIdentification
 from tvident._merged.sampling import Sampling, variances
 from tvident._merged.trials import Trials
@@ -33,7 +33,7 @@ class TermValues(Protocol):
 
 
 @dataclass(frozen=True)
-class Asked:
+class AskedTogether:
     """What is the same for every call of the core.
 
     Parameters
@@ -107,7 +107,7 @@ class Asked:
         return {**self.units, **{element.name: self.units.get(element.of, "") for element in elements}}
 
 
-def identify_trials(trials: Trials, asked: Asked, term_values: TermValues) -> MergedIdentification:
+def identify_trials(trials: Trials, asked: AskedTogether, term_values: TermValues) -> MergedIdentification:
     """Identify what repeated trials of one mass share."""
     elements = []
     for coefficient, name in enumerate(COEFFICIENTS):
@@ -139,7 +139,7 @@ def identify_trials(trials: Trials, asked: Asked, term_values: TermValues) -> Me
         masses=0,
         units=asked.units_of(elements),
         phase=trials.phase,
-        recorded=Recorded(
+        recorded=MergedRecorded(
             [[one] for one in trials.angles],
             [[one] for one in trials.torques],
             [None] * len(given),

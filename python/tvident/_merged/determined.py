@@ -36,7 +36,7 @@ _NAMED = 2
 
 
 @dataclass(frozen=True)
-class _Windows:
+class _WindowsOfPart:
     """Sums over windows, constants last."""
 
     products: Array
@@ -132,7 +132,7 @@ def _rows(part: Part, names: list[str], period: float) -> tuple[list[Array], Arr
     return rows, np.tile(noises, (len(equations.trials), 1, 1))
 
 
-def _in_windows(rows: list[Array], noises: Array, windowed: int, length: int) -> _Windows:
+def _in_windows(rows: list[Array], noises: Array, windowed: int, length: int) -> _WindowsOfPart:
     """Return the products of constants without what windows follow, and whether windows tell their own elements apart."""
     size = rows[0].shape[0]
     places = [*range(windowed), *range(windowed), *range(windowed, size)]
@@ -160,7 +160,7 @@ def _in_windows(rows: list[Array], noises: Array, windowed: int, length: int) ->
         scale = np.sqrt(np.maximum(np.diagonal(both[local, local]), np.finfo(float).tiny))
         alone += _projection(_lost(both[local, local], added[local, local], scale))[:windowed, :windowed]
         counted += 1
-    return _Windows(products, noise, squares, follow / counted, alone / counted)
+    return _WindowsOfPart(products, noise, squares, follow / counted, alone / counted)
 
 
 def _lost(products: Array, noise: Array, scale: Array) -> Array:

@@ -90,7 +90,7 @@ def held_back(merging: Merging) -> HeldBackTorque:
 
 @np.errstate(all="ignore")
 def _simulated(merging: Merging, values: Mapping[str, Array], window_length: int) -> Array:
-    """Return how much of the angles a simulation explains; nothing where it would take long, or cannot be done."""
+    """Return how much of the angles a simulation explains; an empty array if it would take long, or cannot be done."""
     recorded, nothing = merging.recorded, np.zeros(0)
     whole = {one.name for one in merging.elements} == set(values) and all(
         np.isfinite(one).all() for one in values.values()
@@ -109,9 +109,9 @@ def _simulated(merging: Merging, values: Mapping[str, Array], window_length: int
                 model = model_of(merging, {name: one[some] for name, one in along.items()}, moving)
                 if isinstance(model, NotLinear):
                     return nothing
-                seen = angles[:, some].copy()
-                seen[:, first - begin :] = np.nan
-                found, _ = model.respond(bridged(rows_of(recorded.torques[trial])[:, some]), None, seen)
+                recorded_angle = angles[:, some].copy()
+                recorded_angle[:, first - begin :] = np.nan
+                found, _ = model.respond(bridged(rows_of(recorded.torques[trial])[:, some]), None, recorded_angle)
             except ValueError:
                 return nothing
             true, found = angles[:, first:end], found[:, first - begin :]

@@ -12,12 +12,12 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident import _core
 from tvident._equation import COEFFICIENTS
-from tvident._merged.call import Asked, TermValues
+from tvident._merged.call import AskedTogether, TermValues
 from tvident._merged.elements import Element, kind_or_number
 from tvident._merged.mechanism import Mechanism
 from tvident._merged.merging import Merging
-from tvident._merged.predicted import Equations, Trial
-from tvident._merged.recorded import Recorded
+from tvident._merged.predicted import Equations, TrialArrays
+from tvident._merged.recorded import MergedRecorded
 from tvident._merged.result import MergedIdentification
 from tvident._merged.sampling import Sampling, variances
 from tvident._merged.structure import Chain, matrices
@@ -66,7 +66,7 @@ class Masses:
         torques = [None if one is None else scaled(one, torque) for one in self.torques]
         return replace(self, angles=[scaled(one, angle) for one in self.angles], torques=torques)
 
-    def with_elements(self, asked: Asked, term_values: TermValues) -> tuple[Masses, list[Element]]:
+    def with_elements(self, asked: AskedTogether, term_values: TermValues) -> tuple[Masses, list[Element]]:
         """Return the masses with all that enters their equations, and the elements, those of terms last.
 
         There is one a term and mass on which a force acts; a mechanism ties equations to each other, so there it is one a mass.
@@ -243,7 +243,7 @@ def _joined(trials: Sequence[Masses]) -> Masses:
     return replace(trials[0], angles=angles, torques=torques, mask=None)
 
 
-def identify_masses(trials: Sequence[Masses], asked: Asked, term_values: TermValues) -> MergedIdentification:
+def identify_masses(trials: Sequence[Masses], asked: AskedTogether, term_values: TermValues) -> MergedIdentification:
     """Identify the elements of several masses, from one trial or from several that share them."""
     joined, elements = _joined(trials).with_elements(asked, term_values)
     several = [joined] if len(trials) == 1 else trials
@@ -284,7 +284,7 @@ def identify_masses(trials: Sequence[Masses], asked: Asked, term_values: TermVal
         units=asked.units_of(elements),
         unknowable=unknowable,
         inertia=joined.inertia,
-        recorded=Recorded(
+        recorded=MergedRecorded(
             [one.angles[: one.count] for one in trials],
             [one.torques for one in trials],
             [one.angles[one.count] if len(one.angles) > one.count else None for one in trials],
@@ -297,7 +297,7 @@ def identify_masses(trials: Sequence[Masses], asked: Asked, term_values: TermVal
 
 def _recorded(
     masses: Masses, equations: Sequence[int], channels: Sequence[int], names: Mapping[int, str], term_values: TermValues
-) -> Trial:
+) -> TrialArrays:
     """Return what was recorded of some equations, as the core takes it."""
     samples = masses.angles[0].size
     terms = np.stack([_term(masses, *one, term_values) for one in names.items()]) if names else None

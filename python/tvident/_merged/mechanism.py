@@ -110,7 +110,12 @@ class Mechanism:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of its factors."""
+        """Names of its factors: a tuple of str.
+
+        See Also
+        --------
+        regressors : what they multiply.
+        """
         return tuple(dict.fromkeys((*self.kinetic, *self.potential, *self.forces)))
 
     def regressors(self, q: Array, v: Array) -> Regressors:
@@ -120,6 +125,15 @@ class Mechanism:
         ------
         ValueError
             If a function returns another shape.
+
+        See Also
+        --------
+        dynamics : the same for simulation.
+
+        References
+        ----------
+        Lagrange's equations; J. Swevers, W. Verdonck, J. De Schutter: Dynamic model identification for industrial robots, IEEE Control
+        Systems Magazine 27 (2007), for equations that are linear in their factors.
         """
         momenta: list[Array] = []
         forces: list[Array] = []
@@ -148,6 +162,15 @@ class Mechanism:
         q, v : ndarray, shape (masses, n)
         step : ndarray, shape (masses,)
             By which coordinates are moved to find slopes.
+
+        See Also
+        --------
+        regressors : the same for identification.
+        MergedIdentification.simulate : integrates them.
+
+        References
+        ----------
+        Lagrange's equations: docs/together.md.
         """
         masses, states = q.shape
         pairs, speeds, units = _around(masses)

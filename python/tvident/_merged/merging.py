@@ -12,7 +12,7 @@ from tvident import _core
 from tvident._equation import COEFFICIENTS
 from tvident._merged.elements import Element
 from tvident._merged.predicted import Equations
-from tvident._merged.recorded import Recorded
+from tvident._merged.recorded import MergedRecorded
 from tvident._merged.sampling import Sampling
 
 Array = npt.NDArray[np.float64]
@@ -62,7 +62,7 @@ class Merging:
         Why some elements cannot be known.
     inertia : mapping of str to ndarray, shape (masses, masses, samples)
         By how much factors of a mechanism enter the matrix of inertia along the motion.
-    recorded : Recorded, optional
+    recorded : MergedRecorded, optional
         Not kept with what is stored.
     is_part : bool
         Whether it is from one time to another of what was recorded.
@@ -79,7 +79,7 @@ class Merging:
     phase: Array | None = None
     unknowable: Mapping[str, str] = field(default_factory=dict)
     inertia: Mapping[str, Array] = field(default_factory=dict)
-    recorded: Recorded | None = None
+    recorded: MergedRecorded | None = None
     is_part: bool = False
 
     @property

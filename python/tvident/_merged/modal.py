@@ -41,7 +41,7 @@ class Modes:
 
 
 @dataclass(frozen=True)
-class Element:
+class ModalElement:
     """By how much an element enters the three matrices, its values over time, and its place in the covariance."""
 
     patterns: tuple[Real, Real, Real]
@@ -53,12 +53,12 @@ def times_of(samples: int) -> npt.NDArray[np.intp]:
     return np.unique(np.linspace(0, max(samples - 1, 0), min(samples, _MOST_TIMES)).round().astype(np.intp))
 
 
-def modes_of(elements: Sequence[Element], covariance: Real, times: npt.NDArray[np.intp], samples: int) -> Modes:
+def modes_of(elements: Sequence[ModalElement], covariance: Real, times: npt.NDArray[np.intp], samples: int) -> Modes:
     """Return the modes of a system.
 
     Parameters
     ----------
-    elements : sequence of Element
+    elements : sequence of ModalElement
         Their values at all samples.
     covariance : ndarray, shape (times, elements, elements)
         Of the elements at the times at which modes are computed.
@@ -150,7 +150,7 @@ def _matched(likeness: Real) -> npt.NDArray[np.intp]:
 
 @np.errstate(all="ignore")
 def _errors(
-    elements: Sequence[Element],
+    elements: Sequence[ModalElement],
     covariance: Real,
     solved: tuple[Complex, Complex, Complex],
     matrices: tuple[Real, Real],

@@ -9,11 +9,11 @@ from typing import Any, Protocol, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from tvident._equation import BUILT_IN, COEFFICIENTS, FixedTerm
+from tvident._equation import BUILT_IN, COEFFICIENTS, FRICTION, OFFSET, FixedTerm
 from tvident._merged.elements import matrix_of
 from tvident._merged.mechanism import Mechanism, steps_of
 from tvident._merged.merging import Merging
-from tvident._merged.not_linear import General, NotLinear, Term
+from tvident._merged.not_linear import General, NotLinear, TermFunction
 from tvident._merged.response import LinearMasses
 from tvident._results import Model
 
@@ -64,14 +64,14 @@ def model_of(merging: Merging, values: Mapping[str, Array], base: Array | None) 
         for of in range(len(COEFFICIENTS))
     ]
     offsets, friction = np.zeros((2, count, samples))
-    terms: list[tuple[int, Array, Term]] = []
+    terms: list[tuple[int, Array, TermFunction]] = []
     for one in beside:
         mass, along = one.entries[0][0], values[one.name]
-        if one.of == "offset":
+        if one.of == OFFSET:
             offsets[mass] += along
-        elif one.of == "coulomb" and (along >= 0).all():
+        elif one.of == FRICTION and (along >= 0).all():
             friction[mass] += along
-        elif one.of == "coulomb":
+        elif one.of == FRICTION:
             # What drives, be it by chance, does not stick.
             terms.append((mass, along, lambda _time, _q, v: np.sign(v)))
         else:
@@ -154,7 +154,7 @@ def _between(values: Array) -> Array:
     return np.asarray((values[..., 1:] + values[..., :-1]) / 2)
 
 
-def _function(name: str, own: Mapping[str, Any]) -> Term:
+def _function(name: str, own: Mapping[str, Any]) -> TermFunction:
     """Return a term as a function of time, angle and velocity."""
     if name in own:
         given = own[name]

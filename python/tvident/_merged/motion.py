@@ -32,7 +32,7 @@ _STILL = 1e-3
 """A mass stands still whose velocity is at most this part of what it would change in the rest of the interval."""
 
 
-class Equations(Protocol):
+class MotionEquations(Protocol):
     """Equations of motion at some states, shape (masses, states)."""
 
     def at(self, sample: int, q: Array, v: Array) -> tuple[Array, Array]:
@@ -48,7 +48,7 @@ class Moving:
 
     Parameters
     ----------
-    equations : Equations
+    equations : MotionEquations
     friction : ndarray, shape (masses, n - 1)
         Of every mass between two samples; zero where there is none.
     period : float
@@ -58,7 +58,7 @@ class Moving:
         Between two samples.
     """
 
-    equations: Equations
+    equations: MotionEquations
     friction: Array
     period: float
     held: Array | None = None

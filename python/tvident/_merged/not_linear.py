@@ -16,7 +16,7 @@ from tvident._results import without_gaps
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
-Term: TypeAlias = Callable[[Array, Array, Array], Array]
+TermFunction: TypeAlias = Callable[[Array, Array, Array], Array]
 """A function of time, angle and velocity."""
 
 _BEGINNING = 2048
@@ -65,7 +65,7 @@ class General:
     inertia: Array
     damping: Array
     stiffness: Array
-    terms: Sequence[tuple[int, Array, Term]]
+    terms: Sequence[tuple[int, Array, TermFunction]]
     period: float
     mechanism: Mechanism | None
     factors: Mapping[str, Array]

@@ -33,7 +33,7 @@ def report(
         for trial in range(min(merging.trials, _MOST_TRIALS)):
             series += _series(result, merging, trial)
             compared += _compared(result, merging, trial)
-    page = _report.Shown(
+    page = _report.ShownResult(
         result,
         values=result.elements,
         derived=lambda: _modes(result, merging),

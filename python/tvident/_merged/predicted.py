@@ -14,7 +14,7 @@ from tvident._results import correlated_with, kernels_of, touched_by
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
-Trial: TypeAlias = tuple[Any, Any, Any, Any, Any]
+TrialArrays: TypeAlias = tuple[Any, Any, Any, Any, Any]
 """Angles, torques and terms, one a row, a mask, and positions in the result, as the core takes them."""
 
 
@@ -27,12 +27,12 @@ class Equations:
     elements : sequence of Element
     numbers : sequence of int
         Which of the masses they are of.
-    trials : sequence of Trial
+    trials : sequence of TrialArrays
     """
 
     elements: Sequence[Element]
     numbers: Sequence[int]
-    trials: Sequence[Trial]
+    trials: Sequence[TrialArrays]
 
 
 def predicted(

@@ -16,7 +16,7 @@ Numbers = npt.NDArray[np.number]
 
 
 @dataclass(frozen=True)
-class Recorded:
+class MergedRecorded:
     """Channels of every trial, by reference: they are not copied.
 
     Parameters

@@ -12,11 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident._files import RESULT_ENDINGS, write_settings, write_table
 from tvident._merged.drawn import drawn
 from tvident._merged.held_back import HeldBackTorque, held_back
 from tvident._merged.merging import Identifiable, Merging
 from tvident._merged.predicted import predicted
-from tvident._merged.simulated import Simulated
+from tvident._merged.simulated import MergedSimulated
+from tvident._merged.stored import store
 from tvident._merged.verdict import verdict_of
 from tvident._merged.words import summary_of, words_of
 from tvident._results import Measured, Scan, Telling, Words, every_sample, known_name, number_of
@@ -29,10 +31,10 @@ if TYPE_CHECKING:
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
-Picture: TypeAlias = Literal["parameters", "torque", "scan"]
+MergedPicture: TypeAlias = Literal["parameters", "torque", "scan"]
 
 
-class Reported(Simulated, Telling, Tabular):
+class Reported(MergedSimulated, Telling, Tabular):
     """The part of a result that is shown.
 
     Attributes
@@ -61,7 +63,7 @@ class Reported(Simulated, Telling, Tabular):
 
     @property
     def trusted(self) -> npt.NDArray[np.bool_]:
-        """Where values can be trusted."""
+        """Where values can be trusted, shape (n,)."""
         raise NotImplementedError
 
     def scan(self, part: int = 0) -> Scan:
@@ -83,6 +85,15 @@ class Reported(Simulated, Telling, Tabular):
             If widths were not compared: something may change with time, or the width was given.
         IndexError
             If there is no such part.
+
+        See Also
+        --------
+        Scan : what it returns.
+        Identification.scan : of one record.
+
+        References
+        ----------
+        The rule is in docs/automatic.md, "Equations of every scale".
         """
         if not self.scans:
             raise ValueError(
@@ -116,6 +127,15 @@ class Reported(Simulated, Telling, Tabular):
             If the result was loaded from a file, or nothing of it can be known.
         IndexError
             If there is no such trial.
+
+        See Also
+        --------
+        plot : draws both, with ``"torque"``.
+        held_back : how much is explained.
+
+        References
+        ----------
+        Equation (A) of docs/automatic.md, with matrices: docs/together.md.
         """
         merging = self._merging
         if not merging.parts:
@@ -156,6 +176,15 @@ class Reported(Simulated, Telling, Tabular):
         ------
         KeyError
             If there is no such element.
+
+        See Also
+        --------
+        elements, stderr : all numbers, and all errors.
+        identifiable : whether it can be known.
+
+        References
+        ----------
+        Errors are explained in docs/automatic.md, "Errors".
         """
         values = self.elements[known_name(name, self.elements)]
         return number_of(values, self.stderr[name], self.kinds[name], self.units.get(name, ""), self.trusted)
@@ -171,6 +200,15 @@ class Reported(Simulated, Telling, Tabular):
         HeldBackTorque
             ``predicted``: percent of the variance of every torque, as averages over the test function; ``simulated``: that of every angle,
             simulated from the state before each part, of equations that are linear or of one mass; ``words()`` says it.
+
+        See Also
+        --------
+        vaf : of any recording.
+        summary : begins with it.
+
+        References
+        ----------
+        M. Stone: Cross-validatory choice and assessment of statistical predictions, Journal of the Royal Statistical Society B 36 (1974).
         """
         return self._held_back
 
@@ -179,11 +217,26 @@ class Reported(Simulated, Telling, Tabular):
         return words_of(self, self._merging.sampling, [part.found for part in self._merging.parts], self._scatter)
 
     def summary(self) -> str:
-        """Return the verdict, a table of the elements, and in words what was chosen and what to do."""
+        """Return the verdict, a table of the elements, and in words what was chosen and what to do.
+
+        Returns
+        -------
+        str
+
+        See Also
+        --------
+        reasons, advice : its sentences, one by one.
+        report : the same as a page, with plots.
+        """
         return summary_of(self, verdict_of(self, self._merging))
 
     def plot(
-        self, what: Picture = "parameters", *, mass: int = 0, trial: int = 0, ax: Axes | Sequence[Axes] | None = None
+        self,
+        what: MergedPicture = "parameters",
+        *,
+        mass: int = 0,
+        trial: int = 0,
+        ax: Axes | Sequence[Axes] | None = None,
     ) -> Figure:
         """Draw the result, on axes of your own or in a new figure.
 
@@ -208,10 +261,15 @@ class Reported(Simulated, Telling, Tabular):
             If matplotlib is missing: install ``tvident[plot]``.
         ValueError
             If there is no such picture, or the record is not there.
+
+        See Also
+        --------
+        tvident.figures : the functions that draw.
+        report : a page to zoom in.
         """
         from tvident import _figures  # noqa: PLC0415 - matplotlib is optional
 
-        arguments.one_of("what", what, get_args(Picture))
+        arguments.one_of("what", what, get_args(MergedPicture))
         if what == "scan":
             return self.scan().plot(ax=ax)
         if what == "parameters":
@@ -245,13 +303,28 @@ class Reported(Simulated, Telling, Tabular):
             If the ending is another one, or a channel does not have a value for every sample.
         OSError
             If there is no such folder, or the file cannot be written.
+
+        See Also
+        --------
+        summary : its words.
+        plot : its pictures, one by one.
         """
         from tvident._merged.paged import report  # noqa: PLC0415 - pages are rarely asked for, and take long to load
 
         report(self, self._merging, path, channels=channels, title=title)
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
-        """Return everything that has one value a sample, by name: elements, their standard errors, residuals and flags."""
+        """Return everything that has one value a sample, by name: elements, their standard errors, residuals and flags.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (n,)
+
+        See Also
+        --------
+        save : writes them.
+        to_pandas, to_polars, to_xarray : the same in tables.
+        """
         found: dict[str, npt.NDArray[Any]] = {"time": self.time}
         if self.phase is not None:
             found["phase"] = self.phase
@@ -265,3 +338,30 @@ class Reported(Simulated, Telling, Tabular):
     def _table(self) -> Table:
         columns = self.columns()
         return Table(columns.pop("time"), columns, self.units, self.settings)
+
+    def save(self, path: str | Path) -> None:
+        """Write every column to a file, with units in the header; all that :func:`tvident.load` needs too, if the file can hold it.
+
+        Parameters
+        ----------
+        path : str or Path
+            A name that ends in ``.npz`` or ``.parquet``, from which the result comes back as it is, without the recording; or in ``.csv``
+            and others, for columns alone, with the settings beside. The file appears whole or not at all.
+
+        Raises
+        ------
+        ValueError
+            If the ending is another one.
+        OSError
+            If there is no such folder, or the file cannot be written.
+
+        See Also
+        --------
+        tvident.load : reads it back.
+        Identification.save : of one record.
+        """
+        if Path(path).suffix in RESULT_ENDINGS:
+            store(Path(path), self)
+        else:
+            write_table(path, self.columns(), self.units)
+            write_settings(Path(path), self.settings)

@@ -5,22 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident._equation import COEFFICIENTS
-from tvident._files import RESULT_ENDINGS, write_settings, write_table
-from tvident._merged import modal
 from tvident._merged.determined import undetermined
 from tvident._merged.elements import matrix_of
 from tvident._merged.held_back import HeldBackTorque
 from tvident._merged.heterogeneity import differences_of, excess
 from tvident._merged.merging import Identifiable, Merging, Part
+from tvident._merged.oscillating import Oscillating
 from tvident._merged.reported import Reported
-from tvident._merged.stored import store
 from tvident._merged.words import whose
 from tvident._results import samples_between, scan_of
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
@@ -30,7 +27,7 @@ Array: TypeAlias = npt.NDArray[np.float64]
 UNEXPLAINED_SPREAD = Status.KIND_CONTRADICTED
 
 
-class MergedIdentification(Reported):
+class MergedIdentification(Oscillating, Reported):
     r"""What :func:`tvident.identify` found of what repeated trials or coupled masses share. ``n`` is the number of samples.
 
     Attributes
@@ -144,7 +141,12 @@ class MergedIdentification(Reported):
 
     @classmethod
     def of_known(cls, merging: Merging, known: Mapping[str, Any]) -> MergedIdentification:
-        """Return a result that was found before: what it is made of, without its recording, and attributes."""
+        """Return a result that was found before: what it is made of, without its recording, and attributes.
+
+        See Also
+        --------
+        tvident.load : reads results from files.
+        """
         found = cls.__new__(cls)
         found.__dict__.update({"_merging": merging, **known})
         found.derive()
@@ -167,6 +169,11 @@ class MergedIdentification(Reported):
         ------
         ValueError
             If nothing lies in between.
+
+        See Also
+        --------
+        FileRecording.select : the same of a recording.
+        Identification.between : of one record.
         """
         samples, first, last = samples_between(self.time, begin, end)
         merging, time = self._merging, self.time[samples]
@@ -210,7 +217,12 @@ class MergedIdentification(Reported):
         }
 
     def derive(self) -> None:
-        """Find what follows from the elements; called once."""
+        """Find what follows from the elements; called once.
+
+        See Also
+        --------
+        elements, stderr : what it follows from.
+        """
         merging = self._merging
         self.terms: dict[str, Array] = {
             one.name: self.elements[one.name] for one in merging.elements if one.of not in COEFFICIENTS
@@ -328,7 +340,17 @@ class MergedIdentification(Reported):
 
     @property
     def trusted(self) -> npt.NDArray[np.bool_]:
-        """Where values can be trusted, shape (n,): all that can be known are numbers, and no flag speaks against them."""
+        """Where values can be trusted, shape (n,): all that can be known are numbers, and no flag speaks against them.
+
+        See Also
+        --------
+        status, record_status : the flags that it combines.
+        identifiable : what can be known at all.
+
+        References
+        ----------
+        docs/statuses.md.
+        """
         trusted = (self.status & DOUBTFUL == 0) & (int(self.record_status) & int(DOUBTFUL_RECORD) == 0)
         found = [name for name, kind in self.kinds.items() if kind not in {"known", "unknown"}]
         trusted &= bool(found)
@@ -336,67 +358,6 @@ class MergedIdentification(Reported):
             if self.identifiable[name]:
                 trusted &= np.isfinite(values)
         return np.asarray(trusted)
-
-    @cached_property
-    def modes(self) -> modal.Modes:
-        """Natural frequencies, damping ratios and shapes over time, each mode followed by its pole and shape.
-
-        Raises
-        ------
-        ValueError
-            If the equations of a mechanism are not linear in its motion.
-        """
-        merging = self._merging
-        if merging.inertia:
-            raise ValueError(
-                "modes are those of linear equations; got a Mechanism, whose inertia moves with it; describe its motion around a "
-                "position by a Chain or by matrices"
-            )
-        masses = max(merging.masses, 1)
-        patterns = [matrix_of(merging.elements, coefficient, masses) for coefficient in range(3)]
-        names = [one.name for one in merging.elements if any(one.name in pattern for pattern in patterns)]
-        nothing = np.zeros((masses, masses))
-        elements = [
-            modal.Element(tuple(pattern.get(name, nothing) for pattern in patterns), self.elements[name])  # type: ignore[arg-type] # three of them
-            for name in names
-        ]
-        times = modal.times_of(self.time.size)
-        covariances = {pair: values[times] for pair, values in self._covariances.items()}
-        return modal.modes_of(elements, modal.shared(names, covariances, times.size), times, self.time.size)
-
-    @property
-    def natural_frequency(self) -> Array:
-        """Natural frequencies in Hz, shape (n,) for trials, (modes, n) for masses."""
-        found = self.modes.natural_frequency
-        return found if self._merging.masses else found[0]
-
-    @property
-    def damping_ratio(self) -> Array:
-        """Damping ratios, shape (n,) for trials, (modes, n) for masses."""
-        found = self.modes.damping_ratio
-        return found if self._merging.masses else found[0]
-
-    def save(self, path: str | Path) -> None:
-        """Write every column to a file, with units in the header; all that :func:`tvident.load` needs too, if the file can hold it.
-
-        Parameters
-        ----------
-        path : str or Path
-            A name that ends in ``.npz`` or ``.parquet``, from which the result comes back as it is, without the recording; or in ``.csv``
-            and others, for columns alone, with the settings beside. The file appears whole or not at all.
-
-        Raises
-        ------
-        ValueError
-            If the ending is another one.
-        OSError
-            If there is no such folder, or the file cannot be written.
-        """
-        if Path(path).suffix in RESULT_ENDINGS:
-            store(Path(path), self)
-        else:
-            write_table(path, self.columns(), self.units)
-            write_settings(Path(path), self.settings)
 
     def _settings(self) -> dict[str, Any]:
         """Return what was chosen, as plain JSON."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident._merged.merging import Identifiable, Merging
 from tvident._merged.models import Responding, model_of
-from tvident._merged.recorded import Recorded
+from tvident._merged.recorded import MergedRecorded
 from tvident._results import (
     accounted_for,
     begins_once,
@@ -29,7 +29,7 @@ _BRIDGED = 3
 """Samples of a torque that may be missing: a straight line stands for them, as for one mass."""
 
 
-class Simulated:
+class MergedSimulated:
     """The part of a result of trials or masses that is compared with recordings.
 
     Attributes
@@ -85,6 +85,15 @@ class Simulated:
         ValueError
             If something cannot be known, shapes do not match, the record is not there to tell the state, or the response leaves the
             range of numbers or depends on the steps.
+
+        See Also
+        --------
+        vaf : compares it with recorded angles.
+        Identification.simulate : of one record.
+
+        References
+        ----------
+        C. Moler, C. Van Loan: Nineteen dubious ways to compute the exponential of a matrix, SIAM Review 45 (2003), for linear equations.
         """
         several = self._trials("torque", torque)
         angles = None if angle is None else self._trials("angle", angle)
@@ -102,10 +111,10 @@ class Simulated:
             moving = self._base(base, trial, pushed.shape[1])
             model = self._model(pushed.shape[1], position, moving)
             state = None if states is None else states[trial]
-            seen = None if angles is None else angles[trial]
-            if state is None and seen is None:
-                state, seen = self._begun(trial, pushed, len(several))
-            found.append(model.respond(bridged(pushed), state, seen)[0])
+            recorded_angle = None if angles is None else angles[trial]
+            if state is None and recorded_angle is None:
+                state, recorded_angle = self._begun(trial, pushed, len(several))
+            found.append(model.respond(bridged(pushed), state, recorded_angle)[0])
         return self._as_given(torque, found)
 
     def vaf(
@@ -133,22 +142,35 @@ class Simulated:
         ------
         ValueError
             As in :meth:`simulate`, and if only one of the channels is given.
+
+        See Also
+        --------
+        simulate : the angles that are compared.
+        Identification.vaf : of one record, with the equation.
+        held_back : of parts that were not used to identify.
+
+        References
+        ----------
+        L. Ljung: System identification, theory for the user (1999), on comparing simulated and recorded outputs.
         """
         both_or_none(angle, torque)
-        seen: Any = angle
+        recorded_angle: Any = angle
         pushed: Any = torque
         if angle is None:
             recorded = self._record("angle= and torque=")
-            seen, pushed = ([rows_of(one) for one in of] for of in (recorded.angles, recorded.torques))
+            recorded_angle, pushed = ([rows_of(one) for one in of] for of in (recorded.angles, recorded.torques))
             if not self._merging.masses:
-                seen, pushed = ([one[0] for one in of] for of in (seen, pushed))
+                recorded_angle, pushed = ([one[0] for one in of] for of in (recorded_angle, pushed))
             elif self._merging.trials == 1:
-                seen, pushed = seen[0], pushed[0]
-        simulated = self._trials("angle", self.simulate(pushed, angle=seen, phase=phase, base=base))
-        shares = [accounted_for(one, found) for one, found in zip(self._trials("angle", seen), simulated, strict=True)]
+                recorded_angle, pushed = recorded_angle[0], pushed[0]
+        simulated = self._trials("angle", self.simulate(pushed, angle=recorded_angle, phase=phase, base=base))
+        shares = [
+            accounted_for(one, found)
+            for one, found in zip(self._trials("angle", recorded_angle), simulated, strict=True)
+        ]
         if not self._merging.masses:
-            return float(shares[0][0]) if self._is_alone(seen) else np.concatenate(shares)
-        return shares[0] if self._is_alone(seen) else np.stack(shares)
+            return float(shares[0][0]) if self._is_alone(recorded_angle) else np.concatenate(shares)
+        return shares[0] if self._is_alone(recorded_angle) else np.stack(shares)
 
     @property
     def _dimensions(self) -> int:
@@ -246,7 +268,7 @@ class Simulated:
         model = self._model(angles.shape[1], position, None if base is None else bridged(rows_of([base]))[0])
         return model.respond(bridged(torques), None, angles)[1], None
 
-    def _record(self, cure: str) -> Recorded:
+    def _record(self, cure: str) -> MergedRecorded:
         """Return the record that was identified, if it is still there."""
         return still_there(self._merging.recorded, cure)
 

@@ -83,7 +83,12 @@ class Chain:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of its elements."""
+        """Names of its elements: a tuple of springs, dampers and masses.
+
+        See Also
+        --------
+        elements : with what was given of each.
+        """
         return tuple(element.name for element in self.elements({}))
 
     def elements(self, given: Mapping[str, Any]) -> list[Element]:
@@ -94,6 +99,15 @@ class Chain:
         given : mapping of str to object
             For inertia, damping and stiffness a kind or a number for all, one for each in a sequence, or some in a mapping by name or by
             what is connected.
+
+        Returns
+        -------
+        list of Element
+
+        See Also
+        --------
+        names : their names.
+        Matrix : describes a matrix instead.
         """
         inertias: list[tuple[Any, str]] = [(mass, f"inertia_{mass}") for mass in range(self.masses)]
         dampers = [(link, "_".join(("damping", *map(str, link)))) for link in self.dampers or ()]
@@ -188,6 +202,14 @@ class Matrix:
             Inertia, damping or stiffness.
         masses : int
             How many rows it has.
+
+        Returns
+        -------
+        list of Element
+
+        See Also
+        --------
+        Chain.elements : those of springs and masses.
         """
         coefficient = COEFFICIENTS.index(of)
         everywhere = list(product(range(masses), repeat=2))

@@ -10,13 +10,13 @@ from tvident._equation import COEFFICIENTS
 from tvident._merged.merging import Merging
 from tvident._results import (
     CHANGING,
-    believed,
-    disbelieved,
     known_to,
     negative,
     relative_error,
     share_of,
     two_digits,
+    verdict_of_distrusted,
+    verdict_of_trusted,
     why_not,
 )
 
@@ -34,17 +34,17 @@ def verdict_of(result: Any, merging: Merging) -> str:
     lost = [name for name, verdict in result.identifiable.items() if not verdict]
     asked = [one.name for one in merging.elements if not one.is_known]
     if len(lost) == len(asked):
-        return disbelieved(result, "nothing can be known of what was asked")
+        return verdict_of_distrusted(result, "nothing can be known of what was asked")
     share = _explained(result, merging)
     reason = why_not(result, lambda: _sign(result, merging), lambda: share)
     if reason:
-        return disbelieved(result, reason)
+        return verdict_of_distrusted(result, reason)
     known = _known(result, merging)
     if lost:
         known += (
             f"{', ' if known else ''}{lost[0]}{f' and {len(lost) - 1} more' if len(lost) > 1 else ''} cannot be known"
         )
-    return believed(result, known, share)
+    return verdict_of_trusted(result, known, share)
 
 
 def _known(result: Any, merging: Merging) -> str:

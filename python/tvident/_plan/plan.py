@@ -89,6 +89,15 @@ class ExperimentPlan:
         -------
         ndarray of float64, shape (duration times sample_rate,)
             In N m, or N of an axis that slides.
+
+        See Also
+        --------
+        plan_experiment : chooses the frequencies.
+        simulate_torsional_rig : a rig to try it on.
+
+        References
+        ----------
+        R. Pintelon, J. Schoukens: System identification, a frequency domain approach (2012): random-phase multisines.
         """
         rate = arguments.positive_number("sample_rate", sample_rate)
         time = np.arange(round(self.duration * rate)) / rate
@@ -104,6 +113,11 @@ class ExperimentPlan:
         Returns
         -------
         str
+
+        See Also
+        --------
+        excitation : the torque as samples.
+        Identification.summary : what the recording then says.
         """
         name = f"stiffness within {100 * self.wanted:.3g} %"
         periods = self.duration * self.frequencies[0] if self.frequencies.size else math.inf

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._regression.windows import Asked
+from tvident._regression.windows import AskedWindows
 from tvident._status import Status
 from tvident._units import times_in_seconds
 
@@ -24,7 +24,7 @@ _CHUNK = 1 << 14
 
 
 @dataclass
-class Found:
+class FoundInWindows:
     """Results of all windows, as the core has them."""
 
     params: Array
@@ -54,7 +54,7 @@ class Spans:
     at_least: int | None
 
 
-def irregular_times(asked: Asked, rows: int) -> Array | None:
+def irregular_times(asked: AskedWindows, rows: int) -> Array | None:
     """Return times in seconds where a duration was asked for on times that are not uniform; None otherwise.
 
     Raises
@@ -81,7 +81,7 @@ def irregular_times(asked: Asked, rows: int) -> Array | None:
     return None
 
 
-def spans_given(asked: Asked, times: Array, regressors: int) -> Spans:
+def spans_given(asked: AskedWindows, times: Array, regressors: int) -> Spans:
     """Return which rows lie in the window of every row."""
     duration = arguments.seconds("window_length", str(asked.window_length))
     if asked.half_life is not None:
@@ -131,11 +131,11 @@ def solved(
     columns: npt.NDArray[np.number],
     weights: Array | None,
     solve: Callable[..., Any],
-) -> Found:
+) -> FoundInWindows:
     """Solve every window; `solve` is the core's function with all that does not depend on windows."""
     (rows, p), q = regressors.shape, columns.shape[1]
     one, of_sides = np.full((p, q, rows), np.nan), np.full((q, rows), np.nan)
-    found = Found(
+    found = FoundInWindows(
         params=one,
         stderr=one.copy(),
         residuals=of_sides,

@@ -12,8 +12,8 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident import _core
 from tvident._huber import pseudo_values
-from tvident._regression.durations import Found, check_uniform, irregular_times, solved, spans_given
-from tvident._regression.windows import Alignment, Asked, Windows, lags_given, windows_given
+from tvident._regression.durations import FoundInWindows, check_uniform, irregular_times, solved, spans_given
+from tvident._regression.windows import Alignment, AskedWindows, RegressionWindows, lags_given, windows_given
 
 MOST_REGRESSORS = 16
 """No problem may have more regressors than this."""
@@ -222,7 +222,7 @@ def rolling_least_squares(
         raise ValueError(f"A must have at most {MOST_REGRESSORS} columns; got {count}; drop or combine some")
     is_robust = arguments.one_of("loss", loss, ("squares", "huber")) == "huber"
     is_correlated = arguments.one_of("covariance", covariance, ("classic", "hac")) == "hac"
-    asked = Asked(window_length, alignment, half_life, min_observations, t)
+    asked = AskedWindows(window_length, alignment, half_life, min_observations, t)
     times = irregular_times(asked, rows)
     if times is not None:
         spans = spans_given(asked, times, count)
@@ -243,7 +243,7 @@ def rolling_least_squares(
     # Every row's residual is needed.
     stride = 1 if is_correlated or times is not None else every
     solve = partial(_core.rolling_least_squares, constant=_constant(regressors, relative), workers=threads)
-    found: _core.RollingRegressions | Found
+    found: _core.RollingRegressions | FoundInWindows
     with arguments.reporter(progress, "least squares") as report:
         if times is not None:
             found = solved(spans, regressors, columns, relative, solve)
@@ -285,7 +285,7 @@ def _with_clipped_residuals(
     regressors: npt.NDArray[np.number],
     columns: npt.NDArray[np.number],
     weight: npt.NDArray[np.float64] | None,
-    windows: Windows,
+    windows: RegressionWindows,
     workers: int | None,
 ) -> npt.NDArray[np.float64]:
     """Return right-hand sides whose least squares are those of Huber's loss."""

@@ -14,7 +14,7 @@ Alignment: TypeAlias = Literal["centre", "trailing", "leading"]
 
 
 @dataclass(frozen=True)
-class Asked:
+class AskedWindows:
     """What a call says of windows."""
 
     window_length: int | str
@@ -25,7 +25,7 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Windows:
+class RegressionWindows:
     """What windows are like."""
 
     rows: int
@@ -33,7 +33,7 @@ class Windows:
     at_least: int | None
     half_life: float | None
 
-    def around_rows(self) -> Windows:
+    def around_rows(self) -> RegressionWindows:
         """Return windows of the same length around every row, in which all rows count the same."""
         return replace(self, alignment="centre", half_life=None)
 
@@ -47,7 +47,7 @@ class Windows:
         }
 
 
-def windows_given(asked: Asked, rows: int, regressors: int) -> Windows:
+def windows_given(asked: AskedWindows, rows: int, regressors: int) -> RegressionWindows:
     """Return the windows that were asked for, for a record of so many rows."""
     period = None if asked.t is None else arguments.sample_period(rows, t=asked.t)
     for name, value in (("window_length", asked.window_length), ("half_life", asked.half_life)):
@@ -70,7 +70,7 @@ def windows_given(asked: Asked, rows: int, regressors: int) -> Windows:
     fading = None
     if asked.half_life is not None:
         fading = _half_life(asked.half_life, period or 1.0, alignment, length, regressors)
-    return Windows(length, alignment, at_least, fading)
+    return RegressionWindows(length, alignment, at_least, fading)
 
 
 def _half_life(value: float | str, period: float, alignment: str, length: int, regressors: int) -> float:
@@ -91,7 +91,7 @@ def _half_life(value: float | str, period: float, alignment: str, length: int, r
     return half_life
 
 
-def lags_given(lags: int | None, windows: Windows, *, is_correlated: bool, is_robust: bool) -> int | None:
+def lags_given(lags: int | None, windows: RegressionWindows, *, is_correlated: bool, is_robust: bool) -> int | None:
     """Return over how many rows residuals are correlated, as it was given; check what goes together."""
     if windows.half_life is not None and (is_correlated or is_robust):
         other = "covariance='hac'" if is_correlated else "loss='huber'"

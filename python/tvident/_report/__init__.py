@@ -1,7 +1,7 @@
 """Writes a report: one page that shows a result and its recording without a network."""
 
 from tvident._report.channels import check_page, names_of_channels, samples_shown, series_of, write_page
-from tvident._report.content import Compared, Curve, Shown, title_of, unit_of
+from tvident._report.content import Compared, Curve, ShownResult, title_of, unit_of
 from tvident._report.packed import Series
 from tvident._report.written import check_plotly
 
@@ -9,7 +9,7 @@ __all__ = [
     "Compared",
     "Curve",
     "Series",
-    "Shown",
+    "ShownResult",
     "check_page",
     "check_plotly",
     "names_of_channels",

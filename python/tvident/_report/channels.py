@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._files import listed
-from tvident._report.content import Reported, Shown, unit_of
+from tvident._report.content import ReportedResult, ShownResult, unit_of
 from tvident._report.packed import Series
 from tvident._report.written import write_report
 from tvident._units import in_words_of, named_unit, unit_said
@@ -27,7 +27,7 @@ def names_of_channels(units: Mapping[str, str]) -> tuple[str, str]:
     return in_words_of(units, "Angle"), in_words_of(units, "Torque")
 
 
-def series_of(result: Reported, name: str, of: str, values: npt.ArrayLike, *, unit: str | None = None) -> Series:
+def series_of(result: ReportedResult, name: str, of: str, values: npt.ArrayLike, *, unit: str | None = None) -> Series:
     """Return a recorded channel as a page shows it."""
     start = float(result.time[0]) if result.time.size else 0.0
     shown = unit_of(of, result.units) if unit is None else unit
@@ -37,7 +37,7 @@ def series_of(result: Reported, name: str, of: str, values: npt.ArrayLike, *, un
 
 def write_page(
     path: str | Path,
-    page: Shown,
+    page: ShownResult,
     recorded: Sequence[Series],
     channels: Mapping[str, npt.ArrayLike] | None,
     title: str | None,

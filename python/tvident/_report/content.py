@@ -33,7 +33,7 @@ _COMMON_POWER = re.compile(r"\((.+) ± (.+)\)(e.+)")
 _SYMBOLS = {"inertia": "Inertia I", "damping": "Damping C", "stiffness": "Stiffness K"}
 
 
-class Reported(Protocol):
+class ReportedResult(Protocol):
     """What a report takes from every result."""
 
     time: Array
@@ -97,12 +97,12 @@ class Compared:
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownResult:
     """What a page shows of a result, where kinds of results differ.
 
     Parameters
     ----------
-    result : Reported
+    result : ReportedResult
     values : mapping of str to ndarray, shape (n,)
         Parameters and terms by name.
     derived : callable
@@ -120,7 +120,7 @@ class Shown:
         Takes words and returns them as whoever asked for the page speaks: of options, where that was the command line.
     """
 
-    result: Reported
+    result: ReportedResult
     values: Mapping[str, Array]
     derived: Callable[[], Sequence[Curve]]
     quality: Mapping[str, Array]
@@ -137,10 +137,10 @@ def unit_of(name: str, units: Mapping[str, str]) -> str:
     return "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³").replace(" ", "·")
 
 
-def content_of(shown: Shown, recorded: list[Series], title: str) -> tuple[dict[str, Any], list[Series]]:
+def content_of(shown: ShownResult, recorded: list[Series], title: str) -> tuple[dict[str, Any], list[Series]]:
     """Return what a page says, plain JSON, and the series of its plots; plots name them by number."""
     result = shown.result
-    drawn = _Drawn(shown, list(recorded))
+    drawn = _DrawnSeries(shown, list(recorded))
     drawn.recorded()
     drawn.found()
     for one in shown.compared:
@@ -171,10 +171,10 @@ def content_of(shown: Shown, recorded: list[Series], title: str) -> tuple[dict[s
     return content, series
 
 
-class _Drawn:
+class _DrawnSeries:
     """Collects what is drawn: series, and plots that name them by number."""
 
-    def __init__(self, shown: Shown, series: list[Series]) -> None:
+    def __init__(self, shown: ShownResult, series: list[Series]) -> None:
         self.shown, self.result = shown, shown.result
         self.series = series
         self.charts: list[dict[str, Any]] = []
@@ -193,7 +193,7 @@ class _Drawn:
             self.shade = self._add("flagged", "", self._flagged.view(np.uint8))
 
     def found(self) -> None:
-        """Draw what changes, with bands of two standard errors."""
+        """Draw the time-varying parameters, with bands of two standard errors."""
         result, values = self.result, self.shown.values
         curves = [
             Curve(title_of(name), unit_of(name, result.units), found, result.stderr[name])
@@ -260,11 +260,11 @@ def title_of(name: str) -> str:
     return _SYMBOLS.get(name, plain if len(plain.split()[0]) <= _SYMBOL else plain.capitalize())
 
 
-def _is_unknown(result: Reported, name: str) -> bool:
+def _is_unknown(result: ReportedResult, name: str) -> bool:
     return str(result.settings["kinds"].get(name)) != "known"
 
 
-def _numbers(shown: Shown) -> list[dict[str, str]]:
+def _numbers(shown: ShownResult) -> list[dict[str, str]]:
     """Return a line for every parameter: its value and error, or its range."""
     result, values = shown.result, shown.values
     lines = []
@@ -306,22 +306,22 @@ def _apart(value: float, error: float) -> str:
     return _COMMON_POWER.sub(r"\1\3 ± \2\3", arguments.with_error(value, error))
 
 
-def _everywhere(result: Reported) -> Status:
+def _everywhere(result: ReportedResult) -> Status:
     """Return the flags that all samples have: they are said once, and shade nothing."""
     return Status(int(np.bitwise_and.reduce(result.status)) if result.status.size else 0)
 
 
-def _worth_a_look(result: Reported) -> int:
+def _worth_a_look(result: ReportedResult) -> int:
     return int((DOUBTFUL | Status.GAP) & ~(_everywhere(result) | Status(int(result.record_status))))
 
 
-def _flags_over_time(result: Reported) -> dict[Status, npt.NDArray[np.bool_]]:
+def _flags_over_time(result: ReportedResult) -> dict[Status, npt.NDArray[np.bool_]]:
     """Return where each flag is set, for flags that are set somewhere."""
     occurring = int(np.bitwise_or.reduce(result.status)) if result.status.size else 0
     return {flag: result.status & flag != 0 for flag in Status if occurring & flag}
 
 
-def _warnings(result: Reported, marks: Mapping[Status, npt.NDArray[np.bool_]]) -> list[dict[str, Any]]:
+def _warnings(result: ReportedResult, marks: Mapping[Status, npt.NDArray[np.bool_]]) -> list[dict[str, Any]]:
     """Return what is flagged, in words, with its share and the times of its longest stretches."""
     warnings: list[dict[str, Any]] = [
         {"flag": flag.name, "words": flag.advice, "where": "the whole record", "times": [], "more": 0}
@@ -342,8 +342,8 @@ def _warnings(result: Reported, marks: Mapping[Status, npt.NDArray[np.bool_]]) -
     return warnings
 
 
-def _tone(result: Reported, verdict: str) -> str:
-    """Return whether all is well, something deserves a look, or nothing is to be believed: never better than the verdict."""
+def _tone(result: ReportedResult, verdict: str) -> str:
+    """Return whether all is well, something deserves a look, or nothing is to be trusted: never better than the verdict."""
     if (
         verdict.startswith("do not trust")
         or int(result.record_status) & int(DOUBTFUL_RECORD)

@@ -13,7 +13,7 @@ from string import Template
 from typing import Any
 
 from tvident._files import printable, replaced
-from tvident._report.content import Shown, content_of
+from tvident._report.content import ShownResult, content_of
 from tvident._report.packed import Packed, Series, in_words, packed, text_of
 
 _LONGEST_TITLE = 200
@@ -38,7 +38,7 @@ def _plotly(place: Path) -> str:
     return text_of(place.read_bytes(), level=6, strategy=0)
 
 
-def write_report(path: str | Path, shown: Shown, recorded: list[Series], title: str) -> None:
+def write_report(path: str | Path, shown: ShownResult, recorded: list[Series], title: str) -> None:
     """Write a page that shows a result, its channels, and recorded and predicted torque; it appears whole or not at all."""
     place = check_plotly()
     with ThreadPoolExecutor(1) as beside:

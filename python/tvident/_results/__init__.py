@@ -19,13 +19,13 @@ from tvident._results.told import Telling
 from tvident._results.torque import correlated_with, kernels_of, touched_by
 from tvident._results.verdict import (
     CHANGING,
-    believed,
-    disbelieved,
     known_to,
     negative,
     relative_error,
     share_of,
     two_digits,
+    verdict_of_distrusted,
+    verdict_of_trusted,
     why_not,
 )
 from tvident._results.words import TRIED, Words, of_batch
@@ -48,12 +48,10 @@ __all__ = [
     "Words",
     "accounted_for",
     "begins_once",
-    "believed",
     "both_or_none",
     "chosen",
     "correlated_with",
     "covariance_between",
-    "disbelieved",
     "every_sample",
     "explained_steps",
     "from_file",
@@ -82,6 +80,8 @@ __all__ = [
     "still_there",
     "touched_by",
     "two_digits",
+    "verdict_of_distrusted",
+    "verdict_of_trusted",
     "where_held_back",
     "why_not",
     "with_shared",

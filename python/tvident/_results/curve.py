@@ -91,24 +91,56 @@ class ExpandedParameter:
 
     @property
     def size(self) -> Any:
-        """How many functions there are."""
+        """How many functions there are: an int, or one for each of two channels.
+
+        See Also
+        --------
+        sizes : what was tried.
+        Expansion : asks for a size.
+        """
         sizes = self._functions.sizes
         return int(sizes[0]) if len(sizes) == 1 else tuple(int(one) for one in sizes)
 
     @property
     def position(self) -> Any:
-        """Even places within the limits."""
+        """Even places within the limits, shape (201,), or one such array for each of two channels, in the channel's unit.
+
+        See Also
+        --------
+        value, stderr : the curve there.
+        at : the curve at other places.
+        """
         each = tuple(np.linspace(low, high, _POINTS) for low, high in self._ranges)
         return each[0] if len(each) == 1 else each
 
     @property
     def value(self) -> Array:
-        """The curve at ``position``, or the surface over both."""
+        """The curve at ``position``, shape (201,), or the surface over both, (201, 201), in the parameter's unit.
+
+        See Also
+        --------
+        stderr : its error.
+        at : at other places.
+
+        References
+        ----------
+        The expansion is explained in docs/expansions.md.
+        """
         return self.at(*self._grid)
 
     @property
     def stderr(self) -> Array:
-        """Its standard error."""
+        """Its standard error, in the shape and unit of ``value``.
+
+        See Also
+        --------
+        value : the curve.
+        stderr_at : at other places.
+
+        References
+        ----------
+        By the delta method, from the covariance of all factors: docs/expansions.md.
+        """
         return self.stderr_at(*self._grid)
 
     def at(self, *positions: npt.ArrayLike) -> Array:
@@ -122,6 +154,15 @@ class ExpandedParameter:
         Returns
         -------
         ndarray of float64, of that shape
+
+        See Also
+        --------
+        stderr_at : errors there.
+        value : at even places.
+
+        References
+        ----------
+        The expansion is explained in docs/expansions.md.
         """
         functions, inside, shape = self._at(positions)
         return np.where(inside, functions @ self._own, np.nan).reshape(shape)
@@ -137,6 +178,15 @@ class ExpandedParameter:
         Returns
         -------
         ndarray of float64, of that shape
+
+        See Also
+        --------
+        at : the curve there.
+        stderr : at even places.
+
+        References
+        ----------
+        By the delta method, from the covariance of all factors: docs/expansions.md.
         """
         functions, inside, shape = self._at(positions)
         variance = np.einsum("ij,jk,ik->i", functions, self._own_covariance, functions)
@@ -164,6 +214,11 @@ class ExpandedParameter:
             If matplotlib is missing: install ``tvident[plot]``.
         ValueError
             If it is a function of two channels.
+
+        See Also
+        --------
+        at, stderr_at : the numbers.
+        tvident.figures : other pictures.
         """
         from tvident import _figures  # noqa: PLC0415 - matplotlib is optional
 

@@ -45,7 +45,7 @@ def _steps(result: Any) -> Iterator[tuple[str, list[str]]]:
 
 
 def _scan(result: Any) -> str:
-    """Return the estimates by the width of the test function; nothing where there is none."""
+    """Return the estimates by the width of the test function; an empty string if there are none."""
     try:
         return str(result.scan().summary())
     except (ValueError, IndexError):

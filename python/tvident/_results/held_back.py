@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._arguments import explained_in_words
-from tvident._equation import COEFFICIENTS
+from tvident._equation import COEFFICIENTS, OFFSET
 from tvident._results.response import Model, accounted_for, without_gaps
 
 PARTS = 10
@@ -83,7 +83,7 @@ def evaluated(
     held = np.zeros(angle.shape[-1], bool)
     pieces, whole = [], []
     # Where a term is not linear the state takes many simulations; the last ten test functions tell it.
-    is_linear = set(model.values) <= {*COEFFICIENTS, "offset"}
+    is_linear = set(model.values) <= {*COEFFICIENTS, OFFSET}
     for begin, first, end in parts:
         held[first:end] = True
         before = min(window_length, first - begin)

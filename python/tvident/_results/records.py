@@ -124,7 +124,7 @@ def with_shared(result: Identification, shared: Shared, changes: Mapping[str, Id
 
 
 def _change(result: Identification, other: Identification, name: str, deviation: float) -> Array:
-    """Return by how much something moves with what is shared; nothing where either has no number."""
+    """Return by how much something moves with what is shared; zero if either has no number."""
     moved = other._found.values[name] - result._found.values[name]  # noqa: SLF001 - of this room
     return np.nan_to_num(moved) if deviation > 0 else np.zeros_like(moved)
 
@@ -188,7 +188,12 @@ class IdentifiedRecords(Sequence[Identification]):
 
     @property
     def advice(self) -> tuple[str, ...]:
-        """What to do about what looks wrong in what is shared."""
+        """What to do about what looks wrong in what is shared: a tuple of sentences.
+
+        See Also
+        --------
+        Identification.advice : what to do about one of the records.
+        """
         shared = self._shared
         if shared is None:
             return ()
@@ -207,6 +212,10 @@ class IdentifiedRecords(Sequence[Identification]):
         Returns
         -------
         str
+
+        See Also
+        --------
+        Identification.summary : of one of the records.
         """
         lines = [f"{name}, shared by {len(self)} records: {with_error(*one)}" for name, one in self.constants.items()]
         lines += [f"  {line}" for line in self.advice]

@@ -42,7 +42,7 @@ def report(
             _report.series_of(result, name, of, values)
             for name, of, values in ((angle, "angle", recorded.given[0]), (torque, "torque", recorded.given[1]))
         ]
-    page = _report.Shown(
+    page = _report.ShownResult(
         result,
         values={name: getattr(result, name) for name in COEFFICIENTS} | result.terms,
         derived=lambda: [

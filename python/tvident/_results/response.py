@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
-from tvident._equation import COEFFICIENTS, TERM_NAMES, FixedTerm
+from tvident._equation import BUILT_IN, COEFFICIENTS, TERM_NAMES, FixedTerm
 
 Array: TypeAlias = npt.NDArray[np.float64]
 Numbers: TypeAlias = npt.NDArray[np.number]
@@ -76,10 +76,11 @@ class Model:
             )
         if (self.values["inertia"] != 0).any():
             return
+        acting = [name for name, value in self.values.items() if (value != 0).any()]
         of_velocity = [
-            name for name in ("coulomb", "stribeck", *self.own) if (self.values.get(name, np.zeros(1)) != 0).any()
+            name for name in acting if name in self.own or (name in BUILT_IN and BUILT_IN[name].needs_velocity)
         ]
-        of_angle = [name for name in ("cubic", "gravity") if (self.values.get(name, np.zeros(1)) != 0).any()]
+        of_angle = [name for name in acting if name in BUILT_IN and BUILT_IN[name].is_of_angle]
         if of_velocity or (of_angle and (self.values["damping"] == 0).all()):
             raise ValueError(
                 f"a system without inertia must be linear, or damped with terms of the angle alone, to be simulated; got "
@@ -116,7 +117,7 @@ class Model:
             return np.broadcast_to(value, shape)
 
         initial = how["initial"]
-        velocities: dict[str, Any] = {"stribeck": list(self.stribeck)} if "stribeck" in values else {}
+        fades = any(name in BUILT_IN and BUILT_IN[name].inner for name in values)
         found = _core.respond(
             [factor(name) for name in COEFFICIENTS],
             [(name, factor(name)) for name in values if name in TERM_NAMES],
@@ -127,7 +128,7 @@ class Model:
             angle=how["angle"],
             initial=None if initial is None else initial.reshape(-1, 2).tolist(),
             spans=how["spans"],
-            **velocities,
+            stribeck=list(self.stribeck) if fades else None,
         )
         lost = [(record, sample) for record, sample in enumerate(found.lost) if sample is not None]
         if lost:

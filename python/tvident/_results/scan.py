@@ -95,6 +95,11 @@ class Scan:
         Returns
         -------
         str
+
+        See Also
+        --------
+        plot : the same as a picture.
+        Identification.scan : returns it.
         """
         if not self.window_length.size:
             return "there is nothing to compare: the record is too short, or no other width determines the constants"
@@ -136,6 +141,11 @@ class Scan:
             If matplotlib is missing: install ``tvident[plot]``.
         ValueError
             If the record was too short to compare widths.
+
+        See Also
+        --------
+        summary : the same as a table.
+        Identification.scan : returns it.
         """
         from tvident import _figures  # noqa: PLC0415 - matplotlib is optional
 

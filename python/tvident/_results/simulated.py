@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident._equation import OFFSET
 from tvident._results.held_back import HeldBack, evaluated, parts_of
 from tvident._results.recorded import Recorded, begins_once, both_or_none, still_there
 from tvident._results.response import Model, accounted_for, every_sample
@@ -84,6 +85,17 @@ class Simulated:
         ValueError
             If shapes do not match, the record is not there to tell the state, or the response leaves the range of numbers, as that of an
             unstable system does.
+
+        See Also
+        --------
+        vaf : compares it with a recorded angle.
+        held_back : the same of parts that were not used to identify.
+        predicted_torque : compares torques, and needs no state to begin in.
+
+        References
+        ----------
+        A. H. Al-Mohy, N. J. Higham: Computing the action of the matrix exponential, SIAM Journal on Scientific Computing 33 (2011).
+        J. D. Lawson: Generalized Runge-Kutta processes for stable systems, SIAM Journal on Numerical Analysis 4 (1967), for further terms.
         """
         torques = self._channel("torque", torque)
         model = self._model()
@@ -124,6 +136,15 @@ class Simulated:
         ------
         ValueError
             As in :meth:`simulate`, and if only one of the channels is given.
+
+        See Also
+        --------
+        simulate : the angle that is compared.
+        held_back : of parts that were not used to identify.
+
+        References
+        ----------
+        L. Ljung: System identification, theory for the user (1999), on comparing simulated and recorded outputs.
         """
         both_or_none(angle, torque)
         if angle is None or torque is None:
@@ -149,6 +170,15 @@ class Simulated:
         ------
         ValueError
             If there are several records, or the record is not there any more.
+
+        See Also
+        --------
+        plot : draws both, with ``"torque"``.
+        vaf : compares angles instead.
+
+        References
+        ----------
+        Equations (1) and (A) of docs/mathematics.md and docs/automatic.md.
         """
         if self.inertia.ndim != 1:
             raise ValueError(
@@ -175,6 +205,15 @@ class Simulated:
         ------
         KeyboardInterrupt
             If it is interrupted.
+
+        See Also
+        --------
+        vaf : of any recording.
+        summary : begins with it.
+
+        References
+        ----------
+        M. Stone: Cross-validatory choice and assessment of statistical predictions, Journal of the Royal Statistical Society B 36 (1974).
         """
         if self._held_back is None:
             self._held_back = self._hold_back()
@@ -239,8 +278,8 @@ class Simulated:
         if "angle_zero" in self.constants:
             # K (θ - θ₀): the spring's torque at the encoder's zero is one more offset, which changes as the stiffness does.
             zero = np.asarray(self.constants["angle_zero"][0])[..., np.newaxis]
-            values["offset"] = values["offset"] - zero * self.stiffness
-            alone.discard("offset")
+            values[OFFSET] = values[OFFSET] - zero * self.stiffness
+            alone.discard(OFFSET)
 
         def prepared(name: str, value: Array) -> Array:
             if name in alone or isinstance(s["known"].get(name), int | float):

@@ -26,12 +26,24 @@ class Telling:
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """What was chosen, and why."""
+        """What was chosen, and why: a tuple of sentences.
+
+        See Also
+        --------
+        advice : what to do.
+        summary : both, with the numbers.
+        """
         return self._in_own_words(self._told.reasons)
 
     @property
     def advice(self) -> tuple[str, ...]:
-        """What to do about what looks wrong."""
+        """What to do about what looks wrong: a tuple of sentences.
+
+        See Also
+        --------
+        reasons : what was chosen.
+        record_status : the flags behind it.
+        """
         return self._in_own_words(self._told.advice)
 
     def _in_own_words(self, sentences: tuple[str, ...]) -> tuple[str, ...]:

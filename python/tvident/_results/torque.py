@@ -10,7 +10,7 @@ import numpy.typing as npt
 from numpy.polynomial import Polynomial
 
 from tvident._derivatives import fit_local_polynomials
-from tvident._equation import BUILT_IN
+from tvident._equation import BUILT_IN, OFFSET
 from tvident._results.response import Model, every_sample, without_gaps
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -65,14 +65,14 @@ def _sum(model: Model, motion: tuple[Array, Array, Array], averaged: Callable[[A
     known = {"inertia": acceleration, "damping": velocity, "stiffness": angle}
     total = np.zeros(angle.size)
     for name, factor in model.values.items():
-        if name == "offset":
+        if name == OFFSET:
             regressor = np.ones(1)
         elif name in known:
             regressor = known[name]
         elif name in model.own:
             regressor = _where_known(np.asarray(model.own[name].values(t, angle.copy(), velocity.copy())), averaged)
         else:
-            inner = model.stribeck[:1] if name == "stribeck" else ()
+            inner = model.stribeck[:1] if BUILT_IN[name].inner else ()
             regressor = averaged(BUILT_IN[name].function(np, angle, velocity, *inner))
         total = total + np.broadcast_to(every_sample(factor, angle.size, 1), angle.shape) * regressor
     return np.asarray(total)

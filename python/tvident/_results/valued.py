@@ -24,7 +24,7 @@ class Valued(Tabular):
 
     @property
     def trusted(self) -> npt.NDArray[np.bool_]:
-        """Where values can be trusted."""
+        r"""Where values can be trusted, shape (\*, n)."""
         raise NotImplementedError
 
     def value(self, name: str, record: int | None = None) -> Measured:
@@ -49,6 +49,15 @@ class Valued(Tabular):
             If there is no such parameter.
         ValueError
             If there are several records and none is named.
+
+        See Also
+        --------
+        constants, stderr : all numbers, and all errors.
+        summary : a table of them.
+
+        References
+        ----------
+        Medians and ranges are those of samples that are trusted; the errors are explained in docs/automatic.md, "Errors".
 
         Examples
         --------

@@ -77,16 +77,16 @@ def _of_one(result: Any) -> str:
     share = cache(lambda: explained(result))  # a prediction of the whole record
     reason = _distrusted(result, share)
     if reason:
-        return disbelieved(result, reason)
-    return believed(result, _errors(result), share())
+        return verdict_of_distrusted(result, reason)
+    return verdict_of_trusted(result, _errors(result), share())
 
 
-def disbelieved(result: Any, reason: str) -> str:
+def verdict_of_distrusted(result: Any, reason: str) -> str:
     """Return the verdict on a result that something says to distrust."""
     return f"do not trust: {reason}{'; see what to do' if result.advice else ''}"
 
 
-def believed(result: Any, known: str, share: float | None) -> str:
+def verdict_of_trusted(result: Any, known: str, share: float | None) -> str:
     """Return the verdict on a result that nothing says to distrust, by how well it is known and by how much of the torque it explains."""
     parts = [known] if known else []
     if share is not None:

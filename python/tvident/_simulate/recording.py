@@ -76,6 +76,10 @@ class Recording:
             If the ending is another one.
         OSError
             If there is no such folder, or the file cannot be written.
+
+        See Also
+        --------
+        tvident.read_recording : reads it back.
         """
         names = ("time", "angle", "torque", "slider_position", "inertia", "damping", "stiffness")
         write_table(path, {name: getattr(self, name) for name in names}, UNITS)

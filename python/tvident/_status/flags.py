@@ -93,7 +93,12 @@ class Status(enum.IntFlag):
 
     @property
     def advice(self) -> str:
-        """What the flags mean and what to do, in words."""
+        """What the flags mean and what to do, in words: one string.
+
+        See Also
+        --------
+        Identification.advice : what to do about one record.
+        """
         return "; ".join(_ADVICE[flag] for flag in Status if flag in self) or "all is well"
 
 

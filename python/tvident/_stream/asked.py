@@ -20,7 +20,7 @@ from tvident._stream.weak import WeakStream
 _CURE: Final = "give settings= of an earlier result"
 
 
-class Work(Protocol):
+class StreamWork(Protocol):
     """What a stream is beneath its names."""
 
     @property
@@ -77,7 +77,7 @@ class Asked(Protocol):
     def equation(self) -> Equation:
         """What is known and what is not."""
 
-    def begun(self, step: int, state: Any) -> Work:
+    def begun(self, step: int, state: Any) -> StreamWork:
         """Return the work that begins, or goes on from a state."""
 
 
@@ -103,7 +103,7 @@ class InStrongForm:
     factors: list[float] | None
     forgetting: float
 
-    def begun(self, step: int, state: Any) -> Work:
+    def begun(self, step: int, state: Any) -> StreamWork:
         """Return the work that begins, or goes on from a state."""
         return _core.ParameterStream(
             plan(**self.plan),
@@ -133,7 +133,7 @@ class InWeakForm:
     given: Given
     half_life: float
 
-    def begun(self, step: int, state: Any) -> Work:
+    def begun(self, step: int, state: Any) -> StreamWork:
         """Return the work that begins, or goes on from a state."""
         return WeakStream(self.given, self.equation.names, step, self.half_life, state)
 

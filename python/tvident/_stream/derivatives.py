@@ -185,12 +185,21 @@ class LocalPolynomialStream(SampleStream[StreamedDerivatives]):
             If the stream has ended, `y` has more than one axis, or holds what is no number where `nan_policy` is ``"raise"``.
         TypeError
             If `y` is complex or holds no numbers.
+
+        See Also
+        --------
+        finish : what is left at the end.
+        fit_local_polynomials : the same numbers of a whole record.
+
+        References
+        ----------
+        Equations (2), (8) and (9) of docs/mathematics.md; the delay is explained in docs/real-time.md.
         """
         self._check_open()
         return self._given(self._stream.push(self._piece("y", y)))
 
-    def _given(self, found: tuple[int, _core.LocalEstimates, npt.NDArray[np.float64]]) -> StreamedDerivatives:
-        first, estimates, errors = found
+    def _given(self, found: _core.StreamedEstimates) -> StreamedDerivatives:
+        first, estimates, errors = found.first, found.estimates, found.stderr
         return StreamedDerivatives(
             self._times(first, estimates.status.size),
             estimates.derivatives,

@@ -14,7 +14,7 @@ from tvident._equation import COEFFICIENTS, LINEAR_UNITS, UNITS, GivenTerm, Para
 from tvident._identify import Method
 from tvident._pieces import Given
 from tvident._status import DOUBTFUL, Status
-from tvident._stream.asked import Work, asked_of
+from tvident._stream.asked import StreamWork, asked_of
 from tvident._stream.pieces import SampleStream
 from tvident._stream.weak import WeakStream
 from tvident._units import ROTARY, axis_of, factor_said, scaled
@@ -234,7 +234,7 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         self._hold = False
         self._stream = self._begun(None)
 
-    def _begun(self, state: Any) -> Work:
+    def _begun(self, state: Any) -> StreamWork:
         """Return a stream that begins, or goes on from a state."""
         stream = self._asked.begun(self._step, state)
         stream.hold(self._hold)
@@ -242,23 +242,46 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
 
     @property
     def names(self) -> list[str]:
-        """What is unknown, by name."""
+        """What is unknown, by name: a list of str.
+
+        See Also
+        --------
+        units : their units.
+        push : gives their values.
+        """
         return list(self._asked.equation.names)
 
     @property
     def units(self) -> dict[str, str]:
-        """Units of what is unknown."""
+        """Units of what is unknown: a dict of name to str.
+
+        See Also
+        --------
+        names : what is unknown.
+        """
         units = UNITS if self._axis.system is ROTARY else LINEAR_UNITS
         return {name: units.get(name, "") for name in self._asked.equation.names}
 
     @property
     def record_status(self) -> Status:
-        """Flags of the recording, in weak form: of the latest block, and of constants so far. The strong form judges nothing of it."""
+        """Flags of the recording, in weak form: of the latest block, and of constants so far. The strong form judges nothing of it.
+
+        See Also
+        --------
+        Status : what flags mean.
+        Identification.record_status : of a whole record.
+        """
         return self._stream.record_status if isinstance(self._stream, WeakStream) else Status(0)
 
     @property
     def hold(self) -> bool:
-        """Whether constants stay as they are."""
+        """Whether constants stay as they are: True while held.
+
+        See Also
+        --------
+        reset : forgets all equations.
+        push : goes on with what is not held.
+        """
         return self._hold
 
     @hold.setter
@@ -267,7 +290,12 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         self._stream.hold(self._hold)
 
     def reset(self) -> None:
-        """Forget all equations so far: constants are those of the equations that follow. Windows forget by themselves."""
+        """Forget all equations so far: constants are those of the equations that follow. Windows forget by themselves.
+
+        See Also
+        --------
+        hold : keeps constants instead.
+        """
         self._stream.reset()
 
     def push(self, angle: npt.ArrayLike, torque: npt.ArrayLike) -> StreamedIdentification:
@@ -289,6 +317,15 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
             If the stream has ended, angle and torque have not the same length, or hold what is no number where `nan_policy` is ``"raise"``.
         TypeError
             If an array is complex or holds no numbers.
+
+        See Also
+        --------
+        finish : what is left at the end.
+        identify : the same numbers of a whole record.
+
+        References
+        ----------
+        Equations (1) to (9) of docs/mathematics.md, (A) of docs/automatic.md; the delay is explained in docs/real-time.md.
         """
         self._check_open()
         angles, torques = self._piece("angle", angle), self._piece("torque", torque)

@@ -36,6 +36,11 @@ class Stream(Generic[Out]):
         ------
         ValueError
             If the stream has ended before, or nothing has come that could end.
+
+        See Also
+        --------
+        push : takes samples.
+        delay : how late numbers are.
         """
         self._check_open()
         self._check_end()
@@ -63,7 +68,13 @@ class Stream(Generic[Out]):
 
     @property
     def delay(self) -> int:
-        """Samples, or rows, from one to its numbers."""
+        """Samples, or rows, from one to its numbers.
+
+        See Also
+        --------
+        push : gives numbers that late.
+        finish : gives the rest.
+        """
         return int(self._stream.delay)
 
 
@@ -77,7 +88,12 @@ class SampleStream(Stream[Out]):
 
     @property
     def samples(self) -> int:
-        """Samples that have come so far."""
+        """Samples that have come so far: an int.
+
+        See Also
+        --------
+        delay : how far behind results are.
+        """
         return int(self._stream.samples)
 
     def _piece(self, name: str, values: npt.ArrayLike) -> npt.NDArray[Any]:

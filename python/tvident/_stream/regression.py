@@ -98,17 +98,27 @@ class RollingStream(Stream[StreamedRegression]):
         self._window = arguments.whole_number("window_length", window_length, least=1)
         self._step = arguments.whole_number("step", step, least=1)
         self._shape: tuple[int, int] | None = None
-        self._one_side = True
+        self._one_rhs = True
         self._stream = self._begun(None)
 
     @property
     def delay(self) -> int:
-        """Rows from one to its window."""
+        """Rows from one to its window.
+
+        See Also
+        --------
+        push : gives windows that late.
+        """
         return self._window - 1 - self._window // 2
 
     @property
     def rows(self) -> int:
-        """Rows that have come so far."""
+        """Rows that have come so far: an int.
+
+        See Also
+        --------
+        delay : how far behind results are.
+        """
         return 0 if self._stream is None else self._stream.rows
 
     def push(self, A: npt.ArrayLike, b: npt.ArrayLike) -> StreamedRegression:
@@ -132,26 +142,36 @@ class RollingStream(Stream[StreamedRegression]):
             If the stream has ended, lengths differ, or there are other columns than before.
         TypeError
             If an array is complex or holds no numbers.
+
+        See Also
+        --------
+        finish : what is left at the end.
+        rolling_least_squares : the same numbers of all rows at once.
+
+        References
+        ----------
+        Equation (4) of docs/mathematics.md; W. M. Gentleman: Least squares computations by Givens transformations without square roots,
+        Journal of the Institute of Mathematics and its Applications 12 (1973).
         """
         self._check_open()
-        sides = arguments.any_array("b", b)
+        rhs = arguments.any_array("b", b)
         regressors = arguments.any_array("A", A)
-        if sides.ndim == 0:
-            regressors, sides = regressors.reshape(1, -1), sides.reshape(1)
+        if rhs.ndim == 0:
+            regressors, rhs = regressors.reshape(1, -1), rhs.reshape(1)
         elif regressors.ndim == 1:
             regressors = regressors[:, None]
-        if regressors.ndim != 2 or sides.ndim > 2:  # noqa: PLR2004 - a matrix has two axes
+        if regressors.ndim != 2 or rhs.ndim > 2:  # noqa: PLR2004 - a matrix has two axes
             raise ValueError(
-                f"A must have shape (m, p) and b shape (m,) or (m, q); got {regressors.shape} and {sides.shape}; reshape them"
+                f"A must have shape (m, p) and b shape (m,) or (m, q); got {regressors.shape} and {rhs.shape}; reshape them"
             )
-        if sides.shape[0] != regressors.shape[0]:
+        if rhs.shape[0] != regressors.shape[0]:
             raise ValueError(
-                f"A and b must have as many rows as each other; got {regressors.shape[0]} and {sides.shape[0]}; push them together"
+                f"A and b must have as many rows as each other; got {regressors.shape[0]} and {rhs.shape[0]}; push them together"
             )
         if self._stream is None:
-            self._shape, self._one_side = _shape_of(regressors, sides), sides.ndim == 1
+            self._shape, self._one_rhs = _shape_of(regressors, rhs), rhs.ndim == 1
             self._stream = self._begun(None)
-        return self._given(self._stream.push(regressors.T, sides.reshape(sides.shape[0], -1).T))
+        return self._given(self._stream.push(regressors.T, rhs.reshape(rhs.shape[0], -1).T))
 
     def _check_end(self) -> None:
         """Check that rows have come."""
@@ -166,10 +186,10 @@ class RollingStream(Stream[StreamedRegression]):
             else _core.RollingStream(self._window, *self._shape, step=self._step, state=state)
         )
 
-    def _given(self, answer: tuple[int, _core.RollingRegressions]) -> StreamedRegression:
-        first, found = answer
+    def _given(self, settled: _core.StreamedRegressions) -> StreamedRegression:
+        first, found = settled.first, settled.regressions
         row = np.arange(first, first + found.status.size * self._step, self._step, dtype=np.int64)
-        if self._one_side:
+        if self._one_rhs:
             params, stderr, rss = found.params[:, 0].T, found.stderr[:, 0].T, found.rss[0]
         else:
             params, stderr, rss = np.moveaxis(found.params, -1, 0), np.moveaxis(found.stderr, -1, 0), found.rss.T
@@ -179,9 +199,9 @@ class RollingStream(Stream[StreamedRegression]):
         return f"<RollingStream after {self.rows} rows, windows of {self._window}, {self._progress()}>"
 
 
-def _shape_of(regressors: npt.NDArray[Any], sides: npt.NDArray[Any]) -> tuple[int, int]:
+def _shape_of(regressors: npt.NDArray[Any], rhs: npt.NDArray[Any]) -> tuple[int, int]:
     """Return how many regressors and right-hand sides there are."""
     count = regressors.shape[1]
     if count > MOST_REGRESSORS:
         raise ValueError(f"A must have at most {MOST_REGRESSORS} columns; got {count}; drop or combine some")
-    return count, 1 if sides.ndim == 1 else sides.shape[1]
+    return count, 1 if rhs.ndim == 1 else rhs.shape[1]

@@ -91,6 +91,11 @@ class Tabular:
         ------
         ImportError
             If pandas is missing: install ``tvident[tables]``.
+
+        See Also
+        --------
+        to_polars, to_xarray : other containers.
+        Identification.columns, Identification.save : arrays by name, and files.
         """
         pandas, table = _package("pandas"), self._table()
         columns = {name: values.reshape(-1) for name, values in table.columns.items()}
@@ -119,6 +124,11 @@ class Tabular:
         ------
         ImportError
             If polars is missing: install ``tvident[tables]``.
+
+        See Also
+        --------
+        to_pandas, to_xarray : other containers.
+        Identification.columns, Identification.save : arrays by name, and files.
         """
         polars, table = _package("polars"), self._table()
         count, columns = table.time.size, dict[str, Any]()
@@ -146,6 +156,11 @@ class Tabular:
         ------
         ImportError
             If xarray is missing: install ``tvident[tables]``.
+
+        See Also
+        --------
+        to_pandas, to_polars : other containers.
+        Identification.columns, Identification.save : arrays by name, and files.
         """
         xarray, table = _package("xarray"), self._table()
         known = table.labels

@@ -88,6 +88,10 @@ class Channel(np.ndarray[Any, Any]):
         ------
         ValueError
             If one of the units is unknown, or they measure different quantities.
+
+        See Also
+        --------
+        tvident.identify : converts channels by itself.
         """
         here, there = unit_of(self.unit), unit_of(unit)
         if here is None or there is None or here.dimension != there.dimension or not here.factor > 0 < there.factor:
@@ -101,7 +105,7 @@ class Channel(np.ndarray[Any, Any]):
 
 
 def unit_said(values: Any) -> str:
-    """Return the unit that an array says it has; nothing where it says none.
+    """Return the unit that an array says it has; an empty string if it says none.
 
     Channels of ours say it, quantities of pint, astropy and unyt, and attributes of xarray and pandas; of a list all that it holds.
 

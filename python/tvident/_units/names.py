@@ -27,7 +27,7 @@ _TORQUES = {"nm": "Nm", "nmm": "Nmm", "mnm": "mNm", "knm": "kNm"}
 
 
 def named_unit(name: str) -> tuple[str, str]:
-    """Return a channel's name without its unit, and the unit; nothing where it has none.
+    """Return a channel's name without its unit, and the unit; an empty string if it has none.
 
     What stands in brackets at the end is the unit, whatever it is, unless it is a number, which tells channels apart (``Y[0]``; a ratio is
     `` [1]``); elsewhere only what is known as one.
@@ -64,7 +64,7 @@ def _without_brackets(name: str) -> tuple[str, str]:
 
 
 def derivative_units(unit: str, count: int) -> list[str]:
-    """Return the units of a channel and its derivatives by time in seconds; nothing where the channel has none."""
+    """Return the units of a channel and its derivatives by time in seconds; empty strings if the channel has none."""
     base = f"({unit})" if "/" in unit else unit
     powers = ["", "/s", *(f"/s^{order}" for order in range(2, count))]
     return [base + power if unit and power else unit for power in powers[:count]]

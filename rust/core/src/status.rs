@@ -76,6 +76,11 @@ impl Status {
         self.0
     }
 
+    /// Flags as they are stored in arrays, in the same memory.
+    pub(crate) fn of_column(column: Vec<u16>) -> Vec<Self> {
+        column.into_iter().map(Self).collect()
+    }
+
     /// Whether every flag of `other` is set.
     #[must_use]
     pub const fn contains(self, other: Self) -> bool {
@@ -94,5 +99,21 @@ impl BitOr for Status {
 impl BitOrAssign for Status {
     fn bitor_assign(&mut self, other: Self) {
         self.0 |= other.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_column_of_flags_stays_where_it_is() {
+        let column = vec![0_u16, 1, 64, u16::MAX];
+        let (place, room) = (column.as_ptr(), column.capacity());
+        let flags = Status::of_column(column);
+        assert_eq!(flags, [Status::GOOD, Status::INVALID, Status::RANK_DEFICIENT, Status(u16::MAX)]);
+        assert_eq!((flags.as_ptr().cast(), flags.capacity()), (place, room));
+        let back: Vec<u16> = flags.into_iter().map(Status::bits).collect();
+        assert_eq!((back.as_ptr(), back.capacity()), (place, room));
     }
 }

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
+use tvident::Status;
 use tvident::identify::{
     FreeOffset, Identification as Found, InstrumentTest, Kind, Outside, Scan as FoundScan, Unknown as FoundUnknown,
     WeakDetails,
@@ -120,7 +121,7 @@ impl Identification {
                 Unknown {
                     kind: name(unknown.kind),
                     values: array(unknown.values),
-                    stderr: array(unknown.stderr),
+                    stderr: array(unknown.unscaled_stderr),
                     factor: unknown.factor,
                     test: unknown.test.map(|test| (test.probability, test.spread)),
                     untested: unknown.untested,
@@ -149,7 +150,7 @@ impl Identification {
             covariances: found.covariances.into_iter().map(|one| (one.pair, array(one.values))).collect(),
             condition: array(found.condition),
             residual_std: array(found.residual_std),
-            status: PyArray1::from_vec(py, found.status).unbind(),
+            status: PyArray1::from_vec(py, found.status.into_iter().map(Status::bits).collect()).unbind(),
             record_status: found.record_status.bits(),
             order: PyArray1::from_vec(py, found.order).unbind(),
             instrument: instrument.map(|test| (test.exogeneity, test.strength)),

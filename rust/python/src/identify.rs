@@ -122,7 +122,7 @@ impl StrongForm {
         found.iter().map(|found| Scan::new(py, found)).collect()
     }
 
-    /// The triangular factor of the equations around some samples of one record: its numbers row by row, its columns, and how many rows it stands for.
+    /// The equations around some samples of one record.
     #[pyo3(signature = (motions, wanted, *, workers=None))]
     fn rows(
         &self,
@@ -130,56 +130,96 @@ impl StrongForm {
         motions: &Motions,
         wanted: (usize, usize),
         workers: Option<NonZeroUsize>,
-    ) -> PyResult<Rows> {
+    ) -> PyResult<FactoredRows> {
         let (form, motions) = (self.settings(), motions.all()?);
         let motion = motions.first().ok_or_else(|| PyValueError::new_err("there is no record"))?;
         let mut found = None;
         watched(py, None, |watch| {
-            found = Some(rows_of_part(&form, motion, wanted.0..wanted.1, threads(workers), watch)?.numbers());
+            found = Some(rows_of_part(&form, motion, wanted.0..wanted.1, threads(workers), watch)?);
             Ok(())
         })?;
-        found.ok_or_else(|| PyValueError::new_err("there are no rows"))
+        found.as_ref().map(FactoredRows::of).ok_or_else(|| PyValueError::new_err("there are no rows"))
     }
 
-    /// Values, covariance, residual and condition number of the constants that rows tell; None where they do not.
+    /// The constants that rows tell; None where they do not.
     #[pyo3(signature = (motions, rows, *, workers=None))]
     fn constants(
         &self,
         py: Python<'_>,
         motions: &Motions,
-        rows: Rows,
+        rows: &FactoredRows,
         workers: Option<NonZeroUsize>,
     ) -> PyResult<Option<ConstantsOfRows>> {
-        let (form, motions, rows) = (self.settings(), motions.all()?, summary(&rows)?);
+        let (form, motions, rows) = (self.settings(), motions.all()?, rows.summary()?);
         let motion = motions.first().ok_or_else(|| PyValueError::new_err("there is no record"))?;
         let mut found = None;
         watched(py, None, |watch| {
             found = constants_of_rows(&form, motion, &rows, threads(workers), watch)?;
             Ok(())
         })?;
-        Ok(found.map(|found| (found.values, found.covariance, found.residual, found.condition)))
+        Ok(found.map(|found| ConstantsOfRows {
+            values: found.values,
+            covariance: found.covariance,
+            residual: found.residual,
+            condition: found.condition,
+        }))
     }
 }
 
-/// Values, covariance, residual and condition number.
-type ConstantsOfRows = (Vec<f64>, Vec<f64>, f64, f64);
+/// The constants that rows tell, the covariance of these row by row, and what is left.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+pub(crate) struct ConstantsOfRows {
+    values: Vec<f64>,
+    covariance: Vec<f64>,
+    /// Standard deviation of the residuals.
+    residual: f64,
+    condition: f64,
+}
 
-/// The numbers of a triangular factor, its columns, and how many rows it stands for.
-type Rows = (Vec<f64>, usize, usize);
+/// Rows as they are kept and sent elsewhere: by their triangular factor.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+pub(crate) struct FactoredRows {
+    /// The numbers of the factor, row by row.
+    factor: Vec<f64>,
+    columns: usize,
+    /// How many rows it stands for.
+    rows: usize,
+}
 
-fn summary((numbers, columns, rows): &Rows) -> PyResult<Summary> {
-    Summary::of_numbers(numbers, *columns, *rows).ok_or_else(|| PyValueError::new_err("this is no triangular factor"))
+#[pymethods]
+impl FactoredRows {
+    #[new]
+    fn new(factor: Vec<f64>, columns: usize, rows: usize) -> Self {
+        Self { factor, columns, rows }
+    }
+
+    /// What pickling needs.
+    fn __getnewargs__(&self) -> (Vec<f64>, usize, usize) {
+        (self.factor.clone(), self.columns, self.rows)
+    }
+}
+
+impl FactoredRows {
+    fn of(summary: &Summary) -> Self {
+        let (factor, columns, rows) = summary.numbers();
+        Self { factor, columns, rows }
+    }
+
+    fn summary(&self) -> PyResult<Summary> {
+        Summary::of_numbers(&self.factor, self.columns, self.rows)
+            .ok_or_else(|| PyValueError::new_err("this is no triangular factor"))
+    }
 }
 
 /// The factor of the rows of two together.
 #[pyfunction]
-pub(crate) fn merged_rows(one: Rows, other: Rows) -> PyResult<Rows> {
-    let (mut all, other) = (summary(&one)?, summary(&other)?);
-    if one.1 != other.numbers().1 {
+pub(crate) fn merged_rows(one: &FactoredRows, other: &FactoredRows) -> PyResult<FactoredRows> {
+    if one.columns != other.columns {
         return Err(PyValueError::new_err("rows to be merged have the same columns"));
     }
-    all.add(&other);
-    Ok(all.numbers())
+    let mut all = one.summary()?;
+    all.add(&other.summary()?);
+    Ok(FactoredRows::of(&all))
 }
 
 impl StrongForm {

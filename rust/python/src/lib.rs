@@ -41,11 +41,11 @@ mod _core {
     #[pymodule_export]
     use crate::identified::{Identification, OutsideMask, Scan, Suspect, Unknown};
     #[pymodule_export]
-    use crate::identify::{StrongForm, WeakForm, identify, merged_rows};
+    use crate::identify::{ConstantsOfRows, FactoredRows, StrongForm, WeakForm, identify, merged_rows};
     #[pymodule_export]
     use crate::irregular::{PassedNoise, Resampling};
     #[pymodule_export]
-    use crate::local_polynomials::{LocalEstimates, LocalPolynomials};
+    use crate::local_polynomials::{IncompleteEstimates, LocalEstimates, LocalPolynomials};
     #[pymodule_export]
     use crate::merged::{MergedElement, MergedIdentification, identify_merged};
     #[pymodule_export]
@@ -61,9 +61,9 @@ mod _core {
     #[pymodule_export]
     use crate::streamed_parameters::{ParameterStream, StreamedParameters};
     #[pymodule_export]
-    use crate::streams::{PolynomialStream, RollingStream};
+    use crate::streams::{PolynomialStream, RollingStream, StreamedEstimates, StreamedRegressions};
     #[pymodule_export]
-    use crate::window_fit::WindowFit;
+    use crate::window_fit::{WindowEstimates, WindowFit};
 
     /// Probability below which parts of a record differ by more than chance.
     #[pymodule_export]

@@ -48,14 +48,17 @@ pub(crate) struct LocalEstimates {
     pub(crate) sigma: Py<PyArrayDyn<f64>>,
 }
 
-/// Derivatives, their standard errors, orders, flags and noise.
-type IncompleteEstimates<'py> = (
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray1<usize>>,
-    Bound<'py, PyArray1<u16>>,
-    Bound<'py, PyArray1<f64>>,
-);
+/// What was estimated at some samples from what their windows hold.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+pub(crate) struct IncompleteEstimates {
+    /// One row a derivative.
+    derivatives: Py<PyArray2<f64>>,
+    stderr: Py<PyArray2<f64>>,
+    order: Py<PyArray1<usize>>,
+    status: Py<PyArray1<u16>>,
+    /// Standard deviation of the noise.
+    sigma: Py<PyArray1<f64>>,
+}
 
 /// Tables for windows of one length, made once and used for any number of records.
 #[pyclass(frozen, module = "tvident._core")]
@@ -162,19 +165,18 @@ impl LocalPolynomials {
         Ok(outputs.derivatives.into_bound(samples.py()))
     }
 
-    /// Estimates at some samples of one record from what their windows hold, within parts of the record: derivatives and their standard
-    /// errors, a row each, then orders, flags and noise.
+    /// Estimates at some samples of one record from what their windows hold, within parts of the record.
     #[pyo3(signature = (samples, places, parts, least, *, weights=None, workers=None, progress=None))]
-    fn estimate_incomplete<'py>(
+    fn estimate_incomplete(
         &self,
-        samples: &Bound<'py, PyUntypedArray>,
+        samples: &Bound<'_, PyUntypedArray>,
         places: Vec<usize>,
         parts: Vec<(usize, usize)>,
         least: usize,
         weights: Option<Vec<f64>>,
         workers: Option<NonZeroUsize>,
-        progress: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<IncompleteEstimates<'py>> {
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<IncompleteEstimates> {
         let py = samples.py();
         let records = records(samples)?;
         let record = records.first().ok_or_else(|| PyValueError::new_err("there is no record"))?;
@@ -194,13 +196,13 @@ impl LocalPolynomials {
         let order: Vec<usize> = found.iter().map(|one| one.order).collect();
         let status: Vec<u16> = found.iter().map(|one| one.status.bits()).collect();
         let sigma: Vec<f64> = found.iter().map(|one| one.sigma).collect();
-        Ok((
-            PyArray2::from_vec2(py, &rows(|one| one.0))?,
-            PyArray2::from_vec2(py, &rows(|one| one.1))?,
-            order.into_pyarray(py),
-            status.into_pyarray(py),
-            sigma.into_pyarray(py),
-        ))
+        Ok(IncompleteEstimates {
+            derivatives: PyArray2::from_vec2(py, &rows(|one| one.0))?.unbind(),
+            stderr: PyArray2::from_vec2(py, &rows(|one| one.1))?.unbind(),
+            order: order.into_pyarray(py).unbind(),
+            status: status.into_pyarray(py).unbind(),
+            sigma: sigma.into_pyarray(py).unbind(),
+        })
     }
 
     /// The criterion of every order in the window around a sample of a record.

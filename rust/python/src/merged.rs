@@ -6,6 +6,7 @@ use std::num::NonZeroUsize;
 use numpy::{PyArray1, PyReadonlyArray1, PyUntypedArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use tvident::Status;
 use tvident::exec::workers as threads;
 use tvident::identify::{
     Element, Entry, FoundElement as Found, Merged, MergedFound, MergedOptions, Multiplied, Trial,
@@ -197,7 +198,7 @@ pub(crate) fn identify_merged<'py>(
         condition: found.condition,
         weakest: found.weakest,
         residual: array(found.residual),
-        status: PyArray1::from_vec(py, found.status).unbind(),
+        status: PyArray1::from_vec(py, found.status.into_iter().map(Status::bits).collect()).unbind(),
         record_status: found.record_status.bits(),
         jumps: found.jumps,
         scan: Scan::new(py, &found.scan)?,

@@ -111,8 +111,8 @@ impl PolynomialStream {
         (state.first, PyArray1::from_vec(py, state.samples), state.given, state.ended)
     }
 
-    /// Takes in samples. Returns the number of the first sample that is given, its estimates and those after it, and their standard errors.
-    fn push<'py>(&mut self, samples: &Bound<'py, PyUntypedArray>) -> PyResult<Given<'py>> {
+    /// Takes in samples, and returns the estimates that they settle.
+    fn push(&mut self, samples: &Bound<'_, PyUntypedArray>) -> PyResult<StreamedEstimates> {
         let py = samples.py();
         let record = one(samples)?;
         let given = self.stream.upcoming(record.len());
@@ -123,7 +123,7 @@ impl PolynomialStream {
     }
 
     /// Ends the stream and returns the rest, as `push` does.
-    fn finish<'py>(&mut self, py: Python<'py>) -> PyResult<Given<'py>> {
+    fn finish(&mut self, py: Python<'_>) -> PyResult<StreamedEstimates> {
         let given = self.stream.at_end();
         let stream = &mut self.stream;
         outputs(py, &self.plan, given, self.step, self.errors, |estimates, errors| {
@@ -133,18 +133,25 @@ impl PolynomialStream {
     }
 }
 
-/// The number of the first sample, estimates, and standard errors by derivative (none where they are not wanted).
-type Given<'py> = (usize, LocalEstimates, Bound<'py, PyArrayDyn<f64>>);
+/// Estimates that are settled.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+pub(crate) struct StreamedEstimates {
+    /// The number of the first sample.
+    first: usize,
+    estimates: Py<LocalEstimates>,
+    /// Standard errors by derivative; none where they are not wanted.
+    stderr: Py<PyArrayDyn<f64>>,
+}
 
 /// Makes the arrays and has them filled.
-fn outputs<'py>(
-    py: Python<'py>,
+fn outputs(
+    py: Python<'_>,
     plan: &Plan,
     given: Range<usize>,
     step: usize,
     with_errors: bool,
     fill: impl FnOnce(&mut Estimates<'_>, &mut [&mut [f64]]) -> PyResult<()>,
-) -> PyResult<Given<'py>> {
+) -> PyResult<StreamedEstimates> {
     let (elements, count) = elements(&given, step);
     let kinds = plan.options().derivatives.len();
     let derivatives = zeros::<f64>(py, &[kinds, count])?;
@@ -171,7 +178,7 @@ fn outputs<'py>(
         status: status.unbind(),
         sigma: sigma.unbind(),
     };
-    Ok((elements.first, estimates, errors))
+    Ok(StreamedEstimates { first: elements.first, estimates: Py::new(py, estimates)?, stderr: errors.unbind() })
 }
 
 /// The only record of an array.
@@ -231,12 +238,12 @@ impl RollingStream {
         (state.first, PyArray1::from_vec(py, state.rows), state.given, state.ended)
     }
 
-    /// Takes in rows, one row of each array a column. Returns the number of the first row that is given, and the windows from there on.
-    fn push<'py>(
+    /// Takes in rows, one row of each array a column, and returns the windows that they settle.
+    fn push(
         &mut self,
-        regressors: &Bound<'py, PyUntypedArray>,
-        rhs: &Bound<'py, PyUntypedArray>,
-    ) -> PyResult<Windows> {
+        regressors: &Bound<'_, PyUntypedArray>,
+        rhs: &Bound<'_, PyUntypedArray>,
+    ) -> PyResult<StreamedRegressions> {
         let py = regressors.py();
         let (regressors, rhs) = (records(regressors)?, records(rhs)?);
         if (regressors.len(), rhs.len()) != (self.regressors, self.rhs_count) {
@@ -263,7 +270,7 @@ impl RollingStream {
     }
 
     /// Ends the stream and returns the rest, as `push` does.
-    fn finish(&mut self, py: Python<'_>) -> PyResult<Windows> {
+    fn finish(&mut self, py: Python<'_>) -> PyResult<StreamedRegressions> {
         let given = self.stream.at_end();
         let stream = &mut self.stream;
         windows(py, (self.regressors, self.rhs_count), given, self.step, |regressions| {
@@ -273,8 +280,13 @@ impl RollingStream {
     }
 }
 
-/// The number of the first row that is given, and the windows from there on; these have no residuals of their own, nor the part explained.
-type Windows = (usize, RollingRegressions);
+/// Windows that are settled; these have no residuals of their own, nor the part explained.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+pub(crate) struct StreamedRegressions {
+    /// The number of the first row.
+    first: usize,
+    regressions: Py<RollingRegressions>,
+}
 
 /// Makes the arrays and has them filled.
 fn windows(
@@ -283,11 +295,11 @@ fn windows(
     given: Range<usize>,
     step: usize,
     fill: impl FnOnce(&mut Regressions<'_>) -> PyResult<()>,
-) -> PyResult<Windows> {
+) -> PyResult<StreamedRegressions> {
     let (elements, count) = elements(&given, step);
     let found = RollingRegressions::filled(py, shape, (elements, count), false, |mut regressions| {
         fill(&mut regressions)?;
         Ok(0)
     })?;
-    Ok((elements.first, found))
+    Ok(StreamedRegressions { first: elements.first, regressions: Py::new(py, found)? })
 }

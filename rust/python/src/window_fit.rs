@@ -15,6 +15,14 @@ use crate::local_polynomials::{LocalEstimates, criterion_of};
 use crate::records::records;
 use crate::watch::watched;
 
+/// What was estimated in windows of samples that have times of their own.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+pub(crate) struct WindowEstimates {
+    estimates: Py<LocalEstimates>,
+    /// Standard errors of the derivatives.
+    stderr: Py<PyArrayDyn<f64>>,
+}
+
 /// Windows of so many samples, or of so many seconds, around samples at given times.
 #[pyclass(frozen, module = "tvident._core")]
 pub(crate) struct WindowFit {
@@ -49,13 +57,13 @@ impl WindowFit {
 
     /// Estimates along the last axis, and the standard errors of the derivatives.
     #[pyo3(signature = (samples, *, step=1, workers=None, progress=None))]
-    fn estimate<'py>(
+    fn estimate(
         &self,
-        samples: &Bound<'py, PyUntypedArray>,
+        samples: &Bound<'_, PyUntypedArray>,
         step: usize,
         workers: Option<NonZeroUsize>,
-        progress: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<(LocalEstimates, Bound<'py, PyArrayDyn<f64>>)> {
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<WindowEstimates> {
         let py = samples.py();
         let records = records(samples)?;
         if records.iter().any(|record| tvident::record::Samples::len(record) != self.core.times.len()) {
@@ -85,7 +93,7 @@ impl WindowFit {
             status: filled(py, &shape, found.iter().map(|one| one.status.as_slice()))?.unbind(),
             sigma: filled(py, &shape, found.iter().map(|one| one.sigma.as_slice()))?.unbind(),
         };
-        Ok((estimates, rows(|one| &one.errors)?))
+        Ok(WindowEstimates { estimates: Py::new(py, estimates)?, stderr: rows(|one| &one.errors)?.unbind() })
     }
 
     /// The criterion of every order in the window around a sample of a record.

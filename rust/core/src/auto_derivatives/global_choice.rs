@@ -138,10 +138,10 @@ impl Survey<'_> {
 /// The best pair of a ladder, by iterative refinement of the reference. Returns it with the place of its reference.
 fn best_of(ladder: &[Surveyed], noise: &CorrelatedNoise) -> Option<(Pair, (usize, usize))> {
     let mut reference = (0, ladder.first()?.bank.orders.len() - 1);
-    let mut seen = Vec::new();
+    let mut tried = Vec::new();
     let mut best = None;
-    while !seen.contains(&reference) {
-        seen.push(reference);
+    while !tried.contains(&reference) {
+        tried.push(reference);
         let least_gain = ladder.get(reference.0)?.bank.gains[reference.1] / JUDGED;
         let compared = ladder[reference.0].compared(reference.1);
         let (mut shorter_best, mut least): (_, Option<(f64, usize, usize)>) = (None, None);

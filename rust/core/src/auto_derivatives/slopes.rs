@@ -78,7 +78,7 @@ fn slopes(basis: &Basis, place: usize, derivative: usize) -> [f64; MOST_DEGREES]
     let known = values.iter_mut().take(basis.degrees()).enumerate();
     known.for_each(|(degree, value)| *value = basis.value(degree, place));
     for d in 1..=derivative {
-        climb(basis, basis.position(place), d, &mut values, |number| number);
+        legendre_slopes(basis, basis.position(place), d, &mut values, |number| number);
     }
     values
 }
@@ -87,14 +87,14 @@ fn slopes(basis: &Basis, place: usize, derivative: usize) -> [f64; MOST_DEGREES]
 fn slopes_between(basis: &Basis, x: f64, derivative: usize) -> [f64; MOST_DEGREES] {
     let mut values = [0.0; MOST_DEGREES];
     for d in 0..=derivative {
-        climb(basis, x, d, &mut values, |number| number);
+        legendre_slopes(basis, x, d, &mut values, |number| number);
     }
     values
 }
 
 /// The `d`-th derivatives from those below, of one number or of several side by side.
 #[inline(always)]
-fn climb<N>(basis: &Basis, x: N, d: usize, values: &mut [N; MOST_DEGREES], of: impl Fn(f64) -> N)
+fn legendre_slopes<N>(basis: &Basis, x: N, d: usize, values: &mut [N; MOST_DEGREES], of: impl Fn(f64) -> N)
 where
     N: Copy + Add<Output = N> + Sub<Output = N> + Mul<Output = N>,
 {
@@ -138,7 +138,7 @@ impl Kernel for SlopeSums<'_> {
                 }
             }
             for d in usize::from(slopes.step == 1)..=slopes.derivative {
-                climb(basis, x, d, &mut values, Packet::splat);
+                legendre_slopes(basis, x, d, &mut values, Packet::splat);
             }
             // As sums of numbers begin.
             let mut sum = Packet::splat(-0.0);

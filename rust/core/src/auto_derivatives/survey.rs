@@ -196,7 +196,7 @@ impl<'a> Survey<'a> {
     }
 
     /// The first samples and the coefficients of windows in a part of the record, about so many, at equal distances from its ends: for the reversed
-    /// record, the same seen from the other.
+    /// record, the same counted from the other end.
     ///
     /// # Errors
     /// If there is not the memory.

@@ -16,6 +16,7 @@ use crate::identify::weak::form::identify_weak;
 use crate::identify::weak::options::WeakOptions;
 use crate::identify::weak::outside_mask::Outside;
 use crate::inference::missing_terms::Missing;
+use crate::status::Status;
 
 /// What was found of the unknowns of one record, by the numbers of their regressors.
 struct Found {
@@ -142,7 +143,7 @@ pub(crate) fn weak(
         covariances: unknowns.covariances(&regressors),
         condition: unknowns.results.condition,
         residual_std: unknowns.results.deviation,
-        status: unknowns.results.status,
+        status: Status::of_column(unknowns.results.status),
         record_status: found.record_status,
         order: Vec::new(),
         jumps: found.jumps,
@@ -184,7 +185,7 @@ pub(crate) fn strong(
         covariances: unknowns.covariances(&regressors),
         condition: unknowns.results.condition,
         residual_std: unknowns.results.deviation,
-        status: unknowns.results.status,
+        status: Status::of_column(unknowns.results.status),
         record_status: found.record_status,
         order: found.order,
         jumps: Vec::new(),

@@ -22,9 +22,9 @@ pub struct Unknown {
     pub kind: Kind,
     /// One value for every wanted sample, or one for the record.
     pub values: Vec<f64>,
-    /// Their standard errors, each still to be multiplied by `factor`.
-    pub stderr: Vec<f64>,
-    /// What standard errors are multiplied by: one, unless they are those of ordinary least squares.
+    /// Their standard errors without [`Unknown::factor`]; [`Unknown::stderr`] has it.
+    pub unscaled_stderr: Vec<f64>,
+    /// What these are multiplied by: one, unless they are those of ordinary least squares, whose equations are correlated.
     pub factor: f64,
     /// Whether it is the same in all parts of the record, where that was tested.
     pub test: Option<Test>,
@@ -39,16 +39,22 @@ impl Unknown {
             number,
             kind: Kind::Constant,
             values: vec![value],
-            stderr: vec![stderr],
+            unscaled_stderr: vec![stderr],
             factor: 1.0,
             test: None,
             untested: false,
         }
     }
 
-    /// Values for every wanted sample, with standard errors that are still to be multiplied.
-    pub(crate) fn windowed(number: usize, values: Vec<f64>, stderr: Vec<f64>, factor: f64) -> Self {
-        Self { number, kind: Kind::Windowed, values, stderr, factor, test: None, untested: false }
+    /// Values for every wanted sample, with standard errors and what those are multiplied by.
+    pub(crate) fn windowed(number: usize, values: Vec<f64>, unscaled_stderr: Vec<f64>, factor: f64) -> Self {
+        Self { number, kind: Kind::Windowed, values, unscaled_stderr, factor, test: None, untested: false }
+    }
+
+    /// Standard errors: one for every wanted sample, or one for the record.
+    #[must_use]
+    pub fn stderr(&self) -> Vec<f64> {
+        self.unscaled_stderr.iter().map(|error| self.factor * error).collect()
     }
 
     /// Whether it has one value for the record.
@@ -130,8 +136,8 @@ pub struct Identification {
     pub condition: Vec<f64>,
     /// Standard deviation of the residuals of the torque.
     pub residual_std: Vec<f64>,
-    /// Bits of [`Status`] for every wanted sample: what holds there.
-    pub status: Vec<u16>,
+    /// What holds at every wanted sample.
+    pub status: Vec<Status>,
     /// What holds for the whole record.
     pub record_status: Status,
     /// Order of the polynomial around every wanted sample; empty in weak form.

@@ -63,10 +63,10 @@ pub(crate) fn propagate(found: &mut Identification, holes: &[usize], step: usize
         }
         for unknown in found.unknowns.iter_mut().filter(|unknown| !unknown.is_constant()) {
             unknown.values[element] = f64::NAN;
-            unknown.stderr[element] = f64::NAN;
+            unknown.unscaled_stderr[element] = f64::NAN;
         }
         found.residual_std[element] = f64::NAN;
         found.condition[element] = f64::NAN;
-        found.status[element] |= (Status::INVALID | Status::GAP).bits();
+        found.status[element] |= Status::INVALID | Status::GAP;
     }
 }

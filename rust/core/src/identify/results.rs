@@ -248,7 +248,7 @@ impl RowResults {
             let only = if self.is_usable(row) { row } else { next };
             place = Place { row: only, next: only, part: 0.0, beyond: exact - only as f64, nearest: only };
         }
-        // A jump between two rows: the one on the sample's side of it is carried on.
+        // A jump between two rows: the row on the same side of the jump as the sample is carried on.
         let jump = self.jumps.partition_point(|jump| jump.sample <= sample);
         let before = jump.checked_sub(1).is_some_and(|index| self.jumps[index].sample as f64 > self.at(row));
         let after = self.jumps.get(jump).is_some_and(|jump| jump.sample as f64 <= self.at(next));

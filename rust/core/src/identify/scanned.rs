@@ -58,7 +58,7 @@ impl Scan {
         self.plateau.map_or(1.0, |plateau| plateau.factor(&self.scales))
     }
 
-    /// Whether another scan has other constants where its plateau begins, if this one is to be believed.
+    /// Whether another scan has other constants where its plateau begins, if this one is accepted.
     pub(crate) fn contradicts(&self, other: &Self) -> bool {
         let (true, Some(one)) = (self.factor() >= LEAST_PLATEAU, other.narrowest()) else { return false };
         let same = self.scales.iter().find(|scale| scale.half_width == one.half_width);
@@ -75,8 +75,8 @@ impl Scan {
         self.tried >= ENOUGH_WIDTHS && self.factor() < LEAST_PLATEAU
     }
 
-    /// The plateau, if it is wide enough to be believed or widths were too few for that.
-    pub(crate) fn believable(&self) -> Option<Plateau> {
+    /// The plateau, if it is wide enough to be accepted or widths were too few for that.
+    pub(crate) fn accepted_plateau(&self) -> Option<Plateau> {
         self.plateau.filter(|_| !self.has_no_plateau())
     }
 
@@ -125,12 +125,12 @@ impl Scans {
         Self { best, corrected }
     }
 
-    /// The half-width to believe where another one lies off the plateau: a little wider than its narrowest, which is the first that its
+    /// The half-width to accept where another one lies off the plateau: a little wider than its narrowest, which is the first that its
     /// errors cannot tell from the others. A wider one that agrees may stay.
-    pub(crate) fn believed(&self, half_width: usize) -> Option<usize> {
-        let plateau = self.best.believable()?;
+    pub(crate) fn accepted(&self, half_width: usize) -> Option<usize> {
+        let plateau = self.best.accepted_plateau()?;
         let (place, _) = self.corrected.nearest(half_width)?;
-        let on_its_own = self.corrected.believable().is_some_and(|own| own.holds(place));
+        let on_its_own = self.corrected.accepted_plateau().is_some_and(|own| own.holds(place));
         if on_its_own || place > plateau.last && !self.contradict(half_width) {
             return None;
         }
@@ -139,12 +139,12 @@ impl Scans {
 
     /// Whether a half-width, corrected for noise, contradicts the plateau.
     pub(crate) fn contradict(&self, half_width: usize) -> bool {
-        let (Some(believed), Some((place, chosen))) = (self.best.narrowest(), self.corrected.nearest(half_width))
+        let (Some(accepted), Some((place, chosen))) = (self.best.narrowest(), self.corrected.nearest(half_width))
         else {
             return false;
         };
-        let on_its_own = self.corrected.believable().is_some_and(|own| own.holds(place));
-        !on_its_own && !believed.agrees(chosen, CONTRADICTS)
+        let on_its_own = self.corrected.accepted_plateau().is_some_and(|own| own.holds(place));
+        !on_its_own && !accepted.agrees(chosen, CONTRADICTS)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Whether equations of every scale agree: the plateau.
 //!
 //! With the width of the test function the band moves in which the equation of motion is asked to hold. Where it holds, all widths give
-//! the same constants; narrow ones are more precise if noise is what it is taken for, and wrong if it is not. So a result is believed
+//! the same constants; narrow ones are more precise if noise is what it is taken for, and wrong if it is not. So a result is accepted
 //! where a range of widths agrees, each within the errors that blocks of the record show (after Lepski's comparison of scales, 1990,
 //! but only along a range: the widest test functions may be wrong for other reasons).
 

@@ -123,7 +123,7 @@ mod tests {
             for (which, found) in at_row(off, None).into_iter().enumerate() {
                 let [value, predicted] = found.expect("a window");
                 assert_near(predicted, rows.rhs[ROW] - constants, 1e-9);
-                // What is believed at the row itself comes from all rows around it, this one too.
+                // The value at the row itself comes from all rows around it, this one too.
                 let untouched = (value - line(ROW as f64 * PERIOD)[0]).abs() < 1e-8;
                 assert_eq!(untouched, off == 0.0 || which != 1, "{which}: {value}");
             }

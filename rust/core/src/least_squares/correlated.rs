@@ -88,7 +88,7 @@ struct Fits<'a> {
 #[derive(Default)]
 struct RowProducts {
     first: isize,
-    /// As many numbers a row as [`side`] says.
+    /// As many numbers a row as [`numbers_of_a_row`] says.
     values: Vec<f64>,
     /// Rows that count before each row.
     counts: Vec<u32>,
@@ -108,7 +108,7 @@ struct Scratch {
 }
 
 /// Numbers of a row that stand side by side for so many regressors: whole vectors.
-const fn side(regressors: usize) -> usize {
+const fn numbers_of_a_row(regressors: usize) -> usize {
     if regressors <= 4 {
         4
     } else if regressors <= 8 {
@@ -176,13 +176,13 @@ impl Fits<'_> {
     /// The products of some rows; those outside of the record are zero.
     #[inline(always)]
     fn products(&self, range: Range<isize>, products: &mut RowProducts) {
-        let (p, side, total) = (self.plan.regressors, side(self.plan.regressors), self.rows());
+        let (p, row_size, total) = (self.plan.regressors, numbers_of_a_row(self.plan.regressors), self.rows());
         let clamp = |row: isize| row.clamp(0, total.cast_signed()).unsigned_abs();
         let rows = clamp(range.start)..clamp(range.end);
         let length = (range.end - range.start).max(0).unsigned_abs();
         products.first = range.start;
         products.values.clear();
-        products.values.resize(length * side, 0.0);
+        products.values.resize(length * row_size, 0.0);
         products.counts.clear();
         products.counts.resize(length + 1, 0);
         if !rows.is_empty() {
@@ -200,14 +200,14 @@ impl Fits<'_> {
             let (residuals, weights) = rest.split_at_mut(rows.len());
             self.take_off_fits(&rows, columns, residuals);
             let skipped = (rows.start.cast_signed() - range.start).unsigned_abs();
-            let (values, counts) = (&mut values[skipped * side..], &mut counts[skipped + 1..]);
+            let (values, counts) = (&mut values[skipped * row_size..], &mut counts[skipped + 1..]);
             for ((count, residual), weight) in counts.iter_mut().zip(&mut *residuals).zip(&*weights) {
                 let counted = is_usable(*residual) && *weight > 0.0;
                 *count = u32::from(counted);
                 *residual = if counted { weight * *residual } else { 0.0 };
             }
             for (regressor, column) in columns.chunks(rows.len()).enumerate() {
-                for ((row, residual), x) in values.chunks_exact_mut(side).zip(&*residuals).zip(column) {
+                for ((row, residual), x) in values.chunks_exact_mut(row_size).zip(&*residuals).zip(column) {
                     // A row that does not count may hold what is no number.
                     row[regressor] = if *residual == 0.0 { 0.0 } else { residual * x };
                 }
@@ -245,12 +245,12 @@ impl Fits<'_> {
         let pieces = stretches(self.rows(), LEARNT_OF.max(8 * self.plan.window), 8)
             .map(|rows| Piece { size: rows.len(), content: rows })
             .collect();
-        let (p, side) = (self.plan.regressors, side(self.plan.regressors));
+        let (p, row_size) = (self.plan.regressors, numbers_of_a_row(self.plan.regressors));
         let of_rows = |rows: Range<usize>, products: &mut RowProducts| {
             self.products(rows.start.cast_signed()..rows.end.cast_signed(), products);
             let mut sums = vec![Neighbours::default(); p];
             for (regressor, sums) in sums.iter_mut().enumerate() {
-                let at = |row: usize| products.values[row * side + regressor];
+                let at = |row: usize| products.values[row * row_size + regressor];
                 for row in 1..rows.len() {
                     sums.add(at(row - 1), at(row));
                 }

@@ -34,7 +34,7 @@ use crate::simd::instructions::Instructions;
 const HALVES: [usize; 15] = [8, 10, 12, 17, 24, 35, 50, 70, 100, 140, 200, 280, 400, 560, 800];
 const PART: usize = 16;
 
-/// Degrees that are seen in each, and lower ones in the longest.
+/// Degrees that are measured in each, and lower ones in the longest.
 const HIGH: Range<usize> = 12..16;
 const LOW: [Range<usize>; 4] = [8..12, 5..8, 3..5, 2..3];
 
@@ -76,8 +76,8 @@ const CHANGE: f64 = 1e-6;
 /// The powers of all noises, by half-width and lowest degree.
 static POWERS: Kept<(usize, usize), Arc<[f64]>> = Kept::new();
 
-/// What some degrees of windows of one length see.
-struct Seen {
+/// What some degrees of windows of one length measure.
+struct Statistic {
     /// Angular frequency per sample, about.
     frequency: f64,
     /// Mean of the squared coefficients, relative standard deviation of that mean, and kurtosis of the coefficients.
@@ -95,31 +95,32 @@ pub fn coloured_noise(record: &dyn Samples, variance: f64, instructions: Instruc
     if halves.len() < FEWEST || variance.is_nan() || variance <= 0.0 {
         return white;
     }
-    let mut seen = Vec::new();
+    let mut measured = Vec::new();
     for &half in &halves[..WHITE] {
-        seen.extend(look(record, half, &[HIGH], instructions));
+        measured.extend(look(record, half, &[HIGH], instructions));
     }
-    if seen.len() < WHITE || explains(&seen, &[0]).is_some() || seen[TAILS].kurtosis > KURTOSIS {
+    if measured.len() < WHITE || explains(&measured, &[0]).is_some() || measured[TAILS].kurtosis > KURTOSIS {
         return white;
     }
     for &half in &halves[WHITE..] {
         let longest = half == halves[halves.len() - 1];
         let degrees: Vec<Range<usize>> = std::iter::once(HIGH).chain(LOW.into_iter().filter(|_| longest)).collect();
-        seen.extend(look(record, half, &degrees, instructions));
+        measured.extend(look(record, half, &degrees, instructions));
     }
-    coloured(&seen).unwrap_or(white)
+    coloured(&measured).unwrap_or(white)
 }
 
-/// The coloured noise that explains what is seen, from the highest frequencies on, or `None`.
-fn coloured(seen: &[Seen]) -> Option<CorrelatedNoise> {
+/// The coloured noise that explains what is measured, from the highest frequencies on, or `None`.
+fn coloured(measured: &[Statistic]) -> Option<CorrelatedNoise> {
     let all: Vec<usize> = (0..=corners().count()).collect();
-    let explained = (WHITE..=seen.len()).take_while(|&count| explains(&seen[..count], &all).is_some()).last()?;
+    let explained =
+        (WHITE..=measured.len()).take_while(|&count| explains(&measured[..count], &all).is_some()).last()?;
     if explained < FEWEST {
         return None;
     }
     // The last may hold some of the signal that ends the sequence.
-    let whole = explained == seen.len();
-    let part = &seen[..if whole { explained } else { explained - 1 }];
+    let whole = explained == measured.len();
+    let part = &measured[..if whole { explained } else { explained - 1 }];
     let lowest = part[part.len() - 1].frequency;
     let slow = |corner: f64| corner < lowest / if whole { 2.0 } else { 4.0 };
     let mut used: Vec<usize> = std::iter::once(0)
@@ -159,7 +160,7 @@ fn coloured(seen: &[Seen]) -> Option<CorrelatedNoise> {
     (!no_noise).then_some(found)
 }
 
-/// Continues noise of density `1/f` to lower frequencies than are seen. The noises of one octave after the other have the same variance `a`
+/// Continues noise of density `1/f` to lower frequencies than are measured. The noises of one octave after the other have the same variance `a`
 /// then, and the density at `ω` is `π a / (ω ln 2)`.
 fn extend(first_order: &mut Vec<(f64, f64)>, white: f64, lowest: f64) {
     let found = CorrelatedNoise::new(white, first_order.clone());
@@ -181,7 +182,7 @@ fn corners() -> impl Iterator<Item = f64> {
 }
 
 /// Looks at the noise of a record through some degrees of windows of one length.
-fn look(record: &dyn Samples, half: usize, groups: &[Range<usize>], instructions: Instructions) -> Vec<Seen> {
+fn look(record: &dyn Samples, half: usize, groups: &[Range<usize>], instructions: Instructions) -> Vec<Statistic> {
     let length = 2 * half + 1;
     let first = groups.iter().map(|group| group.start).min().unwrap_or(0);
     // Windows are short, and little memory is not asked for.
@@ -210,7 +211,7 @@ fn look(record: &dyn Samples, half: usize, groups: &[Range<usize>], instructions
         let own = group.start - first..group.end - first;
         let power = mean(&squares[own.clone()]);
         let independent = (group.len() * used.min(record.len())) as f64 / length as f64;
-        Seen {
+        Statistic {
             frequency: (group.start + group.end + 1) as f64 / 2.0 / half as f64,
             power,
             deviation: (2.0 / independent + MISFIT * MISFIT).sqrt(),
@@ -246,31 +247,33 @@ fn powers(basis: &Basis, degrees: &Range<usize>) -> Arc<[f64]> {
     std::iter::once(1.0).chain(first_order).collect()
 }
 
-/// The amounts of some noises, if they explain everything that is seen.
-fn explains(seen: &[Seen], noises: &[usize]) -> Option<Vec<f64>> {
-    let amounts = fit(seen, noises).1;
-    seen.iter().all(|one| misfit(one, noises, &amounts).abs() <= AWAY).then_some(amounts)
+/// The amounts of some noises, if they explain everything that is measured.
+fn explains(measured: &[Statistic], noises: &[usize]) -> Option<Vec<f64>> {
+    let amounts = fit(measured, noises).1;
+    measured.iter().all(|one| misfit(one, noises, &amounts).abs() <= AWAY).then_some(amounts)
 }
 
-/// How far the noises are from what is seen, in standard deviations.
-fn misfit(seen: &Seen, noises: &[usize], amounts: &[f64]) -> f64 {
-    let sum: f64 = noises.iter().zip(amounts).map(|(&noise, amount)| amount * seen.of_noises[noise]).sum();
-    (sum / seen.power - 1.0) / seen.deviation
+/// How far the noises are from what is measured, in standard deviations.
+fn misfit(measured: &Statistic, noises: &[usize], amounts: &[f64]) -> f64 {
+    let sum: f64 = noises.iter().zip(amounts).map(|(&noise, amount)| amount * measured.of_noises[noise]).sum();
+    (sum / measured.power - 1.0) / measured.deviation
 }
 
 /// The amounts, none below zero, of least squared misfit, and that misfit: by active sets (Lawson and Hanson 1974, chapter 23).
-fn fit(seen: &[Seen], noises: &[usize]) -> (f64, Vec<f64>) {
-    let row = |one: &Seen| -> Vec<f64> {
+fn fit(measured: &[Statistic], noises: &[usize]) -> (f64, Vec<f64>) {
+    let row = |one: &Statistic| -> Vec<f64> {
         noises.iter().map(|&noise| one.of_noises[noise] / one.power / one.deviation).collect()
     };
-    let rows: Vec<Vec<f64>> = seen.iter().map(row).collect();
-    let sum = |term: &dyn Fn(&[f64], &Seen) -> f64| rows.iter().zip(seen).map(|(row, one)| term(row, one)).sum::<f64>();
+    let rows: Vec<Vec<f64>> = measured.iter().map(row).collect();
+    let sum = |term: &dyn Fn(&[f64], &Statistic) -> f64| {
+        rows.iter().zip(measured).map(|(row, one)| term(row, one)).sum::<f64>()
+    };
     let count = noises.len();
     let normal = Mat::from_fn(count, count, |i, j| sum(&|row, _| row[i] * row[j]));
     let right: Vec<f64> = (0..count).map(|i| sum(&|row, one| row[i] / one.deviation)).collect();
     let (mut amounts, mut free) = (vec![0.0; count], Vec::new());
     for _ in 0..ROUNDS {
-        // In the unit of what is seen: noises of different memory are of different size.
+        // In the unit of what is measured: noises of different memory are of different size.
         let gain = |i: usize| {
             let known: f64 = free.iter().map(|&j: &usize| normal[(i, j)] * amounts[j]).sum();
             (right[i] - known) / normal[(i, i)].sqrt()
@@ -283,7 +286,7 @@ fn fit(seen: &[Seen], noises: &[usize]) -> (f64, Vec<f64>) {
             let part = Mat::from_fn(free.len(), free.len(), |i, j| normal[(free[i], free[j])]);
             let Ok(factor) = Llt::new(part.as_ref(), Side::Lower) else {
                 // Two noises that cannot be told apart here.
-                return (squared_misfit(seen, noises, &amounts), amounts);
+                return (squared_misfit(measured, noises, &amounts), amounts);
             };
             let wanted = factor.solve(Mat::from_fn(free.len(), 1, |i, _| right[free[i]]));
             // As far towards these as none goes below zero; the first that would is held.
@@ -299,9 +302,9 @@ fn fit(seen: &[Seen], noises: &[usize]) -> (f64, Vec<f64>) {
             free.retain(|&one| one != held);
         }
     }
-    (squared_misfit(seen, noises, &amounts), amounts)
+    (squared_misfit(measured, noises, &amounts), amounts)
 }
 
-fn squared_misfit(seen: &[Seen], noises: &[usize], amounts: &[f64]) -> f64 {
-    seen.iter().map(|one| misfit(one, noises, amounts).powi(2)).sum()
+fn squared_misfit(measured: &[Statistic], noises: &[usize], amounts: &[f64]) -> f64 {
+    measured.iter().map(|one| misfit(one, noises, amounts).powi(2)).sum()
 }

@@ -15,7 +15,7 @@ const FEWEST_CLIPPED: usize = 20;
 /// A motion that turns round or comes to rest slows down before; one that is clipped arrives with at least this part of its typical speed.
 const ARRIVES: f64 = 0.2;
 
-/// Steps finer than the typical change by this factor let that be seen.
+/// Steps finer than the typical change by this factor show that.
 const FINE: f64 = 2.0;
 
 /// The longest hold that is looked for, the part of the changes that must come in its beat, and how many changes and how often there must be.

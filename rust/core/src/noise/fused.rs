@@ -190,16 +190,16 @@ impl Banded {
     }
 
     /// Solves with the factor.
-    fn solve(&self, side: &mut [f64]) {
-        let count = side.len();
+    fn solve(&self, rhs: &mut [f64]) {
+        let count = rhs.len();
         for row in 1..count {
-            let far = if row >= 2 { self.below[1][row] * side[row - 2] } else { 0.0 };
-            side[row] -= self.below[0][row] * side[row - 1] + far;
+            let far = if row >= 2 { self.below[1][row] * rhs[row - 2] } else { 0.0 };
+            rhs[row] -= self.below[0][row] * rhs[row - 1] + far;
         }
         for row in (0..count).rev() {
-            let near = if row + 1 < count { self.below[0][row + 1] * side[row + 1] } else { 0.0 };
-            let far = if row + 2 < count { self.below[1][row + 2] * side[row + 2] } else { 0.0 };
-            side[row] = side[row] / self.main[row] - near - far;
+            let near = if row + 1 < count { self.below[0][row + 1] * rhs[row + 1] } else { 0.0 };
+            let far = if row + 2 < count { self.below[1][row + 2] * rhs[row + 2] } else { 0.0 };
+            rhs[row] = rhs[row] / self.main[row] - near - far;
         }
     }
 }

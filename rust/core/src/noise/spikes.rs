@@ -10,7 +10,7 @@ use crate::noise::quantisation::quantisation_step;
 use crate::record::samples::{Samples, all_usable, read_around};
 
 /// Neighbours on either side, and the degree of the polynomial through all of them.
-const SIDE: usize = 3;
+const NEIGHBOURS: usize = 3;
 const DEGREE: usize = 3;
 
 /// Samples of a spike at most, of the angle and of the torque: a torque can be there for two, and the machine feels it.
@@ -38,7 +38,7 @@ const TOGETHER: usize = 1 << 12;
 const PARTS: usize = 64;
 
 /// Samples around those that are looked at together.
-const AROUND: usize = NEARBY + 2 * SIDE + LONGEST[0];
+const AROUND: usize = NEARBY + 2 * NEIGHBOURS + LONGEST[0];
 
 /// The part of the samples from which on they are no spikes but a noise with heavy tails, or what the machine does.
 const SELDOM: usize = 250;
@@ -151,7 +151,7 @@ impl Others {
 
     fn add(&mut self, place: usize, distance: f64, before: Option<&Alone>) {
         // A spike bends what is near it.
-        if before.is_none_or(|one| one.end() + 2 * SIDE < place) {
+        if before.is_none_or(|one| one.end() + 2 * NEIGHBOURS < place) {
             self.recent.push((place, distance));
         }
         if self.recent.len() > AROUND {
@@ -166,7 +166,7 @@ impl Others {
 
     /// Counts what is not near a place.
     fn count(&mut self, place: usize) {
-        let near = self.recent.partition_point(|&(one, _)| one + 2 * SIDE < place);
+        let near = self.recent.partition_point(|&(one, _)| one + 2 * NEIGHBOURS < place);
         for (_, distance) in self.recent.drain(..near) {
             let place = Self::place(distance);
             self.counts.resize(self.counts.len().max(place + 1), 0);
@@ -209,41 +209,42 @@ struct Surrounded {
 impl Surrounded {
     /// `None` where all windows hold a missing sample.
     fn new(width: usize, channel: &dyn Samples, quantum: f64) -> Option<Self> {
-        let middle = (2 * SIDE + width - 1) as f64 / 2.0;
-        let outside = (0..SIDE).chain(SIDE + width..2 * SIDE + width);
-        let times: Vec<f64> = outside.chain(SIDE..SIDE + width).map(|place| place as f64 - middle).collect();
+        let middle = (2 * NEIGHBOURS + width - 1) as f64 / 2.0;
+        let outside = (0..NEIGHBOURS).chain(NEIGHBOURS + width..2 * NEIGHBOURS + width);
+        let times: Vec<f64> =
+            outside.chain(NEIGHBOURS..NEIGHBOURS + width).map(|place| place as f64 - middle).collect();
         let mut basis: Vec<Vec<f64>> = Vec::new();
         for degree in 0..=DEGREE {
             let power = times.iter().map(|time| time.powf(degree as f64)).collect();
-            basis.push(orthonormal(power, &basis, 2 * SIDE));
+            basis.push(orthonormal(power, &basis, 2 * NEIGHBOURS));
         }
         let mut one = Self { width, basis, usual: 0.0 };
         let size = |window: &[f64]| Size { size: one.distance(window, 0), left: 0.0 };
-        one.usual = Size::usual(channel, 2 * SIDE + width, quantum, size)?.size;
+        one.usual = Size::usual(channel, 2 * NEIGHBOURS + width, quantum, size)?.size;
         Some(one)
     }
 
     fn length(&self) -> usize {
-        2 * SIDE + self.width
+        2 * NEIGHBOURS + self.width
     }
 
     /// The neighbours in a window, without its first sample, which would cost digits.
-    fn neighbours(&self, window: &[f64]) -> [f64; 2 * SIDE] {
-        std::array::from_fn(|place| window[if place < SIDE { place } else { place + self.width }] - window[0])
+    fn neighbours(&self, window: &[f64]) -> [f64; 2 * NEIGHBOURS] {
+        std::array::from_fn(|place| window[if place < NEIGHBOURS { place } else { place + self.width }] - window[0])
     }
 
     /// What neighbours say of one of the samples between.
     fn said(&self, neighbours: &[f64], between: usize) -> f64 {
-        self.basis.iter().map(|column| product(column, neighbours) * column[2 * SIDE + between]).sum()
+        self.basis.iter().map(|column| product(column, neighbours) * column[2 * NEIGHBOURS + between]).sum()
     }
 
     fn distance(&self, window: &[f64], between: usize) -> f64 {
-        window[SIDE + between] - window[0] - self.said(&self.neighbours(window), between)
+        window[NEIGHBOURS + between] - window[0] - self.said(&self.neighbours(window), between)
     }
 
     /// The window whose samples between begin at a place.
     fn window<'a>(&self, values: &'a [f64], at: usize) -> &'a [f64] {
-        &values[at - SIDE..][..self.length()]
+        &values[at - NEIGHBOURS..][..self.length()]
     }
 
     /// How far the samples from a place on are from what their neighbours say: the first or the last, whichever is nearer, for what is between them may
@@ -265,7 +266,7 @@ impl Surrounded {
         let squares = product(&neighbours, &neighbours);
         let left_by = |degree: usize| {
             let explained: f64 = self.basis[..=degree].iter().map(|column| product(column, &neighbours).powi(2)).sum();
-            ((squares - explained).max(0.0) / (2 * SIDE) as f64).sqrt()
+            ((squares - explained).max(0.0) / (2 * NEIGHBOURS) as f64).sqrt()
         };
         left_by(DEGREE) <= CALM * distance
             && SMOOTH * left_by(1) < distance
@@ -281,7 +282,7 @@ impl Surrounded {
 
     /// How far samples nearby are from what their neighbours say, on the side where it is more; `None` where too few are there on both sides.
     fn usual_nearby(&self, values: &[f64], at: usize) -> Option<f64> {
-        let (first, apart) = (at - SIDE, SIDE + self.width);
+        let (first, apart) = (at - NEIGHBOURS, NEIGHBOURS + self.width);
         let before = first.saturating_sub(NEARBY + apart)..first - apart;
         let after = first + apart..(first + apart + NEARBY).min(values.len() + 1 - self.length());
         let usual = |starts: std::ops::Range<usize>| {

@@ -276,10 +276,10 @@ pub(crate) fn lines(rows: &Rows, model: &Model, block: &Range<usize>, constants:
     let entry = |i: usize, j: usize| moments[i.max(j) * count + i.min(j)];
     let normal: Vec<f64> = (0..first * first).map(|place| entry(place / first, place % first)).collect();
     let inverse = inverse(&normal, first)?;
-    let side = |i: usize| {
+    let rhs = |i: usize| {
         entry(i, count - 1) - constants.iter().enumerate().map(|(k, value)| entry(i, first + k) * value).sum::<f64>()
     };
-    let value = |i: usize| (0..first).map(|j| inverse[i * first + j] * side(j)).sum::<f64>();
+    let value = |i: usize| (0..first).map(|j| inverse[i * first + j] * rhs(j)).sum::<f64>();
     let half = products.centre(block).0;
     Some((0..model.windowed.len()).map(|one| [value(2 * one), value(2 * one + 1) / half]).collect())
 }
@@ -305,9 +305,9 @@ fn solve(parts: &[Vec<f64>], constants: usize, lags: usize) -> Option<(Vec<f64>,
     let normal: Vec<f64> = (0..constants * constants).map(|place| sum(place / constants, place % constants)).collect();
     let inverse = inverse(&normal, constants)?;
     let row = |i: usize| &inverse[i * constants..(i + 1) * constants];
-    let sides: Vec<f64> = (0..constants).map(|i| sum(i, constants)).collect();
+    let rhs: Vec<f64> = (0..constants).map(|i| sum(i, constants)).collect();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let solution: Vec<f64> = (0..constants).map(|i| dot(row(i), &sides)).collect();
+    let solution: Vec<f64> = (0..constants).map(|i| dot(row(i), &rhs)).collect();
     let pull = |part: &Vec<f64>| -> Vec<f64> {
         let score = |i: usize| part[i * size + constants] - dot(&part[i * size..i * size + constants], &solution);
         let scores: Vec<f64> = (0..constants).map(score).collect();

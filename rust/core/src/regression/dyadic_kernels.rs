@@ -194,3 +194,160 @@ fn summarise(
         absorb(layout, summary, rows, batch, false);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::equation::rows::Rows;
+    use crate::regression::model::Model;
+    use crate::regression::simulated::{PERIOD, assert_near, least_squares, model, products, rows};
+    use crate::regression::solved::local;
+    use crate::simd::instructions::Instructions;
+    use crate::simd::vectors::dispatch;
+
+    const ROWS: usize = 150;
+    /// Reflections of some dozen rows whose columns grow with time.
+    const ROUNDING: f64 = 1e-11;
+
+    /// Both layouts that the compiler unrolls, and one that it does not.
+    fn models() -> [Model; 3] {
+        [
+            model(),
+            Model { windowed: vec![0], constant: vec![], linear: true },
+            Model { windowed: vec![0, 1], constant: vec![2], linear: false },
+        ]
+    }
+
+    fn noisy() -> Rows {
+        let mut rows = rows(ROWS, |time| [1.0 + 0.1 * time, 0.1], 0.3);
+        rows.exclude([3, 40, 41, 90].into_iter());
+        rows
+    }
+
+    /// The columns of some rows, of which those before and behind the record are zero, with times from the first of them.
+    fn columns(problem: &Problem<'_>, begin: isize, count: usize) -> Vec<Vec<f64>> {
+        let of = |column: &[f64]| -> Vec<f64> {
+            let at = |offset: usize| usize::try_from(begin + offset.cast_signed()).ok();
+            (0..count).map(|offset| at(offset).and_then(|row| column.get(row)).copied().unwrap_or(0.0)).collect()
+        };
+        let windowed: Vec<_> = problem.windowed.iter().map(|column| of(column)).collect();
+        let mut found = windowed.clone();
+        if problem.layout.linear {
+            for (companion, value) in problem.companions.iter().zip(&windowed) {
+                let times = (0..count).map(|offset| offset as f64 * PERIOD);
+                found.push(
+                    of(companion).iter().zip(value).zip(times).map(|((own, one), time)| own + time * one).collect(),
+                );
+            }
+        }
+        found.extend(problem.constants.iter().map(|column| of(column)));
+        found.push(of(problem.rhs));
+        found
+    }
+
+    /// What a summary says of rows, whatever the signs of its factor.
+    fn assert_is_of(table: &Table, place: usize, problem: &Problem<'_>, begin: isize, count: usize) {
+        let layout = problem.layout;
+        let mut summary = vec![Packet::ZERO; layout.size()];
+        table.load(place, &mut summary);
+        let at = |row: usize, column: usize| if row <= column { summary[layout.entry(row, column)].0[0] } else { 0.0 };
+        let expected = products(&columns(problem, begin, count));
+        for i in 0..layout.columns() {
+            for j in 0..=i {
+                let product: f64 = (0..layout.columns()).map(|k| at(k, i) * at(k, j)).sum();
+                assert_near(product, expected[i][j], ROUNDING * (1.0 + expected[i][i] + expected[j][j]));
+            }
+        }
+        let usable = (begin..begin + count.cast_signed())
+            .filter(|&row| usize::try_from(row).is_ok_and(|row| problem.usable.get(row) == Some(&true)));
+        assert_eq!(summary[layout.sums()].0[0], usable.count() as f64);
+    }
+
+    /// Summaries of blocks from one of them on.
+    fn summarised(problem: &Problem<'_>, step: usize, first: isize, count: usize, with: Instructions) -> Table {
+        let mut table = Table::default();
+        table.resize(problem.layout.size(), count);
+        let memory = &mut memory(problem.layout);
+        dispatch(with, Summaries { problem, step, first, count, table: &mut table, memory });
+        table
+    }
+
+    #[test]
+    fn blocks_of_any_length_have_the_products_of_their_rows() {
+        let rows = noisy();
+        for model in models() {
+            let problem = model.problem(&rows, &rows.rhs, 0.0, None);
+            for instructions in Instructions::available() {
+                for (step, first) in [(1, 37), (BATCH - 1, 0), (BATCH, 3), (BATCH + 1, -2), (3 * BATCH, 1)] {
+                    let count = 11;
+                    let table = summarised(&problem, step, first, count, instructions);
+                    for place in 0..count {
+                        let begin = (first + place.cast_signed()) * step.cast_signed();
+                        assert_is_of(&table, place, &problem, begin, step);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn merged_summaries_have_the_products_of_both() {
+        let (rows, step, count) = (noisy(), 4, 13);
+        for model in models() {
+            let problem = model.problem(&rows, &rows.rhs, 0.0, None);
+            let layout = problem.layout;
+            for instructions in Instructions::available() {
+                let blocks = summarised(&problem, step, 0, count + 4, instructions);
+                let mut both = Table::default();
+                both.resize(layout.size(), count);
+                let memory = &mut memory(layout);
+                // Blocks 1 and 2, then block 3, for every window one block later.
+                for (summaries, others, blocks_later) in
+                    [(Some((&blocks, 1)), (&blocks, 2), 1), (None, (&blocks, 3), 2)]
+                {
+                    let later = (blocks_later * step) as f64 * PERIOD;
+                    dispatch(
+                        instructions,
+                        Merges { layout, table: &mut both, summaries, others, count, later, memory },
+                    );
+                    for place in 0..count {
+                        let begin = ((place + 1) * step).cast_signed();
+                        assert_is_of(&both, place, &problem, begin, (blocks_later + 1) * step);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_summary_is_solved_at_the_time_that_is_asked_for_and_written_where_it_belongs() {
+        let (rows, step, count) = (rows(ROWS, |time| [1.0 + 0.1 * time, 0.1], 0.3), 20, 6);
+        let model = Model { windowed: vec![0], constant: vec![], linear: true };
+        let problem = model.problem(&rows, &rows.rhs, 0.0, None);
+        for instructions in Instructions::available() {
+            let table = summarised(&problem, step, 0, count, instructions);
+            let mut result = Solved::new(problem.layout, 0, 2 * WIDTH);
+            let later = 7.0 * PERIOD;
+            let solves = Solves {
+                problem: &problem,
+                summaries: (&table, 1),
+                count: count - 1,
+                later,
+                scratch: &mut SolveScratch::new(problem.layout),
+                result: &mut result,
+                place: WIDTH,
+                memory: &mut memory(problem.layout),
+            };
+            dispatch(instructions, solves);
+            for place in 0..count - 1 {
+                let [value, rate] = least_squares(&columns(&problem, ((place + 1) * step).cast_signed(), step))[..]
+                else {
+                    panic!("a value and its rate")
+                };
+                assert_near(local(&result, WIDTH + place, &[], 0), value + later * rate, ROUNDING);
+                assert_near(local(&result, WIDTH + place, &[], 1), rate, ROUNDING);
+            }
+            assert_eq!(result.field(result.fields.count())[..WIDTH], [0.0; WIDTH]);
+        }
+    }
+}

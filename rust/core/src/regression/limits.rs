@@ -16,9 +16,9 @@ pub(crate) const UNEXPLAINED: f64 = 4e-4;
 /// A smaller part of it is explained for every purpose.
 pub(crate) const NEGLIGIBLE: f64 = 1e-6;
 
-/// The flag of a condition number.
+/// The flag of a condition number; one that is no number tells nothing apart.
 pub(crate) fn status_of(condition: f64) -> Status {
-    if condition.is_infinite() {
+    if !condition.is_finite() {
         Status::RANK_DEFICIENT
     } else if condition > HARDLY_TOLD_APART {
         Status::ILL_CONDITIONED
@@ -39,6 +39,7 @@ mod tests {
             (HARDLY_TOLD_APART.next_up(), Status::ILL_CONDITIONED),
             (f64::MAX, Status::ILL_CONDITIONED),
             (f64::INFINITY, Status::RANK_DEFICIENT),
+            (f64::NAN, Status::RANK_DEFICIENT),
         ] {
             assert_eq!(status_of(condition), status, "{condition}");
         }

@@ -225,27 +225,27 @@ mod tests {
         let noise = RowNoise::new(&KERNELS, variance);
         correct(LAYOUT, &summary, &noise, &mut square, &mut factor, &mut rhs, &mut column, &mut pivots, &mut residual);
         let columns: Vec<Vec<f64>> = (0..p).map(|j| (0..=j).map(|i| factor[i * p + j].0[0]).collect()).collect();
-        let sides = columns.iter().map(|one| one.iter().zip(&rhs).map(|(a, b)| a * b.0[0]).sum()).collect();
-        (products(&columns), sides, residual.0[0])
+        let rhs_products = columns.iter().map(|one| one.iter().zip(&rhs).map(|(a, b)| a * b.0[0]).sum()).collect();
+        (products(&columns), rhs_products, residual.0[0])
     }
 
     #[test]
     fn the_corrected_factor_is_that_of_the_products_without_the_noise() {
         let (raw, variance) = (products(&columns()), 0.005);
-        let (normal, sides, residual) = corrected(variance);
+        let (normal, rhs_products, residual) = corrected(variance);
         for i in 0..3 {
             for j in 0..3 {
                 assert_near(normal[i][j], raw[i][j] - added(i, j, variance), ROUNDING);
             }
-            assert_near(sides[i], raw[i][3] - added(i, 3, variance), ROUNDING);
+            assert_near(rhs_products[i], raw[i][3] - added(i, 3, variance), ROUNDING);
         }
-        let best = crate::regression::simulated::solved(normal, sides.clone());
-        let explained: f64 = best.iter().zip(&sides).map(|(value, side)| value * side).sum();
+        let best = crate::regression::simulated::solved(normal, rhs_products.clone());
+        let explained: f64 = best.iter().zip(&rhs_products).map(|(value, rhs)| value * rhs).sum();
         assert_near(residual, raw[3][3] - added(3, 3, variance) - explained, 100.0 * ROUNDING);
     }
 
     #[test]
-    fn noise_that_would_be_all_there_is_is_believed_in_part() {
+    fn noise_that_would_be_all_there_is_is_subtracted_in_part() {
         let raw = products(&columns());
         let (normal, _, residual) = corrected(1e6);
         // The same part is taken off every product, and a tenth of each direction is left at least.

@@ -36,7 +36,7 @@ pub(crate) struct Scale {
     pub(crate) step: usize,
     /// Blocks of a one-sided window.
     blocks: usize,
-    /// Blocks in the gap between the two sides.
+    /// Blocks in the gap between the windows before and after.
     gap: usize,
     /// Rows between a window and the row that it predicts.
     pub(crate) reach: usize,

@@ -214,7 +214,7 @@ fn identification(
     if found.is_some() && test.strength < WEAK_INSTRUMENT {
         record_status |= Status::ILL_CONDITIONED;
     }
-    let status = if found.is_none() { (Status::INVALID | Status::RANK_DEFICIENT).bits() } else { 0 };
+    let status = if found.is_none() { Status::INVALID | Status::RANK_DEFICIENT } else { Status::GOOD };
     let value = |one: usize| found.map_or(f64::NAN, |found| found.values[one]);
     let entry = |one: usize, other: usize| found.map_or(f64::NAN, |found| found.covariance[one * count + other]);
     let constants = numbers.iter().enumerate();

@@ -77,21 +77,21 @@ impl MergedSession<'_, '_, '_> {
         }
         let start = width.unwrap_or_else(|| typical.min(widest));
         let mut current = TestFunction::new(start, self.exponent(), delta)?;
-        let mut seen = Vec::new();
+        let mut tried = Vec::new();
         loop {
             self.build(current)?;
             self.pilot()?;
             let best: Vec<TestFunction> =
                 candidates.iter().filter_map(|(one, tried)| tried.best(self.alone(*one))).collect();
-            let Some(first) = best.first().filter(|_| seen.len() < ROUNDS) else { break };
+            let Some(first) = best.first().filter(|_| tried.len() < ROUNDS) else { break };
             let mean = best.iter().map(|one| (one.half_width() as f64).ln()).sum::<f64>() / best.len() as f64;
             let away = |half: &usize| ((*half as f64).ln() - mean).abs();
             let half = widths.iter().copied().min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(start);
             let next = TestFunction::new(half, first.exponent(), delta)?;
-            if next == current || seen.contains(&next) {
+            if next == current || tried.contains(&next) {
                 break;
             }
-            seen.push(current);
+            tried.push(current);
             current = next;
         }
         self.at_end =

@@ -119,7 +119,7 @@ impl MergedSession<'_, '_, '_> {
         }))
     }
 
-    /// How well windows of some lengths predict what they have not seen: on stretches of many rows as far as they hold windows so long.
+    /// How well windows of some lengths predict rows that were left out: on stretches of many rows as far as they hold windows so long.
     fn validated(&mut self, model: &Model, scales: &[Scale]) -> Result<Vec<Validated>, Error> {
         let (covariance, expected) = self.covariance();
         // Stretches may begin with the row of any equation.
@@ -187,7 +187,7 @@ impl MergedSession<'_, '_, '_> {
             }
             differs.retain(|(one, _)| tested(*one));
             differs.sort_by(|a, b| b.1.excess().total_cmp(&a.1.excess()));
-            // What changes makes its neighbours seem to change, too: the one that explains most is set free.
+            // An unknown that varies makes others seem to vary, too: the one that explains most is set free.
             let before = self.parameters.clone();
             let mut best: Option<(MergedFit, Vec<f64>)> = None;
             for &&(one, _) in differs.iter().take(TRIED) {

@@ -54,8 +54,8 @@ pub struct MergedFound {
     pub weakest: Vec<f64>,
     /// Standard deviation of what is left, over the noise's, at every wanted sample.
     pub residual: Vec<f64>,
-    /// Bits of [`Status`] for every wanted sample.
-    pub status: Vec<u16>,
+    /// What holds at every wanted sample.
+    pub status: Vec<Status>,
     /// What holds for the whole record.
     pub record_status: Status,
     /// Samples before which windowed elements jump.
@@ -82,6 +82,6 @@ impl MergedFound {
         }
         self.covariances = results.covariances;
         self.residual = results.deviation;
-        self.status = results.status;
+        self.status = Status::of_column(results.status);
     }
 }

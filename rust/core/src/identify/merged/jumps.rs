@@ -70,7 +70,7 @@ impl MergedSession<'_, '_, '_> {
         search.find(&residuals(&problem, &fitted.fit, &mut self.stages)?.0, &self.jumps, &mut self.stages)
     }
 
-    /// What every windowed element is multiplied with, sample by sample, in every row of a time; nothing where jumps of one would act
+    /// What every windowed element is multiplied with, sample by sample, in every row of a time; `None` if jumps of one would act
     /// through a derivative, trials are aligned on a phase, or nothing is windowed.
     fn signals(&self, fitted: &MergedFit) -> Option<Vec<Vec<f64>>> {
         let merged = self.merged;

@@ -34,7 +34,7 @@ impl MergedSession<'_, '_, '_> {
     pub(crate) fn onto_plateau(&mut self, suggested: Option<TestFunction>) -> Result<(), Error> {
         let scans = self.scan()?;
         let half = suggested.map(|one| one.half_width());
-        let moved = half.map_or_else(|| scans.best.inside(), |half| scans.believed(half));
+        let moved = half.map_or_else(|| scans.best.inside(), |half| scans.accepted(half));
         let widest = scans.best.scales.last().map(|one| one.half_width);
         let half = moved.or(half).or(widest).ok_or(self.too_short())?;
         let exponent = suggested.map_or(self.exponent(), |one| one.exponent());

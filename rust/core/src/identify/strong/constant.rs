@@ -215,7 +215,7 @@ fn identification(
         covariances: pairs.map(|pair| Covariance { pair, values: vec![entry(pair.0, pair.1)] }).collect(),
         condition: vec![solved.condition],
         residual_std: vec![solved.residual],
-        status,
+        status: Status::of_column(status),
         record_status,
         order,
         jumps: Vec::new(),

@@ -3,7 +3,7 @@
 //! Ordinary least squares assume independent equations and constant unknowns within a window. Neither holds: derivatives at
 //! neighbouring samples come from nearly the same samples, and unknowns that change within a window bias it. Windows that share no
 //! equation show both effects. The second difference of three of them, `x₀ − (x₋ + x₊)/2`, has the variance `v₀ + (v₋ + v₊)/4` if
-//! their variances are right, and a steady drift adds nothing to it. An error common to all windows is not seen.
+//! their variances are right, and a steady drift adds nothing to it. An error common to all windows cannot be found this way.
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
@@ -254,22 +254,22 @@ impl Scattering {
         self.factors = factors(self.values.len(), [taken]).or(self.factors.take());
     }
 
-    /// The numbers that it resumes from: what was seen, window by window, and the factors.
+    /// The numbers that it resumes from: the windows so far, and the factors.
     pub(crate) fn state(&self) -> (usize, usize, Vec<f64>) {
-        let seen =
+        let windows =
             (0..self.count()).flat_map(|place| self.values.iter().chain(&self.errors).map(move |one| one[place]));
         let factors = (0..self.values.len()).map(|unknown| self.factor(unknown));
-        (self.next, self.patience, factors.chain(seen).collect())
+        (self.next, self.patience, factors.chain(windows).collect())
     }
 
     /// Goes on from there.
     pub(crate) fn resume(&mut self, (next, patience, numbers): (usize, usize, &[f64])) {
         let unknowns = self.values.len();
-        let (factors, seen) = numbers.split_at(unknowns.min(numbers.len()));
+        let (factors, windows) = numbers.split_at(unknowns.min(numbers.len()));
         self.factors =
             (factors.len() == unknowns && factors.iter().all(|factor| !factor.is_nan())).then(|| factors.to_vec());
         (self.next, self.patience) = (next, patience);
-        for window in seen.chunks_exact(2 * unknowns.max(1)) {
+        for window in windows.chunks_exact(2 * unknowns.max(1)) {
             let columns = self.values.iter_mut().chain(&mut self.errors);
             columns.zip(window).for_each(|(column, value)| column.push(*value));
         }

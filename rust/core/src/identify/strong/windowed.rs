@@ -111,7 +111,7 @@ pub(crate) fn windows(
                 .collect(),
             condition: columns.condition,
             residual_std: columns.residual_std,
-            status: columns.status,
+            status: Status::of_column(columns.status),
             record_status: Status::GOOD,
             order: columns.order,
             jumps: Vec::new(),

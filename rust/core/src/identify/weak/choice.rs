@@ -107,7 +107,7 @@ impl Session<'_, '_, '_> {
         let candidates = Candidates::new(evidence, &widths, exponent, share, &mut self.stages)?;
         let start = width.unwrap_or_else(|| usable.widest(typical.max(LEAST_HALF_WIDTH), &widths));
         let mut current = TestFunction::new(start, exponent.unwrap_or(9), delta)?;
-        let mut seen = Vec::new();
+        let mut tried = Vec::new();
         loop {
             let thinned = self.some_rows(current, widest)?;
             let weak = match thinned {
@@ -116,8 +116,8 @@ impl Session<'_, '_, '_> {
             };
             let parameters = self.pilot(&weak, model)?;
             match candidates.best(parameters) {
-                Some(best) if best != current && !seen.contains(&best) && seen.len() < ROUNDS => {
-                    seen.push(current);
+                Some(best) if best != current && !tried.contains(&best) && tried.len() < ROUNDS => {
+                    tried.push(current);
                     current = best;
                 }
                 _ => {

@@ -163,7 +163,7 @@ impl Session<'_, '_, '_> {
         Ok(worst.filter(|_| fit.scale.is_some() || alone))
     }
 
-    /// Sets all that was tested free where one of them changes and yet the rows are predicted badly: what changes beside what is held
+    /// Sets all that was tested free where one of them changes and yet the rows are predicted badly: a parameter that varies beside one that is held
     /// constant needs windows so short that a test sees nothing.
     fn set_others_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided) -> Result<(), Error> {
         let others: Vec<usize> =
@@ -180,7 +180,7 @@ impl Session<'_, '_, '_> {
         Ok(())
     }
 
-    /// Finds what changes slowly, and the other constants beside it.
+    /// Estimates what varies slowly, and the other constants beside it.
     fn set_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided) -> Result<(), Error> {
         let instructions = self.options.instructions;
         let Some(first) = decided.first else { return Ok(()) };

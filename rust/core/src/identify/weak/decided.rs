@@ -27,7 +27,7 @@ pub(crate) struct Decided {
     pub(crate) found: Option<slowly_varying::SlowCoefficients>,
     /// `None` if the constants are not determined.
     pub(crate) fit: Option<Fit>,
-    /// The length of windows that predicts best while nothing changes slowly. What changes is looked for from there: windows that were chosen while
+    /// The length of windows that predicts best while nothing varies slowly. The search for what varies begins there: windows that were chosen while
     /// too little was free are so short that nothing else is found from them.
     pub(crate) first: Option<Scale>,
     /// Mean squared error of predicting a row from others, over the noise's.
@@ -82,7 +82,7 @@ impl Decided {
         }
     }
 
-    /// The right-hand side without what changes slowly.
+    /// The right-hand side without what varies slowly.
     pub(crate) fn rhs<'a>(&'a self, rows: &'a Rows) -> &'a [f64] {
         self.found.as_ref().map_or(&rows.rhs, |found| &found.rhs)
     }
@@ -92,7 +92,7 @@ impl Decided {
         self.model.problem(rows, self.rhs(rows), noise, self.correlated.as_ref())
     }
 
-    /// The model with what changes slowly before the other constants.
+    /// The model with what varies slowly before the other constants.
     pub(crate) fn ordered(&self) -> Model {
         let constant = self.slow.iter().chain(&self.model.constant).copied().collect();
         Model { constant, ..self.model.clone() }

@@ -238,7 +238,7 @@ fn settled(
     channel_noise: [f64; 2],
     mut stages: Stages<'_, '_>,
 ) -> Result<WeakIdentified, Error> {
-    // What looks like a pulse where samples are missing may be a loss that was not seen.
+    // What looks like a pulse where samples are missing may be a loss that was not detected.
     let (mut pulses, mut calm, mut round) = (Vec::new(), Vec::new(), if whole { 0 } else { PULSE_ROUNDS });
     loop {
         let calm_torque = calm.as_slice();

@@ -62,7 +62,7 @@ pub(crate) struct WeakIdentified {
     pub(crate) constant_pairs: Vec<(usize, usize, f64)>,
     /// Pairs of unknowns whose covariances are at the samples.
     pub(crate) pairs: Vec<(usize, usize)>,
-    /// Samples before which what changes jumps.
+    /// Samples before which windowed parameters jump.
     pub(crate) jumps: Vec<usize>,
     /// Samples of pulses of the stiffness, whose ends are among the jumps.
     pub(crate) pulses: Vec<Range<usize>>,

@@ -34,7 +34,7 @@ const NEAR: usize = 2;
 const SHORTEST_WINDOW: usize = 9;
 
 /// Constants on both sides of a place, and blocks beside it.
-struct Sides {
+struct BeforeAndAfter {
     constants: [Vec<f64>; 2],
     /// Rows of a block.
     length: usize,
@@ -81,12 +81,12 @@ impl Session<'_, '_, '_> {
         let Some(values) = ends.windows(2).map(values).collect::<Option<Vec<_>>>() else { return Ok(Vec::new()) };
         let derivatives = self.derivatives(weak.function.half_width())?;
         let placed = places.iter().zip(values.windows(2)).map(|(&block, values)| {
-            let sides = Sides {
+            let both = BeforeAndAfter {
                 constants: [values[0].clone(), values[1].clone()],
                 length,
                 sample: weak.first + blocks[block].start * weak.stride,
             };
-            self.placed(weak, decided, model, &derivatives, &sides)
+            self.placed(weak, decided, model, &derivatives, &both)
         });
         Ok(placed.collect::<Option<Vec<Jump>>>().unwrap_or_default())
     }
@@ -98,7 +98,7 @@ impl Session<'_, '_, '_> {
         decided: &Decided,
         model: &Model,
         derivatives: &[Vec<f64>; 2],
-        sides: &Sides,
+        both: &BeforeAndAfter,
     ) -> Option<Jump> {
         let [velocity, acceleration] = derivatives.each_ref().map(Vec::as_slice);
         let mut rhs = weak.rows.rhs.clone();
@@ -109,7 +109,7 @@ impl Session<'_, '_, '_> {
                 1 => moving.push(Box::new(velocity)),
                 2 => moving.push(Box::new(Whole(self.record.angle))),
                 _ => {
-                    let value = f64::midpoint(sides.constants[0][place], sides.constants[1][place]);
+                    let value = f64::midpoint(both.constants[0][place], both.constants[1][place]);
                     let column = &weak.rows.regressors[unknown].value;
                     rhs.iter_mut().zip(column).for_each(|(rhs, column)| *rhs -= value * column);
                     continue;
@@ -137,22 +137,22 @@ impl Session<'_, '_, '_> {
         };
         let half = weak.function.half_width();
         let (rows, last) = (weak.rows.len(), weak.first + (weak.rows.len() - 1) * weak.stride);
-        let mut sample = sides.sample;
+        let mut sample = both.sample;
         let mut jump = None;
-        for wide in [sides.length * weak.stride, NEAR * half, NEAR * half] {
+        for wide in [both.length * weak.stride, NEAR * half, NEAR * half] {
             let row_of = |sample: usize| (sample.saturating_sub(weak.first) / weak.stride).min(rows);
             let row = row_of(sample).clamp(1, rows - 1);
             let gap = wide / weak.stride + weak.reach();
-            let before = row.saturating_sub(gap + sides.length)..row.saturating_sub(gap);
-            let after = (row + gap).min(rows)..(row + gap + sides.length).min(rows);
-            let line = |block: &Range<usize>, side: usize, origin: usize| -> Option<Lines> {
+            let before = row.saturating_sub(gap + both.length)..row.saturating_sub(gap);
+            let after = (row + gap).min(rows)..(row + gap + both.length).min(rows);
+            let line = |block: &Range<usize>, place_of: usize, origin: usize| -> Option<Lines> {
                 let centre = 0.5 * (block.start + block.end) as f64 - 0.5;
-                let found = lines(&weak.rows, model, block, &sides.constants[side])?;
+                let found = lines(&weak.rows, model, block, &both.constants[place_of])?;
                 let at = |[value, growth]: [f64; 2]| {
                     let growth = growth * weak.rows.period;
                     [value + growth * (origin as f64 - centre), growth]
                 };
-                let constants = factors.iter().map(|&place| [sides.constants[side][place], 0.0]);
+                let constants = factors.iter().map(|&place| [both.constants[place_of][place], 0.0]);
                 Some(constants.chain(found.into_iter().map(at)).collect())
             };
             let both = [line(&before, 0, row)?, line(&after, 1, row - 1)?];

@@ -86,7 +86,7 @@ impl Session<'_, '_, '_> {
     }
 
     /// A lag that is large beside the test function that was chosen without it, about, or `None` where there is none or it is given. Windows follow
-    /// what such a lag leaves as if it were motion, and nothing of it is seen beside them: so unknowns are constant here, and the test function is
+    /// what such a lag leaves as if it were motion, and it cannot be found beside them: so unknowns are constant here, and the test function is
     /// half a typical cycle wide on either side.
     fn large_lag(&mut self, chosen: &Chosen) -> Result<Option<f64>, Error> {
         if self.options.lag.is_some() {
@@ -140,8 +140,8 @@ impl Session<'_, '_, '_> {
             };
             if let Some((lag_before, left_before)) = last {
                 // Noise of the rate hides a part of what is left; two steps tell which.
-                let seen = (left_before - left) / (lag - lag_before);
-                response = if seen.is_finite() { seen.clamp(LEAST_RESPONSE, 1.0) } else { response };
+                let measured = (left_before - left) / (lag - lag_before);
+                response = if measured.is_finite() { measured.clamp(LEAST_RESPONSE, 1.0) } else { response };
             }
             let (step, error) = (left / response, error / response);
             if error > UNKNOWN * widest {
@@ -165,7 +165,7 @@ impl Session<'_, '_, '_> {
         decided: &Decided,
         fit: &Fit,
     ) -> Result<Option<(f64, f64)>, Error> {
-        // What changes slowly depends on the angle only, so what it took off the right-hand side is the same for every lag.
+        // Slowly varying parameters depend on the angle only, so what they took off the right-hand side is the same for every lag.
         let (before, without) = (&chosen.weak.rows.rhs, decided.rhs(&chosen.weak.rows));
         let slow = before.iter().zip(without).map(|(rhs, without)| rhs - without);
         let rhs = weak.rows.rhs.iter().zip(slow).map(|(rhs, slow)| rhs - slow).collect();

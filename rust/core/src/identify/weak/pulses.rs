@@ -43,7 +43,7 @@ const EXPLAINED: f64 = 0.9;
 /// pulses of the inertia in their places, over the noise's variance.
 const BETTER: f64 = 20.0;
 
-/// Where pulses would not be seen, and how large they are.
+/// Where pulses could not be found, and how large they are.
 pub(crate) struct Hidden {
     places: Vec<Range<usize>>,
     change: f64,
@@ -170,7 +170,7 @@ impl Session<'_, '_, '_> {
         Ok(((without? - error) * independent > BETTER).then_some(added))
     }
 
-    /// Samples at which a pulse like those that were found would hardly be seen, and the change of such a pulse.
+    /// Samples at which a pulse like those that were found could hardly be found, and the change of such a pulse.
     pub(crate) fn hidden_pulses(&self, chosen: &Chosen, pulses: &[Pulse]) -> Option<Hidden> {
         let expected = chosen.fitted.as_ref()?.expected;
         let mut lengths: Vec<usize> = pulses.iter().map(|pulse| pulse.samples.len()).collect();
@@ -200,7 +200,7 @@ impl Session<'_, '_, '_> {
         }
     }
 
-    /// What is left of every row by windows that hold none of some rows, and whether they say anything of it; nothing where these are none or too many.
+    /// What is left of every row by windows that hold none of some rows, and whether they say anything of it; `None` if these are none or too many.
     fn left_without(
         &mut self,
         chosen: &mut Chosen,
@@ -237,7 +237,7 @@ fn largest_change(pulse: &Pulse) -> f64 {
     pulse.change.iter().fold(0.0, |most, change| most.max(change.abs()))
 }
 
-/// Makes the errors of values such that they hold a pulse where one would not be seen, but for where one was.
+/// Makes the errors of values such that they hold a pulse where one could not be found, but for where one was.
 pub(crate) fn allow_hidden(found: &mut WeakIdentified, place: usize, step: usize, hidden: &Hidden, pulses: &[Pulse]) {
     let errors = &mut found.results.errors[place];
     let mut unseen = vec![false; errors.len()];

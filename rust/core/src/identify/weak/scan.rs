@@ -1,4 +1,4 @@
-//! Scanning the width of the test function: do equations of every scale agree, and which widths may be believed?
+//! Scanning the width of the test function: do equations of every scale agree, and which widths are accepted?
 
 use std::ops::Range;
 
@@ -39,7 +39,7 @@ impl Session<'_, '_, '_> {
             None => scans.insert(self.scan(model, chosen.weak.function.half_width())?),
         };
         let before = chosen.weak.function.half_width();
-        let moved = if given { None } else { scans.believed(before) };
+        let moved = if given { None } else { scans.accepted(before) };
         let half_width = moved.unwrap_or(before);
         self.scan = scans.best.clone();
         let mut chosen = if half_width == before { chosen } else { self.chosen_with(half_width, model)? };

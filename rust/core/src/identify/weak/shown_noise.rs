@@ -32,7 +32,7 @@ const SETTLED: f64 = 0.1;
 const LEFT_BY_SHORT: f64 = 1e-5;
 /// Rows over which what is left is correlated, in reaches of a test function: where two share no sample noise of the channels may last.
 const REACHES: usize = 4;
-/// Parts of a record with constants of their own: what changes over the record is not noise.
+/// Parts of a record with constants of their own: what varies over the record is not noise.
 const PARTS: usize = 64;
 /// Windows in such a part, at least, and windows among which the part's constants take next to nothing of the noise.
 const FEW_WINDOWS: usize = 4;
@@ -118,7 +118,7 @@ impl Session<'_, '_, '_> {
     }
 
     /// What a fit leaves of rows that it did not see, over the variance that is expected: of the usual row, so that jumps, touches and spikes
-    /// do not count. Nothing where it cannot be more than that.
+    /// do not count. `None` if it cannot be more than that.
     fn left_over_expected(&mut self, weak: &WeakRows, fitted: &Decided) -> Result<Option<f64>, Error> {
         if self.noise[1] == self.channel_noise[1] && !fitted.model.windowed.is_empty() && fitted.error <= MORE {
             return Ok(None);
@@ -128,7 +128,7 @@ impl Session<'_, '_, '_> {
     }
 
     /// The covariance of what a fit leaves of rows that it did not see. Of those that it did see windows take a part for what they follow, most
-    /// of it where the motion is. Nothing where nothing is windowed, or no row can be told from others.
+    /// of it where the motion is. `None` if nothing is windowed, or no row can be told from others.
     pub(crate) fn shown_unseen(&mut self, weak: &WeakRows, fitted: &Decided) -> Result<Option<RowCovariance>, Error> {
         if fitted.model.windowed.is_empty() {
             return Ok(None);

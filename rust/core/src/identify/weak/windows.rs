@@ -111,7 +111,7 @@ impl Session<'_, '_, '_> {
         Ok(place.is_some_and(is_inside).then_some(compared))
     }
 
-    /// How well windows of some lengths predict what they have not seen. A few rows rule out what they can; the others are compared on all
+    /// How well windows of some lengths predict rows that were left out. A few rows rule out what they can; the others are compared on all
     /// rows, or on stretches of a long record as far as they hold windows so long, and on all of it beyond where the longest of those are best.
     fn compare(&mut self, rows: &Rows, decided: &Decided, lengths: &[Scale]) -> Result<ComparedLengths, Error> {
         let (scales, ruled_out) = self.rule_out(rows, decided, lengths)?;

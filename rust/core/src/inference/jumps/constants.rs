@@ -1,9 +1,9 @@
 //! Between which blocks of a record its constants jump.
 //!
 //! Once the unknowns of a block are eliminated, what it says of the constants `c` are products `S = M_cc` and `s = M_cy`. Blocks that share
-//! constants explain `sᵀ S⁻¹ s` of the sum of squares, each summed over the blocks. A jump between two blocks adds what both sides explain
-//! apart. It is believed where that is beyond chance and beyond what is gained by leaving out any single block, which something may have
-//! spoilt. Both sides are then searched like the whole (binary segmentation, Scott and Knott 1974). In the end the few blocks around each
+//! constants explain `sᵀ S⁻¹ s` of the sum of squares, each summed over the blocks. A jump between two blocks adds what both parts explain
+//! apart. It is accepted where that is beyond chance and beyond what is gained by leaving out any single block, which something may have
+//! spoilt. Both parts are then searched like the whole (binary segmentation, Scott and Knott 1974). In the end the few blocks around each
 //! jump must tell it from a parabola in time: slow changes are no jumps.
 
 use std::ops::Range;
@@ -11,7 +11,7 @@ use std::ops::Range;
 use crate::regression::block_fit::inverse;
 
 /// The least gain by a jump, and by how much more than by anything else, over the variance of an independent row.
-const BELIEVED: f64 = 60.0;
+const SIGNIFICANT: f64 = 60.0;
 const BETTER: f64 = 20.0;
 
 /// Blocks on either side of a jump, at least.
@@ -58,7 +58,7 @@ impl Told<'_> {
             return;
         }
         let Some((place, gain)) = self.best(&blocks) else { return };
-        if gain < BELIEVED * self.variance || gain < self.single(&blocks) + BETTER * self.variance {
+        if gain < SIGNIFICANT * self.variance || gain < self.single(&blocks) + BETTER * self.variance {
             return;
         }
         found.push(place);
@@ -71,10 +71,10 @@ impl Told<'_> {
         let (before, place, after) =
             (jumps[0].max(jumps[1].saturating_sub(AROUND)), jumps[1], jumps[2].min(jumps[1] + AROUND));
         let explained = |blocks: Range<usize>| self.solved(&self.sums(blocks, 0)).map(|(_, explained)| explained);
-        let sides = (explained(before..place), explained(place..after), explained(before..after));
-        let (Some(early), Some(late), Some(whole)) = sides else { return false };
+        let parts = (explained(before..place), explained(place..after), explained(before..after));
+        let (Some(early), Some(late), Some(whole)) = parts else { return false };
         let gain = early + late - whole;
-        gain > BELIEVED * self.variance && gain > self.parabolas(&(before..after)) + BETTER * self.variance
+        gain > SIGNIFICANT * self.variance && gain > self.parabolas(&(before..after)) + BETTER * self.variance
     }
 
     /// The place of the jump that explains most, and by how much more than no jump.
@@ -119,9 +119,9 @@ impl Told<'_> {
                 sums[row / count + column / count][row % count * size + column % count]
             })
             .collect();
-        let side: Vec<f64> = (0..wide).map(|row| sums[row / count][row % count * size + count]).collect();
+        let rhs: Vec<f64> = (0..wide).map(|row| sums[row / count][row % count * size + count]).collect();
         let whole = self.solved(&sums[0]).map(|(_, explained)| explained);
-        match (explained(&normal, &side), whole) {
+        match (explained(&normal, &rhs), whole) {
             (Some((_, parabolas)), Some(whole)) => parabolas - whole,
             _ => f64::INFINITY,
         }
@@ -143,19 +143,19 @@ impl Told<'_> {
     fn solved(&self, products: &[f64]) -> Option<(Vec<f64>, f64)> {
         let (count, size) = (self.constants, self.constants + 1);
         let normal: Vec<f64> = (0..count * count).map(|place| products[place / count * size + place % count]).collect();
-        let side: Vec<f64> = (0..count).map(|row| products[row * size + count]).collect();
-        explained(&normal, &side)
+        let rhs: Vec<f64> = (0..count).map(|row| products[row * size + count]).collect();
+        explained(&normal, &rhs)
     }
 }
 
 /// The solution of normal equations, and what it explains of the sum of squares.
-fn explained(normal: &[f64], side: &[f64]) -> Option<(Vec<f64>, f64)> {
-    let count = side.len();
+fn explained(normal: &[f64], rhs: &[f64]) -> Option<(Vec<f64>, f64)> {
+    let count = rhs.len();
     let inverse = inverse(normal, count)?;
     let values: Vec<f64> = (0..count)
-        .map(|row| inverse[row * count..(row + 1) * count].iter().zip(side).map(|(entry, side)| entry * side).sum())
+        .map(|row| inverse[row * count..(row + 1) * count].iter().zip(rhs).map(|(entry, rhs)| entry * rhs).sum())
         .collect();
-    let sum = values.iter().zip(side).map(|(value, side)| value * side).sum();
+    let sum = values.iter().zip(rhs).map(|(value, rhs)| value * rhs).sum();
     Some((values, sum))
 }
 

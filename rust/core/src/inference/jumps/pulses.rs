@@ -21,13 +21,13 @@ const MOST_PLACES: usize = 200;
 const NEAR: usize = 2;
 
 /// Least reduction of the sum of squares by a pulse, over the noise of one independent row, and the largest part of it that may be left.
-const BELIEVED: f64 = 40.0;
+const SIGNIFICANT: f64 = 40.0;
 const LEFT: f64 = 0.25;
 
-/// What plainly stands out leaves at least so many times what is believed.
+/// What plainly stands out leaves at least so many times what is accepted.
 const PLAIN: f64 = 2.0;
 
-/// A pulse that reduces the sum of squares by so much on average is believed in 19 of 20 cases: (√40 + 1.64)². And places for a length of it.
+/// A pulse that reduces the sum of squares by so much on average is accepted in 19 of 20 cases: (√40 + 1.64)². And places for a length of it.
 const SEEN: f64 = 63.4;
 const STEPS_OF_PULSE: usize = 4;
 
@@ -143,8 +143,8 @@ impl PulseSearch<'_> {
     /// Stretches of rows that leave more than noise, and those whose test function touches theirs.
     pub(crate) fn conspicuous(&self) -> Vec<Range<usize>> {
         let reach = self.reach();
-        // A pulse that is believed leaves at least half of its squares in the rows around each of its samples.
-        let least = BELIEVED / 2.0 * self.variance * self.inflation;
+        // A pulse that is accepted leaves at least half of its squares in the rows around each of its samples.
+        let least = SIGNIFICANT / 2.0 * self.variance * self.inflation;
         let squares: Vec<f64> =
             self.left.iter().zip(self.usable).map(|(left, usable)| if *usable { left * left } else { 0.0 }).collect();
         let sum = |row: usize| -> f64 {
@@ -162,7 +162,7 @@ impl PulseSearch<'_> {
 
     /// Whether most of what stands out in some stretches of rows is in those that hardly do: in a long record chance makes many of them.
     pub(crate) fn is_chance(&self, over: &[Range<usize>]) -> bool {
-        let plain = PLAIN * BELIEVED * self.variance * self.inflation;
+        let plain = PLAIN * SIGNIFICANT * self.variance * self.inflation;
         let reach = self.reach();
         let (mut all, mut plainly) = (0.0, 0.0);
         for rows in over {
@@ -207,7 +207,7 @@ impl PulseSearch<'_> {
         let (_, gain, _) = products.pulse(pair.0, pair.1);
         let left = (total - gain).max(0.0);
         let noise = self.inflation * self.variance.max(left / over.len() as f64);
-        if gain < BELIEVED * noise || left > LEFT * total {
+        if gain < SIGNIFICANT * noise || left > LEFT * total {
             return None;
         }
         let mut of_others = 0.0_f64;
@@ -362,9 +362,9 @@ mod tests {
         let (ones, function) = (vec![1.0; 1000], vec![0.2; 9]);
         let is_chance = |large: &[usize]| {
             let mut left = vec![0.0; 1000];
-            (50..1000).step_by(50).for_each(|row| left[row] = (0.6 * BELIEVED).sqrt());
+            (50..1000).step_by(50).for_each(|row| left[row] = (0.6 * SIGNIFICANT).sqrt());
             for &row in large {
-                left[row] = (20.0 * BELIEVED).sqrt();
+                left[row] = (20.0 * SIGNIFICANT).sqrt();
             }
             let search = PulseSearch {
                 left: &left,

@@ -28,7 +28,7 @@ use crate::regression::window_length::{Cells, SHORTEST_ALONE, Scale};
 const SUSPECTED: f64 = 36.0;
 
 /// Least reduction of the sum of squares by a jump, over the noise of one independent row.
-const BELIEVED: f64 = 40.0;
+const SIGNIFICANT: f64 = 40.0;
 
 /// Largest share of the sum of squares that a jump may leave: a steep slope is no jump.
 const LEFT: f64 = 0.5;
@@ -99,7 +99,7 @@ impl JumpSearch<'_> {
     /// Stretches of rows whose residuals are large enough for a jump to be accepted there.
     fn conspicuous(&self, errors: &[f64]) -> Vec<Range<usize>> {
         let reach = 2 * (self.function.len() / 2).div_ceil(self.stride) * self.group;
-        let least = BELIEVED * self.noise(0.0, 1.0) / CONSPICUOUS;
+        let least = SIGNIFICANT * self.noise(0.0, 1.0) / CONSPICUOUS;
         let mut found: Vec<Range<usize>> = Vec::new();
         let mut sum = 0.0;
         for row in 0..errors.len() + reach {
@@ -169,7 +169,7 @@ impl JumpSearch<'_> {
     /// Places a jump near a row, or returns `None` if there is none.
     fn place(&self, windows: &Around<'_>, row: usize, shared: &SharedWindows<'_>) -> Option<Jump> {
         let (jump, (over, left)) = self.placed(windows, self.first + row / self.group * self.stride)?;
-        self.is_believed(&over, left, shared).then_some(jump)
+        self.is_significant(&over, left, shared).then_some(jump)
     }
 
     /// Places a jump near a sample. Returns it with the rows over which residuals are summed, and their sum of squares.
@@ -203,12 +203,12 @@ impl JumpSearch<'_> {
     }
 
     /// Whether a jump is significant: windows of no length may predict the rows around it nearly as well without one.
-    fn is_believed(&self, over: &Range<usize>, left: f64, shared: &SharedWindows<'_>) -> bool {
+    fn is_significant(&self, over: &Range<usize>, left: f64, shared: &SharedWindows<'_>) -> bool {
         let rows: Vec<usize> = over.clone().filter(|&row| self.whole.usable[row]).collect();
         let noise = self.noise(left, rows.len() as f64);
         // Short windows follow steep slopes, so they reject most candidates.
         let mut tried = false;
-        let beaten = |without: f64| (without - left) / noise < BELIEVED || left > LEFT * without;
+        let beaten = |without: f64| (without - left) / noise < SIGNIFICANT || left > LEFT * without;
         for without in self.scales.iter().filter_map(|scale| self.without(*scale, over, &rows, shared)) {
             if beaten(without) {
                 return false;

@@ -2,7 +2,7 @@
 //!
 //! A mass has no jump of its angle: an impact changes its velocity, a torque its acceleration. So windows around every border of two samples are
 //! asked for a step there. Where that shows that samples are lost, and how many, longer windows are asked for shifts of time by as many, which
-//! are seen where the motion turns round, too.
+//! are found where the motion turns round, too.
 
 use crate::error::Error;
 use crate::exec::pool::Watch;
@@ -26,8 +26,8 @@ const ENOUGH: usize = 3;
 pub(crate) fn breaks(angle: &dyn Samples, watch: &mut Watch<'_>) -> Result<Vec<usize>, Error> {
     let quantum = quantisation_step(angle);
     let mut found: Vec<usize> = Vec::new();
-    for (half, degree, sides) in WINDOWS {
-        let more = Steps::new(half, degree, sides).find(angle, quantum, &found, watch)?;
+    for (half, degree, changing) in WINDOWS {
+        let more = Steps::new(half, degree, changing).find(angle, quantum, &found, watch)?;
         // Short windows follow noise: they are asked only where there is something.
         if found.is_empty() && more.is_empty() {
             return Ok(found);
@@ -81,13 +81,13 @@ mod tests {
         let lost = [700, 1500, 1508, 2900, 4111, 5200];
         let time = |sample: usize| (sample + 3 * lost.iter().filter(|&&place| place <= sample).count()) as f64;
         let broken: Vec<f64> = (0..samples).map(|n| motion(time(n)) + 2e-3 * noise[n]).collect();
-        // Where the motion turns round nothing is seen of a loss, and nothing is wrong.
-        let seen = |&&place: &&usize| (motion(time(place)) - motion(time(place) - 3.0)).abs() > 0.04;
+        // Where the motion turns round a loss cannot be found, and nothing is wrong.
+        let moves = |&&place: &&usize| (motion(time(place)) - motion(time(place) - 3.0)).abs() > 0.04;
         let places = found(&broken);
-        for place in lost.iter().filter(seen) {
+        for place in lost.iter().filter(moves) {
             assert!(places.contains(place), "{place} {places:?}");
         }
-        assert!(lost.iter().filter(seen).count() >= 4);
+        assert!(lost.iter().filter(moves).count() >= 4);
         assert!(places.iter().all(|place| lost.contains(place)), "{places:?}");
         let whole: Vec<f64> = (0..samples).map(|n| motion(n as f64) + 2e-3 * noise[n]).collect();
         assert_eq!(found(&whole), [] as [usize; 0]);

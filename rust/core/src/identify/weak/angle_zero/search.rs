@@ -51,7 +51,7 @@ impl Session<'_, '_, '_> {
         let Some(offset) = offset.filter(|_| self.options.angle_zero.is_none()) else {
             return self.decide_and_choose_again(chosen, model);
         };
-        // Before anything else follows what the offset may not: looking for what changes and jumps takes longest where nothing fits.
+        // Before anything else follows what the offset may not: looking for parameters that vary and jump takes longest where nothing fits.
         let missed = self.offset_is_missed(&mut chosen, model, offset)?;
         if missed && let Some(settled) = self.with_angle_zero(model, offset, Some(&mut chosen))? {
             return Ok(settled);

@@ -39,7 +39,7 @@ pub(crate) struct Fitted<'a> {
 }
 
 impl Session<'_, '_, '_> {
-    /// Puts together what changes and its errors, with the pairs of unknowns whose covariances are among them.
+    /// Puts together time-varying parameters and their errors, with the pairs of unknowns whose covariances are among them.
     pub(crate) fn at_rows(
         &mut self,
         fitted: &Fitted<'_>,
@@ -93,7 +93,7 @@ impl Session<'_, '_, '_> {
         Ok((results, pairs))
     }
 
-    /// Standard errors of what changes, covariances of pairs of coefficients, and which pairs those are.
+    /// Standard errors of time-varying parameters, covariances of pairs of coefficients, and which pairs those are.
     fn errors_at_rows(&mut self, fitted: &Fitted<'_>, tracks: &Tracks) -> Result<ErrorsAtRows, Error> {
         let Fitted { problem, decided, all, errors, covariance, .. } = *fitted;
         let count = problem.layout.constant;

@@ -19,7 +19,7 @@ use crate::regression::subsample::{stretches_of_rows, thinned_column, thinned_ro
 use crate::status::Status;
 use crate::weak_form::weak_rows::WeakRows;
 
-/// What changes, at rows from `first` on, whatever it was taken from.
+/// Time-varying parameters, at rows from `first` on, whatever they were taken from.
 pub(crate) struct Tracks {
     pub(crate) first: isize,
     pub(crate) values: Vec<Vec<f64>>,
@@ -74,7 +74,7 @@ impl Session<'_, '_, '_> {
         row(wanted.start).saturating_sub(span + 1).min(end)..end
     }
 
-    /// What changes, at every row.
+    /// Time-varying parameters, at every row.
     pub(crate) fn tracks(
         &mut self,
         problem: &Problem<'_>,

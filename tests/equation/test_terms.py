@@ -11,8 +11,6 @@ import pytest
 
 import tvident
 from calls import paper
-from tvident import _core
-from tvident._equation import BUILT_IN
 
 Array = npt.NDArray[np.float64]
 
@@ -37,23 +35,6 @@ def swings(n: int = 8000) -> tuple[Array, Array]:
         acceleration -= amplitude * omega**2 * np.sin(omega * t + phase)
     torque = INERTIA * acceleration + DAMPING * velocity + GRAVITY * np.sin(angle) + OFFSET
     return angle, torque
-
-
-def test_the_table_here_holds_the_functions() -> None:
-    angle, velocity = np.random.default_rng(3).standard_normal((2, 50))
-    for name, function in FUNCTIONS.items():
-        known = velocity if BUILT_IN[name].needs_velocity else None
-        np.testing.assert_array_equal(BUILT_IN[name].function(np, angle, known), function(0.0, angle, velocity))
-
-
-def test_there_is_one_table_here_and_one_in_the_core() -> None:
-    linear = [name for name, term in BUILT_IN.items() if not term.inner]
-    assert linear == _core.built_in_terms()
-    assert linear == list(FUNCTIONS)
-    for term in BUILT_IN.values():
-        assert "{amount}" in term.suspicion
-        assert term.unit
-        assert term.meaning
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

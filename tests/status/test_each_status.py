@@ -122,6 +122,23 @@ def late(samples: int, **call: Any) -> Shown:
     return identified(recording.angle[samples:], recording.torque[: recording.torque.size - samples], **call)
 
 
+def touched(torque: float) -> Shown:
+    """Identify a record while which somebody touched the machine for a second, with so many times its torque."""
+    recording = rig("constant")
+    n = recording.angle.size
+    push = waves([5.3, 8.9], n)
+    push *= torque * recording.torque.std() / push.std()
+    begins, ends = 6000, 7000
+    more = np.where(around(n, begins, ends), push, 0.0)
+    result = tvident.identify(recording.angle, recording.torque + more, sample_rate=RATE, **weak(regression_window=500))
+    # What is left around a row is averaged over a window of its own, of equations that each hold a test function.
+    reach = result.settings["regression_window"] + result.settings["window_length"]
+    inner, outer = around(n, begins, ends), around(n, begins - reach, ends + reach)
+    assert outer.mean() < 0.5
+    samples = np.where(outer & ~inner, np.uint16(0), result.status)
+    return Shown(samples, int(result.record_status), inner if torque else np.zeros(n, bool))
+
+
 def outside_a_mask(*, differs: bool) -> Shown:
     angle, torque, outside = another_system_outside()
     if not differs:
@@ -208,6 +225,12 @@ CASES: list[tuple[Status, str, Callable[[], Shown], Callable[[], Shown]]] = [
         "another system outside the mask",
         lambda: outside_a_mask(differs=True),
         lambda: outside_a_mask(differs=False),
+    ),
+    (
+        Status.NOISE_MODEL,
+        "a touch",
+        lambda: touched(0.5),
+        lambda: touched(0.0),
     ),
     (
         Status.COLOURED,
