@@ -230,6 +230,10 @@ def test_words_of_a_plot_stand_apart_and_on_one_line(browser: Any, short: tuple[
         opened.page.evaluate(question, title)
         opened.page.wait_for_timeout(200)
     assert opened.ask(f"({overlapping})()") == []
+    # The same time stands at the same place in every plot, that of the status too, whose names are in the page.
+    assert len(set(opened.ask("tvidentReport.charts.filter((one) => one.isListening).map((one) => one.div._fullLayout._size.l)"))) == 1
+    names = opened.ask("[...document.querySelectorAll('.annotation-text')].map((one) => one.textContent)")
+    assert {"edge", "gap"} <= set(names)
     keys = "[...document.querySelectorAll('.head')].map((head) => [...head.querySelectorAll('.key')].map((key) => key.offsetTop))"
     tops = opened.ask(keys)
     assert any(len(each) > 2 for each in tops)
