@@ -98,6 +98,44 @@ def test_json_says_what_the_summary_says(folder: Path) -> None:
     assert said["advice"] == list(result.advice)
 
 
+def test_json_of_channels_and_of_models(folder: Path) -> None:
+    np.savetxt(
+        folder / "odd.csv",
+        [[0.0, np.nan], [0.1, np.nan], [0.2, np.nan]],
+        delimiter=",",
+        header="t [s],a [deg]",
+        comments="",
+    )
+    time, angle = json.loads(run("info", "odd.csv", "--json").stdout)["channels"]
+    assert [time["name"], time["unit"], time["samples"], time["greatest"]] == ["t [s]", "s", 3, 0.2]
+    assert [angle["missing"], angle["mean"], angle["remark"]] == [3, None, "holds no numbers"]
+    compare = ("compare", *IDENTIFY[1:], "--model", "none", "--model", "coulomb", "--json")
+    said = json.loads(run(*compare).stdout)
+    assert said["best"] == said["models"][0]["model"]
+    assert said["models"][0]["weight"] >= said["models"][1]["weight"]
+    assert said["averaged"]["inertia"]["value"] == pytest.approx(0.0123, rel=0.01)
+    methods = json.loads(run(*compare[:-5], "--methods", "--json").stdout)["methods"]
+    assert {"tvident"} <= {one["method"] for one in methods}
+
+
+def test_what_goes_wrong_is_json_too(folder: Path) -> None:
+    np.savez(folder / "rest.npz", angle=np.zeros(500), torque=np.zeros(500))
+    nothing = run("identify", "rest.npz", *IDENTIFY[2:], "--json")
+    assert nothing.returncode == 1
+    assert json.loads(nothing.stdout)["parameters"]["inertia"]["value"] is None
+    for call, status in (
+        (("identify", "none.npz", *IDENTIFY[2:]), 1),
+        (("info", "none.npz"), 1),
+        (("compare", *IDENTIFY[1:-2]), 2),
+        ((*IDENTIFY, "--lag", "soon"), 2),
+    ):
+        done = run(*call, "--json")
+        assert done.returncode == status
+        said = json.loads(done.stdout)
+        assert said["exit_status"] == status
+        assert said["error"] in done.stderr
+
+
 def test_a_run_is_repeated_from_its_result_and_from_toml(folder: Path) -> None:
     options = ["--inertia", "0.0123", "--term", "coulomb", "--window-length", "41"]
     assert run(*IDENTIFY, *options, "-o", "first.npz").returncode == 0
