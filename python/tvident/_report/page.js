@@ -180,6 +180,10 @@
       const ofStrips = { range: [names.length - 0.5, -0.5], tickvals: [], showgrid: false };
       // Above their strips, so that times stand where they do in every other plot.
       const annotations = names.map((text, row) => ({ text, xref: "paper", x: 0, xanchor: "left", y: row - 0.22, yanchor: "middle", showarrow: false }));
+      // An empty plot looks as if something were broken.
+      if (!this.strips.length && !line.some((trace) => trace.y.some((value) => value !== null && Number.isFinite(value)))) {
+        annotations.push({ text: "no numbers here", xref: "paper", x: 0.5, yref: "paper", y: 0.5, showarrow: false });
+      }
       const ofLine = { range: line.length ? yRange(line, this.isRobust) : [0, 1], nticks: 5, gridcolor: grid, exponentformat: "power" };
       // Marks that are not seen keep the two axes' words apart where they meet.
       const apart = { ticks: "outside", tickcolor: "rgba(0,0,0,0)" };
