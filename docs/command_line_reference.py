@@ -17,7 +17,9 @@ replace what is read. The command comes with `pip install 'tvident[cli]'`; where
 `python -m tvident` runs it. `--settings` takes a TOML file of options, such as
 `inertia = 0.0123` and `term = ["coulomb"]`, what `--settings-output` wrote, or a result: NPZ and Parquet files hold
 their settings, beside others stands a file with `.settings.json` behind the name of the result. So a run can be repeated from what
-it wrote, to the last digit. This page is written by `make docs` from what the commands say themselves."""
+it wrote, to the last digit. With `--json` standard output is one JSON object whatever happens: an error is
+`{"error": "…", "exit_status": 1}`. `tvident completion` prints what makes bash, zsh and fish complete.
+This page is written by `make docs` from what the commands say themselves."""
 
 
 def reference() -> str:

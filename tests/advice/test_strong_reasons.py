@@ -87,7 +87,8 @@ def test_what_rests_is_told_to_be_left_out() -> None:
     nothing = paper(np.zeros(2000), np.zeros(2000))
     assert advice(nothing).startswith("the record does not determine inertia, damping and stiffness: nothing moves")
     missing = paper(np.full(2000, np.nan), np.zeros(2000))
-    assert advice(missing).startswith("no window holds enough equations")
+    assert advice(missing).startswith("the angle holds no numbers: all 2000 samples are missing")
+    assert "\nno window holds enough equations" in advice(missing)
 
 
 def test_a_term_that_looks_like_another_is_told() -> None:

@@ -56,6 +56,9 @@ def test_without_what_the_command_is_made_with_the_library_is_there(tmp_path: Pa
     assert refused.stderr.splitlines() == [
         "Error: the command tvident needs click, which is not installed; install it with: pip install 'tvident[cli]'"
     ]
+    # Where the program is not on the path, it is asked for as a module.
+    as_module = run_without(sys.executable, "-m", "tvident", "demo")
+    assert (as_module.returncode, as_module.stderr) == (1, refused.stderr)
     program = "import tvident; fit = tvident.fit_local_polynomials([1.0] * 99, 21, progress={}); print(fit.order.size)"
     assert run_without(sys.executable, "-c", program.format("None")).stdout == "99\n"
     refused = run_without(sys.executable, "-c", program.format("True"))

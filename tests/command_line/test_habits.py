@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -52,19 +54,39 @@ def test_every_command_is_listed_with_what_it_says_of_itself() -> None:
         assert (command.help or "").partition("\n\n")[0].replace("\n", " ") == sentence
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_completion_of_names_and_options(shell: str) -> None:
-    script = run("completion", shell).stdout
-    assert "_TVIDENT_COMPLETE" in script
-    variables = {"COMP_WORDS": "tvident identify --stiff", "COMP_CWORD": "2" if shell != "fish" else "--stiff"}
+ASKED = {
+    "bash": "complete() { :; }\n. ./script\nCOMP_WORDS=(tvident identify --inert); COMP_CWORD=2\n"
+    '_tvident_completion tvident; printf "%s\\n" "${COMPREPLY[@]}"',
+    "zsh": "compdef() { :; }; _describe() { print -rl -- $completions_with_descriptions; }\n. ./script\n"
+    "words=(tvident identify --inert); CURRENT=3\n_tvident_completion",
+    "fish": 'source ./script\ncomplete -C "tvident identify --inert"',
+}
+"""What makes a shell say how it would complete a line."""
+
+
+@pytest.mark.parametrize(
+    ("shell", "said"), [("bash", "--inertia"), ("zsh", r"--inertia:{}"), ("fish", "--inertia\t{}")]
+)
+def test_completion_of_names_and_options(shell: str, said: str, tmp_path: Path) -> None:
+    if shutil.which(shell) is None:
+        if os.environ.get("TVIDENT_REQUIRE_SHELLS"):
+            pytest.fail(f"completion cannot be tried without {shell}; install it")
+        pytest.skip(f"completion cannot be tried without {shell}; install it")
+    (tmp_path / "script").write_text(run("completion", shell).stdout)
+    path = os.pathsep.join([str(Path(TVIDENT).parent), os.environ["PATH"]])
+    plain = {"bash": ["--norc"], "zsh": ["-f"], "fish": ["--no-config"]}[shell]
     done = subprocess.run(
-        [TVIDENT],
-        env=variables | {"_TVIDENT_COMPLETE": f"{shell}_complete"},
+        [shell, *plain, "-c", ASKED[shell]],
+        cwd=tmp_path,
+        env=os.environ | {"PATH": path, "HOME": str(tmp_path)},
         capture_output=True,
         text=True,
         check=False,
     )
-    assert "--stiffness" in done.stdout
+    # Commas part fields in some versions of click; descriptions have them, too.
+    assert done.stdout.splitlines() == [
+        said.format("auto, constant, windowed, varying, a known number, or a channel.")
+    ], done.stderr
 
 
 def test_json_says_what_the_summary_says(folder: Path) -> None:
@@ -74,6 +96,44 @@ def test_json_says_what_the_summary_says(folder: Path) -> None:
     assert said["parameters"]["inertia"]["value"] == result.constants["inertia"][0]
     assert said["verdict"].startswith("K(t) known to")
     assert said["advice"] == list(result.advice)
+
+
+def test_json_of_channels_and_of_models(folder: Path) -> None:
+    np.savetxt(
+        folder / "odd.csv",
+        [[0.0, np.nan], [0.1, np.nan], [0.2, np.nan]],
+        delimiter=",",
+        header="t [s],a [deg]",
+        comments="",
+    )
+    time, angle = json.loads(run("info", "odd.csv", "--json").stdout)["channels"]
+    assert [time["name"], time["unit"], time["samples"], time["greatest"]] == ["t [s]", "s", 3, 0.2]
+    assert [angle["missing"], angle["mean"], angle["remark"]] == [3, None, "holds no numbers"]
+    compare = ("compare", *IDENTIFY[1:], "--model", "none", "--model", "coulomb", "--json")
+    said = json.loads(run(*compare).stdout)
+    assert said["best"] == said["models"][0]["model"]
+    assert said["models"][0]["weight"] >= said["models"][1]["weight"]
+    assert said["averaged"]["inertia"]["value"] == pytest.approx(0.0123, rel=0.01)
+    methods = json.loads(run(*compare[:-5], "--methods", "--json").stdout)["methods"]
+    assert {"tvident"} <= {one["method"] for one in methods}
+
+
+def test_what_goes_wrong_is_json_too(folder: Path) -> None:
+    np.savez(folder / "rest.npz", angle=np.zeros(500), torque=np.zeros(500))
+    nothing = run("identify", "rest.npz", *IDENTIFY[2:], "--json")
+    assert nothing.returncode == 1
+    assert json.loads(nothing.stdout)["parameters"]["inertia"]["value"] is None
+    for call, status in (
+        (("identify", "none.npz", *IDENTIFY[2:]), 1),
+        (("info", "none.npz"), 1),
+        (("compare", *IDENTIFY[1:-2]), 2),
+        ((*IDENTIFY, "--lag", "soon"), 2),
+    ):
+        done = run(*call, "--json")
+        assert done.returncode == status
+        said = json.loads(done.stdout)
+        assert said["exit_status"] == status
+        assert said["error"] in done.stderr
 
 
 def test_a_run_is_repeated_from_its_result_and_from_toml(folder: Path) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -180,6 +181,22 @@ def test_every_picture_draws_on_axes_of_ones_own(
     assert result.plot("torque", ax=three[:2]).axes == list(three)
     with pytest.raises(ValueError, match="ax must be one Axes, or 2 of them for this picture; got 3; give 2"):
         result.plot("torque", ax=three)
+
+
+@pytest.mark.parametrize("what", ["poles", "torque", "scan"])
+def test_panels_inside_of_axes_keep_their_words_apart(result: tvident.Identification, what: Any) -> None:
+    for is_free in (False, True):
+        figure = plt.figure(figsize=(11, 6))
+        ax = figure.add_axes((0.2, 0.2, 0.6, 0.6)) if is_free else figure.subplots(1, 2)[1]
+        result.plot(what, ax=ax)
+        figure.canvas.draw()
+        panels = [one for one in [*figure.axes, *ax.child_axes] if one.get_title(loc="left")]
+        assert len(panels) > 1
+        for above, below in pairwise(panels):
+            bottom = above.get_tightbbox().y0  # of words below the axis
+            assert below.get_window_extent().y1 < bottom
+            assert below._left_title.get_window_extent().y1 < bottom + 1  # noqa: SLF001 - there is no other way to it
+        plt.close(figure)
 
 
 def test_derivatives_have_units_and_constants_stay_within_the_picture(rig: tvident.Recording) -> None:

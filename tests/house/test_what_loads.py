@@ -22,6 +22,11 @@ SLOW = {
 }
 """Of the standard library, by half a millisecond to thirty each; NumPy takes some of them itself."""
 
+CALL = "t = numpy.arange(2000) / 1000; tvident.identify(numpy.sin(9 * t), numpy.cos(20 * t * t), sample_rate=1000)"
+
+LATER = {"difflib", "html", "numpy.polynomial"}
+"""What mistakes, notebooks and other families of functions need."""
+
 OPTIONAL = {"click", "matplotlib", "pandas", "plotly", "polars", "pyarrow", "scipy", "tqdm", "xarray"}
 
 
@@ -31,6 +36,10 @@ OPTIONAL = {"click", "matplotlib", "pandas", "plotly", "polars", "pyarrow", "sci
         ("import tvident", {"numpy", "tvident._core", *SLOW, *OPTIONAL}),
         ("import numpy; before |= set(sys.modules); import tvident; tvident.identify", {*SLOW, *OPTIONAL}),
         ("import numpy; before |= set(sys.modules); import tvident; tvident.read_recording", {*SLOW, *OPTIONAL}),
+        (
+            f"import numpy; before |= set(sys.modules); import tvident; {CALL}",
+            {"tvident._merged", *SLOW, *OPTIONAL, *LATER},
+        ),
     ],
 )
 def test_nothing_is_loaded_that_is_not_needed(code: str, forbidden: set[str]) -> None:

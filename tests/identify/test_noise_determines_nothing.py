@@ -137,3 +137,28 @@ def test_one_blow_is_enough() -> None:
     value, error = result.constants["inertia"]
     assert abs(value - INERTIA) < CLOSE * error
     assert abs(value - INERTIA) < 0.01 * INERTIA
+
+
+@pytest.mark.parametrize("method", ["auto", "paper"])
+@pytest.mark.parametrize(
+    ("empty", "said"),
+    [
+        (("angle",), "the angle holds no numbers: all 3000 samples are missing; was another channel meant"),
+        (("torque",), "the torque holds no numbers: all 3000 samples are missing; was another channel meant"),
+        (("angle", "torque"), "the angle and the torque hold no numbers: all 3000 samples are missing"),
+        ((), "no sample has both the angle and the torque"),
+    ],
+)
+def test_a_channel_without_numbers_is_named(method: Any, empty: tuple[str, ...], said: str) -> None:
+    rig = tvident.simulate_torsional_rig(3.0)
+    channels: dict[str, Any] = {"angle": rig.angle.copy(), "torque": rig.torque.copy()}
+    for name in empty:
+        channels[name][:] = np.nan
+    if not empty:
+        channels["angle"][:1600], channels["torque"][1400:] = np.nan, np.nan
+    found = tvident.identify(**channels, sample_rate=RATE, method=method)
+    assert found.advice[0].startswith(said)
+    both: dict[str, Any] = {name: np.stack([getattr(rig, name), values]) for name, values in channels.items()}
+    batch = tvident.identify(**both, sample_rate=RATE, method=method)
+    assert any(line.startswith(f"record 1: {said}") for line in batch.advice)
+    assert said in batch[1].advice[0]

@@ -302,6 +302,20 @@ def test_a_disturbance_where_the_noise_is_least_is_not_given_weight() -> None:
     assert found.constants == alike.constants
 
 
+def test_windows_as_long_as_the_record_are_told() -> None:
+    rig = tvident.simulate_torsional_rig(12.0, seed=5)
+    for more, is_told in (({}, True), ({"regression_window": "0.2 s"}, False), (CONSTANT, False)):
+        found = tvident.identify(rig.angle, rig.torque, sample_rate=1000, **weak(averaging=False, **more))
+        lines = [line for line in found.advice if line.startswith("windows are as long as the record")]
+        assert bool(lines) == is_told
+        assert found.advice[:1] == tuple(lines) or not is_told
+        assert not is_told or "give regression_window=, such as '0.2 s', or ask for averaging" in lines[0]
+    both = tvident.identify(
+        [rig.angle] * 2, [rig.torque] * 2, sample_rate=1000, method=tvident.WeakForm(averaging=False)
+    )
+    assert any("windows are as long as the record" in line for line in both[1].advice)
+
+
 def test_residuals_of_weighted_equations_are_those_of_the_torque() -> None:
     rig = tvident.simulate_torsional_rig(12.0, seed=3, pattern="constant", angle_noise=1e-2)
     left = [

@@ -177,7 +177,7 @@ def test_weights_that_fade_stay_exact_and_errors_hold(alignment: Alignment) -> N
         ({"covariance": "white"}, "covariance must be 'classic' or 'hac'; got 'white'"),
         ({"lags": 3}, "lags must go with covariance='hac'; got 3 with 'classic'"),
         ({"covariance": "hac", "lags": 5}, "less than half of the window's 10 rows; got 5; use 4 or less"),
-        ({"window_length": "2 s"}, "number of rows where no t is given; got '2 s'; give t"),
+        ({"window_length": "2 s"}, "number of rows where no time is given; got '2 s'; give sample_rate, delta or t"),
         ({"window_length": 10, "t": np.arange(100.0) ** 2}, "t must be uniform"),
         ({"window_length": "2 s", "t": np.arange(100.0) // 2}, r"t must increase from row to row; t\[1\] is 0 after 0"),
         (
@@ -262,6 +262,13 @@ def test_a_duration_on_uniform_times_is_a_number_of_rows() -> None:
     one = tvident.rolling_least_squares(A, b, "0.5 s", t=t, alignment="trailing", half_life="0.1 s")
     other = tvident.rolling_least_squares(A, b, 50, alignment="trailing", half_life=10.0)
     np.testing.assert_allclose(one.params, other.params, rtol=1e-9)
+    for time in ({"sample_rate": 100}, {"delta": 0.01}):
+        same = tvident.rolling_least_squares(A, b, "0.5 s", alignment="trailing", half_life="0.1 s", **time)
+        np.testing.assert_allclose(same.params, other.params, rtol=1e-9)
+        with pytest.raises(TypeError, match="give only one of delta, sample_rate and t"):
+            tvident.rolling_least_squares(A, b, "0.5 s", t=t, **time)
+        with pytest.raises(TypeError, match="give only one of delta, sample_rate and t"):
+            tvident.rolling_least_squares(A, b, "0.5 s", t=t**1.1, **time)
     # Times with jitter below the distance to a border hold the same rows.
     shaken = t + 0.002 * generator.uniform(-1, 1, 900)
     plain = tvident.rolling_least_squares(A, b, "0.51 s", t=shaken)

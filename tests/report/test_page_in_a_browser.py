@@ -213,6 +213,23 @@ def test_dragging_shows_the_same_time_in_all_plots_and_a_double_click_the_whole(
     opened.close()
 
 
+def test_a_plot_without_numbers_says_so(browser: Any, tmp_path: Path) -> None:
+    rig = tvident.simulate_torsional_rig(4.0)
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
+    silent = np.where(rig.time < 2, rig.slider_position, np.nan)
+    result.report(tmp_path / "page.html", channels={"off [V]": np.full(rig.time.size, np.nan), "silent [m]": silent})
+    opened = Opened(browser, tmp_path / "page.html")
+    shown = "(title) => tvidentReport.charts.find((one) => one.about.title === title).div.textContent.includes('no numbers here')"
+    said = []
+    for begin, end in ((0.0, 4.0), (2.5, 3.5)):
+        opened.show(begin, end)
+        for title in ("off", "silent", "Angle"):
+            opened.drawn(title)
+            said.append(opened.page.evaluate(shown, title))
+    assert said == [True, False, False, True, True, False]
+    opened.close()
+
+
 def test_words_of_a_plot_stand_apart_and_on_one_line(browser: Any, short: tuple[Path, tvident.Identification]) -> None:
     opened = Opened(browser, short[0])
     overlapping = """() => {
@@ -230,6 +247,19 @@ def test_words_of_a_plot_stand_apart_and_on_one_line(browser: Any, short: tuple[
         opened.page.evaluate(question, title)
         opened.page.wait_for_timeout(200)
     assert opened.ask(f"({overlapping})()") == []
+    # The same time stands at the same place in every plot, that of the status too, whose names are in the page.
+    assert (
+        len(
+            set(
+                opened.ask(
+                    "tvidentReport.charts.filter((one) => one.isListening).map((one) => one.div._fullLayout._size.l)"
+                )
+            )
+        )
+        == 1
+    )
+    names = opened.ask("[...document.querySelectorAll('.annotation-text')].map((one) => one.textContent)")
+    assert {"edge", "gap"} <= set(names)
     keys = "[...document.querySelectorAll('.head')].map((head) => [...head.querySelectorAll('.key')].map((key) => key.offsetTop))"
     tops = opened.ask(keys)
     assert any(len(each) > 2 for each in tops)

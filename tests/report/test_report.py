@@ -100,6 +100,16 @@ def test_series_that_compress_leave_their_room_to_others() -> None:
         assert {part.about["top"] + 1 for part in parts} == {levels}
 
 
+def test_extremes_of_smooth_series_have_the_room_that_they_take() -> None:
+    # A least and a greatest sample in turns compress less than the curve that they are of: half the numbers, not half the bytes.
+    values = np.convolve(np.random.default_rng(0).standard_normal(400_000), np.hanning(101), "same")
+    many = [Series(str(number), "", (1 + number) * values, 0.0, 1e-3) for number in range(6)]
+    for most_bytes in (500_000, 650_000, 800_000):
+        parts = packed(many, most_bytes=most_bytes)
+        assert any(part.about["merged"] > 1 for part in parts)
+        assert sum(len(part.extremes) + len(part.levels) for part in parts) < 4 / 3 * most_bytes
+
+
 def test_what_does_not_fit_keeps_its_extremes() -> None:
     generator = np.random.default_rng(0)
     many = [Series(str(number), "", generator.standard_normal(100_000), 0.0, 1e-3) for number in range(4)]

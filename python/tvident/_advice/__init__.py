@@ -1,7 +1,7 @@
 """Puts into words what was chosen, why, and what to do next."""
 
 from tvident._advice.collinear import NOT_TOLD_APART
-from tvident._advice.events import spikes_that_stay
+from tvident._advice.events import spikes_that_stay, without_numbers
 from tvident._advice.expansion import FoundExpansion, words_of_expansions
 from tvident._advice.instrument import words_with_instrument
 from tvident._advice.plausible import Plausible
@@ -17,6 +17,7 @@ __all__ = [
     "FoundExpansion",
     "Plausible",
     "spikes_that_stay",
+    "without_numbers",
     "words_of_expansions",
     "words_of_search",
     "words_with_instrument",

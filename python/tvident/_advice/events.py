@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -52,6 +52,28 @@ def spikes(found: _core.Identification) -> list[str]:
         for channel, (name, treated) in enumerate(_TREATED)
         if counts[channel]
     ]
+
+
+def without_numbers(
+    angles: npt.NDArray[np.number], torques: npt.NDArray[np.number], records: Sequence[int]
+) -> list[tuple[int, str]]:
+    """Return which channels hold nothing, by record, of those that determine nothing."""
+    found = []
+    for record in records:
+        there = {
+            name: np.isfinite(of.reshape(-1, of.shape[-1])[record])
+            for name, of in (("angle", angles), ("torque", torques))
+        }
+        empty = [name for name, is_there in there.items() if not is_there.any()]
+        if empty:
+            count = there[empty[0]].size
+            words = f"the {' and the '.join(empty)} hold{'s' if len(empty) == 1 else ''} no numbers: all {count} samples are missing"
+            found.append((record, f"{words}; was another channel meant, or was a sensor not connected?"))
+        elif not (there["angle"] & there["torque"]).any():
+            found.append(
+                (record, "no sample has both the angle and the torque: were they recorded one after the other?")
+            )
+    return found
 
 
 def spikes_that_stay(angles: npt.NDArray[np.number], torques: npt.NDArray[np.number]) -> list[tuple[int, str]]:

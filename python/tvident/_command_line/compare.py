@@ -37,6 +37,7 @@ from tvident._command_line.options import CHANNELS, TIME
 @click.option("--lag", metavar="TIME", help="Delay of the torque: seconds, '2 ms', or auto.")
 @click.option("--mask", metavar="NAME", help="Channel, or file, that is not zero where a sample may be used.")
 @click.option("--workers", type=int, help="Threads; by default all processors.")
+@click.option("--json", "as_json", is_flag=True, help="Print verdict, table and averaged parameters as JSON.")
 @click.option(
     "-o",
     "--output",

@@ -105,9 +105,19 @@ COMMANDS = {
 
 
 class _Worker(click.Command):
-    """Says what the library refuses with options, where it names arguments."""
+    """Says what the library refuses with options, where it names arguments, and as JSON where that was asked for."""
 
     def invoke(self, ctx: click.Context) -> Any:
+        try:
+            with _in_plain_words():
+                return self._invoke(ctx)
+        except click.ClickException as error:
+            if ctx.params.get("as_json"):
+                said = {"error": error.format_message(), "exit_status": error.exit_code}
+                click.echo(import_module("json").dumps(said, ensure_ascii=False))
+            raise
+
+    def _invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
         except (ValueError, TypeError) as error:

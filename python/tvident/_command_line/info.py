@@ -11,6 +11,7 @@ from tvident._command_line.group import commands, main
 
 @main.command()
 @click.argument("file", type=click.Path())
+@click.option("--json", "as_json", is_flag=True, help="Print the channels as JSON, with their units.")
 def info(**options: Any) -> None:
     """List the channels of FILE: how many samples, their range, and what is missing."""
     commands().info(**options)

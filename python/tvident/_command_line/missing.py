@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 
 
-def main() -> None:
+def main(*, prog_name: str = "tvident") -> None:
     """Say what to install, and end."""
     sys.exit(
-        "Error: the command tvident needs click, which is not installed; install it with: pip install 'tvident[cli]'"
+        f"Error: the command {prog_name} needs click, which is not installed; install it with: pip install 'tvident[cli]'"
     )

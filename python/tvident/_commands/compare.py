@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
+import numpy.typing as npt
 
 import tvident
 from tvident import baselines
+from tvident._commands import plain
 from tvident._commands.channels import (
     channel_of,
     channels_in,
@@ -24,6 +28,7 @@ from tvident._commands.equation import lag_of, parameter_of, terms_of
 from tvident._commands.given import check_time, given
 from tvident._commands.named import named
 from tvident._commands.output import PICTURE, RECORDING, RESULTS, check_outputs, give, save_figure
+from tvident._commands.words import in_options
 from tvident._equation import COEFFICIENTS
 
 
@@ -39,6 +44,7 @@ def compare(
     plot: str | None,
     *,
     methods: bool,
+    as_json: bool,
     **options: Any,
 ) -> None:
     """Compare candidates for the equation of motion of the angle and torque in FILE."""
@@ -60,7 +66,7 @@ def compare(
             raise click.UsageError(
                 "--methods compares methods alone; got options of models; leave --model, --plot, --lag and --mask out"
             )
-        _methods(file, (angle, torque, time_channel), (angle_scale, torque_scale), options, output)
+        _methods(file, (angle, torque, time_channel), (angle_scale, torque_scale), options, output, as_json=as_json)
         return
     if lag is not None:
         common["lag"] = lag_of(lag)
@@ -77,9 +83,31 @@ def compare(
         **common,
     )
     units = next(iter(result.results.values())).units
-    give(result.table, {"residual_std": units["residual_std"]}, result.summary(), output)
+    words = plain.as_json(_content(result, units)) if as_json else result.summary()
+    give(result.table, {"residual_std": units["residual_std"]}, words, output)
     if plot is not None:
         save_figure(result.plot(), Path(plot))
+
+
+def _content(result: tvident.ModelComparison, units: Mapping[str, str]) -> dict[str, Any]:
+    """Return what the summary says."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of what is NaN everywhere
+        averaged = {
+            name: {"value": np.nanmedian(value), "stderr": np.nanmedian(error), "unit": units.get(name, "")}
+            for name, (value, error) in result.averaged.items()
+        }
+    return {
+        "verdict": in_options(result.summary().splitlines()[-1]),
+        "best": result.best,
+        "observations": result.observations,
+        "models": _rows(result.table),
+        "averaged": averaged,
+    }
+
+
+def _rows(table: Mapping[str, npt.NDArray[Any]]) -> list[dict[str, Any]]:
+    return [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
 
 
 def _methods(
@@ -88,6 +116,8 @@ def _methods(
     scales: tuple[str | None, str | None],
     options: dict[str, Any],
     output: str | None,
+    *,
+    as_json: bool,
 ) -> None:
     """Compare methods on one recording."""
     channels = channels_in(file)
@@ -104,4 +134,4 @@ def _methods(
             known[name] = np.asarray(channel_of(channels, name, file))
     truth = known if len(known) == len(COEFFICIENTS) else None
     found = baselines.compare_methods(angle, torque, sample_rate=rate, truth=truth)
-    give(found.table, {}, found.summary(), output)
+    give(found.table, {}, plain.as_json({"methods": _rows(found.table)}) if as_json else found.summary(), output)

@@ -9,35 +9,46 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._clocks import grid_of
+from tvident._commands import plain
 from tvident._commands.channels import channels_in
 from tvident._files import aligned, printable
-from tvident._units import ROTARY, named_unit, unit_of
+from tvident._units import ROTARY, named_unit, unit_of, unit_said
 
 
-def info(file: str) -> None:
+def info(file: str, as_json: bool) -> None:  # noqa: FBT001 - click passes options by name
     """List the channels of FILE: how many samples, their range, and what is missing."""
     channels = channels_in(file)
+    if as_json:
+        click.echo(plain.as_json({"file": file, "channels": [_numbers(*one) for one in channels.items()]}))
+        return
     rows: list[tuple[str, ...]] = [
         ("channel", "type", "samples", "mean", "std", "least", "greatest", "missing", "remark")
     ]
     for name, recorded in channels.items():
-        # Half and integer types are too narrow for sums of squares.
-        values = recorded.astype(np.float64)
-        finite = values[np.isfinite(values)]
-        with np.errstate(over="ignore", invalid="ignore"):
-            numbers = (finite.mean(), finite.std(), finite.min(), finite.max()) if finite.size else ()
-        shown = [f"{float(number):.5g}" for number in numbers] or [""] * 4
-        rows.append(
-            (
-                printable(name, 60),
-                str(recorded.dtype),
-                str(values.size),
-                *shown,
-                str(values.size - finite.size),
-                _remark(name, values),
-            )
-        )
+        found = _numbers(name, recorded)
+        measured = (found[one] for one in ("mean", "std", "least", "greatest"))
+        shown = ["" if np.isnan(one) else f"{one:.5g}" for one in measured]
+        counts = str(found["samples"]), *shown, str(found["missing"])
+        rows.append((printable(name, 60), found["type"], *counts, found["remark"]))
     click.echo("\n".join(aligned(rows)))
+
+
+def _numbers(name: str, recorded: npt.NDArray[Any]) -> dict[str, Any]:
+    """Return what there is to say of a channel."""
+    # Half and integer types are too narrow for sums of squares.
+    values = recorded.astype(np.float64)
+    finite = values[np.isfinite(values)]
+    with np.errstate(over="ignore", invalid="ignore"):
+        measured = (finite.mean(), finite.std(), finite.min(), finite.max()) if finite.size else (np.nan,) * 4
+    return {
+        "name": name,
+        "unit": named_unit(name)[1] or unit_said(recorded),
+        "type": str(recorded.dtype),
+        "samples": values.size,
+        **{one: float(number) for one, number in zip(("mean", "std", "least", "greatest"), measured, strict=True)},
+        "missing": values.size - finite.size,
+        "remark": _remark(name, values),
+    }
 
 
 def _remark(name: str, values: npt.NDArray[Any]) -> str:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
-from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -13,6 +10,7 @@ import click
 import numpy as np
 
 import tvident
+from tvident._commands import plain
 from tvident._commands.given import given
 from tvident._commands.output import RECORDING, RESULTS, check_outputs, say
 from tvident._commands.words import in_options
@@ -60,13 +58,6 @@ def _show(found: tvident.ExperimentPlan, *, as_json: bool) -> None:
         say(found.summary())
         return
 
-    def plain(value: Any) -> Any:
-        if isinstance(value, np.ndarray):
-            return value.tolist()
-        if isinstance(value, Mapping):
-            return {name: plain(one) for name, one in value.items()}
-        return value if not isinstance(value, float) or math.isfinite(value) else None
-
     words = found.summary().splitlines()[0]
-    content = {"verdict": in_options(words)} | {one.name: plain(getattr(found, one.name)) for one in fields(found)}
-    click.echo(json.dumps(content, indent=1, ensure_ascii=False))
+    content = {"verdict": in_options(words)} | {one.name: getattr(found, one.name) for one in fields(found)}
+    click.echo(plain.as_json(content))

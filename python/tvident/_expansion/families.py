@@ -9,7 +9,6 @@ from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import chebyshev, laguerre, legendre
 
 from tvident._expansion.splines import spline_values
 from tvident._expansion.wavelets import haar_values, scaling_values
@@ -66,8 +65,8 @@ def _doubled() -> Iterator[int]:
 
 def _chebyshev(places: Array, size: int, derivative: int) -> Array:
     """Return Chebyshev polynomials of the first kind."""
-    change = chebyshev.chebder(np.eye(size), derivative) if derivative else np.eye(size)
-    return np.asarray(chebyshev.chebvander(2 * places - 1, len(change) - 1) @ change * 2.0**derivative)
+    change = np.polynomial.chebyshev.chebder(np.eye(size), derivative) if derivative else np.eye(size)
+    return np.asarray(np.polynomial.chebyshev.chebvander(2 * places - 1, len(change) - 1) @ change * 2.0**derivative)
 
 
 def _second_chebyshev(places: Array, size: int, derivative: int) -> Array:
@@ -77,8 +76,8 @@ def _second_chebyshev(places: Array, size: int, derivative: int) -> Array:
 
 
 def _legendre(places: Array, size: int, derivative: int) -> Array:
-    change = legendre.legder(np.eye(size), derivative) if derivative else np.eye(size)
-    return np.asarray(legendre.legvander(2 * places - 1, len(change) - 1) @ change * 2.0**derivative)
+    change = np.polynomial.legendre.legder(np.eye(size), derivative) if derivative else np.eye(size)
+    return np.asarray(np.polynomial.legendre.legvander(2 * places - 1, len(change) - 1) @ change * 2.0**derivative)
 
 
 def _laguerre(places: Array, size: int, derivative: int) -> Array:
@@ -86,10 +85,10 @@ def _laguerre(places: Array, size: int, derivative: int) -> Array:
     change = np.eye(size)
     for _ in range(derivative):
         slope = np.zeros_like(change)
-        slope[: max(1, size - 1)] = laguerre.lagder(change)
+        slope[: max(1, size - 1)] = np.polynomial.laguerre.lagder(change)
         change = slope - change / 2
     x = LAGUERRE_LENGTH * places
-    functions = laguerre.lagvander(x, size - 1) @ change
+    functions = np.polynomial.laguerre.lagvander(x, size - 1) @ change
     return np.asarray(np.exp(-x / 2)[:, np.newaxis] * functions * LAGUERRE_LENGTH**derivative)
 
 

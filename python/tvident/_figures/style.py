@@ -113,20 +113,29 @@ def panels(
     ax.set_axis_off()
     total, top, shared = sum(heights), 1.0, None
     inside = []
-    place = ax.get_subplotspec()
+    place, between = ax.get_subplotspec(), _between(ax, count, apart=apart)
     if place is not None:
-        grid = place.subgridspec(count, 1, height_ratios=list(heights))
+        # By the mean height of a panel.
+        hspace = between * count / (1 - between * (count - 1))
+        grid = place.subgridspec(count, 1, height_ratios=list(heights), hspace=hspace)
         for row in range(count):
             inside.append(_figure_of(ax).add_subplot(grid[row], sharex=shared))
             shared = None if apart else inside[0]
     else:
         for height in heights:
-            share = height / total
-            inside.append(ax.inset_axes((0, top - 0.72 * share, 1, 0.72 * share), sharex=shared))
-            shared, top = None if apart else inside[0], top - share
+            share = height / total * (1 - between * (count - 1))
+            inside.append(ax.inset_axes((0, top - share, 1, share), sharex=shared))
+            shared, top = None if apart else inside[0], top - share - between
     for one in inside[:-1] if not apart else []:
         one.tick_params(labelbottom=False)
     return _figure_of(ax), inside
+
+
+def _between(ax: Axes, count: int, *, apart: bool) -> float:
+    """Return the share of axes that is left between two panels inside: for a title, and for words of an axis where each has its own."""
+    inches = ax.get_window_extent().height / float(_figure_of(ax).dpi)
+    wanted = (0.8 if apart else 0.35) / max(inches, 0.1)
+    return min(wanted, 0.5 / (count - 1))
 
 
 def _figure_of(ax: Axes) -> Any:

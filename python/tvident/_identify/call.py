@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, Unpack, overload
+from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
 import numpy.typing as npt
 
@@ -17,8 +17,10 @@ from tvident._identify.records import calls_of_records, identify_records, names_
 from tvident._identify.robust import LossAsked
 from tvident._identify.together import Options, identify_together
 from tvident._identify.typed import Entries, OfMasses, OfOne
-from tvident._merged import Chain, Mechanism, MergedIdentification
 from tvident._results import Identification, IdentifiedRecords
+
+if TYPE_CHECKING:
+    from tvident._merged import Chain, Mechanism, MergedIdentification
 
 
 @overload

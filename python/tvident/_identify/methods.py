@@ -32,8 +32,8 @@ class WeakForm:
     averaging : bool
         Average windows of many lengths before, around and after each sample, weighted by their cross-validation errors nearby, and end
         them at jumps; if no parameter is windowed, weight the equations by the inverse of the covariance of their noise. False: one
-        window around each sample, or ordinary least squares. True by default, but False if `regression_window` is given, because then
-        windows of that length are meant.
+        window around each sample, as long as the record where `regression_window` is not given, or ordinary least squares. True by
+        default, but False if `regression_window` is given, because then windows of that length are meant.
     variation : {"auto", "constant", "linear"}
         How windowed parameters may change within a window; ``"auto"`` is linear.
 

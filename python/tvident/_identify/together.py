@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,16 +15,10 @@ from tvident._derivatives import plan
 from tvident._equation import LINEAR_UNITS, OFFSET, UNITS, Unknown, all_terms
 from tvident._identify.columns import WINDOW_OF_TERMS, Columns
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, WeakForm, exponent_of
-from tvident._merged import (
-    AskedTogether,
-    MergedIdentification,
-    Sampling,
-    identify_masses,
-    identify_trials,
-    masses_of,
-    trials_of,
-)
 from tvident._units import ROTARY, Axis, axis_of, times_in_seconds
+
+if TYPE_CHECKING:
+    from tvident._merged import MergedIdentification, Sampling
 
 Numbers = npt.NDArray[np.number]
 
@@ -134,6 +128,9 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
     TypeError
         If there is no sample period, or arrays hold no numbers.
     """
+    # A room of many files, which calls with one trial of one mass need not wait for.
+    from tvident._merged import AskedTogether, identify_masses, identify_trials, masses_of, trials_of  # noqa: PLC0415
+
     _check(angle, options)
     axis = _axis(angle, torque, options.units)
     form = _weak(options.method)
@@ -189,6 +186,8 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
 
 def _sampling(options: Options, axis: Axis, angles: Sequence[Numbers], torques: Sequence[Numbers]) -> Sampling:
     """Return when samples were taken."""
+    from tvident._merged import Sampling  # noqa: PLC0415 - likewise
+
     samples, workers = max(map(len, angles)), arguments.worker_count(options.workers)
     try:
         period, times = sampled(options.time, samples, axis, options.units["time_unit"])

@@ -17,6 +17,7 @@ from tvident._advice import (
     FoundBySearch,
     Plausible,
     spikes_that_stay,
+    without_numbers,
     words_of_search,
     words_with_instrument,
 )
@@ -85,9 +86,26 @@ class Told:
         lacking = [
             (record, one.words(terms, data.units.get(one.name, ""))) for record, one in enumerate(self.lacking) if one
         ]
+        empty = [*_empty((data.angles, data.torques), self.batch), *self._without_room_to_change()]
         return _with_doubts(
-            _with_clipped(words, data.clipped, several=several), [*data.doubts, *lacking], several=several
+            _with_clipped(words, data.clipped, several=several), [*empty, *data.doubts, *lacking], several=several
         )
+
+    def _without_room_to_change(self) -> list[tuple[int, str]]:
+        """Return records whose windows are all there is of them, though something was to change: one length is not looked for."""
+        form = self.request.form
+        if isinstance(form, StrongForm) or form.averaging or form.regression_window != "auto":
+            return []
+        words = (
+            "windows are as long as the record, in which nothing can change: their length is chosen where windows of many are "
+            "averaged; give regression_window=, such as '0.2 s', or ask for averaging"
+        )
+        return [
+            (record, words)
+            for record, one in enumerate(self.found)
+            if any(unknown.kind == "windowed" for unknown in one.unknowns)
+            and not one.record_status & Status.RANK_DEFICIENT
+        ]
 
     def _where_remedies_are_tried(self) -> list[str]:
         """Return where to look for remedies of the records of a batch, which are tried when a record is asked for its words."""
@@ -154,8 +172,14 @@ def _later(
     words = explained.words()
     several = batch.status.ndim > 1
     words = replace(words + (of_batch(more) if several else more[0]), each=words.each)
-    doubts = spikes_that_stay(*channels)
+    doubts = [*_empty(channels, batch), *spikes_that_stay(*channels)]
     return _with_doubts(plausible.before(words, channels[0], batch), doubts, several=several)
+
+
+def _empty(channels: tuple[npt.NDArray[np.number], npt.NDArray[np.number]], batch: Estimates) -> list[tuple[int, str]]:
+    """Return which channels hold nothing, of records without any value."""
+    status = batch.status.reshape(-1, batch.status.shape[-1])
+    return without_numbers(*channels, np.flatnonzero((status & Status.INVALID != 0).all(axis=1)).tolist())
 
 
 def _with_clipped(words: Words, clipped: Sequence[float] | None, *, several: bool) -> Words:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, TypedDict
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypedDict
 
 import numpy.typing as npt
 
@@ -12,7 +12,9 @@ from tvident._equation import GivenTerm, Parameter
 from tvident._identify.aligned import Align
 from tvident._identify.methods import Method
 from tvident._identify.robust import LossAsked
-from tvident._merged import Matrix
+
+if TYPE_CHECKING:
+    from tvident._merged import Matrix
 
 
 class GivenArguments(TypedDict, total=False):
@@ -51,7 +53,7 @@ class OfOne(GivenArguments, total=False):
     stiffness: Parameter | None
 
 
-Entries = Parameter | Matrix | Sequence[Any] | Mapping[Any, Any] | None
+Entries: TypeAlias = "Parameter | Matrix | Sequence[Any] | Mapping[Any, Any] | None"
 
 
 class OfMasses(GivenArguments, total=False):

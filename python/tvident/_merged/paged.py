@@ -33,6 +33,7 @@ def report(
         for trial in range(min(merging.trials, _MOST_TRIALS)):
             series += _series(result, merging, trial)
             compared += _compared(result, merging, trial)
+    result.held_back()  # as long as to identify: here it can be interrupted
     page = _report.ShownResult(
         result,
         values=result.elements,
@@ -40,6 +41,7 @@ def report(
         quality={"residual_std": result.residual_std},
         settings=_settings(result.settings),
         compared=compared,
+        summary=result.summary,
         remarks=_remarks(result),
         repeats=False,
     )

@@ -65,7 +65,7 @@ def irregular_times(asked: AskedWindows, rows: int) -> Array | None:
     if asked.t is None or not isinstance(asked.window_length, str):
         return None
     try:
-        arguments.sample_period(rows, t=asked.t)
+        asked.period(rows)
     except ValueError:
         times = np.ravel(np.asarray(arguments.times_of(times_in_seconds(asked.t)), dtype=np.float64))
         if times.size != rows or not np.isfinite(times).all():

@@ -90,6 +90,8 @@ def rolling_least_squares(
     min_observations: int | None = None,
     covariance: Literal["classic", "hac"] = "classic",
     lags: int | None = None,
+    sample_rate: float | None = None,
+    delta: float | None = None,
     t: npt.ArrayLike | None = None,
     loss: Literal["squares", "huber"] = "squares",
     step: int = 1,
@@ -108,7 +110,7 @@ def rolling_least_squares(
     b : array_like, shape (n,) or (n, q)
         Right-hand sides.
     window_length : int or str
-        Rows in a window, w, more than ``p``; or, with ``t``, a duration such as ``"2 s"``.
+        Rows in a window, w, more than ``p``; or, where the time is given, a duration such as ``"2 s"``.
     alignment : {"centre", "trailing", "leading"}, optional
         Which rows the window of row ``i`` has: ``i - w//2 … i - w//2 + w - 1``, ``i - w + 1 … i`` (nothing of the future), or
         ``i … i + w - 1``. The numbers of a full window are the same, at another row.
@@ -116,7 +118,7 @@ def rolling_least_squares(
         Weight of every row, not negative: one over the variance of its noise, relative to the others. Rows of weight 0 are not used,
         whatever they hold, and a masked weight is 0. Weights of 1 change nothing, and a factor of all weights changes ``rss`` alone.
     half_life : float or str, optional
-        Rows (or, with ``t``, a duration) after which a row counts half as much, within the window: for the window of row ``i`` row ``k``
+        Rows, or a duration, after which a row counts half as much, within the window: for the window of row ``i`` row ``k``
         has the weight ``2**(-|i - k| / half_life)``. It says nothing of noise: standard errors are those of residuals with one variance
         (times that of ``weights``). With alignment "trailing" or "leading".
     min_observations : int, optional
@@ -129,6 +131,8 @@ def rolling_least_squares(
     lags : int, optional
         With ``covariance="hac"``: residuals farther apart than so many rows are independent. By default as the correlation of the
         record's residuals asks for, at most a quarter of the window.
+    sample_rate, delta : float, optional
+        Rows in a second, or seconds from row to row. One of these or ``t`` gives durations their meaning; numbers do not depend on it.
     t : array_like, shape (n,), optional
         Times of the rows, s, or dates. They give durations their meaning. Where they are not uniform, a window holds the rows within the
         duration, as many as there are; the cost is then that of plain windows times how many different numbers of rows windows hold.
@@ -157,7 +161,7 @@ def rolling_least_squares(
         exclude each other: ``half_life`` goes neither with "huber" nor with "hac", "hac" not with "huber", and none of them with times
         that are not uniform.
     TypeError
-        If an array is complex or holds no numbers.
+        If an array is complex or holds no numbers, or more than one of ``sample_rate``, ``delta`` and ``t`` is given.
 
     Notes
     -----
@@ -222,7 +226,7 @@ def rolling_least_squares(
         raise ValueError(f"A must have at most {MOST_REGRESSORS} columns; got {count}; drop or combine some")
     is_robust = arguments.one_of("loss", loss, ("squares", "huber")) == "huber"
     is_correlated = arguments.one_of("covariance", covariance, ("classic", "hac")) == "hac"
-    asked = AskedWindows(window_length, alignment, half_life, min_observations, t)
+    asked = AskedWindows(window_length, alignment, half_life, min_observations, t, delta, sample_rate)
     times = irregular_times(asked, rows)
     if times is not None:
         spans = spans_given(asked, times, count)

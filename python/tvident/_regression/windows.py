@@ -22,6 +22,15 @@ class AskedWindows:
     half_life: float | str | None
     min_observations: int | None
     t: npt.ArrayLike | None
+    delta: float | None = None
+    sample_rate: float | None = None
+
+    def period(self, rows: int) -> float | None:
+        """Return the seconds from row to row; None where nobody said."""
+        times = {"delta": self.delta, "sample_rate": self.sample_rate, "t": self.t}
+        if all(one is None for one in times.values()):
+            return None
+        return arguments.sample_period(rows, delta=self.delta, sample_rate=self.sample_rate, t=self.t)
 
 
 @dataclass(frozen=True)
@@ -49,12 +58,13 @@ class RegressionWindows:
 
 def windows_given(asked: AskedWindows, rows: int, regressors: int) -> RegressionWindows:
     """Return the windows that were asked for, for a record of so many rows."""
-    period = None if asked.t is None else arguments.sample_period(rows, t=asked.t)
+    period = asked.period(rows)
     for name, value in (("window_length", asked.window_length), ("half_life", asked.half_life)):
         if isinstance(value, str) and period is None:
             arguments.seconds(name, value)
             raise ValueError(
-                f"{name} must be a number of rows where no t is given; got {value!r}; give t, or the number of rows"
+                f"{name} must be a number of rows where no time is given; got {value!r}; "
+                "give sample_rate, delta or t, or the number of rows"
             )
     length = arguments.window_length("window_length", asked.window_length, period or 1.0, odd=False)
     arguments.check_window("window_length", length, rows, least=regressors + 1)

@@ -6,6 +6,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeAlias
 
@@ -60,9 +61,6 @@ class ReportedResult(Protocol):
     def trusted(self) -> npt.NDArray[np.bool_]:
         """Where values can be trusted."""
 
-    def summary(self) -> str:
-        """Return the result in words."""
-
 
 @dataclass(frozen=True)
 class Curve:
@@ -111,6 +109,8 @@ class ShownResult:
         Residuals, condition numbers and orders by name.
     settings : sequence of (str, str)
         As an engineer reads them.
+    summary : callable
+        Gives the result in words.
     compared : sequence of Compared
     remarks : mapping of str to str
         What is said beside a parameter.
@@ -125,6 +125,7 @@ class ShownResult:
     derived: Callable[[], Sequence[Curve]]
     quality: Mapping[str, Array]
     settings: Sequence[tuple[str, str]]
+    summary: Callable[[], str]
     compared: Sequence[Compared] = ()
     remarks: Mapping[str, str] = field(default_factory=dict)
     repeats: bool = True
@@ -140,23 +141,28 @@ def unit_of(name: str, units: Mapping[str, str]) -> str:
 def content_of(shown: ShownResult, recorded: list[Series], title: str) -> tuple[dict[str, Any], list[Series]]:
     """Return what a page says, plain JSON, and the series of its plots; plots name them by number."""
     result = shown.result
-    drawn = _DrawnSeries(shown, list(recorded))
-    drawn.recorded()
-    drawn.found()
-    for one in shown.compared:
-        drawn.compared(one)
-    drawn.quality()
-    marks = _flags_over_time(result)
-    drawn.status(marks)
-    series, words = drawn.series, shown.said(result.summary())
+    advice = list(map(shown.said, result.advice))
+    # Both are passes over the whole record: the words take as long as what is drawn.
+    with ThreadPoolExecutor(1) as beside:
+        summary = beside.submit(shown.summary)
+        drawn = _DrawnSeries(shown, list(recorded))
+        drawn.recorded()
+        drawn.found()
+        for one in shown.compared:
+            drawn.compared(one)
+        drawn.quality()
+        marks = _flags_over_time(result)
+        drawn.status(marks)
+        numbers = _numbers(shown)
+        series, words = drawn.series, shown.said(summary.result())
     end = max([one.start + max(0, one.values.size - 1) * one.period for one in series], default=0.0)
     content = {
         "title": title,
         "verdict": words.splitlines()[0],
         "tone": _tone(result, words.splitlines()[0]),
         "span": [min([one.start for one in series], default=0.0), end],
-        "numbers": _numbers(shown),
-        "advice": list(map(shown.said, result.advice)),
+        "numbers": numbers,
+        "advice": advice,
         "warnings": [
             one | {"words": shown.said(in_words_of(result.units, one["words"]))} for one in _warnings(result, marks)
         ],

@@ -90,7 +90,6 @@ class Packed:
 
 def packed(series: Sequence[Series], most_bytes: int = _MOST_BYTES) -> list[Packed]:
     """Return series packed: where samples do not fit, the finest level is of their extremes."""
-    reduced = list(series)
     top, sizes = _finest(series, most_bytes)
     merged = [1] * len(sizes)
     while sum(sizes) > most_bytes:
@@ -99,14 +98,14 @@ def packed(series: Sequence[Series], most_bytes: int = _MOST_BYTES) -> list[Pack
         )
         # Two numbers stand for four samples at first, and for twice as many each time.
         merged[largest] = max(4, 2 * merged[largest])
-        sizes[largest] /= 2
+        sizes[largest] = _size(series[largest], top, merged[largest])
 
     def work(one: Series, every: int) -> Packed:
         return _packed(one if every == 1 else _of_extremes(one, every), top, every)
 
     # Nearly all of the work is NumPy's and zlib's, which let other threads run.
     with ThreadPoolExecutor(min(_MOST_THREADS, os.cpu_count() or 1)) as pool:
-        return list(pool.map(work, reduced, merged))
+        return list(pool.map(work, series, merged))
 
 
 def in_words(parts: Sequence[Packed]) -> str:
@@ -144,7 +143,13 @@ def _highest(bits: int) -> int:
 
 
 def _sizes(series: Sequence[Series], top: int) -> list[float]:
-    return [one.values.size * (_bits(one, top) / 8 + 8 / BLOCK) for one in series]
+    return [_size(one, top, 1) for one in series]
+
+
+def _size(series: Series, top: int, merged: int) -> float:
+    """Return the bytes that a series takes, packed as it is or by the extremes of so many samples."""
+    count = series.values.size if merged == 1 else 2 * -(-series.values.size // merged)
+    return count * (_bits(series, top, merged) / 8 + 8 / BLOCK)
 
 
 def _of_extremes(series: Series, every: int) -> Series:
@@ -189,10 +194,14 @@ def _differences(levels: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return np.concatenate([flat[:1], flat[1:] - flat[:-1]])
 
 
-def _bits(series: Series, top: int) -> float:
-    """Return the bits that a sample takes, from some blocks."""
-    count = -(-series.values.size // BLOCK)
-    rows = [_blocks(series, one, one + 1) for one in range(0, count, max(1, count // _LOOKED_AT))]
+def _bits(series: Series, top: int, merged: int) -> float:
+    """Return the bits that a number takes, from some blocks."""
+    width = BLOCK if merged == 1 else BLOCK // 2 * merged
+    count = -(-series.values.size // width)
+    rows = []
+    for one in range(0, count, max(1, count // _LOOKED_AT)):
+        part = replace(series, values=series.values[one * width : (one + 1) * width])
+        rows.append(_blocks(part if merged == 1 else _of_extremes(part, merged), 0, 1))
     if not rows:
         return 0.0
     levels = _found_levels(np.concatenate(rows), top)[2]

@@ -87,7 +87,7 @@
       this.div.className = "plot";
       this.div.setAttribute("role", "img");
       this.div.setAttribute("aria-label", `${about.title} over time`);
-      if (this.strips.length) this.div.style.height = `${66 + 26 * this.strips.length}px`;
+      if (this.strips.length) this.div.style.height = `${44 + 40 * this.strips.length}px`;
       card.append(head, this.div);
       place.append(card);
     }
@@ -158,7 +158,7 @@
         const least = (to - from) / columns;
         for (const [begin, end] of runs) {
           const wider = Math.max(0, least - (end - begin)) / 2;
-          shapes.push(rectangle([begin - wider, end + wider], { y0: row - 0.3, y1: row + 0.3, fillcolor: colour("strip") }));
+          shapes.push(rectangle([begin - wider, end + wider], { y0: row, y1: row + 0.4, fillcolor: colour("strip") }));
         }
       });
       if (this.strips.length) traces.push({ x: [from], y: [0], mode: "markers", marker: { opacity: 0 }, hoverinfo: "skip" });
@@ -177,15 +177,21 @@
       const ink = colour("muted"), grid = colour("grid");
       const line = traces.filter((trace) => trace.fill === undefined);
       const names = this.strips.map((one) => one.flag.replaceAll("_", " ").toLowerCase());
-      const ofStrips = { range: [names.length - 0.4, -0.6], tickvals: names.map((_, row) => row), ticktext: names, showgrid: false };
+      const ofStrips = { range: [names.length - 0.5, -0.5], tickvals: [], showgrid: false };
+      // Above their strips, so that times stand where they do in every other plot.
+      const annotations = names.map((text, row) => ({ text, xref: "paper", x: 0, xanchor: "left", y: row - 0.22, yanchor: "middle", showarrow: false }));
+      // An empty plot looks as if something were broken.
+      if (!this.strips.length && !line.some((trace) => trace.y.some((value) => value !== null && Number.isFinite(value)))) {
+        annotations.push({ text: "no numbers here", xref: "paper", x: 0.5, yref: "paper", y: 0.5, showarrow: false });
+      }
       const ofLine = { range: line.length ? yRange(line, this.isRobust) : [0, 1], nticks: 5, gridcolor: grid, exponentformat: "power" };
       // Marks that are not seen keep the two axes' words apart where they meet.
       const apart = { ticks: "outside", tickcolor: "rgba(0,0,0,0)" };
       return {
-        margin: { l: this.strips.length ? 118 : 64, r: 18, t: 10, b: 34 },
+        margin: { l: 64, r: 18, t: 10, b: 34 },
         paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
         font: { color: ink, size: 12, family: getComputedStyle(document.body).fontFamily },
-        showlegend: false, hovermode: "x", dragmode: isTouch ? false : "zoom", shapes,
+        showlegend: false, hovermode: "x", dragmode: isTouch ? false : "zoom", shapes, annotations,
         hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { color: colour("ink") } },
         xaxis: { ...apart, ticklen: 9, range: [shown.from, shown.to], ticksuffix: " s", gridcolor: grid, zeroline: false, exponentformat: "none", separatethousands: false, hoverformat: ".6f", nticks: Math.max(3, Math.round(this.div.clientWidth / 120)) },
         yaxis: { ...apart, ticklen: 4, fixedrange: true, zeroline: false, automargin: false, ...(this.strips.length ? ofStrips : ofLine) },

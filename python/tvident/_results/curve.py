@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import legendre
 
 from tvident._expansion import Basis, Rival, scatter
 
@@ -266,5 +265,5 @@ def of_powers(coefficients: Array, covariance: Array) -> tuple[Array, Array]:
     """Return the factors of powers that those of Legendre polynomials stand for, and their covariance."""
     change = np.zeros((coefficients.size, coefficients.size))
     for degree in range(coefficients.size):
-        change[: degree + 1, degree] = legendre.leg2poly(np.eye(coefficients.size)[degree, : degree + 1])
+        change[: degree + 1, degree] = np.polynomial.legendre.leg2poly(np.eye(coefficients.size)[degree, : degree + 1])
     return change @ coefficients, change @ covariance @ change.T

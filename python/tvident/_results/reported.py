@@ -11,6 +11,8 @@ import numpy.typing as npt
 from tvident import _report
 from tvident._equation import COEFFICIENTS
 from tvident._results.recorded import Recorded
+from tvident._results.summary import summary_of
+from tvident._results.verdict import share_of
 from tvident._units import in_words_of
 
 Row: TypeAlias = tuple[str, str]
@@ -34,14 +36,17 @@ def report(
         )
     shown: list[_report.Series] = []
     compared: list[_report.Compared] = []
+    share = None
     if recorded is not None and recorded.is_unchanged:
         angle, torque = _report.names_of_channels(result.units)
         _, *torques = result.predicted_torque()
         compared = [_report.Compared(torque, *torques)]
+        share = share_of(*torques)
         shown = [
             _report.series_of(result, name, of, values)
             for name, of, values in ((angle, "angle", recorded.given[0]), (torque, "torque", recorded.given[1]))
         ]
+    result.held_back()  # as long as to identify: here it can be interrupted
     page = _report.ShownResult(
         result,
         values={name: getattr(result, name) for name in COEFFICIENTS} | result.terms,
@@ -54,6 +59,7 @@ def report(
         quality={name: getattr(result, name) for name in ("residual_std", "condition", "order")},
         settings=_settings(result.settings, result.units),
         compared=compared,
+        summary=lambda: summary_of(result, share),
         said=said,
     )
     _report.write_page(path, page, shown, channels, title)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
 from typing import Any
 
 import numpy as np
@@ -32,6 +31,8 @@ def _good(result: Any) -> str:
 
 def as_html(result: Any) -> str:
     """Return a table of the parameters, and below it what to do."""
+    from html import escape  # noqa: PLC0415 - for notebooks alone
+
     records = int(np.prod(result.inertia.shape[:-1], dtype=int))
     several = result.inertia.ndim > 1
     parts = [f"<p><b>{escape(short(result)[1:-1].partition(':')[0])}</b>, {escape(_good(result))}</p>"]

@@ -202,7 +202,7 @@ class Shown(Simulated, Telling, Valued):
         result over time in plots that can be zoomed down to the sample. Samples have 16 bits each between the extremes of their
         128 neighbours, or as many as 25 MB have room for, at least 7: the page says how many levels these are. The extremes themselves have
         24 bits, so a single sample that stands out is seen at every zoom.
-        Takes about 0.1 s for a million numbers, and as long as :meth:`summary` if that was not asked for before.
+        Takes about 0.1 s for a million numbers, and as long as to identify if :meth:`summary` was not asked for before.
 
         Parameters
         ----------

@@ -33,8 +33,8 @@ def _range(value: Any) -> str:
 
 
 @np.errstate(all="ignore")
-def summary_of(result: Any) -> str:
-    """Return what :meth:`tvident.Identification.summary` does."""
+def summary_of(result: Any, share: float | None = None) -> str:
+    """Return what :meth:`tvident.Identification.summary` does; `share` of the torque that is explained, where that is known already."""
     s = result.settings
     n, seconds = result.time.size, float(result.time[-1] - result.time[0]) if result.time.size else 0.0
     length, rows = (_range(s[name]) for name in ("window_length", "regression_window"))
@@ -43,7 +43,7 @@ def summary_of(result: Any) -> str:
     else:
         form = f"weak form: test functions of {length} samples, exponent {_range(s['exponent'])}"
     lines = [
-        verdict(result),
+        verdict(result, share),
         in_words_of(result.units, result.held_back().words()),
         "",
         *aligned([("parameter", *COLUMNS), *_rows(result)]),

@@ -7,7 +7,6 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import Polynomial
 
 from tvident._derivatives import fit_local_polynomials
 from tvident._equation import BUILT_IN, OFFSET
@@ -101,7 +100,7 @@ def touched_by(missing: npt.NDArray[np.bool_], half: int) -> npt.NDArray[np.bool
 def kernels_of(half: int, exponent: float, period: float) -> Array:
     """Return φ″, -φ′ and φ at the samples, of which φ sums to one, and only φ leaves a constant."""
     u = np.arange(-half, half + 1) / half
-    phi = Polynomial([1, 0, -1]) ** int(exponent)
+    phi = np.polynomial.Polynomial([1, 0, -1]) ** int(exponent)
     seconds = half * period
     rows = np.array([phi.deriv(2)(u) / seconds**2, -phi.deriv(1)(u) / seconds, phi(u)]) / phi(u).sum()
     return np.asarray(rows + np.outer(np.array([0.0, 0.0, 1.0]) - rows.sum(axis=1), rows[2]))

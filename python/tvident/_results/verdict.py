@@ -48,16 +48,16 @@ _RECORDS = 100
 """Of a batch that are looked at."""
 
 
-def verdict(result: Any) -> str:
-    """Return the verdict on a result of one record or of several."""
-    return in_words_of(result.units, _verdict(result))
+def verdict(result: Any, share: float | None = None) -> str:
+    """Return the verdict on a result of one record or of several; `share` of the torque that is explained, where that is known already."""
+    return in_words_of(result.units, _verdict(result, share))
 
 
-def _verdict(result: Any) -> str:
+def _verdict(result: Any, share: float | None) -> str:
     if not result.status.size:
         return "no verdict: there are no samples"
     if result.inertia.ndim == 1:
-        return _of_one(result)
+        return _of_one(result, share)
     shape = result.inertia.shape[:-1]
     count = int(np.prod(shape, dtype=int))
     places = list(np.ndindex(shape))[:_RECORDS]
@@ -73,8 +73,8 @@ def _verdict(result: Any) -> str:
     return f"{words}; do not trust {len(reasons)} of them, such as record {where}: {reasons[first]}"
 
 
-def _of_one(result: Any) -> str:
-    share = cache(lambda: explained(result))  # a prediction of the whole record
+def _of_one(result: Any, known: float | None) -> str:
+    share = cache(lambda: explained(result) if known is None else known)  # a prediction of the whole record
     reason = _distrusted(result, share)
     if reason:
         return verdict_of_distrusted(result, reason)
