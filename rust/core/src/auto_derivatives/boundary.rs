@@ -28,16 +28,19 @@ use faer::{Mat, Par, Side};
 use crate::auto_derivatives::block_means::{mean, step_at_end};
 use crate::auto_derivatives::candidate_weights::Reference;
 use crate::auto_derivatives::candidates::{Target, correlated};
+use crate::auto_derivatives::differences::total;
 use crate::auto_derivatives::global_choice::{CheckCancelled, Pair, rounded};
+use crate::auto_derivatives::local_weights::packet;
 use crate::auto_derivatives::reference_line::ReferenceLine;
 use crate::auto_derivatives::slopes::{BasisSums, SampleSlopes};
 use crate::auto_derivatives::survey::{CLOSELY, Survey};
 use crate::error::Error;
-use crate::local_polynomials::basis::Basis;
+use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
 use crate::local_polynomials::boundary::End;
 use crate::local_polynomials::coefficients::Projected;
 use crate::local_polynomials::single_window::Window;
 use crate::noise::correlated::CorrelatedNoise;
+use crate::simd::f64x8::{Packet, WIDTH};
 use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
 /// The windows over the record's best, in half steps of a doubling, and every how many are tried in records that are not short.
@@ -57,7 +60,7 @@ const LEAST_NEAR: usize = 1024;
 /// The most windows that are used in short records and in others, and the fewest that give a risk.
 const CLOSE_WINDOWS: usize = 1024;
 const MOST_WINDOWS: usize = 256;
-const FEWEST_WINDOWS: usize = 20;
+const FEWEST_WINDOWS: f64 = 20.0;
 
 /// Places at which risks are measured in records that are not short, the closer to each other the nearer to the end; between them risks are interpolated.
 const PLACES: usize = 12;
@@ -181,7 +184,8 @@ impl Near<'_> {
         }
         let means: Vec<f64> = samples.chunks_exact(step).map(mean).collect();
         // In reversed time odd derivatives change their sign.
-        let sign = if last && derivative % 2 == 1 { -1.0 } else { 1.0 };
+        let mirrored = if derivative % 2 == 1 { -1.0 } else { 1.0 };
+        let sign = if last { mirrored } else { 1.0 };
         let Some(outermost) = Window::project(basis, &means, 0.0) else { return Ok(None) };
         let windows = self.survey.windows(half, &self.samples, most, last)?;
         let (starts, projected) = (&windows.starts, &windows.projected);
@@ -195,33 +199,32 @@ impl Near<'_> {
         let constant = f64::from(u8::from(derivative == 0));
         let sums = slopes.sums(&of_slopes, count, target.instructions);
         let values = sums.into_iter().map(|sum| sign * (scale * sum + constant * outermost.reference)).collect();
-        let risk = |place: usize| {
-            let at_place = slopes.of_coefficients(place);
+        let places = if closely { (0..count).collect() } else { knots(count) };
+        let mut references = [Vec::new(), Vec::new()];
+        let mut risk = |(&place, at_place): (&usize, [f64; MOST_DEGREES])| {
             let weights: Vec<f64> = shrinkage
                 .iter()
                 .map(|row| scale * row.iter().zip(&at_place).map(|(a, q)| a * q).sum::<f64>())
                 .collect();
-            let estimates = BoundaryEstimates::new(projected, &weights, constant, target);
-            let difference = |window: usize| {
-                let start = starts[window];
-                [
-                    estimates.forwards[window] - self.reference.at(start + place),
-                    estimates.backwards[window] - self.reference.at(start + length - 1 - place),
-                ]
+            let [forwards, backwards] = &mut references;
+            self.reference.read(starts.iter().map(|start| start + place), forwards);
+            self.reference.read(starts.iter().map(|start| start + length - 1 - place), backwards);
+            let (weights, references) = (&*weights, &references);
+            let differences = BoundaryDifferences { projected, weights, constant, mirrored, references };
+            let (sum, count) = dispatch(target.instructions, differences);
+            let own = if target.noise.is_white() {
+                let share = 1.0 / step as f64;
+                weights.iter().map(|weight| weight * (share * weight)).sum()
+            } else {
+                quadratic(weights, &correlations)
             };
-            let differences = (0..starts.len()).flat_map(difference).filter(|difference| !difference.is_nan());
-            let (sum, compared) =
-                differences.fold((0.0, 0_usize), |(sum, count), difference| (sum + difference * difference, count + 1));
-            let own = quadratic(&weights, &correlations);
-            let shared = self.shared(basis, step, &weights, (place, target));
-            let risk = sum / compared as f64 + variance * (2.0 * shared - self.reference.gain);
-            if compared < FEWEST_WINDOWS { f64::INFINITY } else { risk.max(variance * own) }
+            let shared = self.shared(basis, step, weights, (place, target));
+            let risk = sum / count + variance * (2.0 * shared - self.reference.gain);
+            if count < FEWEST_WINDOWS { f64::INFINITY } else { risk.max(variance * own) }
         };
-        Ok(Some(Shrunk {
-            values,
-            risks: if closely { (0..count).map(risk).collect() } else { interpolated(count, risk) },
-            order: highest,
-        }))
+        let at_places = slopes.of_coefficients_at(&places, target.instructions);
+        let risks: Vec<f64> = places.iter().zip(at_places).map(&mut risk).collect();
+        Ok(Some(Shrunk { values, risks: if closely { risks } else { interpolated(&places, &risks) }, order: highest }))
     }
 
     /// The product of the kernel at a place of a window, given by the weights of its coefficients, with that of the reference.
@@ -242,10 +245,10 @@ impl Near<'_> {
     }
 }
 
-/// A function of places at all of some, computed at a few of them.
-fn interpolated(count: usize, of: impl Fn(usize) -> f64) -> Vec<f64> {
+/// The places at which risks are measured, of so many: the first and the last are among them.
+fn knots(count: usize) -> Vec<usize> {
     if count <= PLACES {
-        return (0..count).map(of).collect();
+        return (0..count).collect();
     }
     let knot = |index: usize| {
         let share = index as f64 / (PLACES - 1) as f64;
@@ -253,8 +256,12 @@ fn interpolated(count: usize, of: impl Fn(usize) -> f64) -> Vec<f64> {
     };
     let mut knots: Vec<usize> = (0..PLACES).map(knot).collect();
     knots.dedup();
-    let at: Vec<f64> = knots.iter().map(|&place| of(place)).collect();
-    let mut values = Vec::with_capacity(count);
+    knots
+}
+
+/// Numbers at all places from those at a few of them.
+fn interpolated(knots: &[usize], at: &[f64]) -> Vec<f64> {
+    let mut values = Vec::with_capacity(knots.last().map_or(0, |last| last + 1));
     for (knots, at) in knots.windows(2).zip(at.windows(2)) {
         let span = (knots[1] - knots[0]) as f64;
         for place in knots[0]..knots[1] {
@@ -267,43 +274,49 @@ fn interpolated(count: usize, of: impl Fn(usize) -> f64) -> Vec<f64> {
     values
 }
 
-/// Adds every coefficient times its weight: those of even degree, and those of odd degree.
-struct SumsByParity<'a> {
-    coefficients: &'a [Vec<f64>],
+/// Estimates at one place of every window, and at its mirror image, beside the reference there: the sum of the squared differences, in eight sums side
+/// by side, and how many there are.
+struct BoundaryDifferences<'a> {
+    projected: &'a Projected,
     weights: &'a [f64],
-    sums: [&'a mut [f64]; 2],
+    /// What a constant signal of one gives.
+    constant: f64,
+    /// One, or minus one where a derivative changes its sign in reversed time.
+    mirrored: f64,
+    /// The reference at these places, by window: forwards and backwards.
+    references: &'a [Vec<f64>; 2],
 }
 
-impl Kernel for SumsByParity<'_> {
-    type Output = ();
+impl Kernel for BoundaryDifferences<'_> {
+    type Output = (f64, f64);
 
     #[inline(always)]
-    fn run<S: Lanes>(self, _: S) {
-        for (degree, (row, weight)) in self.coefficients.iter().zip(self.weights).enumerate() {
-            for (sum, c) in self.sums[degree % 2].iter_mut().zip(row) {
-                *sum += weight * c;
+    fn run<S: Lanes>(self, _: S) -> (f64, f64) {
+        let Self { projected, weights, constant, mirrored, references } = self;
+        let Projected { level, coefficients, .. } = projected;
+        let (mut sum, mut known) = (Packet::ZERO, Packet::ZERO);
+        for first in (0..level.len()).step_by(WIDTH) {
+            let (mut even, mut odd) = (packet(level, first) * Packet::splat(constant), Packet::ZERO);
+            for (pair, weights) in coefficients.chunks(2).zip(weights.chunks(2)) {
+                even += packet(&pair[0], first) * Packet::splat(weights[0]);
+                if let ([_, row], &[_, weight]) = (pair, weights) {
+                    odd += packet(row, first) * Packet::splat(weight);
+                }
+            }
+            // In reversed time odd coefficients change their sign, and so do odd derivatives.
+            let forwards = even + odd - packet(&references[0], first);
+            let backwards = (even - odd) * Packet::splat(mirrored) - packet(&references[1], first);
+            for difference in [forwards, backwards] {
+                let mut square = difference * difference;
+                for lane in 0..WIDTH {
+                    let counts = first + lane < level.len() && !square.0[lane].is_nan();
+                    square.0[lane] = if counts { square.0[lane] } else { 0.0 };
+                    known.0[lane] += if counts { 1.0 } else { 0.0 };
+                }
+                sum += square;
             }
         }
-    }
-}
-
-/// Estimates at one place of every window, and at its mirror image.
-struct BoundaryEstimates {
-    forwards: Vec<f64>,
-    backwards: Vec<f64>,
-}
-
-impl BoundaryEstimates {
-    fn new(projected: &Projected, weights: &[f64], constant: f64, target: &Target<'_>) -> Self {
-        let mut even: Vec<f64> = projected.level.iter().map(|level| level * constant).collect();
-        let mut odd = vec![0.0; even.len()];
-        let (coefficients, sums) = (&*projected.coefficients, [&mut *even, &mut *odd]);
-        dispatch(target.instructions, SumsByParity { coefficients, weights, sums });
-        // In reversed time odd coefficients change their sign, and so do odd derivatives.
-        let sign = if target.derivative % 2 == 0 { 1.0 } else { -1.0 };
-        let forwards = even.iter().zip(&odd).map(|(even, odd)| even + odd).collect();
-        let backwards = even.iter().zip(&odd).map(|(even, odd)| sign * (even - odd)).collect();
-        Self { forwards, backwards }
+        (total(sum), total(known))
     }
 }
 

@@ -15,10 +15,11 @@ use std::sync::{Arc, OnceLock};
 
 use crate::auto_derivatives::block_means::{BlockMeans, Grid, step_for};
 use crate::auto_derivatives::deconvolution::AtCentre;
+use crate::auto_derivatives::slopes::BasisSums;
 use crate::auto_derivatives::symmetric_grid::within;
 use crate::error::Error;
 use crate::local_polynomials::coefficients::{CoefficientScratch, Projected};
-use crate::local_polynomials::mirrored_kernels::{LONGEST, MirroredKernel, MirroredKernels};
+use crate::local_polynomials::mirrored_kernels::{LONGEST, MirroredKernels};
 use crate::local_polynomials::tables::{TablesWanted, WindowTables, tables};
 use crate::noise::correlated::CorrelatedNoise;
 use crate::simd::instructions::Instructions;
@@ -213,25 +214,39 @@ impl Bank {
         let inner = self.inner();
         let (odd, constant) = (self.derivative % 2 == 1, self.constant);
         let make = || {
-            let kernel = || MirroredKernel { odd, constant, outwards: Vec::with_capacity(inner) };
-            let mut kernels: Vec<MirroredKernel> = self.orders.iter().map(|_| kernel()).collect();
-            for row in self.tables.basis.rows().skip(1) {
-                let products = self.weights.iter().zip(row[self.derivative..].iter().step_by(2)).map(|(w, q)| w * q);
-                let sums = running_sums(products).skip(self.first);
-                kernels.iter_mut().zip(sums).for_each(|(kernel, sum)| kernel.outwards.push(sum));
-            }
-            MirroredKernels::new(inner, &kernels, self.instructions)
+            let fill = |distance: usize, weights: &mut [f64]| {
+                let row = &self.tables.basis.row(inner + distance).0[self.derivative..];
+                let mut sum = 0.0;
+                for (l, (weight, q)) in self.weights.iter().zip(row.iter().step_by(2)).enumerate() {
+                    sum += weight * q;
+                    // What comes before the first candidate is overwritten.
+                    weights[l.saturating_sub(self.first)] = sum;
+                }
+            };
+            MirroredKernels::of_one_parity(inner, self.orders.len(), (odd, constant), fill, self.instructions)
         };
         (inner <= LONGEST).then(|| self.mirrored.get_or_init(make))
     }
 
     /// The same from the coefficients of all degrees.
     pub(crate) fn combine(&self, projected: &Projected) -> Vec<Vec<f64>> {
-        let mut sums: Vec<f64> = projected.level.iter().map(|level| level * self.constant).collect();
-        let coefficients = projected.coefficients[self.derivative..].iter().step_by(2);
-        let mut rows: Vec<Vec<f64>> = coefficients.take(self.weights.len()).cloned().collect();
-        dispatch(self.instructions, Accumulate { sums: &mut sums, rows: &mut rows, weights: &self.weights });
-        rows.drain(..self.first);
+        let Projected { level, coefficients, .. } = projected;
+        let coefficients: Vec<&[f64]> =
+            coefficients[self.derivative..].iter().step_by(2).take(self.weights.len()).map(Vec::as_slice).collect();
+        let mut rows: Vec<Vec<f64>> = self.orders.iter().map(|_| Vec::with_capacity(level.len())).collect();
+        let mut sums = [0.0; TOGETHER];
+        for first in (0..level.len()).step_by(TOGETHER) {
+            let sums = &mut sums[..TOGETHER.min(level.len() - first)];
+            for (sum, level) in sums.iter_mut().zip(&level[first..]) {
+                *sum = level * self.constant;
+            }
+            for (l, (row, &weight)) in coefficients.iter().zip(&self.weights).enumerate() {
+                dispatch(self.instructions, AddWeighted { sums, row: &row[first..], weight });
+                if let Some(place) = l.checked_sub(self.first) {
+                    rows[place].extend_from_slice(sums);
+                }
+            }
+        }
         rows
     }
 
@@ -241,16 +256,12 @@ impl Bank {
         let (own, others) = outwards.split_at((self.step / 2 + 1).min(outwards.len()));
         // Both halves of what is at the centre.
         let at_centre = own[0] + 2.0 * own[1..].iter().sum::<f64>();
-        let mut sums = vec![0.0; self.weights.len()];
-        let mut rows = self.tables.basis.rows();
-        let centre = rows.next().unwrap_or_default();
-        for (row, part) in rows.zip(others.chunks(self.step)) {
-            let value: f64 = part.iter().sum();
-            for (sum, q) in sums.iter_mut().zip(row[self.derivative..].iter().step_by(2)) {
-                *sum += q * value;
-            }
-        }
-        let products = sums.iter().enumerate().map(|(l, sum)| {
+        let (basis, inner) = (&self.tables.basis, self.inner());
+        let centre = basis.rows().next().unwrap_or_default();
+        let values: Vec<f64> = others.chunks(self.step).take(inner).map(|part| part.iter().sum()).collect();
+        let all = dispatch(self.instructions, BasisSums { basis, first: inner + 1, values: &values });
+        let sums = all[self.derivative..].iter().step_by(2).take(self.weights.len());
+        let products = sums.enumerate().map(|(l, sum)| {
             let at_centre = centre.get(self.derivative + 2 * l).map_or(0.0, |q| q * at_centre);
             self.weights[l] * (2.0 * sum + at_centre) / self.step as f64
         });
@@ -259,14 +270,39 @@ impl Bank {
 
     /// The weights of a window's samples in a candidate.
     pub(crate) fn kernel(&self, candidate: usize) -> Vec<f64> {
-        let weight = |index| self.weight(candidate, index) / self.step as f64;
-        (0..self.tables.basis.length()).flat_map(|index| std::iter::repeat_n(weight(index), self.step)).collect()
+        let (odd, length) = (self.derivative % 2 == 1, self.tables.basis.length());
+        let mut kernel = vec![0.0; length * self.step];
+        // From the centre outwards: on the left an odd kernel has the other sign.
+        for (distance, row) in self.tables.basis.rows().enumerate() {
+            let products = self.weights[..=self.first + candidate].iter().zip(row[self.derivative..].iter().step_by(2));
+            let weight = products.map(|(weight, q)| weight * q).sum::<f64>() / self.step as f64;
+            let mirrored = if odd { -weight } else { weight };
+            for (index, weight) in [(length / 2 - distance, mirrored), (length / 2 + distance, weight)] {
+                kernel[index * self.step..][..self.step].fill(weight);
+            }
+        }
+        kernel
     }
+}
 
-    /// The weight of one of a window's means in a candidate.
-    fn weight(&self, candidate: usize, index: usize) -> f64 {
-        let weights = self.weights[..=self.first + candidate].iter().enumerate();
-        weights.map(|(l, weight)| weight * self.tables.basis.value(self.derivative + 2 * l, index)).sum()
+/// Samples whose sums stay in the nearest cache.
+const TOGETHER: usize = 1 << 10;
+
+/// Adds a row of numbers with their weight to sums.
+struct AddWeighted<'a> {
+    sums: &'a mut [f64],
+    row: &'a [f64],
+    weight: f64,
+}
+
+impl Kernel for AddWeighted<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _: S) {
+        for (sum, value) in self.sums.iter_mut().zip(self.row) {
+            *sum += self.weight * *value;
+        }
     }
 }
 

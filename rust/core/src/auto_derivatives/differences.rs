@@ -38,19 +38,55 @@ impl Kernel for SquaredDifferences<'_> {
     }
 }
 
-/// `Σ (a - b)²` over a part of two rows, in eight sums side by side.
-pub(crate) struct SquaredDistance<'a> {
-    pub(crate) rows: [&'a [f64]; 2],
+/// `Σ (a - b)²` over a part of some rows and another one, each in eight sums side by side.
+pub(crate) struct SquaredDistances<'a> {
+    pub(crate) rows: &'a [&'a [f64]],
+    pub(crate) compare: &'a [f64],
     pub(crate) part: &'a Range<usize>,
+    pub(crate) sums: &'a mut [f64],
 }
 
-impl Kernel for SquaredDistance<'_> {
-    type Output = f64;
+/// Rows that are summed at once: as many as hide how long a sum takes.
+const ROWS: usize = 4;
+
+impl Kernel for SquaredDistances<'_> {
+    type Output = ();
 
     #[inline(always)]
-    fn run<S: Lanes>(self, _: S) -> f64 {
-        squared_distance(self.rows[0], self.rows[1], self.part)
+    fn run<S: Lanes>(self, _: S) {
+        let Self { rows, compare, part, sums } = self;
+        let (whole, rest) = rows.as_chunks::<ROWS>();
+        let (first, last) = sums.split_at_mut(whole.len() * ROWS);
+        for (rows, sums) in whole.iter().zip(first.chunks_exact_mut(ROWS)) {
+            sums.copy_from_slice(&squared_distances(rows, compare, part));
+        }
+        for (row, sum) in rest.iter().zip(last) {
+            *sum = squared_distance(row, compare, part);
+        }
     }
+}
+
+/// The sums of several rows, with the bits of each.
+#[inline(always)]
+fn squared_distances<const COUNT: usize>(rows: &[&[f64]; COUNT], compare: &[f64], part: &Range<usize>) -> [f64; COUNT] {
+    let (mut sums, mut at) = ([Packet::ZERO; COUNT], part.start);
+    while at + WIDTH <= part.end {
+        let other = Packet::load(&compare[at..]);
+        for (sum, row) in sums.iter_mut().zip(rows) {
+            let differences = Packet::load(&row[at..]) - other;
+            *sum += differences * differences;
+        }
+        at += WIDTH;
+    }
+    let mut totals = [0.0; COUNT];
+    for ((slot, mut sum), row) in totals.iter_mut().zip(sums).zip(rows) {
+        for lane in 0..part.end - at {
+            let difference = row[at + lane] - compare[at + lane];
+            sum.0[lane] += difference * difference;
+        }
+        *slot = total(sum);
+    }
+    totals
 }
 
 #[inline(always)]
@@ -82,7 +118,7 @@ fn squares_of(mut differences: Packet, count: usize) -> Packet {
 }
 
 #[inline(always)]
-fn total(sums: Packet) -> f64 {
+pub(crate) fn total(sums: Packet) -> f64 {
     let [a, b, c, d, e, f, g, h] = sums.0;
     ((a + e) + (c + g)) + ((b + f) + (d + h))
 }
@@ -96,6 +132,26 @@ pub(crate) fn known_squared_distance(a: &[f64], b: &[f64], part: &Range<usize>) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::instructions::Instructions;
+    use crate::simd::vectors::dispatch;
+
+    #[test]
+    fn several_rows_have_the_bits_of_each() {
+        let row = |index: usize| (0..100).map(|i| ((i * (index + 3)) as f64 * 0.37).sin()).collect::<Vec<f64>>();
+        let all: Vec<Vec<f64>> = (0..6).map(row).collect();
+        let rows: Vec<&[f64]> = all.iter().map(Vec::as_slice).collect();
+        let compare = row(9);
+        for part in [0..100, 5..90, 3..11, 1..4, 7..7] {
+            for instructions in Instructions::available() {
+                let mut sums = [0.0; 6];
+                let distances = SquaredDistances { rows: &rows, compare: &compare, part: &part, sums: &mut sums };
+                dispatch(instructions, distances);
+                for (sum, row) in sums.iter().zip(&rows) {
+                    assert_eq!(sum.to_bits(), squared_distance(row, &compare, &part).to_bits(), "{part:?}");
+                }
+            }
+        }
+    }
 
     #[test]
     fn parts_of_any_length_are_summed_wherever_they_lie() {

@@ -22,7 +22,7 @@
 use std::ops::Range;
 
 use crate::auto_derivatives::candidates::{Bank, Target, correlated};
-use crate::auto_derivatives::differences::SquaredDistance;
+use crate::auto_derivatives::differences::SquaredDistances;
 use crate::auto_derivatives::survey::{LONGEST, Survey, Surveyed};
 use crate::auto_derivatives::symmetric_grid::within;
 use crate::error::Error;
@@ -66,6 +66,16 @@ struct JudgedWindow<'a> {
     looked: &'a Surveyed,
     candidate: usize,
     risk: f64,
+    /// The product of its kernel with that of the reference.
+    shared: f64,
+}
+
+/// A candidate of a window by itself: the same.
+struct RefinedWindow {
+    looked: Surveyed,
+    candidate: usize,
+    risk: f64,
+    shared: f64,
 }
 
 /// A window and an order.
@@ -107,30 +117,36 @@ impl Survey<'_> {
         check_cancelled: &mut CheckCancelled<'_>,
     ) -> Result<Pair, Error> {
         // The best of a window, compared with the best so far.
-        let best_of = |half: usize, best: Option<&(Surveyed, usize, f64)>| {
+        let best_of = |half: usize, best: Option<&RefinedWindow>| {
             let Some(bank) = Bank::new(half, target)? else { return Ok(None) };
             let looked = self.look_once(bank);
-            let best = best.map(|&(ref looked, candidate, risk)| JudgedWindow { looked, candidate, risk });
-            let risks = risks(reference, &looked, best, 0.0, target.noise).into_iter().enumerate();
-            let least = risks.min_by(|a, b| a.1.total_cmp(&b.1));
-            Ok::<_, Error>(least.map(|(candidate, risk)| (looked, candidate, risk)))
+            let best = best.map(|&RefinedWindow { ref looked, candidate, risk, shared }| JudgedWindow {
+                looked,
+                candidate,
+                risk,
+                shared,
+            });
+            let judged = judge(reference, &looked, best, 0.0, target.noise).into_iter();
+            let least = judged.min_by(|a, b| a.risk.total_cmp(&b.risk));
+            let least = least.map(|JudgedWindow { candidate, risk, shared, .. }| (candidate, risk, shared));
+            Ok::<_, Error>(least.map(|(candidate, risk, shared)| RefinedWindow { looked, candidate, risk, shared }))
         };
         let Some(mut best) = best_of(pair.half, None)? else { return Ok(pair) };
         for step in REFINEMENTS {
-            let centre = best.0.bank.half;
+            let centre = best.looked.bank.half;
             for half in [rounded(centre as f64 * (-step).exp2()), rounded(centre as f64 * step.exp2())] {
-                if half == best.0.bank.half || half < target.shortest || 2 * half >= self.record().len() / 2 {
+                if half == best.looked.bank.half || half < target.shortest || 2 * half >= self.record().len() / 2 {
                     continue;
                 }
                 if let Some(found) = best_of(half, Some(&best))?
-                    && found.2 < best.2
+                    && found.risk < best.risk
                 {
                     best = found;
                 }
                 check_cancelled()?;
             }
         }
-        let (looked, candidate, _) = best;
+        let RefinedWindow { looked, candidate, .. } = best;
         Ok(Pair { half: looked.bank.half, order: looked.bank.orders[candidate] })
     }
 }
@@ -146,10 +162,11 @@ fn best_of(ladder: &[Surveyed], noise: &CorrelatedNoise) -> Option<(Pair, (usize
         let compared = ladder[reference.0].compared(reference.1);
         let (mut shorter_best, mut least): (_, Option<(f64, usize, usize)>) = (None, None);
         for (window, looked) in ladder.iter().enumerate() {
-            let risks = risks(&compared, looked, shorter_best, least_gain, noise).into_iter().enumerate();
-            let judged = risks.filter(|&(_, risk)| risk.is_finite());
-            let Some((candidate, risk)) = judged.min_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
-            shorter_best = Some(JudgedWindow { looked, candidate, risk });
+            let judged = judge(&compared, looked, shorter_best, least_gain, noise).into_iter();
+            let judged = judged.filter(|judged| judged.risk.is_finite());
+            let Some(judged) = judged.min_by(|a, b| a.risk.total_cmp(&b.risk)) else { continue };
+            let JudgedWindow { candidate, risk, .. } = judged;
+            shorter_best = Some(judged);
             if least.is_none_or(|(least, ..)| risk < least) {
                 least = Some((risk, window, candidate));
             }
@@ -162,18 +179,19 @@ fn best_of(ladder: &[Surveyed], noise: &CorrelatedNoise) -> Option<(Pair, (usize
     best.map(|best| (best, reference))
 }
 
-/// The risk of every candidate of a window of at least some gain, by comparison with a reference; infinite where they cannot be compared. Given another
+/// Every candidate of a window with its risk where it is of at least some gain, by comparison with a reference; infinite where they cannot be compared. Given another
 /// candidate whose risk is known, it is that risk plus the difference where both windows fit.
-fn risks(
+fn judge<'a>(
     reference: &ReferenceCandidate<'_>,
-    looked: &Surveyed,
+    looked: &'a Surveyed,
     beside: Option<JudgedWindow<'_>>,
     least_gain: f64,
     noise: &CorrelatedNoise,
-) -> Vec<f64> {
-    let nothing = || vec![f64::INFINITY; looked.rows.len()];
+) -> Vec<JudgedWindow<'a>> {
+    let nothing = |candidate: usize| JudgedWindow { looked, candidate, risk: f64::INFINITY, shared: 0.0 };
+    let mut found: Vec<JudgedWindow<'_>> = (0..looked.rows.len()).map(nothing).collect();
     if !looked.bank.gains.iter().any(|&gain| gain >= least_gain) {
-        return nothing();
+        return found;
     }
     let variance = noise.variance();
     let longest = looked.bank.half.max(beside.map_or(0, |other| other.looked.bank.half));
@@ -182,39 +200,50 @@ fn risks(
     let surveyed: Vec<&Surveyed> =
         [reference.looked, looked].into_iter().chain(beside.map(|other| other.looked)).collect();
     let grid = surveyed.iter().map(|one| one.grid).max_by_key(|grid| grid.step).unwrap_or(looked.grid);
-    let compare = reference.looked.at(reference.candidate, grid);
+    let of_reference = reference.looked.at(grid);
+    let compare = &*of_reference[reference.candidate];
     let all = surveyed.iter().try_fold(0..usize::MAX, |all, one| Some(within(&all, one.whole.as_ref()?)));
     let all = all.map(|samples| grid.means(&samples));
     let some: Vec<usize> = if all.is_some() {
         Vec::new()
     } else {
-        let rows: Vec<_> = surveyed.iter().map(|one| one.at(0, grid)).collect();
-        (0..grid.count).filter(|&place| !rows.iter().any(|row| row[place].is_nan())).collect()
+        let known: Vec<_> = surveyed.iter().map(|one| one.at(grid)).collect();
+        (0..grid.count).filter(|&place| !known.iter().any(|rows| rows[0][place].is_nan())).collect()
     };
     let count = all.as_ref().map_or(some.len(), Range::len);
     if count < FEWEST_PLACES {
-        return nothing();
+        return found;
     }
-    let distance = |row: &[f64]| {
-        let sum = match &all {
-            Some(part) => dispatch(looked.bank.instructions, SquaredDistance { rows: [row, &*compare], part }),
-            None => some.iter().map(|&place| (row[place] - compare[place]).powi(2)).sum(),
-        };
-        sum / count as f64
+    let distances = |looked: &Surveyed, candidates: &[usize]| -> Vec<f64> {
+        let known = looked.at(grid);
+        let rows: Vec<&[f64]> = candidates.iter().map(|&candidate| &*known[candidate]).collect();
+        let mut sums = vec![0.0; rows.len()];
+        if let Some(part) = &all {
+            let (rows, sums) = (&*rows, &mut *sums);
+            dispatch(looked.bank.instructions, SquaredDistances { rows, compare, part, sums });
+        } else {
+            for (sum, row) in sums.iter_mut().zip(rows) {
+                *sum = some.iter().map(|&place| (row[place] - compare[place]).powi(2)).sum();
+            }
+        }
+        sums
     };
-    let risk = |looked: &Surveyed, candidate: usize, shared: f64| {
-        distance(&looked.at(candidate, grid))
-            + variance * (2.0 * shared + (OPTIMISM - 1.0) * looked.bank.gains[candidate])
+    let risk = |looked: &Surveyed, candidate: usize, distance: f64, shared: f64| {
+        distance / count as f64 + variance * (2.0 * shared + (OPTIMISM - 1.0) * looked.bank.gains[candidate])
     };
     let shift = beside.map_or(0.0, |other| {
-        let shared = other.looked.bank.products(&kernel)[other.candidate];
-        other.risk - risk(other.looked, other.candidate, shared)
+        let distance = distances(other.looked, &[other.candidate])[0];
+        other.risk - risk(other.looked, other.candidate, distance, other.shared)
     });
+    let judged = |candidate: &usize| looked.bank.gains[*candidate] >= least_gain;
+    let candidates: Vec<usize> = (0..looked.rows.len()).filter(judged).collect();
     let shared = looked.bank.products(&kernel);
-    let judged = |(candidate, shared): (usize, f64)| {
-        if looked.bank.gains[candidate] >= least_gain { risk(looked, candidate, shared) + shift } else { f64::INFINITY }
-    };
-    shared.into_iter().enumerate().map(judged).collect()
+    for (&candidate, distance) in candidates.iter().zip(distances(looked, &candidates)) {
+        let shared = shared[candidate];
+        let risk = risk(looked, candidate, distance, shared) + shift;
+        found[candidate] = JudgedWindow { looked, candidate, risk, shared };
+    }
+    found
 }
 
 /// The window nearest to one √2 times shorter, and the candidate of an order in it.
@@ -268,15 +297,16 @@ mod tests {
         };
         // The longest fits in the middle only, and what all are compared with is far off wherever it does not.
         let (reference, short, long) = (surveyed(4, 9.0, 0.0), surveyed(8, 0.0, 0.1), surveyed(30, f64::NAN, 0.3));
-        let judged = |looked, candidate, risk| JudgedWindow { looked, candidate, risk };
         let reference = reference.compared(0);
-        let of_short = risks(&reference, &short, None, 0.0, &noise)[0];
-        let of_long = risks(&reference, &long, Some(judged(&short, 0, of_short)), 0.0, &noise)[0];
+        let of_short = judge(&reference, &short, None, 0.0, &noise)[0];
+        let of_long = judge(&reference, &long, Some(of_short), 0.0, &noise)[0].risk;
+        let of_short = of_short.risk;
         assert!((of_short - 0.6 * 81.0 - 0.4 * 0.01).abs() < 1e-12);
         assert!((of_long - of_short - (0.09 - 0.01)).abs() < 1e-12);
         // The other way round as well.
-        let alone = risks(&reference, &long, None, 0.0, &noise)[0];
-        let beside = risks(&reference, &short, Some(judged(&long, 0, alone)), 0.0, &noise)[0];
+        let alone = judge(&reference, &long, None, 0.0, &noise)[0];
+        let beside = judge(&reference, &short, Some(alone), 0.0, &noise)[0].risk;
+        let alone = alone.risk;
         assert!((alone - beside - (0.09 - 0.01)).abs() < 1e-12);
     }
 }

@@ -253,7 +253,7 @@ fn least(numbers: &[f64]) -> usize {
 
 /// Eight numbers from a place on, zero beyond the last.
 #[inline(always)]
-fn packet(numbers: &[f64], from: usize) -> Packet {
+pub(crate) fn packet(numbers: &[f64], from: usize) -> Packet {
     if from + WIDTH <= numbers.len() {
         return Packet::load(&numbers[from..]);
     }

@@ -45,8 +45,15 @@ impl ReferenceLine {
         Self { line, stencil, kernel: bank.kernel(0), gain: bank.gains[0] }
     }
 
-    /// The reference at a sample, NaN where there is none.
-    pub(crate) fn at(&self, sample: usize) -> f64 {
-        self.line.at(sample, &self.stencil)
+    /// The reference at some samples, NaN where there is none.
+    pub(crate) fn read(&self, samples: impl Iterator<Item = usize>, into: &mut Vec<f64>) {
+        into.clear();
+        let Line { grid, first, values } = &self.line;
+        if grid.step > 1 {
+            into.extend(samples.map(|sample| self.line.at(sample, &self.stencil)));
+            return;
+        }
+        let begin = grid.sample(*first);
+        into.extend(samples.map(|sample| values.get(sample.wrapping_sub(begin)).copied().unwrap_or(f64::NAN)));
     }
 }

@@ -31,12 +31,16 @@ impl<'a> SampleSlopes<'a> {
         sums
     }
 
-    /// The derivative of every polynomial of the basis at a sample.
-    pub(crate) fn of_basis(&self, place: usize) -> [f64; MOST_DEGREES] {
-        if self.step == 1 {
-            return slopes(self.basis, place, self.derivative);
+    /// The derivative of what every coefficient belongs to at some samples: eight at a time, with the bits of each by itself.
+    pub(crate) fn of_coefficients_at(&self, places: &[usize], instructions: Instructions) -> Vec<[f64; MOST_DEGREES]> {
+        let mut all = vec![[0.0; MOST_DEGREES]; places.len()];
+        dispatch(instructions, SlopesAt { slopes: self, places, all: &mut all });
+        if self.step > 1 {
+            for slopes in &mut all {
+                *slopes = self.combine(slopes);
+            }
         }
-        slopes_between(self.basis, self.between(place), self.derivative)
+        all
     }
 
     /// Where a sample lies from the centre, in means.
@@ -45,12 +49,8 @@ impl<'a> SampleSlopes<'a> {
         (place as f64 - centre as f64) / self.step as f64
     }
 
-    /// The derivative of what every coefficient belongs to.
-    pub(crate) fn of_coefficients(&self, place: usize) -> [f64; MOST_DEGREES] {
-        let of_basis = self.of_basis(place);
-        if self.step == 1 {
-            return of_basis;
-        }
+    /// The derivative of what every coefficient belongs to, from those of the basis.
+    fn combine(&self, of_basis: &[f64; MOST_DEGREES]) -> [f64; MOST_DEGREES] {
         let mut slopes = [0.0; MOST_DEGREES];
         for (value, polynomial) in slopes.iter_mut().zip(&self.polynomials) {
             *value = polynomial.iter().zip(of_basis).map(|(factor, slope)| factor * slope).sum();
@@ -69,27 +69,6 @@ impl<'a> SampleSlopes<'a> {
         }
         sums
     }
-}
-
-/// The derivative of every polynomial of a basis at a sample of the window, in working precision: [`Basis::evaluate`] has twice that and takes ten
-/// times as long.
-fn slopes(basis: &Basis, place: usize, derivative: usize) -> [f64; MOST_DEGREES] {
-    let mut values = [0.0; MOST_DEGREES];
-    let known = values.iter_mut().take(basis.degrees()).enumerate();
-    known.for_each(|(degree, value)| *value = basis.value(degree, place));
-    for d in 1..=derivative {
-        legendre_slopes(basis, basis.position(place), d, &mut values, |number| number);
-    }
-    values
-}
-
-/// The same at any position, from the centre, of a window that is much longer than the basis has polynomials.
-fn slopes_between(basis: &Basis, x: f64, derivative: usize) -> [f64; MOST_DEGREES] {
-    let mut values = [0.0; MOST_DEGREES];
-    for d in 0..=derivative {
-        legendre_slopes(basis, x, d, &mut values, |number| number);
-    }
-    values
 }
 
 /// The `d`-th derivatives from those below, of one number or of several side by side.
@@ -121,25 +100,14 @@ impl Kernel for SlopeSums<'_> {
     #[inline(always)]
     fn run<S: Lanes>(self, _: S) {
         let Self { slopes, factors, sums } = self;
-        let (basis, last) = (slopes.basis, sums.len().saturating_sub(1));
+        let last = sums.len().saturating_sub(1);
         for (index, part) in sums.chunks_mut(WIDTH).enumerate() {
-            let (mut values, mut x) = ([Packet::ZERO; MOST_DEGREES], Packet::ZERO);
-            for lane in 0..WIDTH {
+            let mut places = [0; WIDTH];
+            for (lane, place) in places.iter_mut().enumerate() {
                 // Lanes beyond the last sample are not used.
-                let place = (index * WIDTH + lane).min(last);
-                if slopes.step > 1 {
-                    x.0[lane] = slopes.between(place);
-                    continue;
-                }
-                x.0[lane] = basis.position(place);
-                let (row, mirrored) = basis.row(place);
-                for (degree, &value) in row.iter().enumerate() {
-                    values[degree].0[lane] = if mirrored && degree % 2 == 1 { -value } else { value };
-                }
+                *place = (index * WIDTH + lane).min(last);
             }
-            for d in usize::from(slopes.step == 1)..=slopes.derivative {
-                legendre_slopes(basis, x, d, &mut values, Packet::splat);
-            }
+            let values = slopes.at_eight(&places);
             // As sums of numbers begin.
             let mut sum = Packet::splat(-0.0);
             for (&value, &factor) in values.iter().zip(factors) {
@@ -147,6 +115,54 @@ impl Kernel for SlopeSums<'_> {
             }
             part.copy_from_slice(&sum.0[..part.len()]);
         }
+    }
+}
+
+/// The derivatives of the basis in [`SampleSlopes::of_coefficients_at`].
+struct SlopesAt<'a> {
+    slopes: &'a SampleSlopes<'a>,
+    places: &'a [usize],
+    all: &'a mut [[f64; MOST_DEGREES]],
+}
+
+impl Kernel for SlopesAt<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _: S) {
+        for (some, all) in self.places.chunks(WIDTH).zip(self.all.chunks_mut(WIDTH)) {
+            let mut places = [some[0]; WIDTH];
+            places[..some.len()].copy_from_slice(some);
+            let values = self.slopes.at_eight(&places);
+            for (degree, value) in values.iter().enumerate() {
+                for (slopes, &value) in all.iter_mut().zip(&value.0) {
+                    slopes[degree] = value;
+                }
+            }
+        }
+    }
+}
+
+impl SampleSlopes<'_> {
+    /// The derivative of every polynomial of the basis at eight samples.
+    #[inline(always)]
+    fn at_eight(&self, places: &[usize; WIDTH]) -> [Packet; MOST_DEGREES] {
+        let (mut values, mut x) = ([Packet::ZERO; MOST_DEGREES], Packet::ZERO);
+        for (lane, &place) in places.iter().enumerate() {
+            if self.step > 1 {
+                x.0[lane] = self.between(place);
+                continue;
+            }
+            x.0[lane] = self.basis.position(place);
+            let (row, mirrored) = self.basis.row(place);
+            for (degree, &value) in row.iter().enumerate() {
+                values[degree].0[lane] = if mirrored && degree % 2 == 1 { -value } else { value };
+            }
+        }
+        for d in usize::from(self.step == 1)..=self.derivative {
+            legendre_slopes(self.basis, x, d, &mut values, Packet::splat);
+        }
+        values
     }
 }
 
@@ -199,6 +215,35 @@ impl BasisSums<'_> {
 mod tests {
     use super::*;
 
+    /// The derivative of every polynomial of the basis at a sample.
+    fn of_basis(of: &SampleSlopes<'_>, place: usize) -> [f64; MOST_DEGREES] {
+        if of.step == 1 {
+            return slopes(of.basis, place, of.derivative);
+        }
+        slopes_between(of.basis, of.between(place), of.derivative)
+    }
+
+    /// The derivative of every polynomial of a basis at a sample of the window, in working precision: [`Basis::evaluate`] has twice that and takes ten
+    /// times as long.
+    fn slopes(basis: &Basis, place: usize, derivative: usize) -> [f64; MOST_DEGREES] {
+        let mut values = [0.0; MOST_DEGREES];
+        let known = values.iter_mut().take(basis.degrees()).enumerate();
+        known.for_each(|(degree, value)| *value = basis.value(degree, place));
+        for d in 1..=derivative {
+            legendre_slopes(basis, basis.position(place), d, &mut values, |number| number);
+        }
+        values
+    }
+
+    /// The same at any position, from the centre, of a window that is much longer than the basis has polynomials.
+    fn slopes_between(basis: &Basis, x: f64, derivative: usize) -> [f64; MOST_DEGREES] {
+        let mut values = [0.0; MOST_DEGREES];
+        for d in 0..=derivative {
+            legendre_slopes(basis, x, d, &mut values, |number| number);
+        }
+        values
+    }
+
     #[test]
     fn coefficients_combined_give_the_same_derivative() {
         let basis = Basis::new(97, 8).expect("little memory");
@@ -210,8 +255,8 @@ mod tests {
                 let sum = |slopes: [f64; MOST_DEGREES], factors: &[f64]| -> f64 {
                     factors.iter().zip(slopes).map(|(factor, slope)| factor * slope).sum()
                 };
-                let (one, other) =
-                    (sum(slopes.of_basis(place), &combined), sum(slopes.of_coefficients(place), &coefficients));
+                let of_coefficients = slopes.of_coefficients_at(&[place], Instructions::current())[0];
+                let (one, other) = (sum(of_basis(&slopes, place), &combined), sum(of_coefficients, &coefficients));
                 assert!((one - other).abs() < 1e-13 * one.abs().max(1.0), "{one} {other}");
             }
         }
@@ -228,10 +273,28 @@ mod tests {
                     let sums = slopes.sums(&factors, count, instructions);
                     assert_eq!(sums.len(), count);
                     for (place, found) in sums.iter().enumerate() {
-                        let of_basis = slopes.of_basis(place);
+                        let of_basis = of_basis(&slopes, place);
                         let sum: f64 = of_basis.iter().zip(&factors).map(|(slope, factor)| slope * factor).sum();
                         assert_eq!(found.to_bits(), sum.to_bits(), "{step} {derivative} {place}");
                     }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn some_samples_have_the_bits_of_each() {
+        let basis = Basis::new(97, 8).expect("little memory");
+        for (step, derivative) in [(1, 0), (1, 2), (9, 0), (9, 2)] {
+            let slopes = SampleSlopes::new(&basis, step, derivative, 8);
+            let places: Vec<usize> = (0..11).map(|i| i * 9 * step).collect();
+            for instructions in Instructions::available() {
+                let all = slopes.of_coefficients_at(&places, instructions);
+                assert_eq!(all.len(), places.len());
+                for (&place, found) in places.iter().zip(all) {
+                    let of_basis = of_basis(&slopes, place);
+                    let expected = if step == 1 { of_basis } else { slopes.combine(&of_basis) };
+                    assert_eq!(found.map(f64::to_bits), expected.map(f64::to_bits), "{step} {derivative} {place}");
                 }
             }
         }

@@ -3,7 +3,6 @@
 //! Every window is looked at where its means lie: at all places of a grid, or of one that lies within it. Long records are subsampled in
 //! sixteen stretches.
 
-use std::borrow::Cow;
 use std::cell::RefCell;
 use std::f64::consts::LN_2;
 use std::ops::Range;
@@ -33,7 +32,7 @@ const LONGEST_STEP: usize = 81;
 /// Means of the longest windows that a stretch holds.
 const MEANS: usize = 18;
 
-/// Places at which candidates are compared, at most.
+/// Places at which candidates are compared, at most; every third sample at least where records are not short: their errors are the same to 0.1 %.
 const MOST_PLACES: usize = 12 << 10;
 
 /// Places in a half-width, at least, and windows in a half-width near an end, at most.
@@ -55,6 +54,8 @@ pub(crate) struct Survey<'a> {
     /// By half-width, the coefficients at all places; NaN where there is no window.
     known: RefCell<Vec<(usize, Rc<Projected>)>>,
     parts: RefCell<Vec<Rc<PartOfWindows>>>,
+    /// Memory that is used again.
+    scratch: RefCell<(CoefficientScratch, Projected)>,
 }
 
 /// Windows in a part of a record.
@@ -85,15 +86,20 @@ impl PartOfWindows {
     }
 }
 
+/// By step, rows at the places of a grid of that step.
+type CoarserRows = Vec<(usize, Rc<Vec<Vec<f64>>>)>;
+
 /// The candidates of one window at all places, a row each; NaN where there is none.
 #[derive(Debug)]
 pub(crate) struct Surveyed {
     pub(crate) bank: Bank,
-    pub(crate) rows: Vec<Vec<f64>>,
+    pub(crate) rows: Rc<Vec<Vec<f64>>>,
     /// The places: of one stretch after the other as if they were one.
     pub(crate) grid: Grid,
     /// The samples where windows fit, if they fit at all places between: no sample is missing.
     pub(crate) whole: Option<Range<usize>>,
+    /// By their step, the rows at the places of coarser grids: to look for them again would cost as much as to compare them.
+    coarser: RefCell<CoarserRows>,
 }
 
 impl Surveyed {
@@ -103,17 +109,23 @@ impl Surveyed {
         let last = row.iter().rposition(|value| !value.is_nan());
         let fits = first.zip(last).filter(|&(first, last)| !row[first..=last].iter().any(|value| value.is_nan()));
         let whole = fits.map(|(first, last)| grid.sample(first)..grid.sample(last) + 1);
-        Self { bank, rows, grid, whole }
+        Self { bank, rows: Rc::new(rows), grid, whole, coarser: RefCell::default() }
     }
 
-    /// A candidate at the places of a grid that is not finer.
-    pub(crate) fn at(&self, candidate: usize, grid: Grid) -> Cow<'_, [f64]> {
-        let row = &self.rows[candidate];
+    /// All candidates at the places of a grid that is not finer.
+    pub(crate) fn at(&self, grid: Grid) -> Rc<Vec<Vec<f64>>> {
         if grid.step == self.grid.step {
-            return Cow::Borrowed(row);
+            return Rc::clone(&self.rows);
         }
-        let first = (grid.first - self.grid.first) / self.grid.step;
-        row[first..].iter().step_by(grid.step / self.grid.step).take(grid.count).copied().collect()
+        let mut known = self.coarser.borrow_mut();
+        if let Some((_, rows)) = known.iter().find(|(step, _)| *step == grid.step) {
+            return Rc::clone(rows);
+        }
+        let (first, every) = ((grid.first - self.grid.first) / self.grid.step, grid.step / self.grid.step);
+        let coarser = |row: &Vec<f64>| row[first..].iter().step_by(every).take(grid.count).copied().collect();
+        let rows: Rc<Vec<Vec<f64>>> = Rc::new(self.rows.iter().map(coarser).collect());
+        known.push((grid.step, Rc::clone(&rows)));
+        rows
     }
 }
 
@@ -127,12 +139,13 @@ impl<'a> Survey<'a> {
         // Twice the longest window is a candidate, too.
         let longest = if samples > CLOSELY { (2 * LONGEST).min(samples / 4) } else { 0 };
         let (means, closely) = (BlockMeans::new(record, longest)?, samples <= CLOSELY);
-        let (known, parts) = (RefCell::new(Vec::new()), RefCell::new(Vec::new()));
+        let (known, parts, scratch) = (RefCell::default(), RefCell::default(), RefCell::default());
         if samples <= WHOLE {
-            let mut steps = std::iter::successors(Some(1), |step| Some(step * COARSER));
+            let least = if closely { 1 } else { COARSER };
+            let mut steps = std::iter::successors(Some(least), |step| Some(step * COARSER));
             let step = steps.find(|step| samples <= step * MOST_PLACES).unwrap_or(STEP);
             let stretches = std::iter::once(0..samples).collect();
-            return Ok(Self { means, highest, instructions, stretches, step, closely, known, parts });
+            return Ok(Self { means, highest, instructions, stretches, step, closely, known, parts, scratch });
         }
         // Stretches of whole means of any window.
         let most = step_for(longest);
@@ -143,7 +156,7 @@ impl<'a> Survey<'a> {
         let mean = |index: usize| if 2 * index < last { from_begin(index) } else { spare - from_begin(last - index) };
         let first = |index: usize| grid.sample(mean(index)) - most / 2;
         let stretches = (0..STRETCHES).map(|index| first(index)..first(index) + length * most).collect();
-        Ok(Self { means, highest, instructions, stretches, step: STEP, closely, known, parts })
+        Ok(Self { means, highest, instructions, stretches, step: STEP, closely, known, parts, scratch })
     }
 
     /// Looks at the candidates of a window. The coefficients that they are made of are kept for other derivatives.
@@ -160,9 +173,10 @@ impl<'a> Survey<'a> {
     pub(crate) fn look_once(&self, bank: Bank) -> Surveyed {
         let rows = self.known_coefficients(&bank).map_or_else(
             || {
-                let (mut scratch, mut part) = (CoefficientScratch::default(), Projected::default());
+                let (scratch, part) = &mut *self.scratch.borrow_mut();
+                scratch.forget_plan();
                 self.at_places(&bank, bank.orders.len(), |centres, every, rows| {
-                    let found = bank.estimates(&self.means, centres, every, &mut scratch, &mut part);
+                    let found = bank.estimates(&self.means, centres, every, scratch, part);
                     rows.iter_mut().zip(found).for_each(|(row, found)| row.extend(&*found));
                 })
             },
@@ -233,9 +247,10 @@ impl<'a> Survey<'a> {
         let means = means.as_slice();
         let (record, first): (&dyn Samples, usize) = if step > 1 { (&means, beside) } else { (self.record(), begin) };
         let tables = self.tables(inner)?;
-        let (mut scratch, mut projected) = (CoefficientScratch::default(), Projected::default());
+        let (scratch, mut projected) = (&mut self.scratch.borrow_mut().0, Projected::default());
+        scratch.forget_plan();
         let windows = first..first + room.saturating_sub(beside);
-        tables.coefficients().project(record, windows.clone(), every, &mut projected, &mut scratch);
+        tables.coefficients().project(record, windows.clone(), every, &mut projected, scratch);
         let starts = windows.step_by(every).map(|start| begin + (start - first) * step).collect();
         let found = Rc::new(PartOfWindows {
             half,
@@ -273,10 +288,11 @@ impl<'a> Survey<'a> {
         }
         let own = bank.half / bank.step;
         let tables = self.tables(own)?;
-        let (mut scratch, mut part) = (CoefficientScratch::default(), Projected::default());
+        let (scratch, part) = &mut *self.scratch.borrow_mut();
+        scratch.forget_plan();
         let mut rows = self.at_places(bank, tables.basis.degrees() + 1, |centres, every, rows| {
             let (windows, record) = (centres.start - own..centres.end - own, self.means.of(bank.step));
-            tables.coefficients().project(record, windows, every, &mut part, &mut scratch);
+            tables.coefficients().project(record, windows, every, part, scratch);
             let found = part.coefficients.iter().chain([&part.level]);
             rows.iter_mut().zip(found).for_each(|(row, found)| row.extend(found));
         });

@@ -86,12 +86,35 @@ fn powers(
     let basis = basis(length, DEGREES)?;
     let (total, count) = (noise.variance(), (values.len() / length) as f64);
     let squares = dispatch(instructions, CoefficientSquares { values, basis: &basis });
+    let norms = dispatch(instructions, BasisNorms(&basis));
     let power = |(degree, square): (usize, f64)| {
-        let row: Vec<f64> = (0..length).map(|index| basis.value(degree, index)).collect();
-        let expected: f64 = row.iter().zip(noise.correlate(&row)).map(|(a, b)| a * b).sum();
+        let expected = if noise.is_white() {
+            norms[degree]
+        } else {
+            let row: Vec<f64> = (0..length).map(|index| basis.value(degree, index)).collect();
+            row.iter().zip(noise.correlate(&row)).map(|(a, b)| a * b).sum()
+        };
         square / count / (expected * total)
     };
     Ok(squares.into_iter().enumerate().map(power).collect())
+}
+
+/// By degree, the sum of the squares of a basis: one but for rounding.
+struct BasisNorms<'a>(&'a Basis);
+
+impl Kernel for BasisNorms<'_> {
+    type Output = [f64; DEGREES];
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _: S) -> [f64; DEGREES] {
+        let mut sums = [0.0; DEGREES];
+        for index in 0..self.0.length() {
+            for (sum, q) in sums.iter_mut().zip(self.0.row(index).0) {
+                *sum += q * q;
+            }
+        }
+        sums
+    }
 }
 
 /// By degree, the sum of the squared coefficients of windows side by side.

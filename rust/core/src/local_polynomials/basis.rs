@@ -85,7 +85,7 @@ impl Basis {
         let lower = vec![DoubleDouble::ZERO; degrees];
         let tabulate = |(rows, values): (Range<usize>, &mut [f64]), row_of: &mut Vec<DoubleDouble>| {
             for (row, values) in rows.zip(values.chunks_exact_mut(degrees)) {
-                basis.climb(basis.position(length / 2 + row), 0, &lower, row_of);
+                basis.legendre_slopes(basis.position(length / 2 + row), 0, &lower, row_of);
                 values.iter_mut().zip(&*row_of).for_each(|(value, exact)| *value = exact.to_f64());
             }
         };
@@ -196,7 +196,7 @@ impl Basis {
         for d in 0..=derivative {
             std::mem::swap(&mut lower, &mut values);
             values[0] = if d == 0 { self.mean() } else { DoubleDouble::ZERO };
-            self.climb(position, d, &lower, &mut values);
+            self.legendre_slopes(position, d, &lower, &mut values);
         }
         values
     }
@@ -208,7 +208,7 @@ impl Basis {
 
     /// The `d`-th derivative of every polynomial from that of degree zero and the derivatives before. Products with inverses take
     /// a third of the time that quotients take.
-    fn climb(&self, position: f64, d: usize, lower: &[DoubleDouble], values: &mut [DoubleDouble]) {
+    fn legendre_slopes(&self, position: f64, d: usize, lower: &[DoubleDouble], values: &mut [DoubleDouble]) {
         let x = DoubleDouble::from(position);
         for j in 0..self.degrees - 1 {
             let mut value = x * values[j];

@@ -33,6 +33,13 @@ pub(crate) struct CoefficientScratch {
     pub(crate) mirrored: MirroredScratch,
 }
 
+impl CoefficientScratch {
+    /// Makes ready for windows of another plan.
+    pub(crate) fn forget_plan(&mut self) {
+        self.engine = None;
+    }
+}
+
 /// The results of some windows, one row per number.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Projected {

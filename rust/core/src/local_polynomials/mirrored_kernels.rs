@@ -98,6 +98,34 @@ impl MirroredKernels {
         Self { half, groups, instructions }
     }
 
+    /// Prepares so many kernels that are all odd, or all even, with what a constant signal of one gives. `fill` gives the weights of all at a distance from
+    /// the centre, which is one at least.
+    pub(crate) fn of_one_parity(
+        half: usize,
+        count: usize,
+        (odd, constant): (bool, f64),
+        mut fill: impl FnMut(usize, &mut [f64]),
+        instructions: Instructions,
+    ) -> Self {
+        let group = |rows: &[usize]| {
+            let width = rows.len().next_power_of_two().max(2);
+            let mut constants = [0.0; MOST_KERNELS];
+            constants[..rows.len()].fill(constant);
+            let sign = if odd { -1.0 } else { 1.0 };
+            Group { rows: rows.to_vec(), constants, sign, width, weights: vec![0.0; half * width] }
+        };
+        let rows: Vec<usize> = (0..count).collect();
+        let mut groups: Vec<Group> = rows.chunks(MOST_KERNELS).map(group).collect();
+        let mut weights = vec![0.0; count];
+        for distance in 1..=half {
+            fill(distance, &mut weights);
+            for (group, own) in groups.iter_mut().zip(weights.chunks(MOST_KERNELS)) {
+                group.weights[(distance - 1) * group.width..][..own.len()].copy_from_slice(own);
+            }
+        }
+        Self { half, groups, instructions }
+    }
+
     /// Whether every `every`-th window costs less by itself than all windows do with polynomials of so many degrees in steps.
     pub(crate) fn serve(&self, every: usize, degrees: usize) -> bool {
         let sums: usize = self.groups.iter().map(|group| group.width + PAIR).sum();

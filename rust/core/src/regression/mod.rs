@@ -15,6 +15,7 @@ pub(crate) mod predictor;
 pub(crate) mod problem;
 pub(crate) mod residuals;
 pub(crate) mod row_covariance;
+pub(crate) mod row_neighbours;
 pub(crate) mod sandwich;
 #[cfg(test)]
 pub(crate) mod simulated;

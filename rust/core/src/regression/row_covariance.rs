@@ -5,6 +5,7 @@ use std::ops::Range;
 use crate::error::Error;
 use crate::exec::stages::Stages;
 use crate::regression::problem::Correlated;
+use crate::regression::row_neighbours::{AddNeighbours, LaggedProducts, products};
 use crate::simd::instructions::Instructions;
 use crate::simd::vectors::{Kernel, Lanes, dispatch};
 use crate::weak_form::test_function::Kernels;
@@ -98,12 +99,13 @@ impl RowCovariance {
         let whole = usable.iter().all(|&usable| usable);
         let missing = |(residual, usable): (&f64, &bool)| if *usable { *residual } else { 0.0 };
         let residuals: Vec<f64> = residuals.iter().zip(usable).map(missing).collect();
-        let lags = (0..=farthest).map(|lag| {
+        let mut sums = vec![0.0; farthest + 1];
+        dispatch(Instructions::current(), LaggedProducts { values: &residuals, sums: &mut sums });
+        let lags = sums.into_iter().enumerate().map(|(lag, sum)| {
             let rows = residuals.len().saturating_sub(lag);
             let later = residuals.len() - rows;
             let pairs = || usable[..rows].iter().zip(&usable[later..]);
             let count = if whole { rows } else { pairs().filter(|(early, late)| **early && **late).count() } as f64;
-            let sum = sum_of_products(&residuals[..rows], &residuals[later..]);
             (1.0 - lag as f64 / (farthest + 1) as f64) * sum / count.max(1.0)
         });
         Self::by_distance(lags.collect())
@@ -196,39 +198,6 @@ impl RowCovariance {
     }
 }
 
-/// What [`RowCovariance::add`] does where all rows are alike.
-struct AddNeighbours<'a, W> {
-    lags: usize,
-    column: &'a [f64],
-    rows: Range<usize>,
-    weights: W,
-    sums: &'a mut [f64],
-}
-
-impl<W: Fn(usize) -> [f64; 2]> Kernel for AddNeighbours<'_, W> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Lanes>(self, _simd: S) {
-        let Self { lags, column, rows, weights, sums } = self;
-        for lag in 0..lags {
-            let [later, before] = weights(lag);
-            // The last rows have no neighbours so far behind them.
-            let late = column.get(rows.start + lag..).unwrap_or_default();
-            for (sum, value) in sums.iter_mut().zip(late) {
-                *sum += later * value;
-            }
-            if lag > 0 && rows.end > lag {
-                let first = rows.start.max(lag);
-                let early = &column[first - lag..rows.end - lag];
-                for (sum, value) in sums[first - rows.start..].iter_mut().zip(early) {
-                    *sum += before * value;
-                }
-            }
-        }
-    }
-}
-
 /// What [`RowCovariance::add`] does where equations take turns.
 struct AddOfEquations<'a, W> {
     lags: usize,
@@ -282,39 +251,6 @@ fn add_in_rounds(sums: &mut [f64], values: &[f64], weights: &[f64]) {
     }
 }
 
-/// The dot product of two columns, in eight sums side by side: a single one would wait for every addition.
-pub(crate) fn sum_of_products(one: &[f64], other: &[f64]) -> f64 {
-    dispatch(Instructions::current(), DotProduct(one, other))
-}
-
-/// What [`sum_of_products`] computes.
-struct DotProduct<'a>(&'a [f64], &'a [f64]);
-
-impl Kernel for DotProduct<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn run<S: Lanes>(self, _simd: S) -> f64 {
-        let ((one, one_rest), (other, other_rest)) = (self.0.as_chunks::<8>(), self.1.as_chunks::<8>());
-        let mut sums = [0.0; 8];
-        for (one, other) in one.iter().zip(other) {
-            for lane in 0..8 {
-                sums[lane] += one[lane] * other[lane];
-            }
-        }
-        let rest: f64 = one_rest.iter().zip(other_rest).map(|(a, b)| a * b).sum();
-        sums.iter().sum::<f64>() + rest
-    }
-}
-
-/// `Σ_k a(k) b(k + lag)` for two kernels of one length.
-pub(crate) fn products(one: &[f64], other: &[f64], lag: usize) -> f64 {
-    if lag >= one.len() {
-        return 0.0;
-    }
-    sum_of_products(&one[..one.len() - lag], &other[lag..])
-}
-
 #[cfg(test)]
 mod tests {
     use std::num::NonZeroUsize;
@@ -351,6 +287,7 @@ mod tests {
             }
         }
     }
+
     /// Rows of three equations, of which each has noise of its own and shares some with the next: every pair of rows by itself.
     #[test]
     fn rows_of_equations_that_take_turns_have_the_covariance_of_their_pair() {

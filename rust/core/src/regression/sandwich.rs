@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use crate::regression::problem::Problem;
-use crate::regression::row_covariance::{RowCovariance, sum_of_products};
+use crate::regression::row_covariance::RowCovariance;
+use crate::regression::row_neighbours::sum_of_products;
 use crate::regression::solved::Solved;
 
 /// The influence of every row within some windows on a constant: a column of `X̃`, so that the constants are `N⁻¹ X̃ᵀ b`.

@@ -15,7 +15,8 @@ use crate::equation::rows::{Regressor, Rows};
 use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
-use crate::regression::row_covariance::{RowCovariance, products};
+use crate::regression::row_covariance::RowCovariance;
+use crate::regression::row_neighbours::products;
 use crate::simd::f64x8::{Packet, WIDTH};
 
 /// Added to the variance of a row, relative to it, so that frequencies that the test function suppresses do not count.
