@@ -20,6 +20,7 @@ __all__ = [
     "LocalPolynomials",
     "MergedElement",
     "MergedIdentification",
+    "Modes",
     "Motions",
     "Noise",
     "OutsideMask",
@@ -49,6 +50,7 @@ __all__ = [
     "identify_merged",
     "instructions",
     "merged_rows",
+    "modes",
     "noise",
     "noise_coherence",
     "parts_of_quantisation",
@@ -316,6 +318,15 @@ class WindowFit:
         progress: Callable[[int, int], object] | None = None,
     ) -> WindowEstimates: ...
     def scores(self, samples: npt.NDArray[np.number], sample: int) -> npt.NDArray[np.float64]: ...
+
+@final
+class Modes:
+    @property
+    def poles(self) -> npt.NDArray[np.complex128]: ...
+    @property
+    def shapes(self) -> npt.NDArray[np.complex128]: ...
+    @property
+    def lefts(self) -> npt.NDArray[np.complex128]: ...
 
 @final
 class Responses:
@@ -655,6 +666,12 @@ def identify_merged(
     progress: Callable[[int, int], object] | None = None,
 ) -> MergedIdentification: ...
 def built_in_terms() -> list[str]: ...
+def modes(
+    inertia: npt.NDArray[np.float64],
+    damping: npt.NDArray[np.float64],
+    stiffness: npt.NDArray[np.float64],
+    workers: int | None = None,
+) -> Modes: ...
 def respond(
     coefficients: list[npt.NDArray[np.number] | float],
     terms: list[tuple[str, npt.NDArray[np.number] | float]],

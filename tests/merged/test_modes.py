@@ -12,6 +12,7 @@ import tvident
 from merged.simulated import coupled
 from merged.test_masses import OPTIONS
 from parameters import long
+from tvident._merged import modal
 
 Array = npt.NDArray[np.float64]
 
@@ -55,3 +56,20 @@ def test_modes_that_cross_are_not_exchanged(seeds: range) -> None:
     assert (np.abs(np.stack(deviations)) < 4.5).all()
     if len(seeds) > 2:
         assert 0.8 < np.sqrt(np.mean(np.square(deviations))) < 1.2
+
+
+def test_a_mode_is_followed_across_times_at_which_none_is_known() -> None:
+    t = np.linspace(0, 10, 200)
+    springs = [np.full(t.size, 20.0), np.where((t > 4) & (t < 6), np.nan, 10 + 2 * t)]
+    patterns = [np.diag([1.0, 0.0]), np.diag([0.0, 1.0])]
+    nothing = np.zeros((2, 2))
+    elements = [
+        modal.ModalElement((nothing, nothing, one), spring) for one, spring in zip(patterns, springs, strict=True)
+    ]
+    mass = modal.ModalElement((np.eye(2) * 0.02, nothing, nothing), np.ones(t.size))
+    found = modal.modes_of([mass, *elements], np.zeros((t.size, 3, 3)), np.arange(t.size), t.size)
+    # The second spring is the softer one before the gap, and the stiffer one behind it.
+    known = np.isfinite(springs[1])
+    expected = np.sqrt(np.stack([springs[1], springs[0]])[:, known] / 0.02) / (2 * np.pi)
+    np.testing.assert_allclose(found.natural_frequency[:, known], expected, rtol=1e-12)
+    assert np.isnan(found.natural_frequency[:, ~known]).all()

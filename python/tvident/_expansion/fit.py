@@ -9,7 +9,7 @@ of whitened rows (Gauss and Newton); no bias from noise in the regressors is lef
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeAlias
 
@@ -77,6 +77,8 @@ class Fitted:
         How many independent equations there were.
     factor : ndarray, shape (columns, columns), optional
         Triangular, of columns scaled to the same norm; None where they are dependent.
+    beside : ndarray, shape (k, columns + 1), optional
+        Further equations of variance 1 that were solved with those of the record.
     """
 
     values: Array
@@ -84,6 +86,7 @@ class Fitted:
     misfit: float
     observations: float
     factor: Array | None
+    beside: Array | None = None
 
     @cached_property
     def condition(self) -> float:
@@ -157,28 +160,36 @@ class Linearised:
         self.rhs[~usable] = 0.0
         self.angle = record.angle - shown
 
-    def solve(self, unknowns: Sequence[ExpandedUnknown]) -> Fitted:
-        """Return the least-squares solution for some unknowns: by QR decompositions of blocks of whitened rows where these need them."""
+    def solve(self, unknowns: Sequence[ExpandedUnknown], beside: Array | None = None) -> Fitted:
+        """Return the least-squares solution for some unknowns: by QR decompositions of blocks of whitened rows where these need them.
+
+        Parameters
+        ----------
+        unknowns : sequence of ExpandedUnknown
+        beside : ndarray, shape (k, columns + 1), optional
+            Further equations of variance 1, the right-hand side last.
+        """
         size = sum(one.size for one in unknowns)
-        factor = _factor(self._products(unknowns, size), _TO_SOLVE)
+        factor = _factor(self._products(unknowns, size, beside), _TO_SOLVE)
         is_well = factor is not None
         if factor is None:
-            factor = np.zeros((0, size + 1))
+            factor = np.zeros((0, size + 1)) if beside is None else beside
             for white in self.whitened(unknowns):
                 factor = np.asarray(np.linalg.qr(np.concatenate([factor, white]), mode="r"), np.float64)
-        return solved(factor, self.observations, is_well=is_well)
+        return replace(solved(factor, self.observations, is_well=is_well), beside=beside)
 
-    def score(self, unknowns: Sequence[ExpandedUnknown]) -> ScoredSize:
+    def score(self, unknowns: Sequence[ExpandedUnknown], beside: Array | None = None) -> ScoredSize:
         """Return how well some unknowns explain the record, as their solution says."""
         size = sum(one.size for one in unknowns)
-        factor = _factor(self._products(unknowns, size), _TO_COMPARE)
+        factor = _factor(self._products(unknowns, size, beside), _TO_COMPARE)
         if factor is None:
-            return self.solve(unknowns).scored
+            return self.solve(unknowns, beside).scored
         return ScoredSize(size, float(factor[size, size] ** 2), self.observations)
 
-    def _products(self, unknowns: Sequence[ExpandedUnknown], size: int) -> Array:
+    def _products(self, unknowns: Sequence[ExpandedUnknown], size: int, beside: Array | None) -> Array:
         """Return the products of whitened columns, the right-hand side last."""
-        return sum(map(_products, self.whitened(unknowns)), np.zeros((size + 1, size + 1)))
+        start = np.zeros((size + 1, size + 1)) if beside is None else _products(beside)
+        return sum(map(_products, self.whitened(unknowns)), start)
 
     def whitened(self, unknowns: Sequence[ExpandedUnknown]) -> Iterator[Array]:
         """Give pieces of whitened rows, the right-hand side last."""
@@ -194,6 +205,8 @@ class Linearised:
         record = self.record
         reach = int(np.ceil(4 * (max(1, record.rows) / 100) ** (2 / 9))) + record.lags
         middle = np.zeros((fitted.values.size, fitted.values.size))
+        if fitted.beside is not None:
+            middle += _products(fitted.beside[:, :-1])
         last = np.zeros((0, fitted.values.size))
         for white in self.whitened(unknowns):
             scores = white[:, :-1] * (white[:, -1] - white[:, :-1] @ fitted.values)[:, np.newaxis]

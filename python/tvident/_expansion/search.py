@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -15,6 +16,7 @@ from tvident._expansion.families import Family
 from tvident._expansion.fit import Curves, Fitted, Linearised, ScoredSize
 from tvident._expansion.rivals import Rival, scatter
 from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown
+from tvident._expansion.unseen import Bend, Unseen
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -60,6 +62,7 @@ class RecordPart:
     largest : int
     samples : ndarray, shape (n,), optional
         Of a term.
+    is_of_time : bool
     """
 
     name: str
@@ -69,6 +72,7 @@ class RecordPart:
     sizes: Sequence[int | None] = ()
     largest: int = 1
     samples: Array | None = None
+    is_of_time: bool = False
 
     def of(self, sizes: Sequence[int]) -> ExpandedUnknown:
         """Return it with sizes."""
@@ -117,6 +121,7 @@ class SizeSearch:
     tried: dict[tuple[int, ...], Tried] = field(default_factory=dict)
     rivals: dict[str, list[Rival]] = field(default_factory=dict)
     _scores: dict[tuple[int, ...], tuple[list[ExpandedUnknown], ScoredSize]] = field(default_factory=dict)
+    _bends: dict[str, Bend] = field(default_factory=dict)
 
     def run(self, curves: Curves, terms: Array) -> tuple[list[ExpandedUnknown], Fitted, Linearised]:
         """Return the unknowns with their sizes, their factors, and the rows around them.
@@ -142,6 +147,7 @@ class SizeSearch:
             self._scores.clear()
             sizes = self._chosen(around, sizes, free)
             compared, fitted = around, self._solved(around, sizes)
+            self._look_at(sizes, fitted)
             around = self._around(sizes, fitted)
             if not free or sizes == before:
                 break
@@ -208,13 +214,13 @@ class SizeSearch:
 
     def _solved(self, around: Linearised, sizes: Sequence[Sequence[int]]) -> Fitted:
         unknowns = self._unknowns(sizes)
-        fitted = around.solve(unknowns)
+        fitted = around.solve(unknowns, self._unseen_of(unknowns))
         self._keep(sizes, unknowns, fitted.scored)
         return fitted
 
     def _score(self, around: Linearised, sizes: Sequence[Sequence[int]]) -> ScoredSize:
         unknowns = self._unknowns(sizes)
-        found = around.score(unknowns)
+        found = around.score(unknowns, self._unseen_of(unknowns))
         self._keep(sizes, unknowns, found)
         return found
 
@@ -240,7 +246,7 @@ class SizeSearch:
         ]
         found: dict[str, list[Rival]] = {}
         for weight, unknowns in [(1.0, taken), *others]:
-            fitted, first = around.solve(unknowns), 0
+            fitted, first = around.solve(unknowns, self._unseen_of(unknowns)), 0
             for one in unknowns:
                 place = slice(first, first + one.size)
                 first += one.size
@@ -248,6 +254,34 @@ class SizeSearch:
                     rival = Rival(weight, one.basis, fitted.values[place], fitted.covariance[place, place])
                     found.setdefault(one.name, []).append(rival)
         return found
+
+    @cached_property
+    def _unseen(self) -> Unseen:
+        return Unseen(self.record)
+
+    def _look_at(self, sizes: Sequence[Sequence[int]], fitted: Fitted) -> None:
+        """Note how curves of time bend where they are seen."""
+        first = 0
+        for part, one in zip(self.parts, self._unknowns(sizes), strict=True):
+            own = fitted.values[first : first + one.size]
+            first += one.size
+            if part.is_of_time and one.basis is not None and one.basis.families[0].block is None:
+                bend = self._unseen.bend(along_record(one.basis, own))
+                if bend is not None:
+                    self._bends[part.name] = bend
+
+    def _unseen_of(self, unknowns: Sequence[ExpandedUnknown]) -> Array | None:
+        """Return equations of what is not seen of curves of time, the right-hand side last; None where nothing is known of them."""
+        if not self._bends or not self._unseen.places.size:
+            return None
+        found, first, size = [], 0, sum(one.size for one in unknowns)
+        for one in unknowns:
+            if one.name in self._bends and one.basis is not None:
+                rows = np.zeros((self._unseen.places.size, size + 1))
+                rows[:, first : first + one.size] = self._unseen.rows(one.basis, self._bends[one.name])
+                found.append(rows)
+            first += one.size
+        return np.concatenate(found)
 
     def _around(self, sizes: Sequence[Sequence[int]], fitted: Fitted) -> Linearised:
         curves, terms = curves_of(self._unknowns(sizes), fitted.values, self.record.angle.size)

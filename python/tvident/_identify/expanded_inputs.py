@@ -141,7 +141,10 @@ class ExpandedInputs:
             role, places = role_of(name, expansion), self.coordinates[name]
             families = expansion.families_within([one.limits for one in places])
             sizes = expansion.given_sizes
-            found.append(RecordPart(name, role, places, families, sizes, expansion.largest, filled))
+            is_of_time = expansion.is_of_time
+            found.append(
+                RecordPart(name, role, places, families, sizes, expansion.largest, filled, is_of_time=is_of_time)
+            )
         if self.zero:
             found.append(RecordPart("angle_zero", "term", samples=-np.nan_to_num(self.pilot.stiffness)))
         return found

@@ -211,7 +211,9 @@ class Task:
         used = without_spikes(data, found)
         lacking = lacking_terms(used, self._request, self._unknowns, found, self._polynomials, self._known)
         told = Told(used, self._request, self._unknowns, found, batch, settings, lacking)
-        words = told.words(names, searched.told(self.inner, self.ranges, batch, self.columns.samples_of_fading))
+        words = partial(
+            told.words, names, searched.told(self.inner, self.ranges, batch, self.columns.samples_of_fading)
+        )
         batch = told.doubted()
         jumps = tuple(tuple(data.time[one.jumps].tolist()) for one in found)
         return Identification(

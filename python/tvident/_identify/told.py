@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from tvident import _core
 from tvident._advice import (
@@ -56,8 +54,11 @@ class Told:
     settings: Mapping[str, Any]
     lacking: Sequence[Lacking | None] = ()
 
-    def words(self, names: Sequence[str], searched: Sequence[Sequence[FoundBySearch]]) -> Words | Callable[[], Words]:
+    @np.errstate(all="ignore")
+    def words(self, names: Sequence[str], searched: Sequence[Sequence[FoundBySearch]]) -> Words:
         """Return reasons and advice; of several records the advice, since reasons differ too much from one to the next.
+
+        Saying it takes as long as identifying a short record, so it waits until somebody asks.
 
         Parameters
         ----------
@@ -70,12 +71,10 @@ class Told:
         plausible = Plausible(data.axis, data.period, [one.name for one in self.unknowns])
         more = [words_of_search(terms) for terms in searched]
         if isinstance(self.request.form, StrongForm) and data.instruments is None:
-            # What to say takes longer than to identify a short record, so it waits until it is asked for.
-            channels = (data.angles, data.torques)
-            later = partial(_later, self._of_strong_form(), plausible, channels, self.batch, more)
-            if not any(self.lacking) and not data.doubts and data.clock is None and not any(data.clipped or ()):
-                return later
-            words = later()
+            words = self._of_strong_form().words()
+            words = replace(words + (of_batch(more) if several else more[0]), each=words.each)
+            words = plausible.before(words, data.angles, self.batch)
+            words = _with_doubts(words, spikes_that_stay(data.angles, data.torques), several=several)
         else:
             each = [one + search for one, search in zip(self._of_records(names), more, strict=True)]
             words = plausible.before(of_batch(each) if several else each[0], data.angles, self.batch)
@@ -86,7 +85,7 @@ class Told:
         lacking = [
             (record, one.words(terms, data.units.get(one.name, ""))) for record, one in enumerate(self.lacking) if one
         ]
-        empty = [*_empty((data.angles, data.torques), self.batch), *self._without_room_to_change()]
+        empty = [*_empty(data, self.batch), *self._without_room_to_change()]
         return _with_doubts(
             _with_clipped(words, data.clipped, several=several), [*empty, *data.doubts, *lacking], several=several
         )
@@ -161,25 +160,12 @@ class Told:
         )
 
 
-def _later(
-    explained: ExplainedStrong,
-    plausible: Plausible,
-    channels: tuple[npt.NDArray[np.number], npt.NDArray[np.number]],
-    batch: Estimates,
-    more: Sequence[Words],
-) -> Words:
-    """Return what there is to say of the strong form, and of what was searched."""
-    words = explained.words()
-    several = batch.status.ndim > 1
-    words = replace(words + (of_batch(more) if several else more[0]), each=words.each)
-    doubts = [*_empty(channels, batch), *spikes_that_stay(*channels)]
-    return _with_doubts(plausible.before(words, channels[0], batch), doubts, several=several)
-
-
-def _empty(channels: tuple[npt.NDArray[np.number], npt.NDArray[np.number]], batch: Estimates) -> list[tuple[int, str]]:
+def _empty(data: Data, batch: Estimates) -> list[tuple[int, str]]:
     """Return which channels hold nothing, of records without any value."""
     status = batch.status.reshape(-1, batch.status.shape[-1])
-    return without_numbers(*channels, np.flatnonzero((status & Status.INVALID != 0).all(axis=1)).tolist())
+    return without_numbers(
+        data.angles, data.torques, np.flatnonzero((status & Status.INVALID != 0).all(axis=1)).tolist()
+    )
 
 
 def _with_clipped(words: Words, clipped: Sequence[float] | None, *, several: bool) -> Words:

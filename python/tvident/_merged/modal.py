@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _core
+
 Real = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 _MOST_TIMES = 2000
 """Times at which the eigenproblem is solved; in between, modes are interpolated."""
-
-_OVERDAMPED = 1e-9
-"""Imaginary part of a pole, over its magnitude, below which it does not oscillate."""
 
 
 @dataclass(frozen=True)
@@ -72,14 +71,10 @@ def modes_of(elements: Sequence[ModalElement], covariance: Real, times: npt.NDAr
         sum(one.patterns[which] * one.values[times, np.newaxis, np.newaxis] for one in elements) for which in range(3)
     ]
     inertia, damping, stiffness = (np.asarray(one, np.float64) for one in matrices)
-    poles = np.full((times.size, count), np.nan, np.complex128)
-    shapes = np.full((times.size, count, count), np.nan, np.complex128)
-    lefts = np.full((times.size, count, count), np.nan, np.complex128)
-    known = np.all([np.isfinite(one).all((1, 2)) for one in (inertia, damping, stiffness)], axis=0)
-    known[known] = np.linalg.matrix_rank(inertia[known]) == count
-    if known.any():
-        found = _solved(inertia[known], damping[known], stiffness[known])
-        poles[known], shapes[known], lefts[known] = _tracked(*found)
+    found = _core.modes(inertia, damping, stiffness)
+    poles, shapes, lefts = found.poles, np.swapaxes(found.shapes, 1, 2).copy(), found.lefts
+    known = np.isfinite(poles).any(axis=1)
+    poles[known], shapes[known], lefts[known] = _tracked(poles[known], shapes[known], lefts[known])
     frequency, ratio = np.abs(poles) / (2 * np.pi), -poles.real / np.abs(poles)
     errors = _errors(elements, covariance, (poles, shapes, lefts), (inertia, damping))
     everywhere = np.arange(samples)
@@ -97,25 +92,6 @@ def modes_of(elements: Sequence[ModalElement], covariance: Real, times: npt.NDAr
 def _interpolated(at: npt.NDArray[np.intp], times: npt.NDArray[np.intp], values: Real) -> Real:
     """Interpolate; what is next to something unknown is unknown."""
     return np.asarray(np.interp(at, times, values))
-
-
-def _solved(inertia: Real, damping: Real, stiffness: Real) -> tuple[Complex, Complex, Complex]:
-    """Return the poles with a positive imaginary part, their shapes and left shapes, the lowest first, at every time."""
-    times, count, _ = inertia.shape
-    inverse = np.linalg.inv(inertia)
-    state = np.zeros((times, 2 * count, 2 * count))
-    state[:, :count, count:] = np.eye(count)
-    state[:, count:, :count] = -inverse @ stiffness
-    state[:, count:, count:] = -inverse @ damping
-    values, vectors = np.linalg.eig(state)
-    # With q = φ e^{λt} the left vectors of the quadratic problem are those of the state's lower half, times M⁻¹.
-    lefts = np.linalg.inv(vectors)[:, :, count:] @ inverse
-    oscillates = values.imag > _OVERDAMPED * np.abs(values)
-    order = np.argsort(np.where(oscillates, np.abs(values), np.inf), axis=1)[:, :count]
-    take = np.take_along_axis
-    poles = np.where(take(oscillates, order, 1), take(values, order, 1), np.nan)
-    shapes = take(vectors[:, :count, :], order[:, np.newaxis, :], 2)
-    return poles, shapes, take(lefts, order[:, :, np.newaxis], 1)
 
 
 def _tracked(poles: Complex, shapes: Complex, lefts: Complex) -> tuple[Complex, Complex, Complex]:

@@ -13,6 +13,7 @@ mod identify;
 mod irregular;
 mod local_polynomials;
 mod merged;
+mod modes;
 mod motions;
 mod noise;
 mod records;
@@ -48,6 +49,8 @@ mod _core {
     use crate::local_polynomials::{IncompleteEstimates, LocalEstimates, LocalPolynomials};
     #[pymodule_export]
     use crate::merged::{MergedElement, MergedIdentification, identify_merged};
+    #[pymodule_export]
+    use crate::modes::{Modes, modes};
     #[pymodule_export]
     use crate::motions::Motions;
     #[pymodule_export]
