@@ -72,11 +72,13 @@ impl Widths {
         let fits_of = |length: Option<f64>| {
             let blocks = blocks(one, length);
             let few = length.is_some() && blocks.iter().any(|block| block.len() < 2 * one.reach);
-            if few { Vec::new() } else { fit_in_blocks(one.rows, &self.model, &self.noises, &blocks, one.reach) }
+            (!few).then(|| fit_in_blocks(one.rows, &self.model, &self.noises, &blocks, one.reach))
         };
         let pieces = self.lengths.iter().map(|&length| Piece { size: one.rows.len(), content: length }).collect();
         let fits = stages.map(pieces, || (), |length, (): &mut ()| fits_of(length))?;
         for (scans, fits) in self.scans.iter_mut().zip(fits) {
+            // Blocks without room for a width say nothing against it.
+            let Some(fits) = fits else { continue };
             for scan in scans.iter_mut() {
                 scan.tried += 1;
             }
