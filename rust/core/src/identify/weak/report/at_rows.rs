@@ -35,6 +35,8 @@ pub(crate) struct Fitted<'a> {
     pub(crate) errors: &'a Errors,
     /// Covariance and values of the constants, those that change slowly first.
     pub(crate) covariance: &'a [f64],
+    /// What each of them may be wrong by all along the record, which is part of the covariance; empty where nothing is known.
+    pub(crate) changes: &'a [f64],
     pub(crate) constants: &'a [f64],
 }
 
@@ -120,7 +122,7 @@ impl Session<'_, '_, '_> {
 
     /// Standard errors of what changes, covariances of pairs of coefficients, and which pairs those are.
     fn errors_at_rows(&mut self, fitted: &Fitted<'_>, tracks: &Tracks) -> Result<ErrorsAtRows, Error> {
-        let Fitted { problem, decided, errors, covariance, .. } = *fitted;
+        let Fitted { problem, decided, errors, covariance, changes, .. } = *fitted;
         let count = problem.layout.constant;
         let (windowed, slow) = (problem.layout.windowed, decided.slow.len());
         let column = || vec![0.0; tracks.status.len()];
@@ -132,8 +134,10 @@ impl Session<'_, '_, '_> {
             }
             _ => 1.0,
         };
+        let change = |one: usize| changes.get(one).copied().unwrap_or(0.0);
         let between = |one: usize, other: usize, place: usize| {
-            share(one, place) * share(other, place) * covariance[one * count + other]
+            let everywhere = change(one) * change(other);
+            share(one, place) * share(other, place) * (covariance[one * count + other] - everywhere) + everywhere
         };
         let sensitive =
             |unknown: usize, constant: usize, place: usize| tracks.sensitivities[unknown * count + constant][place];
