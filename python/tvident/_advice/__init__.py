@@ -2,7 +2,7 @@
 
 from tvident._advice.events import spikes_that_stay
 from tvident._advice.expansion import FoundExpansion, words_of_expansions
-from tvident._advice.instrument import words_with_instrument
+from tvident._advice.instrument import fed_back_in_records, words_with_instrument
 from tvident._advice.plausible import Plausible
 from tvident._advice.search import FoundBySearch, words_of_search
 from tvident._advice.strong import ExplainedStrong
@@ -14,6 +14,7 @@ __all__ = [
     "FoundBySearch",
     "FoundExpansion",
     "Plausible",
+    "fed_back_in_records",
     "spikes_that_stay",
     "words_of_expansions",
     "words_of_search",

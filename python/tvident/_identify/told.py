@@ -16,6 +16,7 @@ from tvident._advice import (
     ExplainedStrong,
     FoundBySearch,
     Plausible,
+    fed_back_in_records,
     spikes_that_stay,
     words_of_search,
     words_with_instrument,
@@ -28,6 +29,9 @@ from tvident._identify.methods import StrongForm
 from tvident._identify.settings import Request
 from tvident._results import Estimates, Words, of_batch
 from tvident._status import Status
+
+_Channels = tuple[npt.NDArray[np.number], npt.NDArray[np.number]]
+_Doubts = list[tuple[int, str]]
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,9 @@ class Told:
         if isinstance(self.request.form, StrongForm) and data.instruments is None:
             # What to say takes longer than to identify a short record, so it waits until it is asked for.
             channels = (data.angles, data.torques)
-            later = partial(_later, self._of_strong_form(), plausible, channels, self.batch, more)
+            # What was made of several channels, or integrated, has no noise above the motion that would be the angle's alone.
+            doubts = [spikes_that_stay] if data.motion.recorded else [spikes_that_stay, fed_back_in_records]
+            later = partial(_later, self._of_strong_form(), plausible, (channels, doubts), self.batch, more)
             if not any(self.lacking) and not data.doubts and data.clock is None and not any(data.clipped or ()):
                 return later
             words = later()
@@ -146,7 +152,7 @@ class Told:
 def _later(
     explained: ExplainedStrong,
     plausible: Plausible,
-    channels: tuple[npt.NDArray[np.number], npt.NDArray[np.number]],
+    looked_at: tuple[_Channels, Sequence[Callable[[npt.NDArray[np.number], npt.NDArray[np.number]], _Doubts]]],
     batch: Estimates,
     more: Sequence[Words],
 ) -> Words:
@@ -154,7 +160,8 @@ def _later(
     words = explained.words()
     several = batch.status.ndim > 1
     words = replace(words + (of_batch(more) if several else more[0]), each=words.each)
-    doubts = spikes_that_stay(*channels)
+    channels, looks = looked_at
+    doubts = [doubt for look in looks for doubt in look(*channels)]
     return _with_doubts(plausible.before(words, channels[0], batch), doubts, several=several)
 
 
