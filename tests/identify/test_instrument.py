@@ -52,7 +52,7 @@ def test_estimates_are_right_under_feedback_and_their_errors_hold(
 def test_other_units_and_rates(records: tuple[Array, Array, Array], method: str, every: int) -> None:
     """Degrees and N mm change nothing but the numbers; a tenth of the samples, nothing but the errors."""
     rate, window = RATE / every, {1: 101, 10: 11}[every]
-    how = "auto" if method == "weak" else tvident.StrongForm(window_length=window)
+    how: Any = "auto" if method == "weak" else tvident.StrongForm(window_length=window)
     scores = []
     for angle, torque, reference in zip(*(channel[:20, ::every] for channel in records), strict=True):
         plain = tvident.identify(angle, torque, sample_rate=rate, method=how, instrument=reference)
@@ -85,7 +85,7 @@ def test_without_an_instrument_feedback_is_said(records: tuple[Array, Array, Arr
     assert result.vaf() > 90
 
 
-def is_said(result: tvident.Identification) -> bool:
+def is_said(result: Any) -> bool:
     return any("holds the angle's noise" in line and "instrument=" in line for line in result.advice)
 
 
@@ -104,7 +104,13 @@ def test_feedback_is_said_in_both_forms_and_of_few_samples(
 def test_open_loop_is_not_taken_for_feedback(seeds: range) -> None:
     for seed in seeds:
         rig = tvident.simulate_torsional_rig(duration=10.0, seed=seed, angle_noise=10.0 ** -(2 + seed % 4))
-        for every, method in ((1, "auto"), (1, STRONG), (10, "auto"), (10, tvident.StrongForm(window_length=11))):
+        both: list[tuple[int, Any]] = [
+            (1, "auto"),
+            (1, STRONG),
+            (10, "auto"),
+            (10, tvident.StrongForm(window_length=11)),
+        ]
+        for every, method in both:
             channels = rig.angle[::every], rig.torque[::every]
             result = tvident.identify(*channels, sample_rate=1000 / every, method=method, **CONSTANT)
             assert not is_said(result), seed
