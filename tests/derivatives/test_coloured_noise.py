@@ -87,6 +87,20 @@ def test_no_worse_than_the_best_filter(kind: str, colour: str) -> None:
         assert (np.mean(covered, axis=0)[1:] <= high).all(), covered
 
 
+@pytest.mark.parametrize("kind", ["constant", "line"])
+@pytest.mark.parametrize("colour", ["0", "0.8", *long("0.5", "0.9", "1/f")])
+def test_errors_of_a_trend_hold_up_to_its_ends(kind: str, colour: str) -> None:
+    """Near the ends coefficients below their noise are shrunk to nothing. Their errors were nothing, too: half of a record was 0 ± 0."""
+    truth = motion(kind)
+    covered = []
+    for seed in range(20, 28):
+        fit = tvident.fit_local_polynomials(truth[0] + 0.03 * noise(colour, seed), "auto", sample_rate=RATE)
+        assert (fit.stderr > 0).all()
+        covered.append([np.mean(np.abs(fit.derivatives[d] - truth[d]) < 1.96 * fit.stderr[d]) for d in (1, 2)])
+    # Windows are half as long as the record: eight records hold some 24 windows that share nothing.
+    assert (np.mean(covered, axis=0) > COVERAGE[0] - 0.06).all(), covered
+
+
 def test_the_noise_that_is_reported_is_all_of_it() -> None:
     y = motion("sine")[0] + 0.03 * noise("0.8", 5)
     fit = tvident.fit_local_polynomials(y, "auto", sample_rate=RATE)

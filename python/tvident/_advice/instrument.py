@@ -1,6 +1,9 @@
-"""Reasons and advice of an identification with an instrument, in words."""
+"""Reasons and advice of an identification with an instrument, in words, and where one is missing."""
 
 from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
 
 from tvident import _core
 from tvident._results import Words
@@ -32,3 +35,21 @@ def words_with_instrument(found: _core.Identification) -> Words:
         "and errors are too small: excite more, over a longer record, or take a channel nearer to the excitation"
     )
     return Words(tuple(reasons), (weak,))
+
+
+def fed_back(coherence: float | None) -> list[str]:
+    """Return what to do where the noise of angle and torque is coherent above the motion."""
+    if coherence is None or coherence < _core.CORRELATED_NOISE:
+        return []
+    words = (
+        f"the torque holds the angle's noise (coherence {coherence:.2f} above the motion): a controller feeds it back, and "
+        "estimates are biased: give the reference or another channel that moves the system as instrument="
+    )
+    return [words]
+
+
+def fed_back_in_records(angles: npt.NDArray[np.number], torques: npt.NDArray[np.number]) -> list[tuple[int, str]]:
+    """Return the same by record, where nothing is known of the noise yet."""
+    variances = [one.sigma**2 for one in _core.noise(angles)]
+    coherences = _core.noise_coherence(angles, torques, variances)
+    return [(record, line) for record, coherence in enumerate(coherences) for line in fed_back(coherence)]

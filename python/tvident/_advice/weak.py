@@ -20,6 +20,7 @@ from tvident._advice.events import (
     spikes,
     unexplained_here,
 )
+from tvident._advice.instrument import fed_back
 from tvident._advice.lists import listed
 from tvident._advice.scales import disagreement, scales_compared
 from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, UNITS
@@ -114,7 +115,7 @@ class Explained:
             # A jump of a turn leaves nothing of the rest: what else looks wrong is its consequence.
             return Words(reasons, tuple(self._defects()))
         advice = (
-            *self._feedback(),
+            *fed_back(self.coherence),
             *disagreement(self.found, self.names, self.units, flags),
             *self._misfit(flags),
             *unexplained_here(self.found, self.period, self.step),
@@ -237,15 +238,6 @@ class Explained:
 
     def _reach(self) -> int:
         return self.found.window_length // 2
-
-    def _feedback(self) -> list[str]:
-        if self.coherence is None or self.coherence < _core.CORRELATED_NOISE:
-            return []
-        words = (
-            f"the torque holds the angle's noise (coherence {self.coherence:.2f} above the motion): a controller feeds it back, and "
-            "estimates are biased: give the reference or another channel that moves the system as instrument="
-        )
-        return [words]
 
     def _outside(self) -> list[str]:
         if self.found.outside_mask is None:

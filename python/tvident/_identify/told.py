@@ -14,6 +14,7 @@ from tvident._advice import (
     ExplainedStrong,
     FoundBySearch,
     Plausible,
+    fed_back_in_records,
     spikes_that_stay,
     without_numbers,
     words_of_search,
@@ -74,7 +75,11 @@ class Told:
             words = self._of_strong_form().words()
             words = replace(words + (of_batch(more) if several else more[0]), each=words.each)
             words = plausible.before(words, data.angles, self.batch)
-            words = _with_doubts(words, spikes_that_stay(data.angles, data.torques), several=several)
+            doubts = spikes_that_stay(data.angles, data.torques)
+            if not data.motion.recorded:
+                # What was made of several channels, or integrated, has no noise above the motion that would be the angle's alone.
+                doubts = [*doubts, *fed_back_in_records(data.angles, data.torques)]
+            words = _with_doubts(words, doubts, several=several)
         else:
             each = [one + search for one, search in zip(self._of_records(names), more, strict=True)]
             words = plausible.before(of_batch(each) if several else each[0], data.angles, self.batch)

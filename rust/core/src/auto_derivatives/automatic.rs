@@ -179,8 +179,13 @@ pub fn estimate_automatically(
     let mut outputs = DerivativeOutputs { values: estimates.values, errors: estimates.errors, order: estimates.order };
     refinement.estimate(survey.means(), &mut outputs, workers, watch)?;
     let both = boundary::estimate(survey, pair, &at_ends, &mut || check_cancelled(watch, total, total))?;
+    let least = match trend {
+        Some(_) => boundary::errors_of_trend(survey, pair.half, &at_ends)?,
+        None => vec![0.0; pair.half],
+    };
     for (end, at_end) in both {
         for (place, (&value, &error)) in at_end.values.iter().zip(&at_end.errors).enumerate() {
+            let error = error.max(least.get(place).copied().unwrap_or(0.0));
             let sample = if end == End::First { place } else { samples - 1 - place };
             // Places that the windows at the end do not reach may still be reached by shorter ones inside.
             if !value.is_nan() {

@@ -36,6 +36,8 @@ pub(crate) struct SlowCoefficients {
     pub(crate) rhs: Vec<f64>,
     /// The length of windows with the smallest cross-validation error.
     pub(crate) scale: Scale,
+    /// The length of the windows that left the equations for them.
+    pub(crate) equations_of: Scale,
     /// Mean squared error of predicting rows, over the noise's variance.
     pub(crate) error: f64,
     /// Bandwidth: rows on either side that they are estimated from.
@@ -123,8 +125,9 @@ pub(crate) fn find(
         let Some(next) = validated.iter().min_by(|a, b| a.error.total_cmp(&b.error)) else { return Ok(None) };
         let error = next.error;
         let best = next.fit.scale.unwrap_or(scale);
+        let reach = reach.min(whole / 2.0);
+        found = Some(SlowCoefficients { varying, rhs, scale: best, equations_of: scale, error, reach });
         scale = shortened(best);
-        found = Some(SlowCoefficients { varying, rhs, scale: best, error, reach: reach.min(whole / 2.0) });
     }
     Ok(found)
 }

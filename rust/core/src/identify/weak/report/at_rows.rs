@@ -35,6 +35,8 @@ pub(crate) struct Fitted<'a> {
     pub(crate) errors: &'a Errors,
     /// Covariance and values of the constants, those that change slowly first.
     pub(crate) covariance: &'a [f64],
+    /// What each of them may be wrong by all along the record, which is part of the covariance; empty where nothing is known.
+    pub(crate) changes: &'a [f64],
     pub(crate) constants: &'a [f64],
 }
 
@@ -93,22 +95,49 @@ impl Session<'_, '_, '_> {
         Ok((results, pairs))
     }
 
+    /// By slow coefficient: the variance that noise gives it where equations are said to determine it to a variance of one, over its variance as
+    /// a constant of the whole record.
+    fn variances_of_slow(&mut self, fitted: &Fitted<'_>) -> Result<Vec<f64>, Error> {
+        let Fitted { problem, decided, all, errors, .. } = *fitted;
+        let count = problem.layout.constant;
+        let Some(found) = &decided.found else { return Ok(Vec::new()) };
+        let mut variances: Vec<f64> =
+            (0..decided.slow.len()).map(|place| all.pooled.inverse[place * (count + 1)].recip()).collect();
+        if all.scale.is_none_or(|scale| scale == found.equations_of) {
+            return Ok(variances);
+        }
+        // They come from windows of another length than the constants beside them, each row of which counts in another number of them.
+        let (instructions, stages) = (self.options.instructions, &mut self.stages);
+        let own = Fit::new(problem, Some(found.equations_of), errors.expected, instructions, stages)?;
+        let Some(own) = own else { return Ok(variances) };
+        for (place, variance) in variances.iter_mut().enumerate() {
+            let of = |fit: &Fit, stages: &mut _| fit.variance_of(problem, place, &errors.covariance, stages);
+            let ratio = of(&own, &mut self.stages)? / of(all, &mut self.stages)?;
+            if ratio.is_finite() {
+                *variance = ratio / own.pooled.inverse[place * (count + 1)];
+            }
+        }
+        Ok(variances)
+    }
+
     /// Standard errors of time-varying parameters, covariances of pairs of coefficients, and which pairs those are.
     fn errors_at_rows(&mut self, fitted: &Fitted<'_>, tracks: &Tracks) -> Result<ErrorsAtRows, Error> {
-        let Fitted { problem, decided, all, errors, covariance, .. } = *fitted;
+        let Fitted { problem, decided, errors, covariance, changes, .. } = *fitted;
         let count = problem.layout.constant;
         let (windowed, slow) = (problem.layout.windowed, decided.slow.len());
         let column = || vec![0.0; tracks.status.len()];
         // A slow coefficient is taken from a part of the record only, so its error is larger.
+        let equations = self.variances_of_slow(fitted)?;
         let share = |constant: usize, place: usize| match &decided.found {
             Some(found) if constant < slow => {
-                let whole = all.pooled.inverse[constant * (count + 1)];
-                (found.varying.variance(constant, tracks.row(place)) / whole).sqrt()
+                (found.varying.variance(constant, tracks.row(place)) * equations[constant]).sqrt()
             }
             _ => 1.0,
         };
+        let change = |one: usize| changes.get(one).copied().unwrap_or(0.0);
         let between = |one: usize, other: usize, place: usize| {
-            share(one, place) * share(other, place) * covariance[one * count + other]
+            let everywhere = change(one) * change(other);
+            share(one, place) * share(other, place) * (covariance[one * count + other] - everywhere) + everywhere
         };
         let sensitive =
             |unknown: usize, constant: usize, place: usize| tracks.sensitivities[unknown * count + constant][place];

@@ -27,8 +27,8 @@ const CURVATURE: usize = 1;
 const UNSURE: f64 = 0.1;
 
 impl Session<'_, '_, '_> {
-    /// By how much the constants change beside derivatives of the torque that a lag would leave nothing for, or `None` where nothing speaks against
-    /// a lag alone.
+    /// By how much the constants, those that change slowly first, change beside derivatives of the torque that a lag would leave nothing for, or
+    /// `None` where nothing speaks against a lag alone.
     pub(crate) fn left_of_filter(
         &mut self,
         weak: &WeakRows,
@@ -54,12 +54,13 @@ impl Session<'_, '_, '_> {
         rows.clear_unusable();
         // Rows as they are, also where equations were weighted by their noise.
         let (known, expected) = self.covariance(weak, self.parameters(&decided.model, fit));
-        let (model, instructions) = (&decided.model, self.options.instructions);
+        // What changes slowly was taken off the right-hand side; a constant beside it is what it may be wrong by.
+        let (model, instructions) = (decided.ordered(), self.options.instructions);
         let problem = model.problem(&rows, &rhs, self.noise[0], None);
         let before = fit.again(&problem, expected, instructions, &mut self.stages)?;
         add_noise_of_torque(&mut rows, weak, first, [self.noise[0], self.channel_noise[1]]);
         let constant = model.constant.iter().copied().chain(first..first + DERIVATIVES.len()).collect();
-        let model = Model { constant, ..model.clone() };
+        let model = Model { constant, ..model };
         let problem = model.problem(&rows, &rhs, 1.0, None);
         let beside = fit.again(&problem, expected, instructions, &mut self.stages)?;
         let (Some(before), Some(beside)) = (before, beside) else { return Ok(None) };

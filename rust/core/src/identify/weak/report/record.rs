@@ -59,7 +59,7 @@ impl Session<'_, '_, '_> {
         let mut values = vec![0.0; slow];
         values.extend(&fit.pooled.values);
         found.constants = constants(decided, &values, &found.covariance);
-        found.filtered = changes.map(|changes| largest_part(&found.constants, &changes));
+        found.filtered = changes.as_ref().map(|changes| largest_part(&found.constants, &changes[slow..]));
         found.unexplained = match explained {
             Explained::Plainly => false,
             Explained::NoTorque => true,
@@ -90,8 +90,16 @@ impl Session<'_, '_, '_> {
         let usable = &decided.whole.as_ref().unwrap_or(&weak.rows).usable;
         tracks.mark(usable, outside.as_ref());
         found.outside_mask = outside;
-        let (covariance, constants) = (&found.covariance, values.as_slice());
-        let fitted = Fitted { weak: &weak, problem: &problem, decided, all, errors: &errors, covariance, constants };
+        let fitted = Fitted {
+            weak: &weak,
+            problem: &problem,
+            decided,
+            all,
+            errors: &errors,
+            covariance: &found.covariance,
+            changes: changes.as_deref().unwrap_or_default(),
+            constants: &values,
+        };
         let (results, pairs) = self.at_rows(&fitted, tracks)?;
         found.pairs = pairs;
         let rhs = decided.rhs(&weak.rows).to_vec();
@@ -208,13 +216,11 @@ impl Session<'_, '_, '_> {
     }
 }
 
-/// Adds what the last of the constants may be wrong by to their covariance, all at once.
+/// Adds what the constants may be wrong by to their covariance, all at once.
 fn add_changes(covariance: &mut [f64], changes: &[f64]) {
-    let count = covariance.len().isqrt();
-    let slow = count - changes.len();
     for (one, change) in changes.iter().enumerate() {
         for (other, with) in changes.iter().enumerate() {
-            covariance[(slow + one) * count + slow + other] += change * with;
+            covariance[one * changes.len() + other] += change * with;
         }
     }
 }
