@@ -126,11 +126,13 @@ pub(crate) fn errors_of_trend(survey: &Survey<'_>, half: usize, target: &Target<
     let order = target.highest(half);
     let correlations = correlations(&tables.basis, order, 1, target.noise);
     let slopes = SampleSlopes::new(&tables.basis, 1, target.derivative, order + 1);
-    let squared = |place: usize| {
-        let weights: Vec<f64> = slopes.of_coefficients(place)[..=order].iter().map(|q| target.scale() * q).collect();
+    let places = knots(half);
+    let error = |of_coefficients: &[f64; MOST_DEGREES]| {
+        let weights: Vec<f64> = of_coefficients[..=order].iter().map(|q| target.scale() * q).collect();
         (target.noise.variance() * quadratic(&weights, &correlations)).sqrt()
     };
-    Ok(interpolated(half, squared))
+    let errors: Vec<f64> = slopes.of_coefficients_at(&places, target.instructions).iter().map(error).collect();
+    Ok(interpolated(&places, &errors))
 }
 
 /// Averages the estimates of windows of several lengths.
