@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from difflib import get_close_matches
 from typing import Any
 
 from tvident import _arguments as arguments
@@ -375,6 +374,8 @@ def _check_names(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Ma
         if not foreign:
             continue
         other = next((form for form in of_form if foreign[0] in of_form[form]), None)
+        from difflib import get_close_matches  # noqa: PLC0415 - for mistakes alone
+
         near = get_close_matches(str(foreign[0]), may, n=1)
         cure = (
             f"it belongs to the {other} form"

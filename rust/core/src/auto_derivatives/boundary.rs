@@ -30,6 +30,7 @@ use crate::auto_derivatives::candidate_weights::Reference;
 use crate::auto_derivatives::candidates::{Target, correlated};
 use crate::auto_derivatives::differences::total;
 use crate::auto_derivatives::global_choice::{CheckCancelled, Pair, rounded};
+use crate::auto_derivatives::knots::{interpolated, knots};
 use crate::auto_derivatives::local_weights::packet;
 use crate::auto_derivatives::reference_line::ReferenceLine;
 use crate::auto_derivatives::slopes::{BasisSums, SampleSlopes};
@@ -61,9 +62,6 @@ const LEAST_NEAR: usize = 1024;
 const CLOSE_WINDOWS: usize = 1024;
 const MOST_WINDOWS: usize = 256;
 const FEWEST_WINDOWS: f64 = 20.0;
-
-/// Places at which risks are measured in records that are not short, the closer to each other the nearer to the end; between them risks are interpolated.
-const PLACES: usize = 12;
 
 /// Estimates near an end, from the outermost sample inwards.
 #[derive(Debug)]
@@ -126,11 +124,13 @@ pub(crate) fn errors_of_trend(survey: &Survey<'_>, half: usize, target: &Target<
     let order = target.highest(half);
     let correlations = correlations(&tables.basis, order, 1, target.noise);
     let slopes = SampleSlopes::new(&tables.basis, 1, target.derivative, order + 1);
-    let squared = |place: usize| {
-        let weights: Vec<f64> = slopes.of_coefficients(place)[..=order].iter().map(|q| target.scale() * q).collect();
+    let places = knots(half);
+    let error = |of_coefficients: &[f64; MOST_DEGREES]| {
+        let weights: Vec<f64> = of_coefficients[..=order].iter().map(|q| target.scale() * q).collect();
         (target.noise.variance() * quadratic(&weights, &correlations)).sqrt()
     };
-    Ok(interpolated(half, squared))
+    let errors: Vec<f64> = slopes.of_coefficients_at(&places, target.instructions).iter().map(error).collect();
+    Ok(interpolated(&places, &errors))
 }
 
 /// Averages the estimates of windows of several lengths.
@@ -260,35 +260,6 @@ impl Near<'_> {
         let sums = dispatch(target.instructions, BasisSums { basis, first: means.start, values: &values });
         sums.iter().zip(weights).map(|(sum, weight)| sum * weight).sum()
     }
-}
-
-/// The places at which risks are measured, of so many: the first and the last are among them.
-fn knots(count: usize) -> Vec<usize> {
-    if count <= PLACES {
-        return (0..count).collect();
-    }
-    let knot = |index: usize| {
-        let share = index as f64 / (PLACES - 1) as f64;
-        rounded((count - 1) as f64 * share * share)
-    };
-    let mut knots: Vec<usize> = (0..PLACES).map(knot).collect();
-    knots.dedup();
-    knots
-}
-
-/// Numbers at all places from those at a few of them.
-fn interpolated(knots: &[usize], at: &[f64]) -> Vec<f64> {
-    let mut values = Vec::with_capacity(knots.last().map_or(0, |last| last + 1));
-    for (knots, at) in knots.windows(2).zip(at.windows(2)) {
-        let span = (knots[1] - knots[0]) as f64;
-        for place in knots[0]..knots[1] {
-            let distance = (place - knots[0]) as f64 / span;
-            // Where one is infinite so is what lies between.
-            values.push(at[0] * (1.0 - distance) + if distance > 0.0 { at[1] * distance } else { 0.0 });
-        }
-    }
-    values.extend(at.last());
-    values
 }
 
 /// Estimates at one place of every window, and at its mirror image, beside the reference there: the sum of the squared differences, in eight sums side

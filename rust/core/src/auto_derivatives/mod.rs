@@ -9,6 +9,7 @@ pub(crate) mod deconvolution;
 pub(crate) mod differences;
 pub(crate) mod global_choice;
 pub(crate) mod interpolated_average;
+pub(crate) mod knots;
 pub(crate) mod local_average;
 pub(crate) mod local_weights;
 pub(crate) mod mixture;

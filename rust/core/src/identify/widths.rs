@@ -10,12 +10,14 @@ use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
 use crate::identify::scanned::{BLOCKS, LONGER, Scan, Scans};
 use crate::inference::scales::AtScale;
-use crate::regression::block_fit::fit_in_blocks;
+use crate::regression::block_fit::{NoFit, fit_in_blocks};
 use crate::regression::model::Model;
 
 /// Typical cycles of the motion that blocks last in which windowed unknowns grow linearly, and the fewest blocks.
 const CYCLES: [f64; 3] = [3.0, 6.0, 12.0];
 const FEWEST_BLOCKS: usize = 8;
+/// Where so many blocks do not determine constants beside what is windowed, something else than their number is in the way.
+const ENOUGH_BLOCKS: usize = 2 * FEWEST_BLOCKS;
 /// Samples of a long record that are scanned, in so many stretches.
 pub(crate) const MOST_SAMPLES: usize = 1 << 17;
 pub(crate) const STRETCHES: usize = 8;
@@ -72,16 +74,21 @@ impl Widths {
         let fits_of = |length: Option<f64>| {
             let blocks = blocks(one, length);
             let few = length.is_some() && blocks.iter().any(|block| block.len() < 2 * one.reach);
-            if few { Vec::new() } else { fit_in_blocks(one.rows, &self.model, &self.noises, &blocks, one.reach) }
+            let fits = || fit_in_blocks(one.rows, &self.model, &self.noises, &blocks, one.reach);
+            (if few { Vec::new() } else { fits() }, length.is_none() || blocks.len() >= ENOUGH_BLOCKS)
         };
         let pieces = self.lengths.iter().map(|&length| Piece { size: one.rows.len(), content: length }).collect();
         let fits = stages.map(pieces, || (), |length, (): &mut ()| fits_of(length))?;
-        for (scans, fits) in self.scans.iter_mut().zip(fits) {
-            for scan in scans.iter_mut() {
-                scan.tried += 1;
+        for (scans, (fits, enough)) in self.scans.iter_mut().zip(fits) {
+            for (place, scan) in scans.iter_mut().enumerate() {
+                // That few blocks do not determine the constants is for want of a longer record, and says nothing against them; that one of
+                // them holds all that is known does.
+                let failed = fits.get(place).map(|fit| fit.as_ref().err());
+                let says_something = enough || matches!(failed, Some(None | Some(NoFit::Undetermined)));
+                scan.tried += usize::from(says_something);
             }
             for (scan, fit) in scans.iter_mut().zip(fits) {
-                scan.scales.extend(fit.map(|fit| AtScale::new(one.scale, fit)));
+                scan.scales.extend(fit.ok().map(|fit| AtScale::new(one.scale, fit)));
             }
         }
         Ok(())

@@ -196,15 +196,24 @@ pub(crate) fn inverse(matrix: &[f64], count: usize) -> Option<Vec<f64>> {
     Some((0..count).flat_map(|i| work[i * wide + count..(i + 1) * wide].to_vec()).collect())
 }
 
+/// Why blocks give no constants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NoFit {
+    /// One or two blocks tell all there is, or they hardly tell constants apart.
+    Undetermined,
+    /// Beside windowed unknowns more of them would be needed.
+    TooFewBlocks,
+}
+
 /// Fits the constants of a model to rows in blocks, once for every variance of the angle's noise: zero is ordinary least squares. A test
-/// function spans `reach` rows to either side. `None` where too few rows or blocks are left, or they do not determine the constants.
+/// function spans `reach` rows to either side. Each may fail.
 pub(crate) fn fit_in_blocks(
     rows: &Rows,
     model: &Model,
     noises: &[f64],
     blocks: &[Range<usize>],
     reach: usize,
-) -> Vec<Option<BlockFit>> {
+) -> Vec<Result<BlockFit, NoFit>> {
     let products = Products { rows, model };
     let moments: Vec<_> = blocks.iter().map(|block| products.of(block)).collect();
     let scale = products.scale(&moments);
@@ -222,9 +231,14 @@ pub(crate) fn fit_in_blocks(
             part
         };
         let parts: Vec<Vec<f64>> = blocks.iter().zip(&moments).map(part).collect();
-        let spread = if first == 0 { SPREAD } else { SPREAD_BESIDE_WINDOWED };
         let few = used < (ROWS_OF_AN_UNKNOWN * unknowns) as f64;
-        let fit = if few || !is_spread(&parts, constants, spread) { None } else { solve(&parts, constants, lags) };
+        if few || !is_spread(&parts, constants, SPREAD) {
+            return Err(NoFit::Undetermined);
+        }
+        if first > 0 && !is_spread(&parts, constants, SPREAD_BESIDE_WINDOWED) {
+            return Err(NoFit::TooFewBlocks);
+        }
+        let fit = solve(&parts, constants, lags).ok_or(NoFit::Undetermined);
         let unscaled = |i: usize| scale[count - 1] / scale[first + i];
         fit.map(|(values, covariance)| BlockFit {
             values: values.into_iter().enumerate().map(|(i, value)| value * unscaled(i)).collect(),
@@ -364,8 +378,12 @@ mod tests {
     #[test]
     fn too_few_rows_or_blocks_determine_nothing() {
         let rows = rows(WHOLE, |_| [1.0, 0.1], 0.1);
-        assert_eq!(fit_in_blocks(&rows, &model(), &[0.0, 0.1], &blocks(2), 1), [None, None]);
-        assert_eq!(fit_in_blocks(&rows, &model(), &[0.0], &blocks(200), 1), [None]);
-        assert_eq!(fit_in_blocks(&rows, &model(), &[0.0], &[], 1), [None]);
+        assert_eq!(
+            fit_in_blocks(&rows, &model(), &[0.0, 0.1], &blocks(2), 1),
+            [Err(NoFit::Undetermined), Err(NoFit::Undetermined)]
+        );
+        assert_eq!(fit_in_blocks(&rows, &model(), &[0.0], &blocks(200), 1), [Err(NoFit::Undetermined)]);
+        assert_eq!(fit_in_blocks(&rows, &model(), &[0.0], &[], 1), [Err(NoFit::Undetermined)]);
+        assert_eq!(fit_in_blocks(&rows, &model(), &[0.0], &blocks(4), 1), [Err(NoFit::TooFewBlocks)]);
     }
 }

@@ -73,6 +73,7 @@ impl MergedSession<'_, '_, '_> {
         let (group, times) = (self.all.group, self.all.rows.len() / self.all.group);
         let at = |block: usize| times * block / BLOCKS * group;
         let blocks: Vec<Range<usize>> = (0..BLOCKS).map(|block| at(block)..at(block + 1)).collect();
-        fit_in_blocks(&self.all.rows, model, noises, &blocks, self.all.reach())
+        let fits = fit_in_blocks(&self.all.rows, model, noises, &blocks, self.all.reach());
+        fits.into_iter().map(Result::ok).collect()
     }
 }
