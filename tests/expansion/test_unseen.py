@@ -59,7 +59,7 @@ def test_equations_are_second_differences_of_the_curve() -> None:
     factors = np.random.default_rng(0).standard_normal(6)
     curve = basis.along(slice(0, 4000), 0) @ factors
     step, at = unseen.step, unseen.places
-    expected = (curve[at - step] - 2 * curve[at] + curve[at + step]) / (2 * 0.5 * np.sqrt(9.0))
+    expected = (curve[at - step] - 2 * curve[at] + curve[at + step]) / (1.4 * 0.5 * np.sqrt(9.0))
     np.testing.assert_allclose(unseen.rows(basis, Bend(0.5, 9.0)) @ factors, expected, rtol=1e-9, atol=1e-12)
 
 

@@ -25,8 +25,8 @@ _SEEN = 0.5
 _NEAR = 8.0
 """Half-widths from what is not seen to where equations on both sides say what a curve is."""
 
-_WIDER = 2.0
-"""A curve may bend so many times as much as elsewhere: it need not bend as often and as far everywhere."""
+_WIDER = 1.4
+"""The standard deviation is taken for so many times that of elsewhere, twice its variance: a curve need not bend alike everywhere."""
 
 _SAMPLES = 1 << 14
 """Samples at which functions are in memory at a time."""
