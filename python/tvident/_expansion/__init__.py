@@ -4,7 +4,7 @@ from tvident._expansion.basis import Basis, Coordinate
 from tvident._expansion.expansion import Expansion
 from tvident._expansion.fit import Curves, Fitted, Linearised
 from tvident._expansion.rivals import Rival, scatter
-from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown
+from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown, placed
 from tvident._expansion.search import (
     DERIVATIVES,
     SLACK,
@@ -34,5 +34,6 @@ __all__ = [
     "along_record",
     "curves_of",
     "errors_along",
+    "placed",
     "scatter",
 ]

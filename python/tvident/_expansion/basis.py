@@ -13,6 +13,9 @@ from tvident._expansion.families import Family
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
+AT_A_TIME = 1 << 14
+"""Samples at which functions are in memory at a time."""
+
 
 @dataclass(frozen=True)
 class Coordinate:

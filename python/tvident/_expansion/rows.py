@@ -75,6 +75,14 @@ class ExpandedUnknown:
         return 1 if self.basis is None else self.basis.size
 
 
+def placed(unknowns: Sequence[ExpandedUnknown]) -> Iterator[tuple[ExpandedUnknown, slice]]:
+    """Give every unknown and the place of its factors among those of all."""
+    first = 0
+    for one in unknowns:
+        yield one, slice(first, first + one.size)
+        first += one.size
+
+
 def parts(role: str, kernels: Kernels) -> list[Array]:
     """Return the kernels by which a coefficient and its derivatives multiply the angle, after integration by parts."""
     if role == "inertia":

@@ -11,11 +11,11 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from tvident._expansion.basis import Basis, Coordinate
+from tvident._expansion.basis import AT_A_TIME, Basis, Coordinate
 from tvident._expansion.families import Family
 from tvident._expansion.fit import Curves, Fitted, Linearised, ScoredSize
 from tvident._expansion.rivals import Rival, scatter
-from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown
+from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown, placed
 from tvident._expansion.unseen import Bend, Unseen
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -39,9 +39,6 @@ _ROUNDS = 2
 _STEPS = 8
 _SETTLED = 1e-7
 """The last steps end once the misfit changes by less than this part of itself."""
-
-_SAMPLES = 1 << 14
-"""Samples at which functions are in memory at a time."""
 
 DERIVATIVES = {"inertia": 2, "momentum": 1, "damping": 1}
 """How many derivatives of a coefficient its rows need."""
@@ -246,10 +243,8 @@ class SizeSearch:
         ]
         found: dict[str, list[Rival]] = {}
         for weight, unknowns in [(1.0, taken), *others]:
-            fitted, first = around.solve(unknowns, self._unseen_of(unknowns)), 0
-            for one in unknowns:
-                place = slice(first, first + one.size)
-                first += one.size
+            fitted = around.solve(unknowns, self._unseen_of(unknowns))
+            for one, place in placed(unknowns):
                 if one.basis is not None:
                     rival = Rival(weight, one.basis, fitted.values[place], fitted.covariance[place, place])
                     found.setdefault(one.name, []).append(rival)
@@ -261,12 +256,9 @@ class SizeSearch:
 
     def _look_at(self, sizes: Sequence[Sequence[int]], fitted: Fitted) -> None:
         """Note how curves of time bend where they are seen."""
-        first = 0
-        for part, one in zip(self.parts, self._unknowns(sizes), strict=True):
-            own = fitted.values[first : first + one.size]
-            first += one.size
+        for part, (one, place) in zip(self.parts, placed(self._unknowns(sizes)), strict=True):
             if part.is_of_time and one.basis is not None and one.basis.families[0].block is None:
-                bend = self._unseen.bend(along_record(one.basis, own))
+                bend = self._unseen.bend(along_record(one.basis, fitted.values[place]))
                 if bend is not None:
                     self._bends[part.name] = bend
 
@@ -274,13 +266,12 @@ class SizeSearch:
         """Return equations of what is not seen of curves of time, the right-hand side last; None where nothing is known of them."""
         if not self._bends or not self._unseen.places.size:
             return None
-        found, first, size = [], 0, sum(one.size for one in unknowns)
-        for one in unknowns:
+        found, size = [], sum(one.size for one in unknowns)
+        for one, place in placed(unknowns):
             if one.name in self._bends and one.basis is not None:
                 rows = np.zeros((self._unseen.places.size, size + 1))
-                rows[:, first : first + one.size] = self._unseen.rows(one.basis, self._bends[one.name])
+                rows[:, place] = self._unseen.rows(one.basis, self._bends[one.name])
                 found.append(rows)
-            first += one.size
         return np.concatenate(found)
 
     def _around(self, sizes: Sequence[Sequence[int]], fitted: Fitted) -> Linearised:
@@ -295,10 +286,9 @@ def _key(sizes: Sequence[Sequence[int]]) -> tuple[int, ...]:
 def curves_of(unknowns: Sequence[ExpandedUnknown], values: Array, samples: int) -> tuple[Curves, Array]:
     """Return coefficients with their derivatives, and the torque of further terms, at every sample."""
     curves: Curves = []
-    terms, first = np.zeros(samples), 0
-    for one in unknowns:
-        own = values[first : first + one.size]
-        first += one.size
+    terms = np.zeros(samples)
+    for one, place in placed(unknowns):
+        own = values[place]
         along = [
             np.full(samples, own[0] if rate == 0 else 0.0) if one.basis is None else along_record(one.basis, own, rate)
             for rate in range(DERIVATIVES.get(one.role, 0) + 1)
@@ -315,8 +305,8 @@ def along_record(basis: Basis, factors: Array, rate: int = 0) -> Array:
     """Return a curve, or its derivative by time, at every sample of a record."""
     samples = basis.coordinates[0].places.size
     found = np.empty(samples)
-    for first in range(0, samples, _SAMPLES):
-        some = slice(first, min(samples, first + _SAMPLES))
+    for first in range(0, samples, AT_A_TIME):
+        some = slice(first, min(samples, first + AT_A_TIME))
         found[some] = basis.along(some, rate) @ factors
     return found
 
@@ -325,8 +315,8 @@ def errors_along(basis: Basis, covariance: Array, rivals: Sequence[Rival] = ()) 
     """Return the standard errors of a curve at every sample of a record, with what the choice of its size adds."""
     samples = basis.coordinates[0].places.size
     found = np.empty(samples)
-    for first in range(0, samples, _SAMPLES):
-        some = slice(first, min(samples, first + _SAMPLES))
+    for first in range(0, samples, AT_A_TIME):
+        some = slice(first, min(samples, first + AT_A_TIME))
         functions = basis.along(some, 0)
         variance = np.einsum("ij,jk,ik->i", functions, covariance, functions)
         found[some] = np.sqrt(np.maximum(variance, 0) + scatter(rivals, _functions_at(some)))

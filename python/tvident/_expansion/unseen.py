@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from tvident._expansion.basis import Basis
+from tvident._expansion.basis import AT_A_TIME, Basis
 from tvident._expansion.rows import ExpandedRecord
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -27,9 +27,6 @@ _NEAR = 8.0
 
 _WIDER = 1.4
 """The standard deviation is taken for so many times that of elsewhere, twice its variance: a curve need not bend alike everywhere."""
-
-_SAMPLES = 1 << 14
-"""Samples at which functions are in memory at a time."""
 
 
 @dataclass(frozen=True)
@@ -112,8 +109,8 @@ class Unseen:
         Neighbouring differences are nearly the same: so many as are between two bends count as one.
         """
         found = np.empty((self.places.size, basis.size))
-        for first in range(0, self.places.size, _SAMPLES):
-            some = slice(first, first + _SAMPLES)
+        for first in range(0, self.places.size, AT_A_TIME):
+            some = slice(first, first + AT_A_TIME)
             around = self.places[some]
             before, at, behind = (_functions(basis, around + k) for k in (-self.step, 0, self.step))
             found[some] = before - 2 * at + behind

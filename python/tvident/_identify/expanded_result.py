@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -21,6 +21,7 @@ from tvident._expansion import (
     Tried,
     along_record,
     errors_along,
+    placed,
 )
 from tvident._identify.expanded_inputs import ExpandedInputs
 from tvident._results import Estimates, ExpandedParameter, of_powers
@@ -77,7 +78,7 @@ class ExpandedOutcome:
     def curves(self) -> dict[str, ExpandedParameter]:
         """Every expansion as a curve."""
         found = {}
-        for one, place in self._placed():
+        for one, place in placed(self.unknowns):
             if one.basis is None:
                 continue
             expansion = self.given.expansions[one.name]
@@ -113,7 +114,7 @@ class ExpandedOutcome:
         values: dict[str, Array] = {}
         errors: dict[str, Array] = {}
         constants: dict[str, tuple[Any, Any]] = {}
-        for one, place in self._placed():
+        for one, place in placed(self.unknowns):
             own, covariance = self.fitted.values[place], self.fitted.covariance[place, place]
             if one.basis is None:
                 constants[one.name] = (float(own[0]), float(np.sqrt(covariance[0, 0])))
@@ -181,13 +182,6 @@ class ExpandedOutcome:
         squares = ((value[apart] - found.values[name][apart]) ** 2 / variance)[there]
         return float(np.mean(squares)), int(there.sum())
 
-    def _placed(self) -> Iterator[tuple[ExpandedUnknown, slice]]:
-        """Give every unknown and the place of its factors."""
-        first = 0
-        for one in self.unknowns:
-            yield one, slice(first, first + one.size)
-            first += one.size
-
     def _kinds(self) -> dict[str, str]:
         return {
             one.name: "constant" if one.basis is None else "expanded"
@@ -223,9 +217,9 @@ class ExpandedOutcome:
         """Return covariances of pairs of coefficients at every sample."""
         step = slice(None, None, self.given.data.step)
         samples = self.given.data.time.size
-        placed = [(one, place) for one, place in self._placed() if one.name in COEFFICIENTS]
+        coefficients = [(one, place) for one, place in placed(self.unknowns) if one.name in COEFFICIENTS]
         found = {}
-        for (one, rows), (other, columns) in combinations(placed, 2):
+        for (one, rows), (other, columns) in combinations(coefficients, 2):
             block = self.fitted.covariance[rows, columns]
             total = np.zeros(samples)
             for number, row in enumerate(block):
