@@ -74,20 +74,20 @@ impl Widths {
         let fits_of = |length: Option<f64>| {
             let blocks = blocks(one, length);
             let few = length.is_some() && blocks.iter().any(|block| block.len() < 2 * one.reach);
-            let fits = || fit_in_blocks(one.rows, &self.model, &self.noises, &blocks, one.reach);
-            (if few { Vec::new() } else { fits() }, length.is_none() || blocks.len() >= ENOUGH_BLOCKS)
+            let fits = if few {
+                vec![Err(NoFit::TooFewBlocks); self.noises.len()]
+            } else {
+                fit_in_blocks(one.rows, &self.model, &self.noises, &blocks, one.reach)
+            };
+            (fits, length.is_none() || blocks.len() >= ENOUGH_BLOCKS)
         };
         let pieces = self.lengths.iter().map(|&length| Piece { size: one.rows.len(), content: length }).collect();
         let fits = stages.map(pieces, || (), |length, (): &mut ()| fits_of(length))?;
         for (scans, (fits, enough)) in self.scans.iter_mut().zip(fits) {
-            for (place, scan) in scans.iter_mut().enumerate() {
+            for (scan, fit) in scans.iter_mut().zip(fits) {
                 // That few blocks do not determine the constants is for want of a longer record, and says nothing against them; that one of
                 // them holds all that is known does.
-                let failed = fits.get(place).map(|fit| fit.as_ref().err());
-                let says_something = enough || matches!(failed, Some(None | Some(NoFit::Undetermined)));
-                scan.tried += usize::from(says_something);
-            }
-            for (scan, fit) in scans.iter_mut().zip(fits) {
+                scan.tried += usize::from(enough || !matches!(fit, Err(NoFit::TooFewBlocks)));
                 scan.scales.extend(fit.ok().map(|fit| AtScale::new(one.scale, fit)));
             }
         }
