@@ -7,9 +7,12 @@ import numpy.typing as npt
 __all__ = [
     "CORRELATED_NOISE",
     "FEWEST_SAMPLES",
+    "FEWEST_WIDTHS",
     "HARDLY_TOLD_APART",
+    "LEAST_PLATEAU",
     "NOISE_MODEL_FAILS",
     "NO_CHANCE",
+    "OTHER_CONSTANT",
     "WEAK_INSTRUMENT",
     "AutomaticEstimates",
     "ConstantsOfRows",
@@ -68,9 +71,12 @@ _ParameterState: TypeAlias = tuple[list[int], list[npt.NDArray[np.float64]]]
 
 CORRELATED_NOISE: float
 FEWEST_SAMPLES: int
+FEWEST_WIDTHS: int
 HARDLY_TOLD_APART: float
+LEAST_PLATEAU: float
 NOISE_MODEL_FAILS: float
 NO_CHANCE: float
+OTHER_CONSTANT: float
 WEAK_INSTRUMENT: float
 
 @final

@@ -11,17 +11,8 @@ from tvident._advice.lists import listed
 from tvident._arguments import with_error
 from tvident._status import Status
 
-_LEAST_PLATEAU = 2.0
-"""Widths that agree differ by this factor or more, or it may be chance. As in the core."""
-
-_FEWEST = 4
-"""Widths that determine the constants, at least, to be compared. As in the core."""
-
 _TOLD = 3.0
 """Standard errors by which a number differs from zero, at least, to be told from it."""
-
-_BEYOND = 4.0
-"""Standard errors beyond which a constant is another than that of the widths that agree. As in the core."""
 
 
 def scales_compared(found: _core.Identification, flags: Status) -> list[str]:
@@ -33,7 +24,7 @@ def scales_compared(found: _core.Identification, flags: Status) -> list[str]:
         determined = len(scan.window_length)
         return [
             f"of {determined} widths of the test function, no neighbours agree"
-            if determined >= _FEWEST
+            if determined >= _core.FEWEST_WIDTHS
             else f"{scan.tried} widths of the test function were tried; {determined or 'none'} of them determined the constants"
         ]
     if scan.plateau is None:
@@ -55,7 +46,7 @@ def disagreement(
     """Return what disagrees with what, where the flags say that something does, and where to look."""
     if Status.SCALES_DISAGREE not in flags:
         return []
-    if found.scan is not None and len(found.scan.window_length) < _FEWEST:
+    if found.scan is not None and len(found.scan.window_length) < _core.FEWEST_WIDTHS:
         words = (
             f"{_none_of_stiffness(found, names)}test functions of other widths do not determine the parameters, and nothing confirms "
             "these: noise, feedback or rest hides what they would show; excite more, or give what is known; do not trust these numbers"
@@ -103,7 +94,7 @@ def _others(found: _core.Identification, names: Sequence[str], units: Mapping[st
             continue
         value, error = scan.values[place][column], scan.stderr[place][column]
         used, its_error = float(one.values[0]), float(one.stderr[0])
-        if abs(value - used) > _BEYOND * float(np.hypot(error, its_error)):
+        if abs(value - used) > _core.OTHER_CONSTANT * float(np.hypot(error, its_error)):
             unit = units.get(names[unknown], "")
             words.append(
                 f"{names[unknown]} {with_error(value, error)} {unit}, not the {with_error(used, its_error)}".replace(
@@ -118,4 +109,4 @@ def _is_wide(scan: _core.Scan) -> bool:
     if scan.plateau is None:
         return False
     narrowest, widest = scan.plateau
-    return scan.window_length[widest] >= _LEAST_PLATEAU * scan.window_length[narrowest]
+    return scan.window_length[widest] >= _core.LEAST_PLATEAU * scan.window_length[narrowest]

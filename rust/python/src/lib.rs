@@ -83,6 +83,15 @@ mod _core {
     /// Coherence of the noise of both channels from which on one is fed back into the other.
     #[pymodule_export]
     const CORRELATED_NOISE: f64 = tvident::noise::CORRELATED_NOISE;
+    /// Widths that agree differ by this factor or more, or it may be chance.
+    #[pymodule_export]
+    const LEAST_PLATEAU: f64 = tvident::inference::LEAST_PLATEAU;
+    /// Widths that determine the constants, at least, to be compared.
+    #[pymodule_export]
+    const FEWEST_WIDTHS: usize = tvident::identify::FEWEST_WIDTHS;
+    /// Standard errors beyond which a constant is another than that of the widths that agree.
+    #[pymodule_export]
+    const OTHER_CONSTANT: f64 = tvident::identify::OTHER_CONSTANT;
     /// The shortest record that a window is chosen for.
     #[pymodule_export]
     const FEWEST_SAMPLES: usize = tvident::auto_derivatives::FEWEST_SAMPLES;

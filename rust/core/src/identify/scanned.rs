@@ -11,13 +11,13 @@ pub(crate) const BLOCKS: usize = 40;
 /// The estimate of the test function that was chosen contradicts the plateau beyond so many standard errors, the smaller of the two.
 const CONTRADICTS: f64 = 3.0;
 /// Fewer widths than this show no plateau.
-const FEWEST_WIDTHS: usize = 4;
+pub const FEWEST_WIDTHS: usize = 4;
 /// A plateau counts as longer than another from this factor on.
 pub(crate) const LONGER: f64 = 1.05;
 /// How much wider than its narrowest a test function on the plateau is, at most.
 const MARGIN: f64 = 1.5;
 /// A constant is another one than the plateau's beyond so many standard errors of both.
-const OTHER: f64 = 4.0;
+pub const OTHER_CONSTANT: f64 = 4.0;
 /// From so many widths on there has to be a plateau.
 const ENOUGH_WIDTHS: usize = 6;
 
@@ -103,7 +103,7 @@ impl Scan {
     fn differs(&self, scale: &AtScale, constant: &Constant) -> bool {
         let Some(place) = self.unknowns.iter().position(|&one| one == constant.unknown) else { return false };
         let error = scale.errors[place].hypot(constant.error);
-        (scale.values[place] - constant.value).abs() > OTHER * error
+        (scale.values[place] - constant.value).abs() > OTHER_CONSTANT * error
     }
 
     pub(crate) fn nearest(&self, half_width: usize) -> Option<(usize, &AtScale)> {

@@ -16,4 +16,4 @@ pub(crate) mod windows_around;
 
 pub use constancy::{NO_CHANCE, Test};
 pub use missing_terms::{Missing, Suspect};
-pub use scales::{AtScale, Plateau};
+pub use scales::{AtScale, LEAST_PLATEAU, Plateau};

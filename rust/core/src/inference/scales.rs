@@ -11,7 +11,7 @@ use crate::regression::block_fit::BlockFit;
 pub(crate) const AGREE: f64 = 2.0;
 
 /// Widths that agree span at least this factor, or they agree by chance.
-pub(crate) const LEAST_PLATEAU: f64 = 2.0;
+pub const LEAST_PLATEAU: f64 = 2.0;
 
 /// A scale whose error is so many times that of a wider one is drowned in noise: it agrees with anything.
 const DROWNED: f64 = 10.0;
