@@ -90,10 +90,16 @@ class Told:
         lacking = [
             (record, one.words(terms, data.units.get(one.name, ""))) for record, one in enumerate(self.lacking) if one
         ]
-        empty = [*_empty(data, self.batch), *self._without_room_to_change()]
+        empty = [*self._empty(), *self._without_room_to_change()]
         return _with_doubts(
             _with_clipped(words, data.clipped, several=several), [*empty, *data.doubts, *lacking], several=several
         )
+
+    def _empty(self) -> list[tuple[int, str]]:
+        """Return which channels hold nothing, of records without any value."""
+        status = self.batch.status.reshape(-1, self.batch.status.shape[-1])
+        empty = np.flatnonzero((status & Status.INVALID != 0).all(axis=1))
+        return without_numbers(self.data.angles, self.data.torques, empty.tolist())
 
     def _without_room_to_change(self) -> list[tuple[int, str]]:
         """Return records whose windows are all there is of them, though something was to change: one length is not looked for."""
@@ -163,14 +169,6 @@ class Told:
             settings=self.settings,
             mask=None if mask is None else mask[..., ::step],
         )
-
-
-def _empty(data: Data, batch: Estimates) -> list[tuple[int, str]]:
-    """Return which channels hold nothing, of records without any value."""
-    status = batch.status.reshape(-1, batch.status.shape[-1])
-    return without_numbers(
-        data.angles, data.torques, np.flatnonzero((status & Status.INVALID != 0).all(axis=1)).tolist()
-    )
 
 
 def _with_clipped(words: Words, clipped: Sequence[float] | None, *, several: bool) -> Words:
