@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tvident._arguments.arrays import real_array
 from tvident._arguments.containers import package_of, plain
-from tvident._units import Unit, times_in_seconds, unit_of, unit_said
+from tvident._units import ROTARY, is_convertible, times_in_seconds, unit_said
 
 Seconds = npt.NDArray[np.float64]
 
@@ -43,9 +43,6 @@ _NOT_AN_HOUR = 60.0
 
 _SEARCHED = 1e-6
 """How closely the period is found, as a part of what times may be off."""
-
-
-_TIME = unit_of("s") or Unit(1.0, ())
 
 
 class NotUniformError(ValueError):
@@ -130,8 +127,7 @@ def _says_times(labels: Any) -> bool:
     kind = getattr(getattr(labels, "dtype", None), "kind", "O")
     if kind in "mM":
         return True
-    unit = unit_of(unit_said(labels)) if kind in "iuf" else None
-    return unit is not None and unit.dimension == _TIME.dimension
+    return kind in "iuf" and is_convertible(ROTARY, "time", unit_said(labels))
 
 
 def check_against_labels(values: Any, period: float) -> None:

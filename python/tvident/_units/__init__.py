@@ -4,7 +4,16 @@ from tvident._units.axis import Axis, axis_of, factor_said, scaled, times_in_sec
 from tvident._units.channel import Channel, in_its_unit, unit_named, unit_said
 from tvident._units.names import derivative_units, named_unit, with_unit
 from tvident._units.parse import Unit, is_unit, unit_of
-from tvident._units.quantities import LINEAR, ROTARY, System, UnitError, factor_between, factor_to, system_of
+from tvident._units.quantities import (
+    LINEAR,
+    ROTARY,
+    System,
+    UnitError,
+    factor_between,
+    factor_to,
+    is_convertible,
+    system_of,
+)
 from tvident._units.words import QUOTED, in_words_of
 
 __all__ = [
@@ -23,6 +32,7 @@ __all__ = [
     "factor_to",
     "in_its_unit",
     "in_words_of",
+    "is_convertible",
     "is_unit",
     "named_unit",
     "scaled",

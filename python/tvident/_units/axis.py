@@ -65,7 +65,7 @@ def axis_of(
     system = system_of(units["angle"], units["torque"])
     for name in named:
         if units[name]:
-            _check_unchanged(system, name, units[name])
+            _check_named(system, name, units[name])
     factors = {name: factor_to(system, name, unit, name=f"the {name}") for name, unit in units.items()}
     return Axis(system, **factors, assumed=frozenset(name for name, unit in units.items() if not unit))
 
@@ -81,16 +81,14 @@ def factor_said(system: System, name: str, values: Any) -> float:
     unit = unit_said(values)
     if unit:
         return factor_to(system, name, unit, name=f"the {name}")
-    named = unit_named(values)
-    if is_convertible(system, name, named):
-        _check_unchanged(system, name, named)
+    _check_named(system, name, unit_named(values))
     return 1.0
 
 
-def _check_unchanged(system: System, name: str, unit: str) -> None:
+def _check_named(system: System, name: str, unit: str) -> None:
     """Refuse a unit that only a name says, where the numbers may have been converted since."""
     wanted = system.units[name]
-    if factor_to(system, name, unit, name=f"the {name}") != 1:
+    if is_convertible(system, name, unit) and factor_to(system, name, unit, name=f"the {name}") != 1:
         raise UnitError(
             f"the {name} must say its unit where its name says {unit!r}: what is computed from a series keeps the name, so nobody knows "
             f"whether the numbers still are; give {name}_unit={unit!r}, or {name}_unit={wanted!r} if they were converted, or pass "
@@ -101,9 +99,8 @@ def _check_unchanged(system: System, name: str, unit: str) -> None:
 def times_in_seconds(t: Any, time_unit: str | None = None) -> Any:
     """Return times in seconds where they have another unit, and otherwise as they are."""
     unit = time_unit or unit_said(t)
-    named = "" if unit or getattr(getattr(t, "dtype", None), "kind", "") in "mM" else unit_named(t)
-    if is_convertible(ROTARY, "time", named):
-        _check_unchanged(ROTARY, "time", named)
+    if not unit and getattr(getattr(t, "dtype", None), "kind", "") not in {"m", "M"}:
+        _check_named(ROTARY, "time", unit_named(t))
     factor = factor_to(ROTARY, "time", unit, name="the time")
     return t if factor == 1 else scaled(np.asarray(in_its_unit(t)), factor)
 

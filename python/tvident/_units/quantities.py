@@ -73,11 +73,7 @@ def system_of(angle: str | None, torque: str | None) -> System:
 
 def _system(text: str | None, quantity: str) -> str:
     """Return the name of the system whose quantity has this unit; an empty string if it has none, or belongs to neither."""
-    unit = None if not text else unit_of(text)
-    found = (
-        one.name for one in (ROTARY, LINEAR) if unit is not None and not math.isnan(_in(unit, one.dimensions[quantity]))
-    )
-    return next(found, "")
+    return next((one.name for one in (ROTARY, LINEAR) if text and is_convertible(one, quantity, text)), "")
 
 
 def is_convertible(system: System, quantity: str, text: str) -> bool:
