@@ -17,7 +17,7 @@ from tvident._arguments.numbers import (
 )
 from tvident._arguments.progress import Progress, reporter
 from tvident._arguments.sampling import check_power, check_window, length_given, sample_period, seconds, window_length
-from tvident._arguments.shown import shown
+from tvident._arguments.shown import nearest, shown
 from tvident._arguments.times import (
     NotUniformError,
     begin_of,
@@ -62,6 +62,7 @@ __all__ = [
     "labels_out",
     "length_given",
     "mask",
+    "nearest",
     "one_of",
     "own_digits",
     "package_of",

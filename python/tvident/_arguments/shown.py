@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import reprlib
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -24,3 +25,11 @@ def shown(value: object) -> str:
         text = "a whole number of thousands of digits"
     text = " ".join(text.split())
     return text if len(text) <= _MOST else f"{text[: _MOST - 1]}…"
+
+
+def nearest(name: object, known: Iterable[str]) -> str:
+    """Return the question for the known name that comes nearest; an empty string if none is near."""
+    from difflib import get_close_matches  # noqa: PLC0415 - for mistakes alone
+
+    near = get_close_matches(str(name), list(known), n=1)
+    return f"did you mean {near[0]!r}?" if near else ""

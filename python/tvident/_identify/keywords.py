@@ -47,7 +47,4 @@ def _right(name: str, known: frozenset[str]) -> str:
     forms = [form.__name__ for form in (WeakForm, StrongForm) if name in {one.name for one in fields(form)}]
     if forms:
         return "it belongs to a form: use " + " or ".join(f"method=tvident.{form}({name}=…)" for form in forms)
-    from difflib import get_close_matches  # noqa: PLC0415 - for mistakes alone
-
-    near = get_close_matches(name, known, n=1)
-    return f"did you mean {near[0]!r}?" if near else f"it has {', '.join(sorted(known))}"
+    return arguments.nearest(name, known) or f"it has {', '.join(sorted(known))}"

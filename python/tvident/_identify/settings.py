@@ -374,15 +374,10 @@ def _check_names(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Ma
         if not foreign:
             continue
         other = next((form for form in of_form if foreign[0] in of_form[form]), None)
-        from difflib import get_close_matches  # noqa: PLC0415 - for mistakes alone
-
-        near = get_close_matches(str(foreign[0]), may, n=1)
         cure = (
             f"it belongs to the {other} form"
             if other and not within
-            else f"did you mean {near[0]!r}?"
-            if near
-            else "leave it out"
+            else arguments.nearest(foreign[0], may) or "leave it out"
         )
         raise TypeError(
             f"settings{within} must hold names that a result of the {earlier['form']} form has; got {arguments.shown(foreign[0])}; {cure}"
