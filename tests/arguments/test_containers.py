@@ -9,23 +9,11 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import tvident
+from rig_in_containers import ANGLE, DATES, PLAIN, TORQUE, N, identified
 
 pd = pytest.importorskip("pandas")
 pl = pytest.importorskip("polars")
 xr = pytest.importorskip("xarray")
-
-RIG = tvident.simulate_torsional_rig(duration=1.0)
-ANGLE, TORQUE, N = RIG.angle, RIG.torque, RIG.angle.size
-GIVEN: dict[str, Any] = {"inertia": 0.0123, "method": tvident.WeakForm(window_length=33, exponent=9)}
-PLAIN = tvident.identify(ANGLE, TORQUE, sample_rate=1000, **GIVEN)
-DATES = pd.date_range(
-    "2024-03-31 01:59:59.5", periods=N, freq="1ms", tz="Europe/Paris", name="when"
-)  # summer time begins
-
-
-def identified(angle: Any, torque: Any, **options: Any) -> tvident.Identification:
-    found: tvident.Identification = tvident.identify(angle, torque, **({"sample_rate": 1000} | GIVEN | options))
-    return found
 
 
 def matlab(values: Any) -> Any:

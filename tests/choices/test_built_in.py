@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from built_in_functions import FUNCTIONS
 from tvident import _core
 from tvident._choices import BUILT_IN, FRICTION, OFFSET
 
@@ -22,14 +21,6 @@ OTHERS = {
     "_commands/identification.py": "an offset of clocks",
 }
 """Files that name a term, or mean something else by the word."""
-
-FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "offset": lambda _t, angle, _velocity: np.ones_like(angle),
-    "coulomb": lambda _t, _angle, velocity: np.sign(velocity),
-    "cubic": lambda _t, angle, _velocity: angle**3,
-    "gravity": lambda _t, angle, _velocity: np.sin(angle),
-    "viscous_asymmetric": lambda _t, _angle, velocity: np.abs(velocity),
-}
 
 
 def test_the_table_here_holds_the_functions() -> None:

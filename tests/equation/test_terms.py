@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,17 +9,11 @@ import numpy.typing as npt
 import pytest
 
 import tvident
+from built_in_functions import FUNCTIONS
 from calls import paper
 
 Array = npt.NDArray[np.float64]
 
-FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "offset": lambda _t, angle, _velocity: np.ones_like(angle),
-    "coulomb": lambda _t, _angle, velocity: np.sign(velocity),
-    "cubic": lambda _t, angle, _velocity: angle**3,
-    "gravity": lambda _t, angle, _velocity: np.sin(angle),
-    "viscous_asymmetric": lambda _t, _angle, velocity: np.abs(velocity),
-}
 INERTIA, DAMPING, GRAVITY, OFFSET = 0.02, 0.05, 1.5, 0.3
 
 

@@ -3,32 +3,19 @@
 from __future__ import annotations
 
 import json
-from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
 import tvident
+from rig_in_containers import ANGLE, DATES, GIVEN, PLAIN, TORQUE, N
 
 pd = pytest.importorskip("pandas")
 pl = pytest.importorskip("polars")
 xr = pytest.importorskip("xarray")
 
-RIG = tvident.simulate_torsional_rig(duration=1.0)
-ANGLE, TORQUE, N = RIG.angle, RIG.torque, RIG.angle.size
-GIVEN: dict[str, Any] = {"inertia": 0.0123, "method": tvident.WeakForm(window_length=33, exponent=9)}
-PLAIN = tvident.identify(ANGLE, TORQUE, sample_rate=1000, **GIVEN)
-DATES = pd.date_range(
-    "2024-03-31 01:59:59.5", periods=N, freq="1ms", tz="Europe/Paris", name="when"
-)  # summer time begins
-
 UTC = DATES.tz_convert(None).to_numpy()
-
-
-def identified(angle: Any, torque: Any, **options: Any) -> tvident.Identification:
-    found: tvident.Identification = tvident.identify(angle, torque, **({"sample_rate": 1000} | GIVEN | options))
-    return found
 
 
 def test_an_index_of_dates_is_the_time_and_comes_back() -> None:
