@@ -117,9 +117,18 @@ def test_stamps_that_jitter_are_told_from_samples_that_do() -> None:
     assert result.settings["times"] == "even"
     assert result.record_status & Status.CHANNEL_SUSPECTED
     assert "the stamps jitter, not the samples" in result.advice[0]
+    # Settings say how samples were taken. What is wrong with their times is said again, of this record.
+    again = tvident.identify(angle, torque, t=stamps, settings=result.settings)
+    assert again.record_status == result.record_status
+    assert again.advice[0] == result.advice[0]
+    assert again.settings == result.settings
     by_rate = tvident.identify(angle, torque, sample_rate=result.settings["sample_rate"], **CONSTANT)
     assert result.constants == by_rate.constants
     true = tvident.identify(*taken(3, stamps, (1e-4, 0.05)), t=stamps, **CONSTANT)
+    other = tvident.identify(angle, torque, t=stamps, settings=true.settings)
+    assert other.settings["times"] == "true"
+    assert "the earlier result took samples at their times" in other.advice[0]
+    assert tvident.Status.CHANNEL_SUSPECTED in other.record_status
     assert true.settings["times"] == "true"
     assert not true.record_status & Status.CHANNEL_SUSPECTED
 

@@ -59,7 +59,9 @@ def test_settings_given_back_give_the_same_numbers(call: dict[str, Any]) -> None
     earlier = json.loads(json.dumps(first.settings))
     assert earlier == first.settings
     terms = {"terms": call["terms"]} if first.settings["own_terms"] else {}
-    same(first, tvident.identify(RIG.angle, RIG.torque, **WHOLE, settings=earlier, **terms))
+    again = tvident.identify(RIG.angle, RIG.torque, **WHOLE, settings=earlier, **terms)
+    same(first, again)
+    assert again.settings == first.settings
 
 
 def test_a_term_of_ones_own_is_given_again() -> None:
@@ -89,6 +91,13 @@ def test_a_lag_that_was_found_is_taken_again() -> None:
     again = tvident.identify(*late, **WHOLE, settings=json.loads(json.dumps(first.settings)))
     np.testing.assert_array_equal(first.stiffness, again.stiffness)
     assert first.constants["inertia"][0] == again.constants["inertia"][0]
+    assert again.settings == first.settings
+    # What was found is said once, of what found it.
+    assert any(line.startswith("the torque is delayed by") for line in first.reasons)
+    assert not any(line.startswith("the torque is delayed by") for line in again.reasons)
+    own = tvident.identify(*late, **WHOLE, settings=first.settings, lag=0.003)
+    assert "lag" not in own.settings["chosen"]
+    assert "lag_stderr" not in own.settings
     # At another rate the same seconds are other samples.
     slower = tvident.identify(*(one[::2] for one in late), sample_rate=500, settings=first.settings)
     assert slower.settings["lag"] == first.settings["lag"]
@@ -99,6 +108,10 @@ def test_what_is_given_wins_over_settings_and_those_over_the_method() -> None:
     method = tvident.StrongForm(window_length=151, regression_window=300)
     found = tvident.identify(RIG.angle, RIG.torque, **WHOLE, settings=first.settings, method=method)
     same(found, tvident.identify(RIG.angle, RIG.torque, **WHOLE, **paper(window_length=151, regression_window=300)))
+    chosen = tvident.identify(RIG.angle, RIG.torque, **WHOLE).settings
+    plain = tvident.identify(RIG.angle, RIG.torque, **WHOLE, settings=chosen, **plain_weak(window_length=81))
+    assert "window_length" in chosen["chosen"]
+    assert "window_length" not in plain.settings["chosen"]
     known = tvident.identify(RIG.angle, RIG.torque, **WHOLE, method="paper", stiffness=RIG.stiffness)
     with pytest.raises(ValueError, match=r"settings hold no stiffness.*pass stiffness= again"):
         tvident.identify(RIG.angle, RIG.torque, **WHOLE, settings=known.settings)

@@ -153,20 +153,29 @@ def clock_of(
     )
 
 
-def earlier_clock(grid: Grid, earlier: Mapping[str, Any] | None) -> Clock | None:
-    """Return the clock that settings of an earlier result hold; None where they hold none."""
+def as_earlier(clock: Clock, earlier: Mapping[str, Any] | None) -> Clock:
+    """Return the clock that settings of an earlier result hold, itself where they hold none; what is wrong with the times is said again."""
     kind = None if earlier is None else earlier.get("times")
     if earlier is None or kind not in {"true", "even", "lost"}:
-        return None
-    order = earlier.get("spline_order")
+        return clock
+    order, grid = earlier.get("spline_order"), clock.grid
     if order not in {0, 1, 3, 5, 7}:
         raise TypeError(f"spline_order of settings must be 0, 1, 3, 5 or 7; got {order!r}; pass result.settings")
     if kind == "lost" and grid.jitter > 0:
-        return None
+        return clock
     bridged = earlier.get("bridged")
     if isinstance(bridged, int | float) and bridged > 0:
         grid = replace(grid, bridged=float(bridged))
-    return Clock(grid, kind, order or 1, "channels were brought onto a uniform grid as in the earlier result")
+    if kind == clock.kind:
+        return replace(clock, grid=grid, order=order)
+    words = "channels were brought onto a uniform grid as in the earlier result"
+    if clock.kind == "even":
+        doubt = (
+            "the earlier result took samples at their times, but these are smooth in sample number and not in time: the stamps jitter, "
+            "not the samples, as behind a buffer; do not trust these numbers; leave settings= out, or give sample_rate="
+        )
+        return Clock(grid, kind, order or 1, words, doubt)
+    return Clock(grid, kind, order if kind == "even" else order or 1, words, clock.doubt)
 
 
 def _lost(grid: Grid, order: int) -> str:

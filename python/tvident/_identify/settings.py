@@ -99,6 +99,10 @@ class Request:
         Whether the terms earned their places there.
     chosen : bool
         Nobody asked for this form.
+    kept : sequence of str
+        What an earlier result chose, and this one takes from it.
+    lag_stderr : float or sequence of float, optional
+        Of a lag that an earlier result found, in seconds.
     """
 
     name: str
@@ -115,6 +119,8 @@ class Request:
     inner: Mapping[str, Any]
     earned: Mapping[str, Any]
     chosen: bool
+    kept: Sequence[str] = ()
+    lag_stderr: Any = None
 
     @property
     def has_spring(self) -> bool:
@@ -127,6 +133,11 @@ class Request:
         names = [term[0] if isinstance(term, tuple | list) else term for term in self.terms]
         built_in = [BUILT_IN.get(name) if isinstance(name, str) else None for name in names]
         return self.has_spring or not all(one and one.repeats_after(self.period or 0.0) for one in built_in)
+
+    def is_kept(self, name: str) -> bool:
+        """Whether an earlier result chose this, and its choice stands."""
+        is_open = name != "lag" and name not in self.by_record and getattr(self.form, name) == "auto"
+        return name in self.kept and not is_open
 
     def noise_of_equations(self, records: int) -> Sequence[float] | None:
         """Return the variances that an earlier result of as many records showed."""
@@ -208,7 +219,14 @@ def resolve(
         inner={} if earlier is None else dict(earlier.get("inner") or {}),
         earned={} if earlier is None else dict(earlier.get("earned") or {}),
         chosen=earlier is None and name == "auto",
+        kept=() if earlier is None else _kept(earlier, given, has_form=not arguments.is_word(method, "auto")),
+        lag_stderr=None if earlier is None or "lag" in given else earlier.get("lag_stderr"),
     )
+
+
+def _kept(earlier: Mapping[str, Any], given: Mapping[str, Any], *, has_form: bool) -> Sequence[str]:
+    """Return what an earlier result chose that neither an argument nor a form replaces."""
+    return [name for name in earlier["chosen"] if (name not in given if name == "lag" else not has_form)]
 
 
 def _angle_zero(earlier: Mapping[str, Any]) -> Sequence[float] | None:

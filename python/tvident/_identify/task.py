@@ -404,7 +404,7 @@ class Task:
             used |= of_windows(self._names, found)
             lag = {"lag": request.lag}
         else:
-            chosen = [name for name in names if "auto" in self._each(name)]
+            chosen = [name for name in names if "auto" in self._each(name) or name in request.kept]
             used["angle_zero"] = by_record([0.0 if one.angle_zero is None else one.angle_zero[0] for one in found])
             used["shown_noise"] = [one.shown_noise for one in found if one.shown_noise is not None] or None
             used["variation"] = "constant" if request.form.variation == "constant" else "linear"
@@ -416,6 +416,10 @@ class Task:
                     "lag_stderr": by_record([None if error is None else error * data.period for _, error in lags]),
                     "lag_samples": [late for late, _ in lags],
                 }
+            elif "lag" in request.kept:
+                chosen.append("lag")
+                lag |= {"lag_stderr": request.lag_stderr}
+                lag |= {"lag_samples": list(request.lag_samples)} if request.lag_samples is not None else {}
         kinds = dict.fromkeys(COEFFICIENTS, "known")
         for place, unknown in enumerate(self._unknowns):
             turned_out = {one.unknowns[place].kind for one in found}

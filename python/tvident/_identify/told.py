@@ -152,10 +152,9 @@ class Told:
                 variances = [one * spread for one, spread in zip(variances, data.weights.spread, strict=True)]
             coherences = _core.noise_coherence(data.angles, data.torques, variances)
         lags = np.broadcast_to(np.divide(self.settings["lag"], data.period), data.records)
+        chosen = [name for name in self.settings["chosen"] if not self.request.is_kept(name)]
         return [
-            Explained(
-                one, names, self.settings["chosen"], tested, data.period, data.step, coherence, late, data.units
-            ).words()
+            Explained(one, names, chosen, tested, data.period, data.step, coherence, late, data.units).words()
             for one, coherence, late in zip(self.found, coherences, lags.tolist(), strict=True)
         ]
 
