@@ -7,6 +7,9 @@
 //! Coloured noise scatters estimates more than its variance tells. Where blocks differ, short parts of them are compared with their
 //! neighbours as well: what changes slowly hardly differs there. If those scatter more than noise explains, the blocks have to differ by more
 //! than that (analysis of variance, Fisher's F).
+//!
+//! Where no torque acts the equation is homogeneous: in a free decay, or at rest, it holds for any multiple of the parameters, and least squares finds
+//! the smallest, zero. Parts whose torque is no more than its noise are left out, and of a block the longest run of others stands for it.
 
 use std::ops::Range;
 
@@ -35,6 +38,12 @@ const MEDIAN: f64 = 0.454_936;
 /// knows it with.
 const SCATTERED: f64 = 2.0;
 const FREEDOM: f64 = 10.0;
+
+/// Parts that say how much neighbours scatter, at least; so many must be driven.
+const FEWEST_DRIVEN: usize = 2 * PARTS;
+
+/// Standard deviations by which squares of noise exceed their mean by chance.
+const FREE: f64 = 5.0;
 
 /// Probability below which a difference is significant: once in 2000 records.
 pub const NO_CHANCE: f64 = 5e-4;
@@ -117,25 +126,57 @@ pub(crate) fn test(
         let variances: Vec<f64> = (0..constants).map(|i| inflation * variances[i * constants + i]).collect();
         Some((values, variances))
     };
-    let pieces = |count: usize| {
-        let at = move |index: usize| index * rows / count;
-        (0..count).map(|index| at(index)..at(index + 1)).map(|rows| Piece { size: rows.len(), content: rows }).collect()
-    };
-    let estimates = stages.map(pieces(BLOCKS), || (), estimate)?;
+    let piece = |rows: Range<usize>| Piece { size: rows.len(), content: rows };
+    let at = |index: usize| index * rows / (BLOCKS * PARTS);
+    let part = |index: usize| at(index)..at(index + 1);
+    let free: Vec<bool> =
+        (0..BLOCKS * PARTS).map(|index| is_free(problem, &part(index), expected, inflation)).collect();
+    // One alone is between two movements.
+    let is_alone = |index: usize| !(index > 0 && free[index - 1] || free.get(index + 1) == Some(&true));
+    let driven: Vec<bool> = (0..free.len()).map(|index| !free[index] || is_alone(index)).collect();
+    let blocks = (0..BLOCKS).map(|block| PARTS * block..PARTS * (block + 1));
+    let runs = blocks.filter_map(|parts| longest_run(&driven, parts)).map(|run| piece(at(run.start)..at(run.end)));
+    let estimates = stages.map(runs.collect(), || (), estimate)?;
     let of = |estimates: &[Estimate], constant: usize| -> Vec<(f64, f64)> {
         estimates.iter().flatten().map(|(values, variances)| (values[constant], variances[constant])).collect()
     };
     let mut tests: Vec<Option<Test>> = (0..constants).map(|constant| compare(&of(&estimates, constant))).collect();
     let differs = |test: &Option<Test>| test.as_ref().is_some_and(|test| test.probability < NO_CHANCE);
     if tests.iter().any(differs) {
-        let parts = stages.map(pieces(BLOCKS * PARTS), || (), estimate)?;
+        let parts: Vec<_> = (0..driven.len()).filter(|&index| driven[index]).map(|index| piece(part(index))).collect();
+        let driven = parts.len();
+        let parts = stages.map(parts, || (), estimate)?;
         for (constant, test) in tests.iter_mut().enumerate() {
-            if let (Some(test), Some(factor)) = (test, scatter(&of(&parts, constant))) {
+            if let (Some(test), Some(factor)) = (test, scatter(&of(&parts, constant), driven)) {
                 test.beside_scatter(factor, from);
             }
         }
     }
     Ok(tests)
+}
+
+/// The longest run of places that hold, among some.
+fn longest_run(holds: &[bool], places: Range<usize>) -> Option<Range<usize>> {
+    let end = |first: usize| (first..places.end).find(|&place| !holds[place]).unwrap_or(places.end);
+    let runs = places.clone().map(|first| first..end(first)).filter(|run| !run.is_empty());
+    // Of equally long ones the first.
+    runs.rev().max_by_key(Range::len)
+}
+
+/// Whether no torque acts in most of some rows: about its median there, which an offset takes, it is within chance of its noise.
+fn is_free(problem: &Problem<'_>, rows: &Range<usize>, expected: Expected, inflation: f64) -> bool {
+    let used = || rows.clone().filter(|&row| problem.usable[row] && problem.root(row) > 0.0);
+    let torque = median(used().map(|row| problem.rhs[row] / problem.root(row)).collect());
+    let square = |row: usize| (problem.rhs[row] - torque * problem.root(row)).powi(2);
+    let count = used().count() as f64;
+    let chance = 1.0 + FREE * (2.0 * expected.variance_inflation / count).sqrt();
+    median(used().map(square).collect()) <= MEDIAN * chance * inflation * expected.torque
+}
+
+/// The middle of some numbers; NaN of none.
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() { f64::NAN } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
 /// The constants of some rows as if there were no others, and their covariance: in windows as long as they are, or in the longest that jumps
@@ -168,14 +209,15 @@ fn within(fit: &Fit, rows: Range<usize>, step: usize, span: usize) -> Range<usiz
     first..end.max(first)
 }
 
-/// How much neighbouring parts scatter about lines through them, over what noise explains; nothing where few of them say something.
-fn scatter(parts: &[(f64, f64)]) -> Option<f64> {
+/// How much neighbouring parts scatter about lines through them, over what noise explains; nothing where few of those that are `driven` say
+/// something.
+fn scatter(parts: &[(f64, f64)], driven: usize) -> Option<f64> {
     let bend = |three: &[(f64, f64)]| {
         let [(before, a), (here, b), (after, c)] = [three[0], three[1], three[2]];
         (before - 2.0 * here + after).powi(2) / (a + 4.0 * b + c)
     };
     let mut bends: Vec<f64> = parts.windows(3).map(bend).filter(|bend| bend.is_finite()).collect();
-    if 2 * bends.len() < BLOCKS * PARTS {
+    if 2 * bends.len() < driven.max(FEWEST_DRIVEN) {
         return None;
     }
     let middle = bends.len() / 2;
@@ -248,15 +290,17 @@ mod tests {
         assert_eq!([0.0, 1e-9].map(|value| chi_squared_beyond(value, 0)), [1.0, 0.0]);
     }
 
-    /// What is said of two constants, the first of which grows by some part over the record.
-    fn tests_of(growth: f64, from: NoiseFrom) -> Vec<Option<Test>> {
-        use crate::regression::simulated::{CONSTANTS, model, rows, staged, white};
+    /// What is said of two constants, the first of which grows by some part over the record, where so many rows at the end have no torque.
+    fn tests_of(growth: f64, from: NoiseFrom, free: usize) -> Vec<Option<Test>> {
+        use crate::regression::simulated::{CONSTANTS, model, random, rows, staged, white};
         let (count, deviation) = (1600, 0.1);
         let mut rows = rows(count, |time| [1.0 + 0.01 * time, 0.01], deviation);
         for row in 0..count {
             let more = CONSTANTS[0] * growth * (row as f64 / count as f64 - 0.5);
             rows.rhs[row] += more * rows.regressors[1].value[row];
         }
+        let noise = random(100, count);
+        (count - free..count).for_each(|row| rows.rhs[row] = deviation * noise[row] - 3.0);
         let problem = model().problem(&rows, &rows.rhs, 0.0, None);
         let variance = deviation * deviation;
         let covariance = &RowCovariance::by_distance(vec![variance]);
@@ -267,10 +311,22 @@ mod tests {
     }
 
     #[test]
+    fn parts_without_torque_say_nothing_of_constants() {
+        assert_eq!(longest_run(&[true, false, true, true, false, true, true], 0..7), Some(2..4));
+        assert_eq!(longest_run(&[true, false, true, true], 0..2), Some(0..1));
+        assert_eq!(longest_run(&[true, false, true], 1..2), None);
+        let first = |growth: f64, free: usize| tests_of(growth, NoiseFrom::Channels, free)[0].clone();
+        assert_eq!(first(0.0, 800).expect("four blocks").freedom, 3);
+        assert!(first(0.0, 800).expect("four blocks").probability > 1e-3);
+        assert!(first(0.3, 800).expect("four blocks").probability < NO_CHANCE);
+        assert_eq!(first(0.3, 1600), None);
+    }
+
+    #[test]
     fn a_constant_that_grows_is_no_chance_and_one_that_does_not_is() {
         for (growth, differs) in [(0.0, false), (0.05, true), (0.3, true)] {
             let tests: Vec<Test> =
-                tests_of(growth, NoiseFrom::Channels).into_iter().map(|one| one.expect("eight blocks")).collect();
+                tests_of(growth, NoiseFrom::Channels, 0).into_iter().map(|one| one.expect("eight blocks")).collect();
             assert_eq!(tests[0].probability < NO_CHANCE, differs, "{growth}: {:?}", tests[0]);
             assert!(tests[1].probability > 1e-3, "{:?}", tests[1]);
             if growth == 0.3 {
@@ -284,7 +340,7 @@ mod tests {
     #[test]
     fn noise_that_equations_show_asks_for_more_than_chance() {
         let probability = |growth: f64, from: NoiseFrom| {
-            let first = tests_of(growth, from).into_iter().next().flatten();
+            let first = tests_of(growth, from, 0).into_iter().next().flatten();
             first.expect("eight blocks").probability
         };
         for (growth, found) in [(0.03, false), (0.3, true)] {

@@ -1,6 +1,8 @@
 //! Regression with windowed and constant unknowns, corrected for the noise of the regressors.
 
 pub(crate) mod block_fit;
+pub(crate) mod block_products;
+pub(crate) mod block_scatter;
 pub(crate) mod centred_windows;
 pub(crate) mod constants;
 pub(crate) mod dyadic_kernels;

@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use crate::regression::block_fit::inverse;
+use crate::regression::block_products::inverse;
 
 /// The least gain by a jump, and by how much more than by anything else, over the variance of an independent row.
 const SIGNIFICANT: f64 = 60.0;

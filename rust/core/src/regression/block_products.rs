@@ -1,0 +1,197 @@
+//! The rows of a block of a record, as products of their columns: what is left of them once what is windowed is eliminated.
+
+use std::ops::Range;
+
+use crate::equation::rows::Rows;
+use crate::regression::model::Model;
+
+/// What a pivot must keep of its column's square to be more than rounding.
+const NOTHING: f64 = 1e-10;
+
+/// The fewest rows for each unknown.
+pub(crate) const ROWS_OF_AN_UNKNOWN: usize = 5;
+
+/// The rows of one block, as products of their columns: windowed unknowns and their growth in turns, constants, the right-hand side.
+pub(crate) struct Products<'a> {
+    pub(crate) rows: &'a Rows,
+    pub(crate) model: &'a Model,
+}
+
+impl Products<'_> {
+    pub(crate) fn columns(&self) -> usize {
+        2 * self.model.windowed.len() + self.model.constant.len() + 1
+    }
+
+    /// Half the time that a block lasts, in seconds, and the row at its centre.
+    pub(crate) fn centre(&self, block: &Range<usize>) -> (f64, f64) {
+        let half = (0.5 * block.len() as f64 * self.rows.period).max(f64::MIN_POSITIVE);
+        (half, 0.5 * (block.start + block.end) as f64 - 0.5)
+    }
+
+    /// The columns of a row.
+    pub(crate) fn fill(&self, row: usize, time: f64, half: f64, into: &mut [f64]) {
+        let mut place = 0;
+        for &index in &self.model.windowed {
+            let regressor = &self.rows.regressors[index];
+            into[place] = regressor.value[row];
+            into[place + 1] = (time * regressor.value[row] + regressor.companion[row]) / half;
+            place += 2;
+        }
+        for &index in &self.model.constant {
+            into[place] = self.rows.regressors[index].value[row];
+            place += 1;
+        }
+        into[place] = self.rows.rhs[row];
+    }
+
+    /// The products of a block below and on the diagonal, and the powers of time summed over its rows, of which the first counts them.
+    pub(crate) fn of(&self, block: &Range<usize>) -> (Vec<f64>, [f64; 3]) {
+        let (count, (half, centre)) = (self.columns(), self.centre(block));
+        let (mut products, mut row_values) = (vec![0.0; count * count], vec![0.0; count]);
+        let mut times = [0.0; 3];
+        for row in block.clone().filter(|&row| self.rows.usable[row]) {
+            let time = (row as f64 - centre) * self.rows.period;
+            self.fill(row, time, half, &mut row_values);
+            for i in 0..count {
+                let factor = row_values[i];
+                products[i * count..=i * count + i].iter_mut().zip(&row_values).for_each(|(p, v)| *p += factor * v);
+            }
+            times.iter_mut().zip([1.0, time, time * time]).for_each(|(sum, power)| *sum += power);
+        }
+        (products, times)
+    }
+
+    /// Products with the columns divided by `scale` and without what the angle's noise adds, above the diagonal too.
+    pub(crate) fn corrected(&self, part: &(Vec<f64>, [f64; 3]), half: f64, noise: f64, scale: &[f64]) -> Vec<f64> {
+        let (count, (mut products, times)) = (self.columns(), part.clone());
+        let kernels = if noise > 0.0 { self.kernels(half) } else { Vec::new() };
+        for i in 0..count {
+            for j in 0..=i {
+                let added = if noise > 0.0 { noise * expected(&kernels[i], &kernels[j], &times) } else { 0.0 };
+                let value = (products[i * count + j] - added) / (scale[i] * scale[j]);
+                products[i * count + j] = value;
+                products[j * count + i] = value;
+            }
+        }
+        products
+    }
+
+    /// Corrected products of the constants and the right-hand side, without the block's own unknowns. A block that does not determine those
+    /// says nothing of the constants.
+    pub(crate) fn of_constants(
+        &self,
+        block: &Range<usize>,
+        moments: &(Vec<f64>, [f64; 3]),
+        noise: f64,
+        scale: &[f64],
+    ) -> Option<Eliminated> {
+        let first = 2 * self.model.windowed.len();
+        let enough = moments.1[0] > (ROWS_OF_AN_UNKNOWN * first) as f64;
+        enough.then(|| eliminate(self.corrected(moments, self.centre(block).0, noise, scale), self.columns(), first))
+    }
+
+    /// The kernels that the angle's noise enters each column by: one that counts alike, one in proportion to time.
+    fn kernels(&self, half: f64) -> Vec<[Vec<f64>; 2]> {
+        let mut kernels = Vec::new();
+        for &index in &self.model.windowed {
+            let [value, companion] = &self.rows.regressors[index].noise;
+            let divided = |kernel: &[f64]| kernel.iter().map(|one| one / half).collect::<Vec<_>>();
+            kernels.push([value.clone(), Vec::new()]);
+            kernels.push([divided(companion), divided(value)]);
+        }
+        for &index in &self.model.constant {
+            kernels.push([self.rows.regressors[index].noise[0].clone(), Vec::new()]);
+        }
+        kernels.push([self.rows.rhs_noise.clone(), Vec::new()]);
+        kernels
+    }
+
+    /// The root of the mean square of each column.
+    pub(crate) fn scale(&self, parts: &[(Vec<f64>, [f64; 3])]) -> Vec<f64> {
+        let count = self.columns();
+        let rows = parts.iter().map(|(_, times)| times[0]).sum::<f64>().max(1.0);
+        let square = |i: usize| parts.iter().map(|(products, _)| products[i * count + i]).sum::<f64>();
+        (0..count).map(square).map(|square| if square > 0.0 { (square / rows).sqrt() } else { 1.0 }).collect()
+    }
+}
+
+/// What noise of variance one adds to the product of two columns, for powers of time summed over the rows.
+fn expected(one: &[Vec<f64>; 2], other: &[Vec<f64>; 2], times: &[f64; 3]) -> f64 {
+    let dot = |i: usize, j: usize| -> f64 { one[i].iter().zip(&other[j]).map(|(a, b)| a * b).sum() };
+    times[0] * dot(0, 0) + times[1] * (dot(0, 1) + dot(1, 0)) + times[2] * dot(1, 1)
+}
+
+/// What eliminating the first columns of symmetric products leaves.
+pub(crate) struct Eliminated {
+    /// The products of the rest.
+    pub(crate) rest: Vec<f64>,
+    /// What each of the first columns, less those before it, is taken off the later ones times; empty for one that is nothing but rounding,
+    /// which counts as zero.
+    pub(crate) factors: Vec<Vec<f64>>,
+}
+
+/// Eliminates the first columns of symmetric products.
+pub(crate) fn eliminate(mut products: Vec<f64>, count: usize, first: usize) -> Eliminated {
+    let whole: Vec<f64> = (0..first).map(|k| products[k * count + k]).collect();
+    let mut factors = vec![Vec::new(); first];
+    for (k, whole) in whole.into_iter().enumerate() {
+        let pivot = products[k * count + k];
+        if pivot.is_nan() || pivot <= NOTHING * whole {
+            continue;
+        }
+        for i in k + 1..count {
+            let factor = products[i * count + k] / pivot;
+            for j in k + 1..count {
+                products[i * count + j] -= factor * products[k * count + j];
+            }
+            factors[k].push(factor);
+        }
+    }
+    let rest = (first..count).flat_map(|i| products[i * count + first..(i + 1) * count].to_vec()).collect();
+    Eliminated { rest, factors }
+}
+
+/// The inverse of a symmetric positive definite matrix, or `None` if it is not.
+pub(crate) fn inverse(matrix: &[f64], count: usize) -> Option<Vec<f64>> {
+    let wide = 2 * count;
+    let mut work = vec![0.0; count * wide];
+    for i in 0..count {
+        work[i * wide..i * wide + count].copy_from_slice(&matrix[i * count..(i + 1) * count]);
+        work[i * wide + count + i] = 1.0;
+    }
+    for k in 0..count {
+        let pivot = work[k * wide + k];
+        if pivot.is_nan() || pivot <= NOTHING * matrix[k * count + k] {
+            return None;
+        }
+        work[k * wide..(k + 1) * wide].iter_mut().for_each(|value| *value /= pivot);
+        for i in (0..count).filter(|&i| i != k) {
+            let factor = work[i * wide + k];
+            for j in 0..wide {
+                work[i * wide + j] -= factor * work[k * wide + j];
+            }
+        }
+    }
+    Some((0..count).flat_map(|i| work[i * wide + count..(i + 1) * wide].to_vec()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eliminating_leaves_the_inverse_of_that_part_of_the_inverse() {
+        let matrix = [4.0, 1.0, 0.5, 1.0, 3.0, 0.2, 0.5, 0.2, 2.0];
+        let eliminated = eliminate(matrix.to_vec(), 3, 1);
+        let whole = inverse(&matrix, 3).unwrap();
+        let part = inverse(&eliminated.rest, 2).unwrap();
+        for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            assert!((part[2 * i + j] - whole[3 * (i + 1) + j + 1]).abs() < 1e-14);
+        }
+        assert_eq!(eliminated.factors, [[0.25, 0.125]]);
+        // What is nothing but rounding is left as it is.
+        let nothing = eliminate(vec![0.0, 0.0, 0.0, 1.0], 2, 1);
+        assert_eq!((nothing.rest, nothing.factors), (vec![1.0], vec![Vec::new()]));
+        assert_eq!(inverse(&[1.0, 1.0, 1.0, 1.0], 2), None);
+    }
+}
