@@ -103,7 +103,6 @@ def test_no_option_is_passed_over() -> None:
         ({"lag": 0.004}, r"lag= is not supported .* got 0.004; shift the torque"),
         ({"period": 2 * np.pi}, r"period= is not supported .* got 6.28.*; unwrap the angle"),
         ({"loss": "huber"}, r"loss= is not supported .* got 'huber'; leave out by mask="),
-        ({"settings": {"form": "weak"}}, r"settings= is not supported .* got .*; pass method=WeakForm\(window_length"),
         ({"velocity": np.ones((2, SAMPLES))}, r"velocity= is not supported .*; leave it out: the angle alone"),
         ({"nan_policy": "propagate"}, r"nan_policy= is not supported .* got 'propagate'; use 'omit'"),
     ],

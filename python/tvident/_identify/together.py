@@ -18,7 +18,7 @@ from tvident._identify.methods import SHORTEST_TEST_FUNCTION, WeakForm, exponent
 from tvident._units import ROTARY, Axis, axis_of, times_in_seconds
 
 if TYPE_CHECKING:
-    from tvident._merged import MergedIdentification, Sampling
+    from tvident._merged import Earlier, MergedIdentification, Sampling
 
 Numbers = npt.NDArray[np.number]
 
@@ -30,7 +30,6 @@ _ALONE: dict[str, tuple[Any, ...]] = {
     "lag": (None, 0, 0.0),
     "quantisation": (None,),
     "period": (None,),
-    "settings": (None,),
     "loss": (None, "squares"),
     "share": (None, ()),
     "align": (None,),
@@ -46,7 +45,6 @@ _CURES = {
     "lag": "shift the torque by it before, with np.interp, or find it in one trial of one mass",
     "quantisation": "leave it out: the noise of the channels is estimated, that of rounding with it",
     "period": "unwrap the angle before, with np.unwrap(angle, period=…)",
-    "settings": "pass method=WeakForm(window_length=…, exponent=…) with those of settings, and kinds by name",
     "loss": "leave out by mask= what holds spikes",
     "share": "leave it out: what is merged shares all of its parameters",
     "align": "shift the torque by it before, with np.interp",
@@ -84,6 +82,7 @@ class Options:
     parameters: Mapping[str, Any]
     terms: Any
     mask: Any
+    settings: Any
     alone: Mapping[str, Any]
     step: int
     workers: int | None
@@ -100,6 +99,7 @@ class Options:
             "method",
             "terms",
             "mask",
+            "settings",
             "step",
             "workers",
             "progress",
@@ -129,12 +129,13 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
         If there is no sample period, or arrays hold no numbers.
     """
     # A room of many files, which calls with one trial of one mass need not wait for.
-    from tvident._merged import AskedTogether, identify_masses, identify_trials, masses_of, trials_of  # noqa: PLC0415
+    from tvident._merged import AskedTogether, Earlier, identify_masses, identify_trials, masses_of, trials_of  # noqa: PLC0415
 
     _check(angle, options)
     axis = _axis(angle, torque, options.units)
     form = _weak(options.method)
-    terms = all_terms(((OFFSET, "constant"),) if options.terms is None else options.terms, "constant")
+    earlier = None if options.settings is None else Earlier.of(options.settings)
+    terms, kinds = _terms(options.terms, earlier)
     for term in terms:
         if term.inner:
             raise ValueError(
@@ -169,9 +170,14 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
         asked = AskedTogether(
             sampling=sampling,
             parameters={name: value for name, value in options.parameters.items() if value is not None},
-            terms=[(one.name, one.kind) for one in terms],
+            terms=kinds,
             own={one.name: one.own for one in terms if one.own is not None},
-            form=_lengths(form, sampling.period, max(map(len, recorded[0]))),
+            forms=(
+                earlier.forms
+                if earlier is not None and arguments.is_word(options.method, "auto")
+                else [_lengths(form, sampling.period, max(map(len, recorded[0])))]
+            ),
+            earlier=earlier,
             units=UNITS if axis.system is ROTARY else LINEAR_UNITS,
             step=arguments.whole_number("step", options.step, least=1),
             workers=arguments.worker_count(options.workers),
@@ -182,6 +188,22 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
             return identify_trials(trials if sampling.clock is None else trials.on_grid(sampling), asked, values)
         on_grid = masses if sampling.clock is None else [one.on_grid(sampling) for one in masses]
         return identify_masses(on_grid, asked, values)
+
+
+def _terms(given: Any, earlier: Earlier | None) -> tuple[list[Unknown], list[tuple[str, str | None]]]:
+    """Return terms, and their names and kinds; no kind where an earlier result tells it."""
+    if given is None and earlier is not None:
+        if earlier.own_terms:
+            raise ValueError(
+                f"settings hold no functions, and term {earlier.own_terms[0]!r} is one of the user's own; got no terms; pass terms= again, "
+                f"with all of {', '.join(earlier.terms)}"
+            )
+        given = earlier.terms
+    terms = all_terms(((OFFSET, "constant"),) if given is None else given, "constant")
+    if earlier is None:
+        return terms, [(one.name, one.kind) for one in terms]
+    said = [isinstance(one, tuple | list) for one in given]
+    return terms, [(one.name, one.kind if told else None) for one, told in zip(terms, said, strict=True)]
 
 
 def _sampling(options: Options, axis: Axis, angles: Sequence[Numbers], torques: Sequence[Numbers]) -> Sampling:

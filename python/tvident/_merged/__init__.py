@@ -1,6 +1,7 @@
 """Identifies what repeated trials or coupled masses share, from rows that are merged."""
 
 from tvident._merged.call import AskedTogether, identify_trials
+from tvident._merged.earlier import Earlier
 from tvident._merged.loaded import load
 from tvident._merged.masses import Masses, identify_masses, masses_of
 from tvident._merged.mechanism import Mechanism
@@ -13,6 +14,7 @@ from tvident._merged.trials import Trials, trials_of
 __all__ = [
     "AskedTogether",
     "Chain",
+    "Earlier",
     "Identifiable",
     "Masses",
     "Matrix",

@@ -15,7 +15,7 @@ from tvident._equation import COEFFICIENTS
 from tvident._merged.call import AskedTogether, TermValues
 from tvident._merged.elements import Element, kind_or_number
 from tvident._merged.mechanism import Mechanism
-from tvident._merged.merging import Merging
+from tvident._merged.merging import Merging, Part
 from tvident._merged.predicted import Equations, TrialArrays
 from tvident._merged.recorded import MergedRecorded
 from tvident._merged.result import MergedIdentification
@@ -85,9 +85,14 @@ class Masses:
             place, driven = len(rows.forces), self.measured
         for name, kind in asked.terms:
             for mass in driven:
-                found.append(Element(f"{name}_{mass}", name, ((mass, None, place, 1.0),), kind_or_number(name, kind)))
+                found.append(
+                    Element(
+                        f"{name}_{mass}", name, ((mass, None, place, 1.0),), kind_or_number(name, kind or "constant")
+                    )
+                )
                 place += 1
-        return whole, found
+        own_kinds = frozenset(self.structure.kinds) if isinstance(self.structure, Mechanism) else frozenset()
+        return whole, asked.as_before(found, own_kinds)
 
     @property
     def channels(self) -> list[Numbers]:
@@ -257,7 +262,7 @@ def identify_masses(trials: Sequence[Masses], asked: AskedTogether, term_values:
     unknowable = unknowable_of(joined, elements)
     open_ones = [one for one in elements if not one.is_known and one.name not in unknowable]
     samples = max(one.angles[0].size for one in several)
-    parts = []
+    parts: list[Part] = []
     # What is known takes part in all equations, but ties none.
     for equations in components(joined.measured, open_ones):
         inside = [one.at(equations) for one in elements if one.is_known or one in open_ones]
@@ -272,7 +277,9 @@ def identify_masses(trials: Sequence[Masses], asked: AskedTogether, term_values:
         inside = [_rewired(one, {channel: place for place, channel in enumerate(channels)}) for one in inside]
         given = [_recorded(one, equations, channels, names, term_values) for one in several]
         noise = joined.noise(channels, equations, asked.sampling.passed)
-        parts.append(asked.part(Equations(inside, equations, given), samples, noise))
+        parts.append(asked.part(Equations(inside, equations, given), samples, noise, len(parts)))
+    if asked.earlier is not None:
+        asked.earlier.check_parts(len(parts))
     merging = Merging(
         elements,
         parts,
@@ -291,6 +298,7 @@ def identify_masses(trials: Sequence[Masses], asked: AskedTogether, term_values:
             structure=joined.structure,
             own=asked.own,
         ),
+        terms=[name for name, _ in asked.terms],
     )
     return MergedIdentification(merging)
 
