@@ -10,6 +10,7 @@ from tvident._merged.result import MergedIdentification
 from tvident._merged.sampling import Sampling
 from tvident._merged.structure import Chain, Matrix
 from tvident._merged.trials import Trials, trials_of
+from tvident._merged.weighted import of_core, weights_of_trials
 
 __all__ = [
     "AskedTogether",
@@ -26,5 +27,7 @@ __all__ = [
     "identify_trials",
     "load",
     "masses_of",
+    "of_core",
     "trials_of",
+    "weights_of_trials",
 ]

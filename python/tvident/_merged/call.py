@@ -142,7 +142,8 @@ def identify_trials(trials: Trials, asked: AskedTogether, term_values: TermValue
         terms = np.stack([term_values(name, angle) for name, _ in asked.terms]) if asked.terms else None
         mask = None if trials.masks is None else trials.masks[place]
         position = None if trials.positions is None else np.ascontiguousarray(trials.positions[place])
-        given.append((angle[np.newaxis], torque[np.newaxis], terms, mask, position))
+        weights = None if trials.weights is None else trials.weights[place]
+        given.append((angle[np.newaxis], torque[np.newaxis], terms, mask, position, weights))
     passed, noise = asked.sampling.passed, None
     if passed is not None:
         angles, torques = ([float(np.mean(variances(one, passed)))] for one in (trials.angles, trials.torques))

@@ -21,6 +21,7 @@ from tvident._merged.recorded import MergedRecorded
 from tvident._merged.result import MergedIdentification
 from tvident._merged.sampling import Sampling, variances
 from tvident._merged.structure import Chain, matrices
+from tvident._merged.weighted import spread, without_missing
 from tvident._units import scaled
 
 Numbers = npt.NDArray[np.number]
@@ -40,6 +41,7 @@ class Masses:
     torques : sequence of ndarray, or None for a force that was not measured
     structure : Chain or Mechanism, optional
     mask : ndarray of bool, shape (n,), optional
+    weights : ndarray, shape (n,), optional
     momenta : sequence of ndarray, shape (n,)
         Of a mechanism: channels that follow the angles.
     forces : sequence of ndarray, shape (n,)
@@ -54,6 +56,7 @@ class Masses:
     mask: npt.NDArray[np.bool_] | None
     momenta: Sequence[npt.NDArray[np.float64]] = ()
     forces: Sequence[npt.NDArray[np.float64]] = ()
+    weights: npt.NDArray[np.float64] | None = None
     inertia: Mapping[str, npt.NDArray[np.float64]] = field(default_factory=dict)
 
     @property
@@ -65,6 +68,13 @@ class Masses:
         """Return the masses with their channels times factors of units."""
         torques = [None if one is None else scaled(one, torque) for one in self.torques]
         return replace(self, angles=[scaled(one, angle) for one in self.angles], torques=torques)
+
+    def weighted(self, weights: npt.NDArray[np.float64], of_rows: npt.NDArray[np.float64] | None) -> Masses:
+        """Return the masses with weights, those of rows None where all are alike; samples that have none are missing."""
+        torques = [None if one is None else without_missing(one, weights) for one in self.torques]
+        return replace(
+            self, angles=[without_missing(one, weights) for one in self.angles], torques=torques, weights=of_rows
+        )
 
     def with_elements(self, asked: AskedTogether, term_values: TermValues) -> tuple[Masses, list[Element]]:
         """Return the masses with all that enters their equations, and the elements, those of terms last.
@@ -108,8 +118,10 @@ class Masses:
         """
         if not self.momenta and passed is None:
             return None
-        known = variances(self.angles, passed)
-        torques = variances([np.asarray(self.torques[one]) for one in equations], passed)
+        of_weight_one = 1 / spread(self.weights)
+        known = [one * of_weight_one for one in variances(self.angles, passed)]
+        measured = variances([np.asarray(self.torques[one]) for one in equations], passed)
+        torques = [one * of_weight_one for one in measured]
         return [known[one] if one < len(known) else 0.0 for one in channels], torques
 
     def on_grid(self, sampling: Sampling) -> Masses:
@@ -312,7 +324,7 @@ def _recorded(
     torques = [masses.torques[mass] for mass in equations]
     rows = [np.full(samples, np.nan) if one is None else np.asarray(one, np.float64) for one in torques]
     angles = np.stack([np.asarray(masses.channels[channel], np.float64) for channel in channels])
-    return angles, np.stack(rows), terms, masses.mask, None
+    return angles, np.stack(rows), terms, masses.mask, None, masses.weights
 
 
 def components(equations: Sequence[int], elements: Sequence[Element]) -> list[list[int]]:
