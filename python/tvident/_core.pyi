@@ -657,6 +657,7 @@ def identify_merged(
             npt.NDArray[np.number] | None,
             npt.NDArray[np.bool_] | None,
             npt.NDArray[np.float64] | None,
+            npt.NDArray[np.float64] | None,
         ]
     ],
     elements: Sequence[tuple[Sequence[tuple[int, int | None, int, float]], float | None, str]],

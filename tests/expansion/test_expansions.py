@@ -316,3 +316,29 @@ def test_a_rectified_reflex_has_a_gain_that_is_scheduled_and_a_delay_that_is_sea
     for name, truth in (("inertia", 0.0123), ("damping", 0.1), ("stiffness", 13.0)):
         assert abs(result.constants[name][0] / truth - 1) < 0.01
     assert "reflex.delay  searched" in result.summary()
+
+
+@pytest.mark.parametrize("seed", [1, *long(2, 3)])
+def test_a_jump_that_functions_of_time_do_not_follow_is_said(seed: int) -> None:
+    square = tvident.simulate_torsional_rig(duration=8.0, seed=seed, pattern="square")
+    result = identify(square, stiffness=Expansion("bspline"))
+    assert result.record_status & Status.KIND_CONTRADICTED
+    assert any("windows find a jump of stiffness (at 4" in line and "do not follow" in line for line in result.advice)
+
+
+@pytest.mark.parametrize(("last", "seed"), [(0.15, 2), (0.3, 1), *long((0.15, 1), (0.2, 1), (0.2, 2), (0.3, 2))])
+def test_a_jump_near_the_end_is_said(last: float, seed: int) -> None:
+    # 6/x N m/rad.
+    rig = tvident.simulate_torsional_rig(duration=8.0, seed=seed, pattern=lambda t: np.where(t < 8 - last, 0.45, 0.35))
+    result = identify(rig, stiffness=Expansion("bspline"))
+    assert result.record_status & (Status.KIND_CONTRADICTED | Status.SCALES_DISAGREE)
+    assert any("jump" in line or "do not follow" in line for line in result.advice)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "seed"),
+    [("slider", 3), ("ramp", 3), *long(*((one, seed) for one in ("slider", "ramp") for seed in (4, 5, 6)))],
+)
+def test_what_functions_of_time_follow_has_no_flag(pattern: Any, seed: int) -> None:
+    rig = tvident.simulate_torsional_rig(duration=8.0, seed=seed, pattern=pattern)
+    assert not identify(rig, stiffness=Expansion("bspline")).record_status

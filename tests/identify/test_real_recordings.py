@@ -227,3 +227,30 @@ def test_a_servo_whose_stiffness_is_none_hears_so(folder_of_recordings: Path) ->
     found = tvident.identify(angle, torque, sample_rate=1000, stiffness=0)
     assert found.value("inertia").value == pytest.approx(1.2e-4, rel=0.2)
     assert found.value("damping").value == pytest.approx(7.03e-5, rel=0.05)
+
+
+def reflex(t: Array, angle: Array, velocity: Array, delay: float, corner: float) -> Array:
+    """Return the stretch velocity, half-wave rectified and late, through a muscle of two poles."""
+    del angle
+    times = np.arange(0.0, 12 / corner, 1e-3)
+    muscle = 1e-3 * corner**2 * times * np.exp(-corner * times)
+    return np.convolve(np.maximum(np.interp(t - delay, t, velocity), 0.0), muscle)[: t.size]
+
+
+@pytest.mark.long
+def test_a_reflex_explains_more_of_the_ankle_where_the_test_function_is_the_same(folder_of_recordings: Path) -> None:
+    channels = recordings.read(recording(folder_of_recordings, "ankle_stationary.mat"))
+    term = tvident.Term("reflex", reflex, search={"delay": (0.02, 0.08), "corner": (8.0, 60.0)})
+
+    def held_back(terms: list[Any], **method: Any) -> Any:
+        angle, torque = channels["angle"][:20_000], -channels["torque"][:20_000]
+        return tvident.identify(
+            angle, torque, sample_rate=1000, lag=1e-3, terms=terms, **ALL_CONSTANT, **method
+        ).held_back()
+
+    alone, both = (held_back(terms) for terms in (["offset"], [term, "offset"]))
+    # Each is predicted one test function of its own ahead, and says how long that is.
+    assert both.simulated > alone.simulated
+    assert both.ahead > 2 * alone.ahead
+    both = held_back([term, "offset"], **weak(window_length=round(1000 * alone.ahead)))
+    assert both.predicted > alone.predicted

@@ -51,7 +51,7 @@ def refused(trials: bool, masses: bool, structure: str, options: dict[str, Any])
     """Return what is not supported."""
     if structure and not masses:
         return True
-    if (trials or masses) and any(name in options for name in ("share", "align", "lag", "weights")):
+    if (trials or masses) and any(name in options for name in ("share", "align", "lag")):
         return True
     return (structure == "arm" and trials) or ("phase" in options and masses)
 
@@ -72,7 +72,9 @@ def test_whatever_is_asked_together_is_right_or_refused(channels: Any, trials: b
         options = {**time, **beside, "structure": given}
         options |= {"ensemble_axis": 0 if trials else None, "dof_axis": int(trials) if masses else None}
         case = (trials, masses, structure, *options)
-        if refused(trials, masses, structure, beside) or (phase is beside.get("phase") and "t" in time):
+        # Neither goes with times that are not uniform.
+        uneven = "t" in time and (trials or masses) and bool({"phase", "weights"} & set(beside))
+        if refused(trials, masses, structure, beside) or uneven:
             with pytest.raises(ValueError, match=r"got .*; .") as error:
                 identify(angle, torque, **options)
             assert "supported" in str(error.value) or "=" in str(error.value), case
@@ -99,11 +101,9 @@ def test_no_option_is_passed_over() -> None:
 @pytest.mark.parametrize(
     ("option", "words"),
     [
-        ({"weights": np.ones(SAMPLES)}, r"weights= is not supported .* got .*; leave out by mask="),
         ({"lag": 0.004}, r"lag= is not supported .* got 0.004; shift the torque"),
         ({"period": 2 * np.pi}, r"period= is not supported .* got 6.28.*; unwrap the angle"),
         ({"loss": "huber"}, r"loss= is not supported .* got 'huber'; leave out by mask="),
-        ({"settings": {"form": "weak"}}, r"settings= is not supported .* got .*; pass method=WeakForm\(window_length"),
         ({"velocity": np.ones((2, SAMPLES))}, r"velocity= is not supported .*; leave it out: the angle alone"),
         ({"nan_policy": "propagate"}, r"nan_policy= is not supported .* got 'propagate'; use 'omit'"),
     ],

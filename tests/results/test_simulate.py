@@ -227,7 +227,11 @@ def test_a_part_that_was_held_back_tells_a_good_model_from_a_bad_one(
     assert bad.simulated < 90 < bad.predicted < good.predicted
     first = result.summary().splitlines()[1]
     assert first.startswith("explains 99.")
-    assert "predicted one test function ahead in the last tenth of every tenth, held back" in first
+    assert good.ahead == result.settings["window_length"] / 1000
+    assert (
+        f"predicted one test function ahead ({1000 * good.ahead:.0f} ms) in the last tenth of every tenth, held back"
+        in first
+    )
     paper = tvident.identify(rig.angle, rig.torque, sample_rate=1000, method="paper").held_back()
     assert paper.parts < 10
     assert paper.simulated > 90

@@ -19,6 +19,9 @@ _DIFFERS = 2.0
 _STANDARD = 4.0
 """Standard deviations of chance."""
 
+_SHOWN = 5
+"""Jumps that are named."""
+
 _EQUIVALENT = 4.0
 """Sizes whose criterion is at most so much higher are told from the best by chance."""
 
@@ -40,6 +43,8 @@ class FoundExpansion:
         Whether the record chose the size.
     against_windows : (float, int)
         The mean squared difference from windows over its variance, and at how many.
+    missed_jumps : sequence of float
+        Seconds at which windows jump, and it does not.
     """
 
     name: str
@@ -50,10 +55,44 @@ class FoundExpansion:
     is_of_time: bool
     chosen: bool
     against_windows: tuple[float, int]
+    missed_jumps: Sequence[float] = ()
+
+    @property
+    def is_contradicted(self) -> bool:
+        """Whether windows find another parameter."""
+        return bool(self.missed_jumps) or self._differs
+
+    @property
+    def _differs(self) -> bool:
+        squares, count = self.against_windows
+        if count < 2 or not np.isfinite(squares):  # noqa: PLR2004 - one window tells nothing
+            return False
+        # A mean of squares of so many standard normal numbers scatters by this.
+        return bool(squares > max(_DIFFERS, 1 + _STANDARD * np.sqrt(2 / count)))
+
+    def compared(self) -> tuple[list[str], list[str]]:
+        """Return reasons and advice: whether windows agree, and what to do where they do not."""
+        squares, count = self.against_windows
+        jumps = _jumps(self)
+        if count < 2 or not np.isfinite(squares):  # noqa: PLR2004 - one window tells nothing
+            return [] if jumps else [f"{self.name}: not compared with windows"], jumps
+        ratio = np.sqrt(squares)
+        if self._differs:
+            return [], [
+                *jumps,
+                _contradiction(self, f"it and {count} windows differ by {ratio:.2g} standard errors rms"),
+            ]
+        agree = f"{self.name}: the expansion and {count} windows agree: they differ by {ratio:.2g} standard errors rms"
+        return [f"{agree}, beside the jump" if jumps else agree], jumps
 
 
 def words_of_expansions(
-    found: Sequence[FoundExpansion], observations: float, ratio: float, changing: Sequence[str]
+    found: Sequence[FoundExpansion],
+    observations: float,
+    ratio: float,
+    changing: Sequence[str],
+    *,
+    doubted: bool = False,
 ) -> Words:
     """Return how sizes were chosen, whether windows agree, and what to do where they do not.
 
@@ -66,13 +105,24 @@ def words_of_expansions(
         What is left of the equations over their noise.
     changing : sequence of str
         Parameters that were to be constant unless a test rejects it, which windows reject.
+    doubted : bool
+        Whether windows in the place of functions of time find that parts of the record, or widths of the test function, contradict each
+        other.
     """
     reasons, advice = [], []
     for one in found:
         reasons.append(_size(one, observations))
         advice += _at_end(one)
-        said, contradicts = _against_windows(one)
-        (advice if contradicts else reasons).extend(said)
+        agreement, contradiction = one.compared()
+        reasons += agreement
+        advice += contradiction
+    if doubted and not any(one.missed_jumps for one in found):
+        names = listed([one.name for one in found])
+        advice.append(
+            f"windows in the place of {names} as functions of time leave parts of the record, or widths of the test function, that find "
+            "different parameters: something jumps, or changes faster than either follows, and constants may be wrong, too; let it be "
+            "windowed, and look at its residuals near the ends"
+        )
     if np.isfinite(ratio):
         reasons.append(
             f"weighted by their noise and corrected for that of the angle, the equations leave {ratio:.2f} times what the noise explains"
@@ -114,23 +164,26 @@ def _at_end(one: FoundExpansion) -> list[str]:
     return [f"{one.name} takes nearly the largest size of {one.largest}: raise largest=, or let it be windowed"]
 
 
-def _against_windows(one: FoundExpansion) -> tuple[list[str], bool]:
-    squares, count = one.against_windows
-    if count < 2 or not np.isfinite(squares):  # noqa: PLR2004 - one window tells nothing
-        return [f"{one.name}: not compared with windows"], False
-    # A mean of squares of so many standard normal numbers scatters by this.
-    limit = max(_DIFFERS, 1 + _STANDARD * np.sqrt(2 / count))
-    ratio = np.sqrt(squares)
-    if squares <= limit:
-        return [
-            f"{one.name}: the expansion and {count} windows agree: they differ by {ratio:.2g} standard errors rms"
-        ], False
-    said = f"it and {count} windows differ by {ratio:.2g} standard errors rms"
+def _jumps(one: FoundExpansion) -> list[str]:
+    """Return what to do about jumps that windows find and the functions do not follow."""
+    if not one.missed_jumps:
+        return []
+    shown = ", ".join(f"{at:.4g}" for at in one.missed_jumps[:_SHOWN]) + (
+        " …" if len(one.missed_jumps) > _SHOWN else ""
+    )
+    jump = "a jump" if len(one.missed_jumps) == 1 else f"{len(one.missed_jumps)} jumps"
+    words = (
+        f"windows find {jump} of {one.name} (at {shown} s) that the functions do not follow: other parameters make up for that and are "
+        "wrong, too; let it be windowed, or expand it before and after apart"
+    )
+    return [words]
+
+
+def _contradiction(one: FoundExpansion, said: str) -> str:
+    """Return what to do where windows differ by more than chance."""
     if one.is_of_time:
-        too_few = f"the functions do not follow how {one.name} changes: {said}; take more, or another family, or let it be windowed"
-        return [too_few], True
-    unexplained = (
+        return f"the functions do not follow how {one.name} changes: {said}; take more, or another family, or let it be windowed"
+    return (
         f"the schedule does not explain how {one.name} changes: {said}; {one.name} depends on something else too (add it as a second "
         "channel of the Expansion), or these functions are too coarse for it (try another family); otherwise let it be windowed"
     )
-    return [unexplained], True

@@ -20,6 +20,7 @@ from tvident._identify.methods import WeakForm
 from tvident._identify.settings import Request, plain
 from tvident._identify.task import Task
 from tvident._results import ExpandedParameter, Identification, Recorded
+from tvident._status import Status
 
 _PAIR = 2
 """A term and its kind."""
@@ -77,16 +78,23 @@ class ExpandedTask:
                 is_of_time=self._expansions[one.name].is_of_time,
                 chosen=None in self._expansions[one.name].given_sizes,
                 against_windows=outcome.against_windows(one.name, found),
+                missed_jumps=outcome.missed_jumps(one.name, found),
             )
             for one in curves.values()
         ]
+        doubts = outcome.doubts_of_windows
+        if any(one.is_contradicted for one in told):
+            doubts |= Status.KIND_CONTRADICTED
+        found = replace(found, record_status=Status(int(np.asarray(found.record_status))) | doubts)
         kinds = {name: str(kind) for name, kind in pilot.settings["kinds"].items() if name not in curves}
         changing = [
             name
             for name, kind in kinds.items()
             if arguments.is_word(self._request.parameters.get(name), "auto") and kind not in {"constant", "known"}
         ]
-        words = words_of_expansions(told, outcome.fitted.observations, outcome.ratio, changing)
+        words = words_of_expansions(
+            told, outcome.fitted.observations, outcome.ratio, changing, doubted=bool(outcome.doubts_of_windows)
+        )
         if data.labels is not None:
             found = replace(found, labels=data.labels.at(slice(None, None, data.step)))
         return Identification(

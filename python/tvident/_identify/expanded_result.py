@@ -30,6 +30,15 @@ from tvident._units import unit_said
 
 Array = npt.NDArray[np.float64]
 
+_JUMPS = 2.0
+"""Standard errors that a jump of windows must be large for an expansion to have to follow it."""
+
+_FOLLOWED = 0.5
+"""Of a jump, by which an expansion must change within the test function to follow it."""
+
+_DOUBTS = Status.KIND_CONTRADICTED | Status.SCALES_DISAGREE
+"""Flags of windows that hold for smooth functions of time, too."""
+
 _KEPT = Status.COLOURED | Status.CHANNEL_SUSPECTED
 """Flags that windows found of the channels, whatever the equation."""
 
@@ -181,6 +190,38 @@ class ExpandedOutcome:
         variance = pilot.stderr[name][apart] ** 2 + found.errors[name][apart] ** 2
         squares = ((value[apart] - found.values[name][apart]) ** 2 / variance)[there]
         return float(np.mean(squares)), int(there.sum())
+
+    @property
+    def doubts_of_windows(self) -> Status:
+        """What windows of time say against functions of time in their place: parts of the record, or scales, find other parameters.
+
+        A function of a channel may follow what no window does.
+        """
+        if not all(one.is_of_time for one in self.given.expansions.values()):
+            return Status(0)
+        return Status(int(np.asarray(self.given.pilot.record_status))) & _DOUBTS
+
+    def missed_jumps(self, name: str, found: Estimates) -> tuple[float, ...]:
+        """Return the seconds at which windows jump and the expansion does not, within the test function that sees both."""
+        pilot = self.given.pilot
+        if str(pilot.settings["kinds"].get(name)) != "windowed" or self.given.data.step > 1:
+            return ()
+        half = int(pilot.settings["window_length"]) // 2
+        windows, errors = getattr(pilot, name) if name in COEFFICIENTS else pilot.terms[name], pilot.stderr[name]
+        missed = []
+        for jump in pilot.jumps:
+            # The first sample after it.
+            at = int(np.searchsorted(pilot.time, jump))
+            before, after = max(at - half, 0), min(at + half, pilot.time.size - 1)
+            if not 0 < at < pilot.time.size:
+                continue
+            # Beside it few equations are left, since no test function may reach over it.
+            size = windows[after] - windows[before]
+            known = abs(size) > _JUMPS * np.hypot(errors[after], errors[before])
+            follows = (found.values[name][after] - found.values[name][before]) / size
+            if known and not follows > _FOLLOWED:
+                missed.append(float(jump))
+        return tuple(missed)
 
     def _kinds(self) -> dict[str, str]:
         return {

@@ -18,7 +18,7 @@ from tvident._identify.methods import SHORTEST_TEST_FUNCTION, WeakForm, exponent
 from tvident._units import ROTARY, Axis, axis_of, times_in_seconds
 
 if TYPE_CHECKING:
-    from tvident._merged import MergedIdentification, Sampling
+    from tvident._merged import Earlier, Masses, MergedIdentification, Sampling, Trials
 
 Numbers = npt.NDArray[np.number]
 
@@ -26,11 +26,9 @@ _ALONE: dict[str, tuple[Any, ...]] = {
     "velocity": (None,),
     "acceleration": (None,),
     "instrument": (None,),
-    "weights": (None,),
     "lag": (None, 0, 0.0),
     "quantisation": (None,),
     "period": (None,),
-    "settings": (None,),
     "loss": (None, "squares"),
     "share": (None, ()),
     "align": (None,),
@@ -42,11 +40,9 @@ _CURES = {
     "velocity": "leave it out: the angle alone tells the motion",
     "acceleration": "leave it out: the angle alone tells the motion",
     "instrument": "identify one trial of one mass with it",
-    "weights": "leave out by mask= what is not to count",
     "lag": "shift the torque by it before, with np.interp, or find it in one trial of one mass",
     "quantisation": "leave it out: the noise of the channels is estimated, that of rounding with it",
     "period": "unwrap the angle before, with np.unwrap(angle, period=…)",
-    "settings": "pass method=WeakForm(window_length=…, exponent=…) with those of settings, and kinds by name",
     "loss": "leave out by mask= what holds spikes",
     "share": "leave it out: what is merged shares all of its parameters",
     "align": "shift the torque by it before, with np.interp",
@@ -84,6 +80,8 @@ class Options:
     parameters: Mapping[str, Any]
     terms: Any
     mask: Any
+    settings: Any
+    weights: Any
     alone: Mapping[str, Any]
     step: int
     workers: int | None
@@ -100,6 +98,8 @@ class Options:
             "method",
             "terms",
             "mask",
+            "settings",
+            "weights",
             "step",
             "workers",
             "progress",
@@ -129,59 +129,107 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
         If there is no sample period, or arrays hold no numbers.
     """
     # A room of many files, which calls with one trial of one mass need not wait for.
-    from tvident._merged import AskedTogether, identify_masses, identify_trials, masses_of, trials_of  # noqa: PLC0415
+    from tvident._merged import AskedTogether, Earlier, identify_masses, identify_trials  # noqa: PLC0415
 
     _check(angle, options)
     axis = _axis(angle, torque, options.units)
     form = _weak(options.method)
-    terms = all_terms(((OFFSET, "constant"),) if options.terms is None else options.terms, "constant")
+    earlier = None if options.settings is None else Earlier.of(options.settings)
+    terms, kinds = _terms(options.terms, earlier)
     for term in terms:
         if term.inner:
             raise ValueError(
                 f"terms with inner parameters are not supported beside ensemble_axis= and dof_axis= yet; got {term.name!r}; "
                 "find them in one trial, and give a Term with what was found"
             )
-    if options.dof_axis is None:
-        trials = trials_of(angle, torque, options.ensemble_axis or 0, phase=options.phase, mask=options.mask)
-        trials = trials.scaled(axis.angle, axis.torque)
-        channels: Sequence[tuple[str, Sequence[Numbers]]] = (("angle", trials.angles), ("torque", trials.torques))
-    else:
-        masses = [
-            one.scaled(axis.angle, axis.torque)
-            for one in masses_of(
-                angle, torque, options.dof_axis, options.structure, trials=options.ensemble_axis, mask=options.mask
-            )
-        ]
-        channels = [("angle", one.angles) for one in masses]
-    for name, arrays in channels:
-        for one in arrays:
-            arguments.check_nan(name, one, options.alone["nan_policy"], arguments.RowPolicy)
-    recorded = (
-        (trials.angles, trials.torques)
-        if options.dof_axis is None
-        else (
-            [one for of in masses for one in of.angles],
-            [one for of in masses for one in of.torques if one is not None],
-        )
-    )
-    sampling = _sampling(options, axis, *recorded)
+    # One of them is None.
+    trials, masses = (_trials if options.dof_axis is None else _masses)(angle, torque, options, axis)
+    sampling = _sampling(options, axis, *_channels(trials, masses))
     with arguments.reporter(options.progress, "identification") as report:
         asked = AskedTogether(
             sampling=sampling,
             parameters={name: value for name, value in options.parameters.items() if value is not None},
-            terms=[(one.name, one.kind) for one in terms],
+            terms=kinds,
             own={one.name: one.own for one in terms if one.own is not None},
-            form=_lengths(form, sampling.period, max(map(len, recorded[0]))),
+            forms=(
+                earlier.forms
+                if earlier is not None and arguments.is_word(options.method, "auto")
+                else [_lengths(form, sampling.period, max(map(len, _channels(trials, masses)[0])))]
+            ),
+            earlier=earlier,
             units=UNITS if axis.system is ROTARY else LINEAR_UNITS,
             step=arguments.whole_number("step", options.step, least=1),
             workers=arguments.worker_count(options.workers),
             report=report,
         )
         values = _Terms(terms, sampling.period, asked.workers)
-        if options.dof_axis is None:
+        if trials is not None:
             return identify_trials(trials if sampling.clock is None else trials.on_grid(sampling), asked, values)
         on_grid = masses if sampling.clock is None else [one.on_grid(sampling) for one in masses]
         return identify_masses(on_grid, asked, values)
+
+
+def _trials(angle: Any, torque: Any, options: Options, axis: Axis) -> tuple[Trials, list[Masses]]:
+    """Return repeated trials of one mass, with their weights, and no masses."""
+    from tvident._merged import trials_of, weights_of_trials  # noqa: PLC0415 - likewise
+
+    trials = trials_of(angle, torque, options.ensemble_axis or 0, phase=options.phase, mask=options.mask)
+    trials = trials.scaled(axis.angle, axis.torque)
+    weights = weights_of_trials(options.weights, [one.size for one in trials.angles], several=True)
+    for place in range(len(trials.angles)):
+        own = None if weights is None else weights[place]
+        _check_nan({"angle": [trials.angles[place]], "torque": [trials.torques[place]]}, own, options)
+    return trials.weighted(weights), []
+
+
+def _masses(angle: Any, torque: Any, options: Options, axis: Axis) -> tuple[None, list[Masses]]:
+    """Return no trials of one mass, but the masses of every trial, with their weights."""
+    from tvident._merged import masses_of, of_core, weights_of_trials  # noqa: PLC0415 - likewise
+
+    found = masses_of(
+        angle, torque, options.dof_axis or 0, options.structure, trials=options.ensemble_axis, mask=options.mask
+    )
+    masses = [one.scaled(axis.angle, axis.torque) for one in found]
+    lengths = [one.angles[0].size for one in masses]
+    weights = weights_of_trials(options.weights, lengths, several=options.ensemble_axis is not None)
+    for place, one in enumerate(masses):
+        _check_nan({"angle": one.angles}, None if weights is None else weights[place], options)
+    if weights is None:
+        return None, masses
+    of_rows = of_core(weights) or [None] * len(weights)
+    return None, [one.weighted(own, rows) for one, own, rows in zip(masses, weights, of_rows, strict=True)]
+
+
+def _check_nan(channels: Mapping[str, Sequence[Numbers]], weights: Numbers | None, options: Options) -> None:
+    """Refuse what is not finite where that was asked for, but where no weight is."""
+    for name, each in channels.items():
+        for one in each:
+            counted = one if weights is None else np.where(weights > 0, one, 0)
+            arguments.check_nan(name, counted, options.alone["nan_policy"], arguments.RowPolicy)
+
+
+def _channels(trials: Trials | None, masses: Sequence[Masses]) -> tuple[Sequence[Numbers], Sequence[Numbers]]:
+    """Return all angles and all torques."""
+    if trials is not None:
+        return trials.angles, trials.torques
+    torques = [one for of in masses for one in of.torques if one is not None]
+    return [one for of in masses for one in of.angles], torques
+
+
+def _terms(given: Any, earlier: Earlier | None) -> tuple[list[Unknown], list[tuple[str, str | None]]]:
+    """Return terms, and their names and kinds; no kind where an earlier result tells it."""
+    if given is None and earlier is not None:
+        if earlier.own_terms:
+            raise ValueError(
+                f"settings hold no functions, and term {earlier.own_terms[0]!r} is one of the user's own; got no terms; pass terms= again, "
+                f"with all of {', '.join(earlier.terms)}"
+            )
+        given = earlier.terms
+    terms = all_terms(((OFFSET, "constant"),) if given is None else given, "constant")
+    if earlier is None:
+        return terms, [(one.name, one.kind) for one in terms]
+    said = [isinstance(one, tuple | list) for one in given]
+    return terms, [(one.name, one.kind if told else None) for one, told in zip(terms, said, strict=True)]
 
 
 def _sampling(options: Options, axis: Axis, angles: Sequence[Numbers], torques: Sequence[Numbers]) -> Sampling:
@@ -197,6 +245,11 @@ def _sampling(options: Options, axis: Axis, angles: Sequence[Numbers], torques: 
             raise ValueError(
                 f"t must be uniform beside trials of different lengths; got {min(lengths)} to {max(lengths)} samples and steps that "
                 "scatter; resample each trial"
+            ) from None
+        if options.weights is not None:
+            raise ValueError(
+                "weights need uniform times beside ensemble_axis= and dof_axis=; got steps that scatter; resample, or leave by mask= out "
+                "what is not to count"
             ) from None
         return Sampling.of_grid(grid_of(error.times), angles, torques, workers)
     return Sampling(period, arguments.begin_of(times))

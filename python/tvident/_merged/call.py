@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._equation import COEFFICIENTS, Term
+from tvident._merged.earlier import Earlier
 from tvident._merged.elements import Element, kind_or_number
 from tvident._merged.merging import Merging, Part
 from tvident._merged.predicted import Equations
@@ -42,12 +43,15 @@ class AskedTogether:
         When samples were taken.
     parameters : mapping of str to object
         What was given of inertia, damping and stiffness.
-    terms : sequence of (str, str)
-        Names and kinds.
+    terms : sequence of (str, str or None)
+        Names and kinds; none where an earlier result tells it.
     own : mapping of str to Term
         Those of the user's own.
-    form : mapping of str to int or None
-        Window length, exponent and regression window in samples, None where they are chosen.
+    forms : sequence of mapping of str to int or None
+        Window length, exponent and regression window in samples, None where they are chosen: of every part of the equations that shares
+        no unknown with others, or one for all.
+    earlier : Earlier, optional
+        Settings of another result.
     units : mapping of str to str
         By inertia, damping, stiffness and the name of a term.
     step : int
@@ -58,9 +62,10 @@ class AskedTogether:
 
     sampling: Sampling
     parameters: Mapping[str, Any]
-    terms: Sequence[tuple[str, str]]
+    terms: Sequence[tuple[str, str | None]]
     own: Mapping[str, Term]
-    form: Mapping[str, int | None]
+    forms: Sequence[Mapping[str, int | None]]
+    earlier: Earlier | None
     units: Mapping[str, str]
     step: int
     workers: int | None
@@ -71,29 +76,34 @@ class AskedTogether:
         equations: Equations,
         samples: int,
         noise: tuple[list[float], list[float]] | None = None,
+        place: int = 0,
     ) -> Part:
-        """Call the core; the noise is that of every angle and every torque, as variances, where it is not to be estimated."""
+        """Call the core; the noise is that of every angle and every torque, as variances, where it is not to be estimated.
+
+        The place is that of the part among those that share no unknown.
+        """
+        asked = self.forms[min(place, len(self.forms) - 1)]
         found = _core.identify_merged(
             list(equations.trials),
             [element.given() for element in equations.elements],
             samples,
             delta=self.sampling.period,
             noise=noise,
-            window_length=self.form["window_length"],
-            exponent=self.form["exponent"],
-            regression_window=self.form["regression_window"],
+            window_length=asked["window_length"],
+            exponent=asked["exponent"],
+            regression_window=asked["regression_window"],
             step=self.step,
             workers=self.workers,
             progress=self.report,
         )
-        self._check_window(found.regression_window)
-        form = {name: getattr(found, name) for name in self.form}
-        again = replace(self, form=form, report=None)
-        return Part(found, equations, lambda others: again.part(others, samples, noise or found.noise))
+        self._check_window(asked["regression_window"], found.regression_window)
+        again = replace(self, forms=[{name: getattr(found, name) for name in asked}], report=None)
+        chosen = [name for name, value in asked.items() if value is None]
+        return Part(found, equations, lambda others: again.part(others, samples, noise or found.noise), chosen)
 
-    def _check_window(self, nearest: int) -> None:
+    @staticmethod
+    def _check_window(wanted: int | None, nearest: int) -> None:
         """Refuse a regression window that is far from the nearest that there is, in samples; 0 where nothing is windowed."""
-        wanted = self.form["regression_window"]
         if wanted is None or nearest == 0 or wanted / 2 <= nearest <= 2 * wanted:
             return
         bound, cure = ("at least", "more") if nearest > wanted else ("at most", "fewer")
@@ -101,6 +111,13 @@ class AskedTogether:
             f"regression_window must be {bound} about {nearest} samples here, since windows are compared with equations that share no "
             f"samples with them; got {wanted}; use {nearest} or {cure}, or leave it out"
         )
+
+    def as_before(self, elements: Sequence[Element], given: frozenset[str] = frozenset()) -> list[Element]:
+        """Return elements as an earlier result found them, but for those of which something is given now."""
+        if self.earlier is None:
+            return list(elements)
+        said = {name for name, kind in self.terms if kind is not None}
+        return self.earlier.as_before(elements, frozenset(self.parameters) | said | given)
 
     def units_of(self, elements: Sequence[Element]) -> dict[str, str]:
         """Return the units of everything by name."""
@@ -116,7 +133,8 @@ def identify_trials(trials: Trials, asked: AskedTogether, term_values: TermValue
         value = kind_or_number(name, default if given is None else given)
         elements.append(Element(name, name, ((0, coefficient, 0, 1.0),), value))
     for place, (name, kind) in enumerate(asked.terms):
-        elements.append(Element(name, name, ((0, None, place, 1.0),), kind_or_number(name, kind)))
+        elements.append(Element(name, name, ((0, None, place, 1.0),), kind_or_number(name, kind or "constant")))
+    elements = asked.as_before(elements)
     if all(element.is_known for element in elements):
         raise ValueError("at least one parameter must be unknown; all are given; use 'windowed' or 'constant' for one")
     given = []
@@ -124,7 +142,8 @@ def identify_trials(trials: Trials, asked: AskedTogether, term_values: TermValue
         terms = np.stack([term_values(name, angle) for name, _ in asked.terms]) if asked.terms else None
         mask = None if trials.masks is None else trials.masks[place]
         position = None if trials.positions is None else np.ascontiguousarray(trials.positions[place])
-        given.append((angle[np.newaxis], torque[np.newaxis], terms, mask, position))
+        weights = None if trials.weights is None else trials.weights[place]
+        given.append((angle[np.newaxis], torque[np.newaxis], terms, mask, position, weights))
     passed, noise = asked.sampling.passed, None
     if passed is not None:
         angles, torques = ([float(np.mean(variances(one, passed)))] for one in (trials.angles, trials.torques))
@@ -146,5 +165,6 @@ def identify_trials(trials: Trials, asked: AskedTogether, term_values: TermValue
             trials.positions,
             own=asked.own,
         ),
+        terms=[name for name, _ in asked.terms],
     )
     return MergedIdentification(merging)

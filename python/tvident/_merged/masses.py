@@ -15,12 +15,13 @@ from tvident._equation import COEFFICIENTS
 from tvident._merged.call import AskedTogether, TermValues
 from tvident._merged.elements import Element, kind_or_number
 from tvident._merged.mechanism import Mechanism
-from tvident._merged.merging import Merging
+from tvident._merged.merging import Merging, Part
 from tvident._merged.predicted import Equations, TrialArrays
 from tvident._merged.recorded import MergedRecorded
 from tvident._merged.result import MergedIdentification
 from tvident._merged.sampling import Sampling, variances
 from tvident._merged.structure import Chain, matrices
+from tvident._merged.weighted import spread, without_missing
 from tvident._units import scaled
 
 Numbers = npt.NDArray[np.number]
@@ -40,6 +41,7 @@ class Masses:
     torques : sequence of ndarray, or None for a force that was not measured
     structure : Chain or Mechanism, optional
     mask : ndarray of bool, shape (n,), optional
+    weights : ndarray, shape (n,), optional
     momenta : sequence of ndarray, shape (n,)
         Of a mechanism: channels that follow the angles.
     forces : sequence of ndarray, shape (n,)
@@ -54,6 +56,7 @@ class Masses:
     mask: npt.NDArray[np.bool_] | None
     momenta: Sequence[npt.NDArray[np.float64]] = ()
     forces: Sequence[npt.NDArray[np.float64]] = ()
+    weights: npt.NDArray[np.float64] | None = None
     inertia: Mapping[str, npt.NDArray[np.float64]] = field(default_factory=dict)
 
     @property
@@ -65,6 +68,13 @@ class Masses:
         """Return the masses with their channels times factors of units."""
         torques = [None if one is None else scaled(one, torque) for one in self.torques]
         return replace(self, angles=[scaled(one, angle) for one in self.angles], torques=torques)
+
+    def weighted(self, weights: npt.NDArray[np.float64], of_rows: npt.NDArray[np.float64] | None) -> Masses:
+        """Return the masses with weights, those of rows None where all are alike; samples that have none are missing."""
+        torques = [None if one is None else without_missing(one, weights) for one in self.torques]
+        return replace(
+            self, angles=[without_missing(one, weights) for one in self.angles], torques=torques, weights=of_rows
+        )
 
     def with_elements(self, asked: AskedTogether, term_values: TermValues) -> tuple[Masses, list[Element]]:
         """Return the masses with all that enters their equations, and the elements, those of terms last.
@@ -85,9 +95,14 @@ class Masses:
             place, driven = len(rows.forces), self.measured
         for name, kind in asked.terms:
             for mass in driven:
-                found.append(Element(f"{name}_{mass}", name, ((mass, None, place, 1.0),), kind_or_number(name, kind)))
+                found.append(
+                    Element(
+                        f"{name}_{mass}", name, ((mass, None, place, 1.0),), kind_or_number(name, kind or "constant")
+                    )
+                )
                 place += 1
-        return whole, found
+        own_kinds = frozenset(self.structure.kinds) if isinstance(self.structure, Mechanism) else frozenset()
+        return whole, asked.as_before(found, own_kinds)
 
     @property
     def channels(self) -> list[Numbers]:
@@ -103,8 +118,10 @@ class Masses:
         """
         if not self.momenta and passed is None:
             return None
-        known = variances(self.angles, passed)
-        torques = variances([np.asarray(self.torques[one]) for one in equations], passed)
+        of_weight_one = 1 / spread(self.weights)
+        known = [one * of_weight_one for one in variances(self.angles, passed)]
+        measured = variances([np.asarray(self.torques[one]) for one in equations], passed)
+        torques = [one * of_weight_one for one in measured]
         return [known[one] if one < len(known) else 0.0 for one in channels], torques
 
     def on_grid(self, sampling: Sampling) -> Masses:
@@ -257,7 +274,7 @@ def identify_masses(trials: Sequence[Masses], asked: AskedTogether, term_values:
     unknowable = unknowable_of(joined, elements)
     open_ones = [one for one in elements if not one.is_known and one.name not in unknowable]
     samples = max(one.angles[0].size for one in several)
-    parts = []
+    parts: list[Part] = []
     # What is known takes part in all equations, but ties none.
     for equations in components(joined.measured, open_ones):
         inside = [one.at(equations) for one in elements if one.is_known or one in open_ones]
@@ -272,7 +289,9 @@ def identify_masses(trials: Sequence[Masses], asked: AskedTogether, term_values:
         inside = [_rewired(one, {channel: place for place, channel in enumerate(channels)}) for one in inside]
         given = [_recorded(one, equations, channels, names, term_values) for one in several]
         noise = joined.noise(channels, equations, asked.sampling.passed)
-        parts.append(asked.part(Equations(inside, equations, given), samples, noise))
+        parts.append(asked.part(Equations(inside, equations, given), samples, noise, len(parts)))
+    if asked.earlier is not None:
+        asked.earlier.check_parts(len(parts))
     merging = Merging(
         elements,
         parts,
@@ -291,6 +310,7 @@ def identify_masses(trials: Sequence[Masses], asked: AskedTogether, term_values:
             structure=joined.structure,
             own=asked.own,
         ),
+        terms=[name for name, _ in asked.terms],
     )
     return MergedIdentification(merging)
 
@@ -304,7 +324,7 @@ def _recorded(
     torques = [masses.torques[mass] for mass in equations]
     rows = [np.full(samples, np.nan) if one is None else np.asarray(one, np.float64) for one in torques]
     angles = np.stack([np.asarray(masses.channels[channel], np.float64) for channel in channels])
-    return angles, np.stack(rows), terms, masses.mask, None
+    return angles, np.stack(rows), terms, masses.mask, None, masses.weights
 
 
 def components(equations: Sequence[int], elements: Sequence[Element]) -> list[list[int]]:

@@ -31,11 +31,12 @@ class Identifiable:
 
 @dataclass(frozen=True)
 class Part:
-    """What one call of the core found, what it was given, and how it is done once more, with what was chosen, for other samples."""
+    """What one call of the core found, what it was given, how it is done once more for other samples, and which lengths were chosen."""
 
     found: _core.MergedIdentification
     equations: Equations
     again: Callable[[Equations], Part]
+    chosen: Sequence[str] = ()
 
     @property
     def names(self) -> Sequence[str]:
@@ -66,6 +67,8 @@ class Merging:
         Not kept with what is stored.
     is_part : bool
         Whether it is from one time to another of what was recorded.
+    terms : sequence of str
+        Names of the terms, as asked for.
     """
 
     elements: Sequence[Element]
@@ -81,6 +84,7 @@ class Merging:
     inertia: Mapping[str, Array] = field(default_factory=dict)
     recorded: MergedRecorded | None = None
     is_part: bool = False
+    terms: Sequence[str] = ()
 
     @property
     def factors(self) -> frozenset[str]:

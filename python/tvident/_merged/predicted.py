@@ -14,8 +14,8 @@ from tvident._results import correlated_with, kernels_of, touched_by
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
-TrialArrays: TypeAlias = tuple[Any, Any, Any, Any, Any]
-"""Angles, torques and terms, one a row, a mask, and positions in the result, as the core takes them."""
+TrialArrays: TypeAlias = tuple[Any, Any, Any, Any, Any, Any]
+"""Angles, torques and terms, one a row, a mask, positions in the result, and weights, as the core takes them."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def predicted(
     period : float
         Seconds from one sample to the next.
     """
-    angles, torques, terms, _, position = equations.trials[trial]
+    angles, torques, terms, _, position, _ = equations.trials[trial]
     half, kernels = form[0] // 2, kernels_of(form[0] // 2, form[1], period)
     channels = [np.asarray(one, np.float64) for one in angles]
     given = [] if terms is None else [np.asarray(one, np.float64) for one in terms]

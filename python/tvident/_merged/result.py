@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from tvident._equation import COEFFICIENTS
 from tvident._merged.determined import undetermined
+from tvident._merged.earlier import stored
 from tvident._merged.elements import matrix_of
 from tvident._merged.held_back import HeldBackTorque
 from tvident._merged.heterogeneity import differences_of, excess
@@ -368,7 +369,7 @@ class MergedIdentification(Oscillating, Reported):
             "sample_rate": 1 / merging.sampling.period,
             "trials": merging.trials,
             "masses": merging.masses or 1,
-            "kinds": dict(self.kinds),
+            **stored(merging, self.kinds),
             "window_length": [one.window_length for one in of],
             "exponent": [one.exponent for one in of],
             "regression_window": [one.regression_window for one in of],

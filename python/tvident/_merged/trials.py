@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._merged.sampling import Sampling
+from tvident._merged.weighted import of_core, without_missing
 from tvident._units import scaled
 
 Numbers = npt.NDArray[np.number]
@@ -36,6 +37,8 @@ class Trials:
         Of the result.
     phase : ndarray, shape (samples,), or None
         Of every sample of the result.
+    weights : sequence of ndarray, or None
+        Of every sample of a trial.
     """
 
     angles: Sequence[Numbers]
@@ -44,6 +47,7 @@ class Trials:
     positions: Sequence[npt.NDArray[np.float64]] | None
     samples: int
     phase: npt.NDArray[np.float64] | None
+    weights: Sequence[npt.NDArray[np.float64] | None] | None = None
 
     def scaled(self, angle: float, torque: float) -> Trials:
         """Return the trials with their channels times factors of units."""
@@ -51,6 +55,15 @@ class Trials:
             [scaled(one, by) for one in each] for each, by in ((self.angles, angle), (self.torques, torque))
         )
         return replace(self, angles=angles, torques=torques)
+
+    def weighted(self, weights: Sequence[npt.NDArray[np.float64]] | None) -> Trials:
+        """Return the trials with weights; samples that have none are missing."""
+        if weights is None:
+            return self
+        angles, torques = (
+            [without_missing(*pair) for pair in zip(each, weights, strict=True)] for each in (self.angles, self.torques)
+        )
+        return replace(self, angles=angles, torques=torques, weights=of_core(weights))
 
     def on_grid(self, sampling: Sampling) -> Trials:
         """Return the trials with their channels on a uniform grid.

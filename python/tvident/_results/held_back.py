@@ -36,12 +36,15 @@ class HeldBack:
         Parts of the record whose last tenth was held back: ten, or fewer in a short record.
     why_not : str
         Why there are no numbers; empty if there are.
+    ahead : float
+        Seconds that a test function is long: what was predicted with a longer one cannot be compared with what was with a shorter one.
     """
 
     simulated: Any = np.nan
     predicted: Any = np.nan
     parts: int = PARTS
     why_not: str = ""
+    ahead: float = np.nan
 
     def words(self) -> str:
         """Return it as a line."""
@@ -53,10 +56,16 @@ class HeldBack:
         )
         whose = " (median of all records)" if several else ""
         return (
-            f"explains {simulated} of the angle simulated and {predicted} predicted one test function ahead in "
+            f"explains {simulated} of the angle simulated and {predicted} predicted one test function ahead{self._seconds()} in "
             f"{where_held_back(self.parts)}, "
             f"held back from the fit{whose}"
         )
+
+    def _seconds(self) -> str:
+        """Return how far ahead that is, in words."""
+        if not np.isfinite(self.ahead):
+            return ""
+        return f" ({self.ahead:.3g} s)" if self.ahead >= 1 else f" ({1e3 * self.ahead:.3g} ms)"
 
 
 def where_held_back(parts: int) -> str:

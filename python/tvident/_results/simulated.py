@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -238,7 +239,8 @@ class Simulated:
         try:
             rest = recorded.again(angles)
             model = rest._model(rest._beside_gaps())  # noqa: SLF001 - of this class
-            return evaluated(model, recorded.angles, recorded.torques, parts, length)
+            found = evaluated(model, recorded.angles, recorded.torques, parts, length)
+            return found if found.why_not else replace(found, ahead=length * model.period)
         except ValueError as error:
             return HeldBack(why_not=str(error))
 

@@ -120,7 +120,7 @@ _ADVICE = {
     ),
     Status.COLOURED: "the residuals are correlated over more than a test function: a term is missing, or there is a slow disturbance",
     Status.KIND_CONTRADICTED: (
-        "a parameter taken as constant differs between parts of the record: use 'auto' or 'varying'"
+        "a parameter taken as constant differs between parts of the record: use 'auto' or 'varying'; or windows contradict an expansion"
     ),
     Status.WINDOW_LIMIT: (
         "the best test function or window is the shortest or longest that was tried: the change is too fast, or the record is too short; "

@@ -52,12 +52,13 @@ pub(crate) struct MergedIdentification {
     scan: Py<Scan>,
 }
 
-/// One trial: angles, torques and terms, one of each a row, a mask, and positions in the result.
+/// One trial: angles, torques and terms, one of each a row, a mask, positions in the result, and weights.
 type GivenTrial<'py> = (
     Bound<'py, PyUntypedArray>,
     Bound<'py, PyUntypedArray>,
     Option<Bound<'py, PyUntypedArray>>,
     Option<Bound<'py, PyUntypedArray>>,
+    Option<PyReadonlyArray1<'py, f64>>,
     Option<PyReadonlyArray1<'py, f64>>,
 );
 
@@ -71,18 +72,20 @@ struct Channels {
     terms: Vec<StridedSamples>,
     mask: Option<Vec<bool>>,
     position: Option<Vec<f64>>,
+    weights: Option<Vec<f64>>,
 }
 
 impl Channels {
     fn new(given: &GivenTrial<'_>) -> PyResult<Self> {
-        let (angles, torques, terms, mask, position) = given;
+        let (angles, torques, terms, mask, position, weights) = given;
         let terms = terms.as_ref().map(records).transpose()?.unwrap_or_default();
         let mask = mask.as_ref().map(flags).transpose()?;
-        let position = position.as_ref().map(|position| position.as_array().to_vec());
-        let one = Self { angles: records(angles)?, torques: records(torques)?, terms, mask, position };
+        let [position, weights] = [position, weights].map(|one| one.as_ref().map(|one| one.as_array().to_vec()));
+        let one = Self { angles: records(angles)?, torques: records(torques)?, terms, mask, position, weights };
         let samples = one.angles.first().map_or(0, Samples::len);
         let each = one.angles.iter().chain(&one.torques).chain(&one.terms).map(Samples::len);
-        let lengths = each.chain(one.mask.as_ref().map(Vec::len)).chain(one.position.as_ref().map(Vec::len));
+        let numbers = one.position.iter().chain(&one.weights).map(Vec::len);
+        let lengths = each.chain(one.mask.as_ref().map(Vec::len)).chain(numbers);
         if one.angles.is_empty() || one.torques.is_empty() || lengths.into_iter().any(|length| length != samples) {
             return Err(PyValueError::new_err("a trial needs an angle and a torque, and all its channels one length"));
         }
@@ -99,6 +102,7 @@ impl Channels {
             terms: all(&self.terms),
             mask: self.mask.as_deref(),
             position: self.position.as_deref(),
+            weights: self.weights.as_deref(),
         }
     }
 }

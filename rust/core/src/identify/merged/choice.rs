@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::identify::merged::session::MergedSession;
 use crate::identify::merged::system::Multiplied;
-use crate::noise::channel::channel_variance;
+use crate::noise::channel::weighted_variance;
 use crate::noise::spectrum::power_in_pieces;
 use crate::record::samples::Samples;
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
@@ -13,17 +13,22 @@ use crate::weak_form::test_function_choice::{Candidates, Evidence, half_widths, 
 /// Rounds of choosing the test function and estimating what the choice depends on.
 const ROUNDS: usize = 6;
 
-/// Variances of the noise of every angle and of every torque: means over the trials.
+/// Variances of the noise of every angle and of every torque, of a sample of weight one: means over the trials.
 pub(crate) fn noise_of(session: &mut MergedSession<'_, '_, '_>) -> Result<[Vec<f64>; 2], Error> {
     if let Some((angles, torques)) = &session.options.noise {
         return Ok([angles.clone(), torques.clone()]);
     }
     let instructions = session.options.instructions;
     let merged = session.merged;
-    let channels = merged.trials.iter().flat_map(|trial| trial.angles.iter().chain(&trial.torques));
-    let pieces = channels.map(|channel| Piece { size: channel.len(), content: *channel });
-    let level = |channel: &dyn Samples, (): &mut ()| (channel_variance(channel, None, instructions), channel.len());
-    let levels = session.stages.map(pieces.collect(), || (), level)?;
+    let mut pieces = Vec::new();
+    for trial in &merged.trials {
+        let channels = trial.angles.iter().chain(&trial.torques);
+        pieces.extend(channels.map(|one| Piece { size: one.len(), content: (*one, trial.weights) }));
+    }
+    let level = |(channel, weights): (&dyn Samples, Option<&[f64]>), (): &mut ()| {
+        (weighted_variance(channel, weights, None, instructions), channel.len())
+    };
+    let levels = session.stages.map(pieces, || (), level)?;
     let each = merged.channels() + merged.equations();
     let mean = |place: usize| {
         let of = levels.iter().skip(place).step_by(each).filter(|(variance, _)| variance.is_finite());
@@ -108,7 +113,7 @@ impl MergedSession<'_, '_, '_> {
             if trial.angles[channel].len() < length {
                 continue;
             }
-            let one = power_in_pieces(trial.angles[channel], None, length, &mut self.stages)?;
+            let one = power_in_pieces(trial.angles[channel], trial.weights, length, &mut self.stages)?;
             if one.iter().all(|value| value.is_finite()) {
                 power.resize(one.len(), 0.0);
                 power.iter_mut().zip(one).for_each(|(sum, value)| *sum += value);

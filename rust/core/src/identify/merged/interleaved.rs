@@ -55,7 +55,7 @@ impl Channels {
                 lag: 0.0,
                 angle_zero: 0.0,
                 mask: trial.mask,
-                weights: None,
+                weights: trial.weights,
             };
             let workers = stages.workers;
             each.push(stages.stage(|watch| WeakRows::build(&record, function, delta, None, workers, watch))?);
@@ -143,6 +143,8 @@ impl Interleaved {
         self.rows.rhs.fill(0.0);
         self.rows.rhs_noise.clear();
         self.rows.jumps.clear();
+        let weighted = merged.trials.iter().any(|trial| trial.weights.is_some());
+        self.rows.roots = vec![1.0; if weighted { count } else { 0 }];
         self.rows.regressors = merged
             .elements
             .iter()
@@ -162,6 +164,9 @@ impl Interleaved {
                 for &(time, row, ..) in &at {
                     self.rows.usable[time * group + inner] = true;
                     self.rows.rhs[time * group + inner] = weight * rhs[row];
+                    if weighted {
+                        self.rows.roots[time * group + inner] = channels.each[0].rows.root(row);
+                    }
                 }
                 for (element, regressor) in merged.elements.iter().zip(&mut self.rows.regressors) {
                     for entry in element.entries.iter().filter(|entry| entry.equation == equation) {

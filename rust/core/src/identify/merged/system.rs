@@ -54,6 +54,8 @@ pub struct Trial<'a> {
     pub terms: Vec<&'a dyn Samples>,
     /// Where a sample may be the centre of an equation; everywhere if `None`.
     pub mask: Option<&'a [bool]>,
+    /// One over the variance of every sample's noise, as a part of that of a sample of weight one; all alike if `None`.
+    pub weights: Option<&'a [f64]>,
     /// The sample of the result that every sample belongs to, growing; the samples count themselves if `None`.
     pub position: Option<&'a [f64]>,
 }
