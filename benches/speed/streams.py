@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +40,37 @@ def _stream(samples: int, piece: int) -> Callable[[float], Duel]:
     return prepare
 
 
+def _weak(samples: int) -> Callable[[float], Duel]:
+    """Pit a stream in weak form by settings of an earlier result against the batch on one thread; both must agree to chance."""
+
+    def prepare(share: float) -> Duel:
+        angle, torque = signals.recording(max(int(samples * share), 40_000))
+        earlier = tvident.identify(angle[:20_000], torque[:20_000], sample_rate=signals.RATE)
+        # What the earlier recording chose is taken as it is, as every block does.
+        settings = {**earlier.settings, "chosen": []}
+
+        def streamed() -> list[Any]:
+            stream = tvident.IdentificationStream(sample_rate=signals.RATE, settings=settings)
+            return [stream.push(angle, torque), stream.finish()]
+
+        def batch() -> tvident.Identification:
+            found: tvident.Identification = tvident.identify(
+                angle, torque, sample_rate=signals.RATE, settings=settings, workers=1
+            )
+            return found
+
+        def check() -> None:
+            whole = batch()
+            stiffness = np.concatenate([out.stiffness for out in streamed()])
+            away = (stiffness - whole.stiffness) / whole.stderr["stiffness"]
+            if not np.sqrt(np.nanmean(away**2)) < 1:
+                raise checks.DifferentError("a stream differs from the batch by more than chance")
+
+        return Duel([streamed, batch], check, angle.size)
+
+    return prepare
+
+
 STREAMS = [
     Row(
         "stream",
@@ -60,6 +92,13 @@ STREAMS = [
         "`identify`, one thread",
         _stream(20_000, 1),
         most=60,
+    ),
+    Row(
+        "stream-weak",
+        "`IdentificationStream`, weak form by settings of an earlier recording",
+        "`identify` with the same settings, one thread",
+        _weak(200_000),
+        most=1.5,
     ),
 ]
 """One sample at a time fills one of eight lanes and pays for a call from Python: what counts is that it ends before the next one comes."""

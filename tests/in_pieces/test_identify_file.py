@@ -240,6 +240,28 @@ def test_interrupted_work_leaves_no_result_and_goes_on(rig: tvident.Recording, m
     assert not Path(".out.npy.tvident").exists()
 
 
+def test_interrupted_work_goes_on_with_columns_where_rows_are_no_result(rig: tvident.Recording) -> None:
+    source = write("in.npy", rig.angle, rig.torque)
+    options: dict[str, Any] = {"angle": "angle", "torque": "torque", "sample_rate": 1000, "method": "paper", "step": 3}
+
+    def stop(done: int, _: int) -> None:
+        if done > SAMPLES // 2:
+            raise StopError
+
+    with pytest.raises(StopError):
+        tvident.identify_file(source, "out.parquet", **options, progress=stop)
+    # What an interrupted call wrote beyond what it noted is written again.
+    with Path(".out.parquet.tvident/rows").open("ab") as rows:
+        rows.write(bytes(1000))
+    resumed: list[int] = []
+    tvident.identify_file(source, "out.parquet", **options, progress=lambda done, _: resumed.append(done))
+    assert min(resumed) > SAMPLES // 5
+    tvident.identify_file(source, "whole.npy", **options)
+    found, whole = columns_of("out.parquet"), np.load("whole.npy")
+    for name in whole.dtype.names:
+        assert np.array_equal(found[name], whole[name], equal_nan=True), name
+
+
 def test_a_result_takes_the_place_and_the_mode_of_another_through_links(rig: tvident.Recording) -> None:
     source = write("in.npy", rig.angle[:9000], rig.torque[:9000])
     Path("old.npy").touch(mode=0o600)

@@ -3,7 +3,7 @@
 from tvident._identify.call import identify
 from tvident._identify.criterion import aicc, effective_observations
 from tvident._identify.methods import Method, StrongForm, WeakForm
-from tvident._identify.parts import Held, Long, Rows, Span, identify_part, requested
+from tvident._identify.parts import Held, Long, Rows, Span, estimate_part, identify_part, requested
 from tvident._identify.settings import Request, resolve
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "WeakForm",
     "aicc",
     "effective_observations",
+    "estimate_part",
     "identify",
     "identify_part",
     "requested",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -111,7 +112,7 @@ class Data:
     @property
     def records(self) -> int:
         """How many records there are."""
-        return int(np.prod(self.batch, dtype=int))
+        return math.prod(self.batch)
 
     @property
     def settings(self) -> dict[str, Any]:

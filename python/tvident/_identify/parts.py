@@ -129,23 +129,29 @@ def identify_part(
     diagnose : bool
         Look for what may be missing in the equation, and compare test functions of all widths.
     """
+    return _task_of_part(held, options, wanted).run(report, diagnose=diagnose and held.counts)
+
+
+def estimate_part(
+    held: Held, options: Mapping[str, Any], wanted: Span | None, report: Any = None, *, diagnose: bool = True
+) -> Estimates:
+    """Identify a part of a long record as :func:`identify_part` does, and return its numbers alone."""
+    return _task_of_part(held, options, wanted).estimates(report, diagnose=diagnose and held.counts)
+
+
+def _task_of_part(held: Held, options: Mapping[str, Any], wanted: Span | None) -> Task:
+    """Return the task of a part of a long record."""
     if not held.counts:
         # What has no weight is missing, here all of it.
-        nothing = np.full(held.angle.size, np.nan)
-        return identify_part(
-            replace(held, angle=nothing, weights=None),
-            {**options, "nan_policy": "omit"},
-            wanted,
-            report,
-            diagnose=False,
-        )
+        held = replace(held, angle=np.full(held.angle.size, np.nan), weights=None)
+        options = {**options, "nan_policy": "omit"}
     call = _CALL.bind(held.angle, held.torque, weights=held.weights, **options)
     call.apply_defaults()
     first = held.spans[0][0]
     own = None if wanted is None else (max(wanted[0] - first, 0), min(wanted[1] - first, held.angle.size))
     task = prepared({**call.arguments, "wanted": own})
     assert isinstance(task, Task)  # noqa: S101 - what is known of a long record is a number
-    return task.run(report, diagnose=diagnose)
+    return task
 
 
 class Long(Task):

@@ -69,9 +69,11 @@ class Task:
             found = self.found(searched.values, slopes=diagnose, diagnose=diagnose, report=report)
         return self._result(found, searched)
 
-    def estimates(self) -> Estimates:
-        """Identify every record, and return its numbers alone."""
-        return self.run(None, diagnose=False)._found  # noqa: SLF001 - what a result is made of
+    def estimates(self, report: Callable[[int, int], object] | None = None, *, diagnose: bool = False) -> Estimates:
+        """Identify every record, and return its numbers alone: settings, words and ways to go on cost as much as a thousand samples."""
+        searched = self._searched(report)
+        found = self.found(searched.values, slopes=diagnose, diagnose=diagnose, report=report)
+        return self._numbers(found, searched)[1].doubted()
 
     def found(
         self,
@@ -187,8 +189,8 @@ class Task:
 
     # What leaves the range of doubles here is NaN or next to zero, whatever NumPy is told to do about it.
     @np.errstate(all="ignore")
-    def _result(self, found: Sequence[_core.Identification], searched: Searched) -> Identification:
-        """Return the result of what the core found in every record."""
+    def _numbers(self, found: Sequence[_core.Identification], searched: Searched) -> tuple[list[str], Told]:
+        """Return the names of what the core found in every record, and the numbers by name with what is to be told of them."""
         data = self._data
         known = {
             name: value if isinstance(value, float) else value[..., :: data.step] for name, value in self._known.items()
@@ -203,17 +205,22 @@ class Task:
         if data.labels is not None:
             batch = replace(batch, labels=data.labels.at(slice(None, None, data.step)))
         constants = {**batch.constants, **constants_of(data.motion, data.batch)}
-        batch, settings = replace(batch, constants=constants, units=data.units), self._settings(found, searched)
+        batch = replace(batch, constants=constants, units=data.units)
         if data.moved:
+            settings = plain(self._settings(found, searched))
             torques = (data.torques, *(data.torques + change() for change in data.moved))
-            again = [self._replayed(plain(settings), replace(data, torques=one)).estimates() for one in torques]
+            again = [self._replayed(settings, replace(data, torques=one)).estimates() for one in torques]
             batch = with_errors_of_alignment(batch, again[0], again[1:])
         used = without_spikes(data, found)
         lacking = lacking_terms(used, self._request, self._unknowns, found, self._polynomials, self._known)
-        told = Told(used, self._request, self._unknowns, found, batch, settings, lacking)
-        words = partial(
-            told.words, names, searched.told(self.inner, self.ranges, batch, self.columns.samples_of_fading)
-        )
+        return names, Told(used, self._request, self._unknowns, found, batch, lacking)
+
+    def _result(self, found: Sequence[_core.Identification], searched: Searched) -> Identification:
+        """Return the result of what the core found in every record."""
+        data, settings = self._data, self._settings(found, searched)
+        names, told = self._numbers(found, searched)
+        searches = searched.told(self.inner, self.ranges, told.batch, self.columns.samples_of_fading)
+        words = partial(told.words, names, searches, settings)
         batch = told.doubted()
         jumps = tuple(tuple(data.time[one.jumps].tolist()) for one in found)
         return Identification(
@@ -223,7 +230,7 @@ class Task:
             jumps=jumps if data.batch else jumps[0],
             words=words,
             settings=plain(settings),
-            recorded=replace(self._recorded(plain(settings), batch, used), improve=self._improve(found)),
+            recorded=replace(self._recorded(plain(settings), batch, told.data), improve=self._improve(found)),
         )
 
     def _improve(self, found: Sequence[_core.Identification]) -> Callable[[Any, Words], Words] | None:

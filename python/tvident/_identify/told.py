@@ -42,7 +42,6 @@ class Told:
         Those of the equation, without what a search found.
     found : sequence of _core.Identification
     batch : Estimates
-    settings : mapping
     lacking : sequence of Lacking or None
         The term that every record in strong form lacks.
     """
@@ -52,11 +51,12 @@ class Told:
     unknowns: Sequence[Unknown]
     found: Sequence[_core.Identification]
     batch: Estimates
-    settings: Mapping[str, Any]
     lacking: Sequence[Lacking | None] = ()
 
     @np.errstate(all="ignore")
-    def words(self, names: Sequence[str], searched: Sequence[Sequence[FoundBySearch]]) -> Words:
+    def words(
+        self, names: Sequence[str], searched: Sequence[Sequence[FoundBySearch]], settings: Mapping[str, Any]
+    ) -> Words:
         """Return reasons and advice; of several records the advice, since reasons differ too much from one to the next.
 
         Saying it takes as long as identifying a short record, so it waits until somebody asks.
@@ -67,12 +67,14 @@ class Told:
             What the core's unknowns are called.
         searched : sequence of sequence
             Inner parameters of every record.
+        settings : mapping
+            Of the result.
         """
         data, several = self.data, bool(self.data.batch)
         plausible = Plausible(data.axis, data.period, [one.name for one in self.unknowns])
         more = [words_of_search(terms) for terms in searched]
         if isinstance(self.request.form, StrongForm) and data.instruments is None:
-            words = self._of_strong_form().words()
+            words = self._of_strong_form(settings).words()
             words = replace(words + (of_batch(more) if several else more[0]), each=words.each)
             words = plausible.before(words, data.angles, self.batch)
             doubts = spikes_that_stay(data.angles, data.torques)
@@ -81,7 +83,7 @@ class Told:
                 doubts = [*doubts, *fed_back_in_records(data.angles, data.torques)]
             words = _with_doubts(words, doubts, several=several)
         else:
-            each = [one + search for one, search in zip(self._of_records(names), more, strict=True)]
+            each = [one + search for one, search in zip(self._of_records(names, settings), more, strict=True)]
             words = plausible.before(of_batch(each) if several else each[0], data.angles, self.batch)
             words = replace(words, advice=(*words.advice, *self._where_remedies_are_tried()))
         if data.clock is not None:
@@ -138,7 +140,7 @@ class Told:
         more: Any = flags.reshape(data.batch) if data.batch else Status(int(flags[0]))
         return replace(self.batch, record_status=self.batch.record_status | more)
 
-    def _of_records(self, names: Sequence[str]) -> list[Words]:
+    def _of_records(self, names: Sequence[str], settings: Mapping[str, Any]) -> list[Words]:
         """Return what there is to say of each record in weak form, or with an instrument."""
         data = self.data
         if data.instruments is not None:
@@ -151,21 +153,21 @@ class Told:
             if data.weights is not None:
                 variances = [one * spread for one, spread in zip(variances, data.weights.spread, strict=True)]
             coherences = _core.noise_coherence(data.angles, data.torques, variances)
-        lags = np.broadcast_to(np.divide(self.settings["lag"], data.period), data.records)
-        chosen = [name for name in self.settings["chosen"] if not self.request.is_kept(name)]
+        lags = np.broadcast_to(np.divide(settings["lag"], data.period), data.records)
+        chosen = [name for name in settings["chosen"] if not self.request.is_kept(name)]
         return [
             Explained(one, names, chosen, tested, data.period, data.step, coherence, late, data.units).words()
             for one, coherence, late in zip(self.found, coherences, lags.tolist(), strict=True)
         ]
 
-    def _of_strong_form(self) -> ExplainedStrong:
+    def _of_strong_form(self, settings: Mapping[str, Any]) -> ExplainedStrong:
         mask, step = self.data.mask, self.data.step
         names = [one.name for one in self.unknowns]
         return ExplainedStrong(
             found=self.batch,
-            kinds={name: self.settings["kinds"][name] for name in names},
+            kinds={name: settings["kinds"][name] for name in names},
             untested=[name for place, name in enumerate(names) if self.found[0].unknowns[place].untested],
-            settings=self.settings,
+            settings=settings,
             mask=None if mask is None else mask[..., ::step],
         )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
+from bisect import bisect_right
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,10 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._files import printable
-from tvident._in_pieces.rows import read_columns, row_of, write_rows
+from tvident._in_pieces.rows import read_columns, read_some, row_of, write_columns, write_rows
 from tvident._status import Status
 
-_FORMAT = 3
+_FORMAT = 4
 """Folders of another number hold other things."""
 
 Columns = Mapping[str, npt.NDArray[Any]]
@@ -47,7 +48,7 @@ class Kept:
         if self._state is None:
             shutil.rmtree(self.folder, ignore_errors=True)
             self.folder.mkdir()
-            self._state = {"told": self._told, "notes": [], "rows": 0, "flags": {}, "facts": {}}
+            self._state = {"told": self._told, "notes": [], "rows": 0, "pieces": [], "flags": {}, "facts": {}}
             self._write()
 
     @property
@@ -65,17 +66,22 @@ class Kept:
         self._found["facts"][name] = value
         self._write()
 
-    def add(self, columns: Columns, note: Any, head: bytes = b"") -> None:
-        """Keep the rows of one more piece, and a note of it; `head` is what the file of all rows begins with."""
-        row = row_of(columns)
+    def add(self, columns: Columns, note: Any, head: bytes | None = None) -> None:
+        """Keep the rows of one more piece, and a note of it.
+
+        With a `head` the file of all rows begins with it and is what a result may be; without one the columns of every piece lie one after
+        the other, which costs half as much to write and a fifth to read.
+        """
+        row, begin = row_of(columns), len(head or b"")
         with self.place.open("r+b" if self.place.exists() else "w+b") as file:
-            file.write(head)
+            file.write(head or b"")
             # What an interrupted call wrote beyond the rows that it noted is written again.
-            file.seek(len(head) + self._found["rows"] * row.itemsize)
-            count = write_rows(file, row, columns)
+            file.seek(begin + self._found["rows"] * row.itemsize)
+            count = write_columns(file, columns) if head is None else write_rows(file, row, columns)
             file.truncate()
+        self._found["head"], self._found["are_rows"] = begin, head is not None
+        self._found["pieces"].append(count)
         self._found["row"] = [[name, values.dtype.str] for name, values in columns.items()]
-        self._found["head"] = len(head)
         _count(columns["status"], self._found["flags"])
         self._found["rows"] += count
         self._found["notes"].append(note)
@@ -97,11 +103,17 @@ class Kept:
         return dict(self._found["flags"])
 
     def columns(self, first: int, end: int) -> dict[str, npt.NDArray[Any]]:
-        """Return some of the rows that are done, column by column."""
+        """Return some of the rows that are done, column by column; those of one piece, where pieces keep their columns."""
         row = np.dtype([(name, kind) for name, kind in self._found["row"]])
         with self.place.open("rb", buffering=0) as file:
-            file.seek(self._found["head"] + first * row.itemsize)
-            return read_columns(file, row, end - first)
+            if self._found["are_rows"]:
+                file.seek(self._found["head"] + first * row.itemsize)
+                return read_columns(file, row, end - first)
+            begins = np.concatenate([[0], np.cumsum(self._found["pieces"])]).tolist()
+            piece = bisect_right(begins, first) - 1
+            file.seek(begins[piece] * row.itemsize)
+            span = first - begins[piece], end - begins[piece]
+            return read_some(file, row, self._found["pieces"][piece], span)
 
     def remove(self) -> None:
         """Remove the folder."""

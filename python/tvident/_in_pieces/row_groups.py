@@ -16,6 +16,12 @@ from tvident._units import named_unit, with_unit
 _BATCH = 1 << 17
 """Rows that are decoded at a time: a row group may be as long as the file."""
 
+_KEPT = 1 << 22
+"""A column of at most so many rows stays once it is decoded, 32 MiB: windows that tell the scatter lie all over the record.
+
+What is decoded on the way to them is as much as all that follows.
+"""
+
 
 @dataclass
 class ParquetRows:
@@ -56,11 +62,16 @@ class ParquetRows:
                 found[one.name if named_unit(one.name)[1] else with_unit(one.name, unit)] = one.name
         return found
 
+    def group_of(self, sample: int) -> int:
+        """Return the first sample of the row group that a sample is in."""
+        return self._first[int(np.searchsorted(self._first, sample, side="right")) - 1]
+
     def batches(self, name: str, first: int) -> Iterator[tuple[int, npt.NDArray[Any]]]:
         """Give the samples of a column from one on, with the number of the first of each batch."""
-        group = int(np.searchsorted(self._first, first, side="right")) - 1
-        place = self._first[group]
-        for batch in self._file.iter_batches(_BATCH, range(group, self._file.num_row_groups), [name]):
+        place = self.group_of(first)
+        groups = range(self._first.index(place), self._file.num_row_groups)
+        # One column has nothing for several threads to do.
+        for batch in self._file.iter_batches(_BATCH, groups, [name], use_threads=False):
             yield place, np.asarray(batch.column(0).to_numpy(zero_copy_only=False))
             place += batch.num_rows
 
@@ -70,7 +81,7 @@ class ParquetRows:
 
 @dataclass
 class ParquetColumn:
-    """One column: read on from where it was, or again from the row group that a sample is in."""
+    """One column: read on from where it was, or again from the row group that a sample is in; a short one is decoded once."""
 
     rows: ParquetRows
     name: str
@@ -78,8 +89,11 @@ class ParquetColumn:
     _kept: list[tuple[int, npt.NDArray[Any]]] = field(default_factory=list, init=False, repr=False)
 
     def read(self, first: int, end: int) -> npt.NDArray[Any]:
+        if self.rows.samples <= _KEPT:
+            return self._whole(end)[first:end]
         reached = self._kept[-1][0] + self._kept[-1][1].size if self._kept else -1
-        if self._going is None or not self._kept or first < self._kept[0][0] or first > reached + 4 * _BATCH:
+        # Going on within a row group is never longer than from its first row.
+        if self._going is None or not self._kept or first < self._kept[0][0] or self.rows.group_of(first) > reached:
             self._going, self._kept, reached = self.rows.batches(self.name, first), [], -1
         while reached < end:
             batch = next(self._going, None)
@@ -91,3 +105,23 @@ class ParquetColumn:
             self._kept = [one for one in self._kept if one[0] + one[1].size > first]
         parts = [values[max(first - place, 0) : end - place] for place, values in self._kept if place < end]
         return np.concatenate(parts) if len(parts) != 1 else parts[0]
+
+    def _whole(self, end: int) -> npt.NDArray[Any]:
+        """Return all samples, of which those before one are there."""
+        if self._going is None:
+            self._going = self.rows.batches(self.name, 0)
+        _, whole = self._kept[0] if self._kept else (0, np.empty(0))
+        reached = self._kept[0][0] if self._kept else 0
+        while reached < end:
+            batch = next(self._going, None)
+            if batch is None:
+                break
+            place, values = batch
+            if not whole.size:
+                whole = np.empty(self.rows.samples, values.dtype)
+            # Whole numbers are floats in a batch where some are missing.
+            whole = whole.astype(np.result_type(whole, values), copy=False)
+            reached = place + values.size
+            whole[place:reached] = values
+        self._kept = [(reached, whole)]
+        return whole

@@ -29,6 +29,24 @@ def write_rows(file: IO[bytes], row: np.dtype[Any], columns: Mapping[str, npt.ND
     return count
 
 
+def write_columns(file: IO[bytes], columns: Mapping[str, npt.NDArray[Any]]) -> int:
+    """Write columns one after the other, and return how many rows they have."""
+    for values in columns.values():
+        file.write(np.ascontiguousarray(values).view(np.uint8).data)
+    return next(iter(columns.values())).size
+
+
+def read_some(file: IO[bytes], row: np.dtype[Any], rows: int, span: tuple[int, int]) -> dict[str, npt.NDArray[Any]]:
+    """Return some of so many rows whose columns lie one after the other from where the file stands."""
+    begin, columns = file.tell(), {}
+    for name in row.names or ():
+        kind = row[name]
+        file.seek(begin + span[0] * kind.itemsize)
+        columns[name] = np.fromfile(file, kind, span[1] - span[0])
+        begin += rows * kind.itemsize
+    return columns
+
+
 def read_columns(file: IO[bytes], row: np.dtype[Any], count: int) -> dict[str, npt.NDArray[Any]]:
     """Return the columns of the next so many rows of a file."""
     columns = {name: np.empty(count, row[name]) for name in row.names or ()}

@@ -114,15 +114,16 @@ class Run:
         settings, work = self._prepared()
         for piece in self._pieces[len(self._kept.notes) :]:
             # Nothing of a piece stays while the next one is worked on.
-            self._keep(*work.piece(piece, self._progress(piece)))
+            self._keep(work, *work.piece(piece, self._progress(piece)))
             if self._report is not None:
                 self._report(piece[1], self._samples)
         return self._written(settings, work)
 
-    def _keep(self, columns: Columns, note: Any) -> None:
+    def _keep(self, work: Work, columns: Columns, note: Any) -> None:
         """Keep what was found of a piece, in a file that only needs its name where nothing changes any more."""
         rows = -(-self._samples // self._asked.step)
-        head = head_of_rows(row_of(columns), rows) if holds_rows(self._output) else b""
+        is_result = work.is_final and holds_rows(self._output)
+        head = head_of_rows(row_of(columns), rows) if is_result else None
         self._kept.add(columns, note, head)
 
     def _progress(self, piece: Span) -> Any:

@@ -7,6 +7,7 @@ from tvident._pieces.alone import (
     finished,
     look_ahead,
     part_alone,
+    part_estimated,
     reach_of,
     with_neighbours,
 )
@@ -26,6 +27,7 @@ __all__ = [
     "look_ahead",
     "means_of",
     "part_alone",
+    "part_estimated",
     "reach_of",
     "with_neighbours",
 ]

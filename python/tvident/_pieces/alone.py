@@ -44,7 +44,11 @@ def with_neighbours(wanted: Span, reach: int, samples: int, step: int) -> Span:
 
 def part_alone(result: Identification, span: Span, wanted: Span, step: int) -> tuple[Columns, dict[str, Any]]:
     """Return columns of the wanted samples of a span that was identified on its own, and its constants with their covariance."""
-    found = result._found  # noqa: SLF001 - what a result is made of
+    return part_estimated(result._found, span, wanted, step)  # noqa: SLF001 - what a result is made of
+
+
+def part_estimated(found: Estimates, span: Span, wanted: Span, step: int) -> tuple[Columns, dict[str, Any]]:
+    """Return the same of the numbers alone."""
     inside = slice(-((span[0] - wanted[0]) // step), -((span[0] - wanted[1]) // step))
     columns = {name: values[inside] for name, values in columns_of(found).items()}
     constants = {name: [float(one) for one in pair] for name, pair in found.constants.items()}
@@ -58,7 +62,7 @@ def part_alone(result: Identification, span: Span, wanted: Span, step: int) -> t
         "covariance_of": names,
         "covariance": [[_covariance(found, one, other) for other in names] for one in names],
         "changing": changing,
-        "record_status": int(result.record_status),
+        "record_status": int(found.record_status),
         "samples": wanted[1] - wanted[0],
         "counted": span[1] - span[0],
     }

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from tvident import _arguments as arguments
-from tvident._identify import Held, Method, Span, WeakForm, identify_part
-from tvident._results import Identification
+from tvident._identify import Held, Method, Span, WeakForm, estimate_part, identify_part
+from tvident._results import Estimates, Identification
 from tvident._units import ROTARY, Axis
 
 
@@ -73,6 +73,16 @@ class Given:
         """
         if diagnose is None:
             diagnose = chosen is None or self.frozen is not None
+        return identify_part(held, self._options(chosen, step), wanted, report, diagnose=diagnose)
+
+    def estimated(
+        self, held: Held, *, chosen: Mapping[str, Any] | None, step: int, wanted: Span, diagnose: bool = False
+    ) -> Estimates:
+        """Identify a part as :meth:`identified` does, and return its numbers alone."""
+        return estimate_part(held, self._options(chosen, step), wanted, diagnose=diagnose)
+
+    def _options(self, chosen: Mapping[str, Any] | None, step: int) -> dict[str, Any]:
+        """Return the arguments of a part, with what was chosen for the whole record if anything was."""
         equation: dict[str, Any] = {name: value for name, value in self.equation.items() if value is not None}
         method, settings = self.method, self.settings
         if chosen is not None:
@@ -81,7 +91,7 @@ class Given:
             # Nor is the length of windows that predicts best, which a record of its own would choose anew.
             method, settings = "auto" if isinstance(method, WeakForm) else method, {**chosen, "chosen": []}
         units: dict[str, Any] = {} if self.axis.system is ROTARY else {"angle_unit": "m", "torque_unit": "N"}
-        options = {
+        return {
             "delta": self.period,
             "method": method,
             "settings": settings,
@@ -91,4 +101,3 @@ class Given:
             **units,
             **equation,
         }
-        return identify_part(held, options, wanted, report, diagnose=diagnose)

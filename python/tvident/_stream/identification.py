@@ -154,9 +154,9 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
 
     In weak form a whole record knows what a block does not: its noise, constants from samples to come, and which lengths of windows
     predict best over all of it. With ``averaging=False`` and numbers for what is constant, windows differ by the noise alone, on the whole
-    a hundredth of their standard error; otherwise by some 0.6 of it, as their errors say, which are made from the block. A block is as
-    long as windows reach, and has at least 2048 samples before it; one sample costs some 8 µs, 10 ms a block. Every eighth block is
-    asked what may be missing in the equation, or the next that does not lie in a gap.
+    a hundredth of their standard error; otherwise by some 0.6 of it, as their errors say, which are made from the block. A block
+    has at least 1024 samples before it, and after it a third of what windows reach; one sample costs some 3 µs, 4 ms a block. Every
+    fifth block is asked what may be missing in the equation, or the next that does not lie in a gap.
 
     ``half_life``, :attr:`hold` and :meth:`reset` are what MATLAB's ``recursiveLS`` has as ``ForgettingFactor`` (2 to the power
     of minus one over the half-life in samples), ``EnableAdaptation`` and ``reset``.

@@ -17,17 +17,21 @@ from tvident._pieces import (
     Note,
     finished,
     look_ahead,
-    part_alone,
+    part_estimated,
     reach_of,
     with_neighbours,
 )
-from tvident._results import Identification
+from tvident._results import Estimates
 from tvident._status import Status
 
 Numbers = npt.NDArray[np.float64]
 
-_DIAGNOSED = 8
+_DIAGNOSED = 5
 """Of so many blocks one is asked what may be missing in the equation, and whether test functions of all widths agree."""
+
+_LEAST_REACH = 1024
+"""Samples before a block that it is identified with, at least: with those of the block and after it they tell the noise of the channels.
+A block that is asked what may be missing has as many as a piece of a file."""
 
 _OF_DIAGNOSIS = Status.TERM_SUSPECTED | Status.LAG_SUSPECTED | Status.SCALES_DISAGREE
 
@@ -117,9 +121,11 @@ class WeakStream:
     def __init__(self, given: Given, names: Sequence[str], step: int, half_life: float, state: State | None) -> None:
         self._given, self._names, self._step, self._half_life = given, names, step, half_life
         settings = given.settings or {}
-        self._reach = reach_of(settings)
-        self._after = min(look_ahead(settings), self._reach)
-        self._block = self._after
+        ahead = self._least = look_ahead(settings)
+        self._near, self._reach = max(_LEAST_REACH, ahead), reach_of(settings)
+        # Windows as long as those that predict best end within a third of what averaged ones reach, on either side of a sample.
+        self._after = -(-ahead // 3)
+        self._block = 2 * ahead - self._after
         self._hold = False
         self._state = state if state is not None else self._empty()
         self._begin, held = self._state.first, self._state.held
@@ -208,18 +214,18 @@ class WeakStream:
     def _worked(self, end: int) -> Columns:
         """Return the columns of the samples up to one that are not done yet."""
         state, wanted = self._state, (self._state.done, end)
-        span = with_neighbours(wanted, self._reach, state.samples, self._step)
         block = state.done // self._block
         diagnose = state.asked_at is None or block - state.asked_at >= _DIAGNOSED
+        span = with_neighbours(wanted, self._reach if diagnose else self._near, state.samples, self._step)
         try:
-            result = self._identified(span, wanted, diagnose=diagnose)
+            found = self._estimated(span, wanted, diagnose=diagnose)
         except ValueError:
             # Samples in which test functions do not fit beside each other tell nothing.
-            if state.samples >= self._after:
+            if state.samples >= self._least:
                 raise
             state.done = end
             return self._nothing(len(range(0, end, self._step)))
-        columns, note = part_alone(result, span, wanted, self._step)
+        columns, note = part_estimated(found, span, wanted, self._step)
         if not self._hold and state.done >= state.counted_from:
             state.gathered.add(self._counted(note, span, wanted), 0.5 ** ((end - state.done) / self._half_life))
         means = dict.fromkeys(note["constants"], NOTHING_SAID) | state.gathered.means()
@@ -237,17 +243,17 @@ class WeakStream:
 
     def _counted(self, note: Note, span: Span, wanted: Span) -> Note:
         """Return what a block says of constants without neighbours that do not count, or not any more."""
-        first = max(self._state.counted_from, wanted[0] - min(self._half_life, self._reach))
+        first = max(self._state.counted_from, wanted[0] - min(self._half_life, wanted[0] - span[0]))
         if first <= span[0]:
             return note
         some = (-(-int(first) // self._step) * self._step, span[1])
-        return part_alone(self._identified(some, wanted, diagnose=False), some, wanted, self._step)[1]
+        return part_estimated(self._estimated(some, wanted, diagnose=False), some, wanted, self._step)[1]
 
-    def _identified(self, span: Span, wanted: Span, *, diagnose: bool) -> Identification:
+    def _estimated(self, span: Span, wanted: Span, *, diagnose: bool) -> Estimates:
         """Identify some of the samples that are held."""
         angle, torque = self._buffer[:, span[0] - self._begin : span[1] - self._begin]
         held, chosen = Held(angle, torque, [span]), self._given.settings
-        return self._given.identified(held, chosen=chosen, step=self._step, wanted=wanted, diagnose=diagnose)
+        return self._given.estimated(held, chosen=chosen, step=self._step, wanted=wanted, diagnose=diagnose)
 
     def _nothing(self, count: int) -> Columns:
         """Return columns without numbers."""

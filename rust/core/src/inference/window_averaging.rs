@@ -7,8 +7,9 @@
 use std::ops::Range;
 
 use crate::error::Error;
-use crate::exec::pool::ranges;
+use crate::exec::pool::{ROWS, ranges};
 use crate::exec::stages::Stages;
+use crate::inference::over_record::{ErrorSums, OverRecord};
 use crate::inference::windows_around::{Around, WindowAtRow};
 use crate::regression::constants::Expected;
 use crate::regression::problem::Problem;
@@ -22,10 +23,11 @@ const MOST: f64 = 16.0;
 const RECORD: [f64; 2] = [16.0, 5.0];
 /// Cells of at least so many rows are solved once for all pieces.
 const COARSE: usize = 8;
+/// Cells that are judged and those around the rows that are wanted are solved together where these are hardly more than the former: at most
+/// so many times as many.
+const LITTLE: (usize, usize) = (5, 4);
 /// If so many of the longest lengths in the subsample are negligible, all longer ones are assumed to be.
 const OVERLAP: usize = 2;
-/// Rows whose weights spread by less than this part have one weight, but for rounding.
-const EVEN: f64 = 1e-9;
 /// A window whose exponent over the record is so much larger than the best one's gets no weight anywhere.
 const HOPELESS: f64 = 24.0;
 
@@ -70,56 +72,6 @@ impl Candidate {
     }
 }
 
-/// The mean squared error of rows over the record, which grows with their weight: noise is the same in all, what windows do not follow is not.
-#[derive(Clone, Copy, Debug)]
-struct OverRecord {
-    mean: f64,
-    /// By how much the error grows with the weight, and the weight at which it is the mean.
-    growth: f64,
-    middle: f64,
-}
-
-impl OverRecord {
-    const UNUSED: Self = Self { mean: f64::INFINITY, growth: 0.0, middle: 1.0 };
-
-    /// The error that is expected of rows of a weight.
-    fn at(self, weight: f64) -> f64 {
-        (self.mean + self.growth * (weight - self.middle)).max(0.0)
-    }
-}
-
-/// Sums over rows, of which a line of their squared errors by their weights follows.
-#[derive(Clone, Copy, Debug, Default)]
-struct ErrorSums {
-    count: f64,
-    error: f64,
-    weight: f64,
-    squared_weight: f64,
-    product: f64,
-}
-
-impl ErrorSums {
-    fn add(&mut self, error: f64, weight: f64) {
-        self.merge(Self { count: 1.0, error, weight, squared_weight: weight * weight, product: weight * error });
-    }
-
-    fn merge(&mut self, other: Self) {
-        self.count += other.count;
-        self.error += other.error;
-        self.weight += other.weight;
-        self.squared_weight += other.squared_weight;
-        self.product += other.product;
-    }
-
-    fn over_record(self) -> OverRecord {
-        let (mean, middle) = (self.error / self.count, self.weight / self.count);
-        let spread = self.squared_weight - middle * self.weight;
-        let growth = (self.product - middle * self.error) / spread;
-        let differ = spread > EVEN * self.squared_weight;
-        OverRecord { mean, growth: if differ { growth.max(0.0) } else { 0.0 }, middle }
-    }
-}
-
 /// Averages windows of several lengths at the rows that are `wanted` of a problem without constants; others are left NaN. `best` is the length of
 /// windows with the smallest error, in rows. If `thinned` is a subsample of a long record, errors over the record are estimated from it, for all
 /// lengths that it holds.
@@ -134,6 +86,7 @@ pub(crate) fn average(
     let rows = problem.rows();
     let reach = scales.first().map_or(1, |scale| scale.reach);
     let view = View { problem, variance: expected.variance, reach, instructions };
+    let nearby = view.nearby(expected);
     let mut candidates: Vec<_> =
         scales.iter().map(|&scale| Candidate { scale, cells: None, record: [OverRecord::UNUSED; POSITIONS] }).collect();
     let record = RECORD[0].max(RECORD[1] * best as f64 / expected.variance_inflation);
@@ -144,7 +97,7 @@ pub(crate) fn average(
         Some(thinned) => {
             let short = scales.partition_point(|scale| holds(*scale));
             let view = View { problem: thinned, ..view };
-            view.judge(&mut candidates[..short], &(0..thinned.rows()), stages)?;
+            view.judge(&mut candidates[..short], (0..thinned.rows(), None), stages)?;
             short
         }
     };
@@ -156,7 +109,10 @@ pub(crate) fn average(
     let promise =
         |&weight: &f64| errors(&candidates[long..short], weight) <= errors(&candidates[..short], weight) + hope;
     if thinned.is_none() || ends.iter().any(promise) {
-        view.judge(&mut candidates[short..], &middle, stages)?;
+        let both = middle.start.min(wanted.start.saturating_sub(nearby.rows))
+            ..middle.end.max((wanted.end + nearby.rows).min(rows));
+        let kept = (rows <= ROWS && both.len() * LITTLE.1 <= middle.len() * LITTLE.0).then_some(both);
+        view.judge(&mut candidates[short..], (middle, kept), stages)?;
     }
     let hopeless = ends.map(|weight| (weight, errors(&candidates, weight) + hope));
     for candidate in &mut candidates {
@@ -169,7 +125,6 @@ pub(crate) fn average(
 
     let ready = ready(&candidates);
     let mut averages = Averages::new(problem.layout.windowed, rows);
-    let nearby = view.nearby(expected);
     stages.fill(averages.columns(), |rows, columns| {
         let some = rows.start.max(wanted.start)..rows.end.min(wanted.end);
         if !some.is_empty() {
@@ -212,18 +167,21 @@ struct View<'a, 'b> {
 }
 
 impl View<'_, '_> {
-    /// Computes the errors of the candidates over some rows of the record.
+    /// Computes the errors of the candidates over some rows of the record. Their cells around rows that are `kept` stay: of a record of one piece.
     fn judge(
         &self,
         candidates: &mut [Candidate],
-        rows: &Range<usize>,
+        (rows, kept): (Range<usize>, Option<Range<usize>>),
         stages: &mut Stages<'_, '_>,
     ) -> Result<(), Error> {
         let mut solved = Vec::new();
         for candidate in &*candidates {
             let (scale, all) = (candidate.scale, candidate.scale.one_sided_cells(self.problem.rows()));
-            let coarse = scale.step >= COARSE;
-            let cells = if coarse { Some(scale.solve(self.problem, &all, self.instructions, stages)?) } else { None };
+            let cells = if scale.step >= COARSE {
+                Some(scale.solve(self.problem, &all, self.instructions, stages)?)
+            } else {
+                kept.as_ref().map(|kept| self.cells(candidate, kept))
+            };
             solved.push(Candidate { scale, cells, record: candidate.record });
         }
         let ready = ready(&solved);
@@ -243,6 +201,10 @@ impl View<'_, '_> {
                     candidate.record[which] = all.over_record();
                 }
             }
+        }
+        drop(ready);
+        if kept.is_some() {
+            candidates.iter_mut().zip(solved).for_each(|(candidate, solved)| candidate.cells = solved.cells);
         }
         Ok(())
     }
@@ -395,12 +357,16 @@ mod tests {
 
     /// What is averaged of one coefficient alone.
     fn averaged(rows: &Rows, best: usize) -> Averages {
+        averaged_at(rows, best, 0..rows.len())
+    }
+
+    fn averaged_at(rows: &Rows, best: usize, wanted: Range<usize>) -> Averages {
         let model = Model { windowed: vec![0], constant: Vec::new(), linear: true };
         let covariance = RowCovariance::by_distance(vec![DEVIATION * DEVIATION]);
         let correlated = staged(|stages| model.correlated(rows, &covariance, stages));
         let problem = model.problem(rows, &rows.rhs, 0.0, Some(&correlated));
         let (scales, expected) = (Scale::all(ROWS, 3), white(DEVIATION * DEVIATION));
-        staged(|stages| average(&problem, None, &scales, (expected, best, 0..rows.len()), Instructions::Scalar, stages))
+        staged(|stages| average(&problem, None, &scales, (expected, best, wanted), Instructions::Scalar, stages))
     }
 
     /// Rows of one coefficient alone.
@@ -434,6 +400,18 @@ mod tests {
                 let expected = if row < 500 { 1.0 } else { 4.0 };
                 assert!((value - expected).abs() < 0.3, "{row}: {value}");
             }
+        }
+    }
+
+    #[test]
+    fn rows_that_are_wanted_have_the_numbers_of_all() {
+        let rows = alone(|time| [2.0 + time.sin(), time.cos()]);
+        let (whole, part) = (averaged(&rows, 60), averaged_at(&rows, 60, 350..600));
+        for row in 0..ROWS {
+            let (one, other) = (whole.values[0][row], part.values[0][row]);
+            // Running sums of squared errors begin elsewhere, which is rounding.
+            let same = (one - other).abs() < 1e-9 && (whole.errors[0][row] - part.errors[0][row]).abs() < 1e-9;
+            assert!(if (350..600).contains(&row) { same } else { other.is_nan() }, "{row}: {one} and {other}");
         }
     }
 

@@ -43,12 +43,14 @@ impl RollingLeastSquares {
     ) -> Result<usize, Error> {
         let rows = equations.columns.first().map_or(0, |column| column.len());
         let pairs = self.regressors * (self.regressors - 1) / 2;
-        let mut normal: Vec<Vec<f64>> = (0..pairs).map(|_| zeros(rows)).collect::<Result<_, _>>()?;
+        // One array: every one of its own has small pages at its ends, which cost as much as a tenth of the work.
+        let mut normal = zeros(pairs.saturating_mul(rows))?;
         self.normal = true;
         let mut stages = Stages::new(workers, rows, 2, watch);
         let mut inner = regressions.reborrow();
-        inner.normal = normal.iter_mut().map(Vec::as_mut_slice).collect();
+        inner.normal = normal.chunks_exact_mut(rows.max(1)).collect();
         stages.stage(|watch| self.run(equations, inner, workers, watch))?;
+        let normal: Vec<&[f64]> = normal.chunks_exact(rows.max(1)).collect();
         let Regressions { parameters, errors, status, .. } = &mut regressions;
         let (q, mut most) = (self.rhs_count, 0);
         for rhs in 0..q {
@@ -80,7 +82,7 @@ struct Fits<'a> {
     rhs: usize,
     parameters: Vec<&'a [f64]>,
     /// What is above the diagonal of the inverse of every window's normal matrix, row by row; the diagonal is where errors are to be.
-    normal: &'a [Vec<f64>],
+    normal: &'a [&'a [f64]],
     status: &'a [u16],
 }
 
@@ -206,10 +208,10 @@ impl Fits<'_> {
                 *count = u32::from(counted);
                 *residual = if counted { weight * *residual } else { 0.0 };
             }
-            for (regressor, column) in columns.chunks(rows.len()).enumerate() {
-                for ((row, residual), x) in values.chunks_exact_mut(row_size).zip(&*residuals).zip(column) {
+            for (place, (row, &residual)) in values.chunks_exact_mut(row_size).zip(&*residuals).enumerate() {
+                for (product, column) in row.iter_mut().zip(columns.chunks_exact(rows.len())) {
                     // A row that does not count may hold what is no number.
-                    row[regressor] = if *residual == 0.0 { 0.0 } else { residual * x };
+                    *product = if residual == 0.0 { 0.0 } else { residual * column[place] };
                 }
             }
         }
@@ -298,23 +300,24 @@ impl Kernel for Sandwich<'_, '_, '_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, _simd: S) {
-        // Numbers of a row side by side, and of the pairs of them.
+        // Numbers of a row side by side, of the pairs of them, and of the regressors where these are few.
         match self.fits.plan.regressors {
-            1 => self.run_with::<4, 1>(1),
-            2 => self.run_with::<4, 4>(2),
-            3 => self.run_with::<4, 8>(3),
-            4 => self.run_with::<4, 16>(4),
-            5 => self.run_with::<8, 16>(5),
-            p @ ..=8 => self.run_with::<8, 40>(p),
-            p => self.run_with::<16, 136>(p),
+            1 => self.run_with::<4, 1, 1>(),
+            2 => self.run_with::<4, 4, 2>(),
+            3 => self.run_with::<4, 8, 3>(),
+            4 => self.run_with::<4, 16, 4>(),
+            5 => self.run_with::<8, 16, 0>(),
+            ..=8 => self.run_with::<8, 40, 0>(),
+            _ => self.run_with::<16, 136, 0>(),
         }
     }
 }
 
 impl Sandwich<'_, '_, '_> {
     #[inline(always)]
-    fn run_with<const N: usize, const P: usize>(self, p: usize) {
+    fn run_with<const N: usize, const P: usize, const R: usize>(self) {
         let Self { fits, bandwidth, rows, mut errors, scratch } = self;
+        let p = if R == 0 { fits.plan.regressors } else { R };
         let Scratch { products, neighbours, here, next, sums } = scratch;
         let (correlated, length) = (bandwidth.rows, fits.plan.window - bandwidth.rows + 1);
         let first = rows.start.cast_signed() - fits.plan.before.cast_signed();
@@ -324,8 +327,15 @@ impl Sandwich<'_, '_, '_> {
         let begin_of_neighbours = of_block(begin, correlated);
         let end = of_block(first + rows.len().cast_signed(), length) + 2 * length.cast_signed();
         fits.products(begin_of_neighbours..end + correlated.cast_signed(), products);
-        let neighbours = side_by_side::<N>(neighbours, (end - begin_of_neighbours).unsigned_abs());
-        sliding_sums(correlated, products.values.as_chunks::<N>().0, neighbours);
+        let of_rows = products.values.as_chunks::<N>().0;
+        let count = (end - begin_of_neighbours).unsigned_abs();
+        let neighbours = if correlated == 1 {
+            &of_rows[..count]
+        } else {
+            let sums = side_by_side::<N>(neighbours, count);
+            sliding_sums(correlated, of_rows, sums);
+            sums
+        };
         let neighbours = &neighbours[(begin - begin_of_neighbours).unsigned_abs()..];
         let [mut here, mut next, sums] = [here, next, sums].map(|vectors| side_by_side::<P>(vectors, length));
         squares(p, &neighbours[..length], next);
@@ -351,7 +361,7 @@ impl Sandwich<'_, '_, '_> {
                 let places = done..done + some.len();
                 let some_rows = rows.start + places.start..rows.start + places.end;
                 let into = errors.iter_mut().map(|errors| &mut errors[places.clone()]);
-                scale.write(some_rows, &tile, (products.first, &products.counts), into);
+                scale.write::<R>(some_rows, &tile, (products.first, &products.counts), into);
                 done = places.end;
             }
         }

@@ -3,19 +3,34 @@
 use std::ops::Range;
 
 use crate::least_squares::bandwidth::Bandwidth;
+use crate::least_squares::givens_factor::MOST_REGRESSORS;
 use crate::least_squares::plan::RollingLeastSquares;
 
 /// Windows that are finished together.
 pub(crate) const TILE: usize = 256;
 
+/// Windows whose numbers stay in registers until they are finished.
+const AT_ONCE: usize = 8;
+
 /// Windows that keep less of the variance than this beside what their fit takes have no standard error.
 const LEAST_LEFT: f64 = 0.05;
+
+/// Some numbers from a place on; zero beyond the last.
+#[inline(always)]
+fn some(numbers: &[f64], first: usize) -> [f64; AT_ONCE] {
+    let rest = &numbers[first..];
+    rest.first_chunk().copied().unwrap_or_else(|| {
+        let mut some = [0.0; AT_ONCE];
+        some[..rest.len()].copy_from_slice(rest);
+        some
+    })
+}
 
 /// Makes standard errors of the sums over windows.
 pub(crate) struct ErrorScale<'a> {
     plan: &'a RollingLeastSquares,
     /// What is above the diagonal of the inverse of every window's normal matrix, row by row; the diagonal is where errors are to be.
-    normal: &'a [Vec<f64>],
+    normal: &'a [&'a [f64]],
     /// Rows of the record.
     total: usize,
     correlated: f64,
@@ -29,7 +44,7 @@ impl<'a> ErrorScale<'a> {
     #[inline(always)]
     pub(crate) fn new(
         plan: &'a RollingLeastSquares,
-        normal: &'a [Vec<f64>],
+        normal: &'a [&'a [f64]],
         total: usize,
         bandwidth: &Bandwidth,
     ) -> Self {
@@ -40,16 +55,17 @@ impl<'a> ErrorScale<'a> {
     }
 
     /// Writes the errors of some windows, where the diagonals of their normal matrices are, from the sums of squares of each. `counts` are the
-    /// rows that count before each row from a first one on.
+    /// rows that count before each row from a first one on. There are `R` regressors, or zero where the compiler does not know how many.
     #[inline(always)]
-    pub(crate) fn write<'c>(
+    pub(crate) fn write<'c, const R: usize>(
         &self,
         rows: Range<usize>,
         sums: &[[f64; TILE]],
         counts: (isize, &[u32]),
         errors: impl Iterator<Item = &'c mut [f64]>,
     ) {
-        let (p, kept) = (self.plan.regressors, &self.kept);
+        let p = if R == 0 { self.plan.regressors } else { R };
+        let kept = &self.kept[..p];
         let mut scale = [0.0; TILE];
         for (scale, row) in scale.iter_mut().zip(rows.clone()) {
             *scale = self.of_window(row, counts);
@@ -59,25 +75,30 @@ impl<'a> ErrorScale<'a> {
             &self.normal[i * (2 * p - i - 1) / 2 + k - i - 1][rows.clone()]
         };
         for (a, into) in errors.enumerate() {
-            let row_of_normal = |k: usize| if k == a { &*into } else { normal(a, k) };
-            let mut variance = [0.0; TILE];
-            for b in 0..p {
-                let mut inner = [0.0; TILE];
-                for c in 0..p {
-                    let kept = kept[b] * kept[c];
-                    let (i, k) = (b.min(c), b.max(c));
-                    let sum = &sums[i * p - i * i.saturating_sub(1) / 2 + k - i];
-                    for ((inner, of), sum) in inner.iter_mut().zip(row_of_normal(c)).zip(sum) {
-                        *inner += kept * of * sum;
+            for first in (0..into.len().min(TILE)).step_by(AT_ONCE) {
+                let mut of_normal = [[0.0; AT_ONCE]; MOST_REGRESSORS];
+                for (k, of) in of_normal[..p].iter_mut().enumerate() {
+                    *of = some(if k == a { into } else { normal(a, k) }, first);
+                }
+                let mut variance = [0.0; AT_ONCE];
+                for b in 0..p {
+                    let mut inner = [0.0; AT_ONCE];
+                    for c in 0..p {
+                        let kept = kept[b] * kept[c];
+                        let (i, k) = (b.min(c), b.max(c));
+                        let sum = &sums[i * p - i * i.saturating_sub(1) / 2 + k - i][first..first + AT_ONCE];
+                        for ((inner, of), sum) in inner.iter_mut().zip(&of_normal[c]).zip(sum) {
+                            *inner += kept * of * sum;
+                        }
+                    }
+                    for ((variance, of), inner) in variance.iter_mut().zip(&of_normal[b]).zip(&inner) {
+                        *variance += of * inner;
                     }
                 }
-                for ((variance, of), inner) in variance.iter_mut().zip(row_of_normal(b)).zip(&inner) {
-                    *variance += of * inner;
+                for ((error, variance), scale) in into[first..].iter_mut().zip(&variance).zip(&scale[first..]) {
+                    // Where there are no parameters there is no error, and it stays NaN.
+                    *error = (scale * variance).sqrt() + 0.0 * *error;
                 }
-            }
-            for ((error, variance), scale) in into.iter_mut().zip(&variance).zip(&scale) {
-                // Where there are no parameters there is no error, and it stays NaN.
-                *error = (scale * variance).sqrt() + 0.0 * *error;
             }
         }
     }
