@@ -15,7 +15,7 @@ use crate::identify::weak::found::WeakIdentified;
 use crate::identify::weak::friction::FrictionDirection;
 use crate::identify::weak::options::WeakOptions;
 use crate::identify::weak::pulses::{add_pulses, allow_hidden, are_the_same, without_pulses};
-use crate::identify::weak::session::Session;
+use crate::identify::weak::session::{Session, always_constant};
 use crate::identify::weak::torque_jumps::without_jumps;
 use crate::noise::breaks::search::{Broken, breaks};
 use crate::noise::channel::{variance_after, weighted_variance};
@@ -183,7 +183,9 @@ pub(crate) fn with_record<R>(
         torque: motion.torque,
         noise: motion.measured.noise,
         coefficients: motion.coefficients,
+        constant: [false; 3],
         terms: terms.collect(),
+        constant_terms: false,
         lag,
         angle_zero: 0.0,
         mask,
@@ -243,7 +245,11 @@ fn settled(
     loop {
         let calm_torque = calm.as_slice();
         let mut session = Session {
-            record: Record { torque: if pulses.is_empty() { record.torque } else { &calm_torque }, ..record.clone() },
+            record: Record {
+                torque: if pulses.is_empty() { record.torque } else { &calm_torque },
+                constant: always_constant(&record.coefficients, &options.kinds),
+                ..record.clone()
+            },
             options,
             noise: [0.0; 2],
             channel_noise,
