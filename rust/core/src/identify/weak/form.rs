@@ -5,6 +5,7 @@ use std::num::NonZeroUsize;
 use crate::equation::motion::{Measured, Motion, Term};
 use crate::equation::terms::{BuiltInTerm, TermFunction};
 use crate::error::Error;
+use crate::exec::memory;
 use crate::exec::pool::{Piece, Watch};
 use crate::exec::stages::Stages;
 use crate::identify::scanned::Scan;
@@ -31,6 +32,10 @@ use crate::weak_form::weak_rows::{Record, TermSamples};
 
 /// Stages of a call, about: only for showing progress.
 const STAGES: usize = 50;
+
+/// Samples of a record whose rows and windows are given back to the system before there are results: looking for what is free takes next to nothing of
+/// so long a call.
+const LONG: usize = 1_000_000;
 
 /// Times that pulses are looked for, with those of the last time taken off the torque.
 const PULSE_ROUNDS: usize = 2;
@@ -297,6 +302,9 @@ impl Session<'_, '_, '_> {
         // Rows and windows take as much memory as the results.
         drop(decided);
         if let Some(at_rows) = at_rows {
+            if samples >= LONG {
+                memory::give_back();
+            }
             found.results = at_rows.at_samples(samples, self.options.step, &mut self.stages)?;
         }
         found.lag = lag;
