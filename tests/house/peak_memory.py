@@ -32,6 +32,9 @@ CALLS: dict[str, Callable[[Array, Array, int, int], object]] = {
     "the paper's method": lambda angle, torque, _window, workers: tvident.identify(
         angle, torque, sample_rate=1000, method="paper", workers=workers
     ),
+    "the automatic method": lambda angle, torque, _window, workers: tvident.identify(
+        angle, torque, sample_rate=1000, workers=workers
+    ),
     "fit_local_polynomials": lambda angle, _torque, window, workers: tvident.fit_local_polynomials(
         angle, window | 1, step=STEP, workers=workers
     ),

@@ -17,6 +17,10 @@ HOUR = 3_600_000
 """Samples of an hour at 1 kHz."""
 HELD_FOR_AN_HOUR = 400 * MIB
 """Promised: what `identify` holds above its inputs, all results kept."""
+OF_RESULTS = 59
+"""Bytes a sample of what the automatic method finds of a stiffness: seven columns of numbers and two of flags."""
+BESIDE_RESULTS = 16
+"""Promised: bytes a sample that the automatic method needs beside inputs and results."""
 SCRATCH = 8 * MIB
 """Promised: scratch of a thread for windows up to 10 000."""
 LONGEST = 10_000
@@ -53,6 +57,10 @@ def risen_by(name: str, samples: int, window: int, workers: int) -> int:
 
 def test_an_hour_fits_into_400_mib_with_all_its_results() -> None:
     assert risen_by("the paper's method", HOUR, 201, workers=2) < HELD_FOR_AN_HOUR
+
+
+def test_the_automatic_method_needs_little_beside_inputs_and_results() -> None:
+    assert risen_by("the automatic method", HOUR, 0, workers=1) < (OF_RESULTS + BESIDE_RESULTS) * HOUR
 
 
 @pytest.mark.parametrize("workers", [1, 2])

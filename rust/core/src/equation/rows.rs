@@ -34,6 +34,13 @@ pub(crate) struct Rows {
     pub(crate) roots: Vec<f64>,
 }
 
+/// Rows that are no equations for a while, each once, and what they were.
+pub(crate) struct SetAside {
+    rows: Vec<usize>,
+    usable: Vec<bool>,
+    numbers: Vec<f64>,
+}
+
 impl Rows {
     /// What a row was multiplied by.
     pub(crate) fn root(&self, row: usize) -> f64 {
@@ -89,6 +96,36 @@ impl Rows {
         }
     }
 
+    /// Makes rows no equations for a while.
+    pub(crate) fn set_aside(&mut self, rows: Vec<usize>) -> SetAside {
+        let usable = rows.iter().map(|&row| std::mem::replace(&mut self.usable[row], false)).collect();
+        let mut numbers = Vec::new();
+        for column in self.columns_mut() {
+            numbers.extend(rows.iter().filter_map(|&row| column.get_mut(row).map(std::mem::take)));
+        }
+        SetAside { rows, usable, numbers }
+    }
+
+    /// Makes rows that were set aside what they were.
+    pub(crate) fn take_back(&mut self, SetAside { rows, usable, numbers }: SetAside) {
+        let mut numbers = numbers.into_iter();
+        for column in self.columns_mut() {
+            for &row in &rows {
+                if let Some(value) = column.get_mut(row) {
+                    *value = numbers.next().unwrap_or_default();
+                }
+            }
+        }
+        rows.into_iter().zip(usable).for_each(|(row, usable)| self.usable[row] = usable);
+    }
+
+    /// The right-hand side and all regressors, some of which have no companions.
+    fn columns_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
+        let regressors = self.regressors.iter_mut();
+        let regressors = regressors.flat_map(|one| [one.value.as_mut_slice(), one.companion.as_mut_slice()]);
+        std::iter::once(self.rhs.as_mut_slice()).chain(regressors)
+    }
+
     /// Makes every column zero in the rows that are no equations.
     pub(crate) fn clear_unusable(&mut self) {
         for row in 0..self.len() {
@@ -123,4 +160,34 @@ pub(crate) fn joints(stretches: &[Range<usize>]) -> Vec<usize> {
         Some(*end)
     });
     ends.take(stretches.len().saturating_sub(1)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_that_were_set_aside_come_back_as_they_were() {
+        let column = |from: f64| (0..6).map(|row| from + f64::from(row)).collect::<Vec<_>>();
+        let of = |value, companion| Regressor { value, companion, ..Regressor::default() };
+        let mut rows = Rows {
+            regressors: vec![of(column(1.0), column(10.0)), of(column(20.0), Vec::new())],
+            rhs: column(30.0),
+            usable: vec![true, true, false, true, true, true],
+            ..Rows::default()
+        };
+        let before = rows.clone();
+        let aside = rows.set_aside(vec![1, 2, 5]);
+        let mut excluded = before.clone();
+        excluded.exclude([1, 2, 5].into_iter());
+        assert_eq!(rows.usable, excluded.usable);
+        for (found, expected) in rows.columns_mut().zip(excluded.columns_mut()) {
+            assert_eq!(found, expected);
+        }
+        rows.take_back(aside);
+        assert_eq!(rows.usable, before.usable);
+        for (found, expected) in rows.columns_mut().zip(before.clone().columns_mut()) {
+            assert_eq!(found, expected);
+        }
+    }
 }

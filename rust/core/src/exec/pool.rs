@@ -4,15 +4,16 @@
 //! process; a process that was forked makes its own, since threads do not survive a fork.
 
 use std::cell::{Cell, RefCell};
+use std::io;
 use std::mem;
 use std::num::NonZeroUsize;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, TryLockError, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::{ThreadBuilder, ThreadPool, ThreadPoolBuilder};
 
 use crate::error::Error;
 use crate::exec::memory;
@@ -214,6 +215,33 @@ fn newest() -> Option<MutexGuard<'static, Option<Owned>>> {
     None
 }
 
+thread_local! {
+    /// Something that is dropped when its thread ends, as the pool's own are.
+    static DROPPED: Vec<u8> = const { Vec::new() };
+}
+
+/// Begins one thread of a pool, and waits until it has what it needs: for what is dropped at its end a thread asks the C library for memory,
+/// which ends the process where there is none. Threads that began side by side would take it from each other, since each may take addresses for
+/// allocations of its own.
+fn begin(thread: ThreadBuilder) -> io::Result<()> {
+    memory::ask_for(THREAD).map_err(|error| io::Error::new(io::ErrorKind::OutOfMemory, error.to_string()))?;
+    let (begun, wait) = mpsc::channel();
+    let builder = match thread.name() {
+        Some(name) => thread::Builder::new().name(name.to_owned()),
+        None => thread::Builder::new(),
+    };
+    builder.spawn(move || {
+        DROPPED.with(|_| ());
+        // Nobody waits any more only where the caller has ended.
+        let _ = begun.send(());
+        drop(begun);
+        thread.run();
+    })?;
+    // A thread that ended at once has nothing to wait for.
+    let _ = wait.recv();
+    Ok(())
+}
+
 /// The pool of this process, with at least so many threads.
 ///
 /// The threads of a pool that is outgrown end with the last call that uses it.
@@ -225,13 +253,13 @@ fn pool(threads: usize) -> Result<Arc<ThreadPool>, Error> {
         return Ok(Arc::clone(&owned.pool));
     }
     memory::ask_for(threads.saturating_mul(THREAD))?;
-    let pool =
-        ThreadPoolBuilder::new().num_threads(threads).thread_name(|index| format!("tvident-{index}")).build().map_err(
-            |error| match memory::ask_for(threads.min(SOME) * (THREAD + ARENA)) {
-                Ok(()) => Error::Threads { threads, cause: error.to_string() },
-                Err(error) => error,
-            },
-        )?;
+    let builder = ThreadPoolBuilder::new().num_threads(threads).thread_name(|index| format!("tvident-{index}"));
+    let pool = builder.spawn_handler(begin).build().map_err(|error| {
+        match memory::ask_for(threads.min(SOME) * (THREAD + ARENA)) {
+            Ok(()) => Error::Threads { threads, cause: error.to_string() },
+            Err(error) => error,
+        }
+    })?;
     // Threads that begin when memory has run out end the process.
     pool.broadcast(|_| ());
     let pool = Arc::new(pool);
@@ -299,6 +327,8 @@ mod tests {
         // No other test wants as many threads.
         let kept = [pool(64), pool(64)].map(|pool| pool.expect("threads"));
         assert!(Arc::ptr_eq(&kept[0], &kept[1]));
+        let names = kept[0].broadcast(|own| (own.index(), thread::current().name().map(str::to_owned)));
+        assert!(names.into_iter().all(|(index, name)| name == Some(format!("tvident-{index}"))));
         // As a fork may leave it.
         let locked = POOL.lock().expect("no thread panics with the lock");
         let result = run(pieces(10), threads(2), || (), |_, (): &mut ()| (), &mut |_, _| true);

@@ -41,10 +41,15 @@ pub(crate) fn is_mostly_noise(
     let size = regressors.len();
     let gram: Vec<f64> = (0..size * size).map(|index| product(index / size, index % size)).collect();
     let windowed = model.windowed.len();
+    let noise_of = |factors: &[f64]| -> f64 {
+        (0..size * size).map(|index| factors[index / size] * factors[index % size] * gram[index]).sum()
+    };
     let of = |rows: Range<usize>, (): &mut ()| {
         let (mut left, mut noise) = (0.0, 0.0);
         let mut factors = vec![0.0; size];
         factors[..parts.len()].copy_from_slice(&parts);
+        // Constants alone have the same noise in every row.
+        let everywhere = noise_of(&factors);
         for row in rows.filter(|&row| problem.usable[row]) {
             if windowed > 0 {
                 let place = fit.nearest(row);
@@ -61,8 +66,7 @@ pub(crate) fn is_mostly_noise(
             let others =
                 factors[parts.len()..].iter().zip(&problem.windowed).map(|(factor, column)| factor * column[row]);
             left += constants.chain(others).sum::<f64>().powi(2);
-            noise +=
-                (0..size * size).map(|index| factors[index / size] * factors[index % size] * gram[index]).sum::<f64>();
+            noise += if windowed > 0 { noise_of(&factors) } else { everywhere };
         }
         [left, noise]
     };

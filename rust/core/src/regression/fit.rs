@@ -1,5 +1,6 @@
 //! A fit: a model solved in windows of one length, or over the whole record at once.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use crate::error::Error;
@@ -96,7 +97,7 @@ impl Fit {
         covariance: &RowCovariance,
         stages: &mut Stages<'_, '_>,
     ) -> Result<Vec<f64>, Error> {
-        let columns = self.influences(problem, stages)?;
+        let columns = self.influences(problem, 0..problem.layout.constant, stages)?;
         let each = (0..columns.len()).map(|constant| Piece { size: problem.rows(), content: constant });
         let products = |constant: usize, (): &mut ()| products(&columns, constant, covariance);
         let products = stages.map(each.collect(), || (), products)?;
@@ -111,10 +112,16 @@ impl Fit {
         covariance: &RowCovariance,
         stages: &mut Stages<'_, '_>,
     ) -> Result<f64, Error> {
-        let columns = self.influences(problem, stages)?;
-        let mut moved = vec![0.0; columns.first().map_or(0, Vec::len)];
-        for (column, weight) in columns.iter().zip(&self.pooled.inverse[constant * columns.len()..]) {
-            moved.iter_mut().zip(column).for_each(|(sum, value)| *sum += weight * value);
+        let constants = problem.layout.constant;
+        let weights = &self.pooled.inverse[constant * constants..];
+        let mut moved = Vec::new();
+        // As many columns at a time as there are threads.
+        for first in (0..constants).step_by(stages.workers.get()) {
+            let some = first..constants.min(first + stages.workers.get());
+            for (column, weight) in self.influences(problem, some, stages)?.iter().zip(&weights[first..]) {
+                moved.resize(column.len(), 0.0);
+                moved.iter_mut().zip(&**column).for_each(|(sum, value)| *sum += weight * value);
+            }
         }
         let mut noisy = vec![0.0; moved.len()];
         stages.fill([&mut noisy], |rows, parts| {
@@ -125,9 +132,14 @@ impl Fit {
         Ok(moved.iter().zip(&noisy).map(|(a, b)| a * b).sum())
     }
 
-    /// The influence of every row on each of the constants.
-    fn influences(&self, problem: &Problem<'_>, stages: &mut Stages<'_, '_>) -> Result<Vec<Vec<f64>>, Error> {
-        let each = (0..problem.layout.constant).map(|constant| Piece { size: problem.rows(), content: constant });
+    /// The influence of every row on each of some constants.
+    fn influences<'a>(
+        &self,
+        problem: &Problem<'a>,
+        constants: Range<usize>,
+        stages: &mut Stages<'_, '_>,
+    ) -> Result<Vec<Cow<'a, [f64]>>, Error> {
+        let each = constants.map(|constant| Piece { size: problem.rows(), content: constant });
         let windows = 0..self.full.len();
         let influence =
             |constant: usize, (): &mut ()| self.influence(problem, &windows, &self.pooled.weights, constant);
@@ -150,13 +162,13 @@ impl Fit {
     }
 
     /// The influence of every row within some windows on a constant estimated from them.
-    pub(crate) fn influence(
+    pub(crate) fn influence<'a>(
         &self,
-        problem: &Problem<'_>,
+        problem: &Problem<'a>,
         windows: &Range<usize>,
         weights: &[f64],
         constant: usize,
-    ) -> Vec<f64> {
+    ) -> Cow<'a, [f64]> {
         let centre = |window| self.centre(window);
         influence(problem, (&self.full, windows.clone()), weights, [self.step, self.span], centre, constant)
     }

@@ -1,11 +1,12 @@
 //! The covariance of rows: known from the noise of both channels, or estimated from the residuals.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use crate::error::Error;
 use crate::exec::stages::Stages;
 use crate::regression::problem::Correlated;
-use crate::regression::row_neighbours::{AddNeighbours, LaggedProducts, products};
+use crate::regression::row_neighbours::{AddNeighbours, LaggedProducts, SumOfProducts, products};
 use crate::simd::instructions::Instructions;
 use crate::simd::vectors::{Kernel, Lanes, dispatch};
 use crate::weak_form::test_function::Kernels;
@@ -98,7 +99,8 @@ impl RowCovariance {
     pub(crate) fn of_residuals(residuals: &[f64], usable: &[bool], farthest: usize) -> Self {
         let whole = usable.iter().all(|&usable| usable);
         let missing = |(residual, usable): (&f64, &bool)| if *usable { *residual } else { 0.0 };
-        let residuals: Vec<f64> = residuals.iter().zip(usable).map(missing).collect();
+        let residuals: Cow<'_, [f64]> =
+            if whole { residuals.into() } else { residuals.iter().zip(usable).map(missing).collect() };
         let mut sums = vec![0.0; farthest + 1];
         dispatch(Instructions::current(), LaggedProducts { values: &residuals, sums: &mut sums });
         let lags = sums.into_iter().enumerate().map(|(lag, sum)| {
@@ -151,6 +153,22 @@ impl RowCovariance {
             self.add_product(column, first..first + part.len(), part);
         }
         result
+    }
+
+    /// The dot products of some columns with the covariance times another.
+    pub(crate) fn products<C: AsRef<[f64]>>(&self, columns: &[C], with: &[f64]) -> Vec<f64> {
+        let mut sums = vec![SumOfProducts::default(); columns.len()];
+        let mut product = [0.0; PIECE];
+        for first in (0..with.len()).step_by(PIECE) {
+            let rows = first..with.len().min(first + PIECE);
+            let product = &mut product[..rows.len()];
+            product.fill(0.0);
+            self.add_product(with, rows.clone(), product);
+            for (column, sum) in columns.iter().zip(&mut sums) {
+                sum.add(&column.as_ref()[rows.clone()], product);
+            }
+        }
+        sums.iter().map(SumOfProducts::value).collect()
     }
 
     /// Adds some rows of the covariance times a column.
@@ -284,6 +302,20 @@ mod tests {
                     near(found.windowed[0][row], value) && near(found.companions[0][row], value + slope),
                     "{row} of {count}"
                 );
+            }
+        }
+    }
+
+    #[test]
+    fn products_by_pieces_have_the_bits_of_whole_columns() {
+        let covariance = RowCovariance::by_distance(vec![1.0, -0.5, 0.25]);
+        for count in [0, 5, PIECE - 1, PIECE, 2 * PIECE + 13] {
+            let column = |factor: f64| (0..count).map(|row| (row as f64 * factor).sin()).collect::<Vec<_>>();
+            let columns = [0.7, 0.3, 1.9].map(column);
+            let found = covariance.products(&columns, &columns[1]);
+            let whole = covariance.times(&columns[1]);
+            for (found, column) in found.iter().zip(&columns) {
+                assert_eq!(found.to_bits(), products(column, &whole, 0).to_bits(), "{count}");
             }
         }
     }

@@ -77,33 +77,62 @@ fn add_at_ends(weights: &[[f64; 2]], column: &[f64], rows: Range<usize>, sums: &
     }
 }
 
-/// The dot product of two columns, in eight sums side by side: a single one would wait for every addition.
+/// The dot product of two columns.
 pub(crate) fn sum_of_products(one: &[f64], other: &[f64]) -> f64 {
-    dispatch(Instructions::current(), DotProduct(one, other))
+    let mut sum = SumOfProducts::default();
+    sum.add(one, other);
+    sum.value()
 }
 
-/// What [`sum_of_products`] computes.
-struct DotProduct<'a>(&'a [f64], &'a [f64]);
+/// The dot product of two columns that come in pieces, in eight sums side by side: a single one would wait for every addition. Whatever the
+/// pieces are, the bits are the same.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct SumOfProducts {
+    lanes: [f64; 8],
+    /// What the rows beyond the last eight add.
+    rest: f64,
+}
+
+impl SumOfProducts {
+    /// Adds a piece of both columns: a multiple of eight rows, but for the last.
+    pub(crate) fn add(&mut self, one: &[f64], other: &[f64]) {
+        dispatch(Instructions::current(), DotProduct { one, other, sum: self });
+    }
+
+    pub(crate) fn value(&self) -> f64 {
+        self.lanes.iter().sum::<f64>() + self.rest
+    }
+}
+
+/// What [`SumOfProducts::add`] does.
+struct DotProduct<'a> {
+    one: &'a [f64],
+    other: &'a [f64],
+    sum: &'a mut SumOfProducts,
+}
 
 impl Kernel for DotProduct<'_> {
-    type Output = f64;
+    type Output = ();
 
     #[inline(always)]
-    fn run<S: Lanes>(self, _simd: S) -> f64 {
-        let ((one, one_rest), (other, other_rest)) = (self.0.as_chunks::<8>(), self.1.as_chunks::<8>());
-        let mut sums = [0.0; 8];
+    fn run<S: Lanes>(self, _simd: S) {
+        let ((one, one_rest), (other, other_rest)) = (self.one.as_chunks::<8>(), self.other.as_chunks::<8>());
+        let mut sums = self.sum.lanes;
         for (one, other) in one.iter().zip(other) {
             for lane in 0..8 {
                 sums[lane] += one[lane] * other[lane];
             }
         }
-        let rest: f64 = one_rest.iter().zip(other_rest).map(|(a, b)| a * b).sum();
-        sums.iter().sum::<f64>() + rest
+        self.sum.lanes = sums;
+        self.sum.rest = one_rest.iter().zip(other_rest).map(|(a, b)| a * b).sum();
     }
 }
 
 /// Distances whose products are summed at once.
 const TOGETHER: usize = 8;
+
+/// Chunks of eight rows that all distances see before the next: they stay in the nearest cache.
+const CHUNKS: usize = 256;
 
 /// The products of a column with itself at every distance, summed: several distances at once, with the bits of [`sum_of_products`].
 pub(crate) struct LaggedProducts<'a> {
@@ -118,21 +147,29 @@ impl Kernel for LaggedProducts<'_> {
     #[inline(always)]
     fn run<S: Lanes>(self, _simd: S) {
         let Self { values, sums } = self;
-        for (group, sums) in sums.chunks_mut(TOGETHER).enumerate() {
-            let nearest = group * TOGETHER;
-            // Chunks of eight that all distances of the group have.
-            let common = values.len().saturating_sub(nearest + TOGETHER) / 8;
-            let (early, _) = values.as_chunks::<8>();
-            let mut all = [[0.0; 8]; TOGETHER];
-            for (chunk, early) in early.iter().enumerate().take(common) {
-                let Some(late) = values[chunk * 8 + nearest..].first_chunk::<{ TOGETHER + 8 }>() else { break };
-                for (lag, sums) in all.iter_mut().enumerate() {
-                    for lane in 0..8 {
-                        sums[lane] += early[lane] * late[lag + lane];
+        // Chunks of eight that all distances of a group have.
+        let common = |group: usize| values.len().saturating_sub((group + 1) * TOGETHER) / 8;
+        let (early, _) = values.as_chunks::<8>();
+        let mut groups = vec![[[0.0; 8]; TOGETHER]; sums.len().div_ceil(TOGETHER)];
+        for first in (0..early.len()).step_by(CHUNKS) {
+            for (group, kept) in groups.iter_mut().enumerate() {
+                let mut all = *kept;
+                let chunks = first..common(group).min(first + CHUNKS);
+                for (early, chunk) in early[first..].iter().zip(chunks) {
+                    let late = values[chunk * 8 + group * TOGETHER..].first_chunk::<{ TOGETHER + 8 }>();
+                    let Some(late) = late else { break };
+                    for (lag, sums) in all.iter_mut().enumerate() {
+                        for lane in 0..8 {
+                            sums[lane] += early[lane] * late[lag + lane];
+                        }
                     }
                 }
+                *kept = all;
             }
-            for (lag, (sum, mut lanes)) in (nearest..).zip(sums.iter_mut().zip(all)) {
+        }
+        for (group, (sums, all)) in sums.chunks_mut(TOGETHER).zip(groups).enumerate() {
+            let common = common(group);
+            for (lag, (sum, mut lanes)) in (group * TOGETHER..).zip(sums.iter_mut().zip(all)) {
                 let rows = values.len().saturating_sub(lag);
                 let (early, late) = (&values[..rows], &values[values.len() - rows..]);
                 let ((early, early_rest), (late, late_rest)) = (early.as_chunks::<8>(), late.as_chunks::<8>());

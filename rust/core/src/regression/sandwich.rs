@@ -1,26 +1,31 @@
 //! Covariance of the constant unknowns where the noise of rows is correlated: the sandwich estimator.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use crate::regression::problem::Problem;
 use crate::regression::row_covariance::RowCovariance;
-use crate::regression::row_neighbours::sum_of_products;
 use crate::regression::solved::Solved;
 
 /// The influence of every row within some windows on a constant: a column of `X̃`, so that the constants are `N⁻¹ X̃ᵀ b`.
 ///
-/// `step` and `span` are the rows from one window to the next and the rows of a window, `centre` where each is solved.
-pub(crate) fn influence(
-    problem: &Problem<'_>,
+/// `step` and `span` are the rows from one window to the next and the rows of a window, `centre` where each is solved. In a single window over
+/// all rows, without unknowns of its own, it is the constant's regressor.
+pub(crate) fn influence<'a>(
+    problem: &Problem<'a>,
     (full, windows): (&Solved, Range<usize>),
     weights: &[f64],
     [step, span]: [usize; 2],
     centre: impl Fn(usize) -> f64,
     constant: usize,
-) -> Vec<f64> {
+) -> Cow<'a, [f64]> {
     let layout = problem.layout;
     let (fields, q) = (full.fields, layout.windowed);
     let (rows, blocks) = (problem.rows(), span / step);
+    let is_one = full.first == 0 && windows == (0..1) && blocks * step >= rows;
+    if is_one && q == 0 && weights == [1.0] {
+        return Cow::Borrowed(problem.constants[constant]);
+    }
     let first_block = full.first + windows.start.cast_signed();
     let row =
         |block: usize| usize::try_from((first_block + block.cast_signed()) * step.cast_signed()).unwrap_or(0).min(rows);
@@ -64,19 +69,18 @@ pub(crate) fn influence(
             *influence = value;
         }
     }
-    column
+    Cow::Owned(column)
 }
 
 /// Covariance of the constants, row by row: `N⁻¹ X̃ᵀ Γ X̃ N⁻¹`.
-pub(crate) fn sandwich(influence: &[Vec<f64>], inverse: &[f64], covariance: &RowCovariance) -> Vec<f64> {
+pub(crate) fn sandwich<C: AsRef<[f64]>>(influence: &[C], inverse: &[f64], covariance: &RowCovariance) -> Vec<f64> {
     let middle = (0..influence.len()).flat_map(|constant| products(influence, constant, covariance));
     between(&middle.collect::<Vec<_>>(), inverse, influence.len())
 }
 
 /// A row of `X̃ᵀ Γ X̃`, for one constant.
-pub(crate) fn products(influence: &[Vec<f64>], constant: usize, covariance: &RowCovariance) -> Vec<f64> {
-    let noisy = covariance.times(&influence[constant]);
-    influence.iter().map(|other| sum_of_products(other, &noisy)).collect()
+pub(crate) fn products<C: AsRef<[f64]>>(influence: &[C], constant: usize, covariance: &RowCovariance) -> Vec<f64> {
+    covariance.products(influence, influence[constant].as_ref())
 }
 
 /// The product `inverse · middle · inverse` of square matrices, made symmetric.
@@ -136,7 +140,7 @@ mod tests {
         rows.exclude([17, 100, 101].into_iter());
         let problem = model().problem(&rows, &rows.rhs, 0.0, None);
         let fit = fitted(&problem);
-        let columns: Vec<Vec<f64>> =
+        let columns: Vec<_> =
             (0..2).map(|one| fit.influence(&problem, &(0..fit.full.len()), &fit.pooled.weights, one)).collect();
         let moved: Vec<f64> =
             columns.iter().map(|column| column.iter().zip(&rows.rhs).map(|(a, b)| a * b).sum()).collect();
@@ -152,8 +156,7 @@ mod tests {
         let problem = model().problem(&rows, &rows.rhs, 0.0, None);
         let fit =
             staged(|stages| Fit::new(&problem, None, white(1.0), Instructions::Scalar, stages)).expect("constants");
-        let columns: Vec<Vec<f64>> =
-            (0..2).map(|one| fit.influence(&problem, &(0..1), &fit.pooled.weights, one)).collect();
+        let columns: Vec<_> = (0..2).map(|one| fit.influence(&problem, &(0..1), &fit.pooled.weights, one)).collect();
         let covariance = RowCovariance::by_distance(vec![1.0, 0.4, -0.2]);
         let found = sandwich(&columns, &fit.pooled.inverse, &covariance);
         // Row by row: what each moves the constants by, times the covariance of two rows.

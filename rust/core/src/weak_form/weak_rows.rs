@@ -50,7 +50,11 @@ pub(crate) struct Record<'a> {
     /// What is known of the noise of an angle that was fused or integrated.
     pub(crate) noise: Option<&'a AngleNoise>,
     pub(crate) coefficients: [Coefficient<'a>; 3],
+    /// Coefficients that are constant whatever is found: their regressors get no companions.
+    pub(crate) constant: [bool; 3],
     pub(crate) terms: Vec<TermSamples<'a>>,
+    /// Whether that holds for all terms.
+    pub(crate) constant_terms: bool,
     /// Lag of the torque in samples.
     pub(crate) lag: f64,
     /// The angle at which an unknown spring is relaxed.
@@ -159,7 +163,7 @@ impl WeakRows {
         let mut columns = columns.into_iter();
         let mut next = || columns.next().unwrap_or_default();
         let values = [next(), next(), next()];
-        let companions = [next(), next(), next()];
+        let companions = record.constant.map(|constant| if constant { Vec::new() } else { next() });
         for (index, (value, companion)) in values.into_iter().zip(companions).enumerate() {
             let noise = [self.noise.values[index].clone(), self.noise.slopes[index].clone()];
             self.rows.regressors.push(Regressor { value, companion, noise });
@@ -174,6 +178,7 @@ impl WeakRows {
                     self.rows.usable.iter().map(|&usable| f64::from(u8::from(usable))).collect(),
                     vec![0.0; self.rows.usable.len()],
                 ),
+                _ if record.constant_terms => (next(), Vec::new()),
                 TermSamples::TorqueCurvature | TermSamples::TorqueJerk => (next(), vec![0.0; self.rows.usable.len()]),
                 TermSamples::Given(_) | TermSamples::TorqueRate => (next(), next()),
             };
@@ -270,7 +275,8 @@ fn tasks<'a>(
     delta: f64,
 ) -> Tasks<'a> {
     let mut tasks = Tasks { tasks: Vec::new(), width: 0 };
-    let all: Vec<&[f64]> = kernels.values.iter().chain(&kernels.slopes).map(Vec::as_slice).collect();
+    let slopes = kernels.slopes.iter().zip(record.constant).filter(|(_, constant)| !constant).map(|(slope, _)| slope);
+    let all: Vec<&[f64]> = kernels.values.iter().chain(slopes).map(Vec::as_slice).collect();
     #[allow(clippy::cast_possible_truncation, reason = "a lag of a few samples")]
     let torque = || Box::new(Late { channel: record.torque, samples: whole as isize });
     tasks.add(Box::new(Whole(record.angle)), &all, stride);
@@ -278,11 +284,16 @@ fn tasks<'a>(
     let jerk = rate_of(&late.values[0], delta);
     let [_, rate, value] = &kernels.values;
     let slope = &kernels.slopes[2];
+    let of_a_term = if record.constant_terms { 1 } else { 2 };
     for term in &record.terms {
         match *term {
             TermSamples::One => {}
-            TermSamples::Given(samples) => tasks.add(Box::new(Whole(samples)), &[value, slope], stride),
-            TermSamples::TorqueRate => tasks.add(torque(), &[&late.values[1], &late.slopes[1]], stride),
+            TermSamples::Given(samples) => {
+                tasks.add(Box::new(Whole(samples)), &[value.as_slice(), slope][..of_a_term], stride);
+            }
+            TermSamples::TorqueRate => {
+                tasks.add(torque(), &[late.values[1].as_slice(), &late.slopes[1]][..of_a_term], stride);
+            }
             TermSamples::TorqueCurvature => tasks.add(torque(), &[&late.values[0]], stride),
             TermSamples::TorqueJerk => tasks.add(torque(), &[&jerk], stride),
         }

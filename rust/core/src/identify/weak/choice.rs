@@ -122,8 +122,12 @@ impl Session<'_, '_, '_> {
                 }
                 _ => {
                     let end = [widths.first(), widths.last()].contains(&Some(&current.half_width()));
-                    let weak =
-                        if weak.rows.len() < WeakRows::count(current, samples) { self.rows(current)? } else { weak };
+                    let weak = if weak.rows.len() < WeakRows::count(current, samples) {
+                        drop(weak);
+                        self.rows(current)?
+                    } else {
+                        weak
+                    };
                     return Ok(Chosen { weak, parameters, at_end: width.is_none() && end, fitted: None });
                 }
             }

@@ -5,6 +5,7 @@ use std::num::NonZeroUsize;
 use crate::equation::motion::{Measured, Motion, Term};
 use crate::equation::terms::{BuiltInTerm, TermFunction};
 use crate::error::Error;
+use crate::exec::memory;
 use crate::exec::pool::{Piece, Watch};
 use crate::exec::stages::Stages;
 use crate::identify::scanned::Scan;
@@ -15,7 +16,7 @@ use crate::identify::weak::found::WeakIdentified;
 use crate::identify::weak::friction::FrictionDirection;
 use crate::identify::weak::options::WeakOptions;
 use crate::identify::weak::pulses::{add_pulses, allow_hidden, are_the_same, without_pulses};
-use crate::identify::weak::session::Session;
+use crate::identify::weak::session::{Session, always_constant};
 use crate::identify::weak::torque_jumps::without_jumps;
 use crate::noise::breaks::search::{Broken, breaks};
 use crate::noise::channel::{variance_after, weighted_variance};
@@ -31,6 +32,10 @@ use crate::weak_form::weak_rows::{Record, TermSamples};
 
 /// Stages of a call, about: only for showing progress.
 const STAGES: usize = 50;
+
+/// Samples of a record whose rows and windows are given back to the system before there are results: looking for what is free takes next to nothing of
+/// so long a call.
+const LONG: usize = 1_000_000;
 
 /// Times that pulses are looked for, with those of the last time taken off the torque.
 const PULSE_ROUNDS: usize = 2;
@@ -183,7 +188,9 @@ pub(crate) fn with_record<R>(
         torque: motion.torque,
         noise: motion.measured.noise,
         coefficients: motion.coefficients,
+        constant: [false; 3],
         terms: terms.collect(),
+        constant_terms: false,
         lag,
         angle_zero: 0.0,
         mask,
@@ -243,7 +250,11 @@ fn settled(
     loop {
         let calm_torque = calm.as_slice();
         let mut session = Session {
-            record: Record { torque: if pulses.is_empty() { record.torque } else { &calm_torque }, ..record.clone() },
+            record: Record {
+                torque: if pulses.is_empty() { record.torque } else { &calm_torque },
+                constant: always_constant(&record.coefficients, &options.kinds),
+                ..record.clone()
+            },
             options,
             noise: [0.0; 2],
             channel_noise,
@@ -291,6 +302,9 @@ impl Session<'_, '_, '_> {
         // Rows and windows take as much memory as the results.
         drop(decided);
         if let Some(at_rows) = at_rows {
+            if samples >= LONG {
+                memory::give_back();
+            }
             found.results = at_rows.at_samples(samples, self.options.step, &mut self.stages)?;
         }
         found.lag = lag;

@@ -211,11 +211,13 @@ impl Session<'_, '_, '_> {
         if rows.is_empty() || count as f64 > MOST * chosen.weak.rows.len() as f64 {
             return Ok(None);
         }
-        let whole = chosen.weak.rows.clone();
-        chosen.weak.rows.exclude(rows.iter().cloned().flatten());
+        let mut over: Vec<usize> = rows.iter().cloned().flatten().collect();
+        over.sort_unstable();
+        over.dedup();
+        let aside = chosen.weak.rows.set_aside(over);
         let mut fitted = self.fit_first(chosen, model)?;
         self.test(&chosen.weak.rows, &mut fitted)?;
-        chosen.weak.rows = whole;
+        chosen.weak.rows.take_back(aside);
         let usable = chosen.weak.rows.usable.clone();
         let left = self.left_of_all_rows(&chosen.weak, &usable, &fitted)?;
         let others_change = fitted.tests.iter().any(|(_, test)| test.probability < NO_CHANCE);

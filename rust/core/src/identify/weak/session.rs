@@ -37,6 +37,14 @@ pub(crate) struct Session<'a, 'b, 'c> {
     pub(crate) stages: Stages<'b, 'c>,
 }
 
+/// Which coefficients of the motion are constant whatever is found: those that are known, and those that nothing else was asked of.
+pub(crate) fn always_constant(coefficients: &[Coefficient<'_>; 3], kinds: &[Kind]) -> [bool; 3] {
+    let mut kinds = kinds.iter();
+    let is_constant =
+        |one: &Coefficient<'_>| !matches!(one, Coefficient::Unknown) || kinds.next() == Some(&Kind::Constant);
+    coefficients.each_ref().map(is_constant)
+}
+
 impl Session<'_, '_, '_> {
     /// Regressors of the unknowns: coefficients that are not known, then terms.
     pub(crate) fn unknowns(&self) -> Vec<usize> {
@@ -103,5 +111,21 @@ impl Session<'_, '_, '_> {
             record.terms.push(TermSamples::TorqueRate);
         }
         self.stages.stage(|watch| WeakRows::build(&record, function, delta, None, workers, watch))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_known_or_asked_for_as_constant_stays_so() {
+        use Coefficient::{Number, Unknown};
+        let found = |coefficients: [Coefficient<'_>; 3], kinds: &[Kind]| always_constant(&coefficients, kinds);
+        let kinds = [Kind::Automatic, Kind::Constant, Kind::Windowed, Kind::Constant];
+        assert_eq!(found([Unknown; 3], &kinds), [false, true, false]);
+        assert_eq!(found([Unknown, Number(0.1), Unknown], &kinds), [false, true, true]);
+        assert_eq!(found([Number(1.0); 3], &[]), [true; 3]);
+        assert_eq!(found([Unknown; 3], &[Kind::Varying; 3]), [false; 3]);
     }
 }

@@ -206,8 +206,9 @@ impl LeftInWindows {
             .zip(problem.usable)
             .map(|(error, &usable)| if usable && error.is_finite() { [error * error, 1.0] } else { [0.0, 0.0] });
         let counted: Vec<_> = counted.collect();
-        let sums = WindowSums::new(&counted, span);
+        drop(errors);
         let between = BetweenJumps::new(&counted, problem.jumps, span);
+        let sums = WindowSums::new(counted, span);
         let samples = tracks.status.len();
         let mut left = Self { deviation: vec![f64::NAN; samples], rows: vec![0.0; samples] };
         stages.fill([&mut left.deviation, &mut left.rows], |places, columns| {
@@ -251,7 +252,7 @@ impl<'a> BetweenJumps<'a> {
         let ends = jumps.iter().copied().chain([rows.len()]);
         let begins = std::iter::once(0).chain(jumps.iter().copied());
         let parts = begins.zip(ends).filter(|_| !jumps.is_empty());
-        Self { jumps, sums: parts.map(|(begin, end)| WindowSums::new(&rows[begin..end], span)).collect() }
+        Self { jumps, sums: parts.map(|(begin, end)| WindowSums::new(rows[begin..end].to_vec(), span)).collect() }
     }
 
     fn around(&self, row: usize) -> [f64; 2] {

@@ -45,7 +45,8 @@ impl Session<'_, '_, '_> {
         if let Some(stretches) = &stretches {
             (rows, rhs) = (thinned_rows(&rows, stretches), thinned_column(&rhs, stretches));
         }
-        let record = Record { terms: DERIVATIVES.to_vec(), ..self.record.clone() };
+        let (terms, constant) = (DERIVATIVES.to_vec(), [true; 3]);
+        let record = Record { terms, constant, constant_terms: true, ..self.record.clone() };
         let (function, delta, workers) = (weak.function, self.options.delta, self.stages.workers);
         let stretches = stretches.as_deref();
         let more = self.stages.stage(|watch| WeakRows::build(&record, function, delta, stretches, workers, watch))?;

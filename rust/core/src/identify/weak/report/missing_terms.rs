@@ -1,7 +1,9 @@
 //! Tests of terms missing from the equation, beside everything that was estimated.
 
 use std::ops::Range;
+use std::sync::Arc;
 
+use crate::equation::rows::Regressor;
 use crate::equation::terms::BUILT_IN_TERMS;
 use crate::error::Error;
 use crate::identify::weak::decided::Decided;
@@ -11,48 +13,41 @@ use crate::inference::missing_terms::{JudgedTerm, Missing, Suspect};
 use crate::record::derived::Interpolated;
 use crate::regression::fit::Fit;
 use crate::regression::limits::NEGLIGIBLE;
+use crate::regression::problem::Correlated;
 use crate::regression::subsample::{holds, more_stretches_of_rows, stretches_of_rows, thinned_column, thinned_rows};
 use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows};
 
 impl Session<'_, '_, '_> {
-    /// Looks for what may have been left out.
+    /// Looks for what may have been left out. The right-hand side and the windowed regressors times the covariance are those of all rows.
     pub(crate) fn suspects(
         &mut self,
         weak: &mut WeakRows,
         decided: &Decided,
         fit: &Fit,
-        rhs: &[f64],
+        (mut rhs, correlated): (Vec<f64>, Arc<Correlated>),
         errors: &Errors,
     ) -> Result<Vec<Suspect>, Error> {
         if !self.options.diagnose {
             return Ok(Vec::new());
         }
-        let (velocity, samples) = (weak.plain_column(1), self.record.angle.len());
-        let velocity = Interpolated { values: &velocity, first: weak.first, stride: weak.stride, samples };
         let candidates = self.candidates();
-        let mapped: Vec<_> = candidates.iter().map(|missing| missing.samples(self.record.angle, &velocity)).collect();
-        let terms = candidates.iter().zip(&mapped).map(|(missing, mapped)| match (missing, mapped) {
-            (Missing::Lag, _) => TermSamples::TorqueRate,
-            (Missing::Term(_), Some(mapped)) => TermSamples::Given(mapped),
-            (Missing::Term(_), None) => TermSamples::One,
-        });
-        let record = Record { terms: terms.collect(), ..self.record.clone() };
-        let (function, delta, workers) = (weak.function, self.options.delta, self.stages.workers);
         let stretches = stretches_to_judge(weak, decided, fit);
-        let mut rhs = rhs.to_vec();
+        let more = self.regressors_of(&candidates, weak, stretches.as_deref())?;
         if let Some(stretches) = &stretches {
             (weak.rows, rhs) = (thinned_rows(&weak.rows, stretches), thinned_column(&rhs, stretches));
         }
-        let stretches = stretches.as_deref();
-        let more = self.stages.stage(|watch| WeakRows::build(&record, function, delta, stretches, workers, watch))?;
         let first = weak.rows.regressors.len();
-        weak.rows.regressors.extend(more.rows.regressors.into_iter().skip(3));
+        weak.rows.regressors.extend(more);
         weak.rows.clear_unusable();
         if decided.white.is_some() {
             weak.rows = decided.as_white(std::mem::take(&mut weak.rows), &mut self.stages)?;
             rhs.clone_from(&weak.rows.rhs);
         }
-        let correlated = decided.model.correlated(&weak.rows, &errors.covariance, &mut self.stages)?;
+        let correlated = if stretches.is_none() && decided.white.is_none() {
+            correlated
+        } else {
+            decided.model.correlated(&weak.rows, &errors.covariance, &mut self.stages)?
+        };
         let mut suspects = Vec::new();
         for (place, missing) in candidates.iter().enumerate() {
             let judged = JudgedTerm {
@@ -80,6 +75,30 @@ impl Session<'_, '_, '_> {
         }
         Ok(suspects)
     }
+
+    /// The regressors of what may be missing, in all rows or in those of some stretches.
+    fn regressors_of(
+        &mut self,
+        candidates: &[Missing],
+        weak: &WeakRows,
+        stretches: Option<&[Range<usize>]>,
+    ) -> Result<Vec<Regressor>, Error> {
+        let (velocity, samples) = (weak.plain_column(1), self.record.angle.len());
+        let velocity = Interpolated { values: &velocity, first: weak.first, stride: weak.stride, samples };
+        let mapped: Vec<_> = candidates.iter().map(|missing| missing.samples(self.record.angle, &velocity)).collect();
+        let terms = candidates.iter().zip(&mapped).map(|(missing, mapped)| match (missing, mapped) {
+            (Missing::Lag, _) => TermSamples::TorqueRate,
+            (Missing::Term(_), Some(mapped)) => TermSamples::Given(mapped),
+            (Missing::Term(_), None) => TermSamples::One,
+        });
+        // Each is added to the constants.
+        let (terms, constant) = (terms.collect(), [true; 3]);
+        let record = Record { terms, constant, constant_terms: true, ..self.record.clone() };
+        let (function, delta, workers) = (weak.function, self.options.delta, self.stages.workers);
+        let more = self.stages.stage(|watch| WeakRows::build(&record, function, delta, stretches, workers, watch))?;
+        Ok(more.rows.regressors.into_iter().skip(3).collect())
+    }
+
     /// What may be missing: what the equation does not hold already.
     fn candidates(&self) -> Vec<Missing> {
         let terms = BUILT_IN_TERMS.iter().filter(|term| term.looked_for).map(Missing::Term);

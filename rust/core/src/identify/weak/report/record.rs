@@ -105,7 +105,7 @@ impl Session<'_, '_, '_> {
         let rhs = decided.rhs(&weak.rows).to_vec();
         // A term hardly matters where next to nothing is left for it to explain.
         if errors.left > NEGLIGIBLE * weak.rows.mean_square() {
-            found.suspects = self.suspects(&mut weak, decided, fit, &rhs, &errors)?;
+            found.suspects = self.suspects(&mut weak, decided, fit, (rhs, correlated), &errors)?;
         }
         found.record_status = errors.status | record_status(&found, decided, at_end);
         if self.is_contradicted(&weak, &found.constants) {

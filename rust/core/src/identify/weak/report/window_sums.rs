@@ -11,9 +11,9 @@ pub(crate) struct WindowSums<const N: usize> {
 }
 
 impl<const N: usize> WindowSums<N> {
-    pub(crate) fn new(rows: &[[f64; N]], span: usize) -> Self {
+    pub(crate) fn new(rows: Vec<[f64; N]>, span: usize) -> Self {
         let span = span.max(1);
-        let (mut before, mut from) = (Vec::with_capacity(rows.len() + 1), rows.to_vec());
+        let mut before = Vec::with_capacity(rows.len() + 1);
         for block in rows.chunks(span) {
             let mut sum = [0.0; N];
             for row in block {
@@ -25,6 +25,7 @@ impl<const N: usize> WindowSums<N> {
             Some(last) if last.len() < span => last.iter().fold([0.0; N], |sum, row| plus(sum, *row)),
             _ => [0.0; N],
         });
+        let mut from = rows;
         for block in from.chunks_mut(span) {
             for row in (1..block.len()).rev() {
                 block[row - 1] = plus(block[row - 1], block[row]);
@@ -62,7 +63,7 @@ mod tests {
         for count in 0..40 {
             let rows: Vec<[f64; 2]> = (0..count).map(|row| [f64::from(row * row + 1), 1.0]).collect();
             for span in 0..45 {
-                let sums = WindowSums::new(&rows, span);
+                let sums = WindowSums::new(rows.clone(), span);
                 let span = span.max(1);
                 for row in 0..rows.len() + 3 {
                     let end = (row + span.div_ceil(2)).min(rows.len());
@@ -78,7 +79,7 @@ mod tests {
     fn a_large_number_is_in_the_sums_of_its_windows_only() {
         let mut rows = [[1.0]; 100];
         rows[30] = [1e16];
-        let sums = WindowSums::new(&rows, 9);
+        let sums = WindowSums::new(rows.to_vec(), 9);
         for row in (0..26).chain(35..96) {
             assert_eq!(sums.around(row)[0], (row + 5).min(9) as f64, "{row}");
         }
