@@ -9,6 +9,7 @@ pub(crate) mod missing_terms;
 pub(crate) mod scales;
 pub(crate) mod slow_curve;
 pub(crate) mod slow_equations;
+pub(crate) mod slow_points;
 pub(crate) mod slow_triangles;
 pub(crate) mod slowly_varying;
 pub(crate) mod window_averaging;

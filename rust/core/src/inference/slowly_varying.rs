@@ -105,8 +105,8 @@ pub(crate) fn find(
         let mut best: Option<(usize, [Varying; 2], f64)> = None;
         let mut least = f64::INFINITY;
         let mut consider = |terms: usize, reach: f64| {
-            let fitted = |hole: f64| equations.fit(&triangles, terms, (reach, hole), instructions);
-            let (Some(leave_gap_out), Some(full)) = (fitted(hole), fitted(0.0)) else { return false };
+            let fitted = equations.fit(&triangles, terms, (reach, hole), instructions);
+            let Some([leave_gap_out, full]) = fitted else { return false };
             let error = equations.error(&problem, &leave_gap_out, &full, scale, expected.variance);
             let counts = if terms == 1 { simpler * error } else { error };
             let is_better = best.is_none() || counts < least;
