@@ -82,9 +82,9 @@ CURVES: dict[str, tuple[Array, float, float]] = {
     "sine": (0.3 * np.sin(2 * np.pi * TIME / 20 + 0.5), 0.025, 0.93),
     "narrow bump": (0.5 * np.exp(-0.5 * ((TIME - 10) / 0.6) ** 2), 0.045, 0.84),
 }
-"""The change of the damping, its error at most and the least part of it within 95 % intervals, both in the mean of six records: 1.8, 1.7 and
-3.4 % and 0.99, 0.99 and 0.89 measured. They were 4.4, 2.8 and 6.0 %, and 0.74, 0.92 and 0.68, where windows were as long as suits a constant
-stiffness."""
+"""The change of the damping, its error at most and the least part of it within 95 % intervals, both in the mean of six records: 1.8, 1.7
+and 3.4 % and 0.99, 0.99 and 0.89 measured. They were 4.4, 2.8 and 6.0 %, and 0.74, 0.92 and 0.68, where windows were as long as suits a
+constant stiffness."""
 
 
 @pytest.mark.parametrize("shape", ["bump", *long("sine", "narrow bump")])

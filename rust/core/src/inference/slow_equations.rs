@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use crate::inference::slow_curve::Varying;
-use crate::inference::slow_points::Points;
+use crate::inference::slow_points::{DENSITY, Points};
 use crate::inference::slow_triangles::Triangles;
 use crate::regression::constants::{Expected, pool};
 use crate::regression::fit::Fit;
@@ -16,9 +16,6 @@ use crate::simd::vectors::dispatch;
 
 /// Coefficients of the polynomials in time.
 pub(crate) const QUADRATIC: usize = 3;
-
-/// Points within one bandwidth.
-pub(crate) const DENSITY: usize = 8;
 
 /// The equations that windows leave for slow coefficients, which come first among their constants.
 pub(crate) struct Slow<'a> {

@@ -1,6 +1,5 @@
 //! Local polynomials in time fitted to equations around many points, with and without those near each.
 
-use crate::inference::slow_equations::DENSITY;
 use crate::inference::slow_triangles::Triangles;
 use crate::regression::layout::{Fields, Layout};
 use crate::regression::noise_correction::RowNoise;
@@ -9,6 +8,9 @@ use crate::regression::solved::Solved;
 use crate::regression::summary::{absorb, merge};
 use crate::simd::f64x8::{Packet, WIDTH};
 use crate::simd::vectors::{Kernel, Lanes};
+
+/// Points within one bandwidth.
+pub(crate) const DENSITY: usize = 8;
 
 /// Equations that are absorbed at a time.
 const AT_A_TIME: usize = 6;
@@ -59,9 +61,9 @@ impl Points<'_> {
         let apart = self.count.div_ceil(WIDTH);
         for first in 0..apart {
             sides.iter_mut().for_each(Side::clear);
-            let around = Around::new(&self, first, apart);
-            for step in 0..around.steps {
-                let seen = around.seen(&self, step);
+            let nearby = AroundPoints::new(&self, first, apart);
+            for step in 0..nearby.steps {
+                let seen = nearby.seen(&self, step);
                 for (side, weight) in sides.iter_mut().zip(seen.weights) {
                     if weight != Packet::ZERO {
                         side.push((layout, slow, terms), self.equations, &seen, weight);
@@ -82,7 +84,7 @@ impl Points<'_> {
 }
 
 /// The equations around eight points.
-struct Around {
+struct AroundPoints {
     points: [f64; WIDTH],
     /// The first equation of each, and how many there are.
     first: [usize; WIDTH],
@@ -100,24 +102,24 @@ struct Seen {
     counts: [bool; WIDTH],
 }
 
-impl Around {
+impl AroundPoints {
     #[inline(always)]
     fn new(points: &Points<'_>, first: usize, apart: usize) -> Self {
         let spacing = points.reach / DENSITY as f64;
         let places = &points.equations.places;
-        let mut around = Self { points: [0.0; WIDTH], first: [0; WIDTH], count: [0; WIDTH], steps: 0 };
+        let mut nearby = Self { points: [0.0; WIDTH], first: [0; WIDTH], count: [0; WIDTH], steps: 0 };
         for lane in 0..WIDTH {
             let index = first + lane * apart;
             let point = points.start as f64 + index as f64 * spacing;
-            around.points[lane] = point;
+            nearby.points[lane] = point;
             if index < points.count {
                 let begin = places.partition_point(|(row, _)| *row < point - points.reach);
                 let end = places.partition_point(|(row, _)| *row <= point + points.reach);
-                (around.first[lane], around.count[lane]) = (begin, end - begin);
-                around.steps = around.steps.max(end - begin);
+                (nearby.first[lane], nearby.count[lane]) = (begin, end - begin);
+                nearby.steps = nearby.steps.max(end - begin);
             }
         }
-        around
+        nearby
     }
 
     /// The equations that are so many after the first of each point.
