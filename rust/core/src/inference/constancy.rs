@@ -26,7 +26,7 @@ use crate::regression::solved::is_determined;
 use crate::simd::instructions::Instructions;
 
 /// Blocks that a record is cut into.
-const BLOCKS: usize = 8;
+pub(crate) const BLOCKS: usize = 8;
 
 /// Parts of a block that are compared with their neighbours.
 const PARTS: usize = 8;

@@ -35,25 +35,24 @@ pub(crate) fn validate(
     instructions: Instructions,
     stages: &mut Stages<'_, '_>,
 ) -> Result<Vec<Validated>, Error> {
-    let rows = problem.rows();
-    let inside = problem.inside();
-    // The same rows for all lengths, so that they are compared on equal terms.
-    let start =
-        scales.iter().map(|scale| scale.full_rows(rows).start).max().unwrap_or(0).min(inside.start + inside.len() / 4);
-    let end = scales
-        .iter()
-        .map(|scale| scale.full_rows(rows).end)
-        .min()
-        .unwrap_or(rows)
-        .max(inside.start + 3 * inside.len() / 4);
+    let rows = compared_rows(problem, scales);
     let mut validated = Vec::new();
     for &scale in scales {
         if let Some(fit) = Fit::with_leave_gap_out(problem, scale, expected, instructions, stages)? {
-            let error = error(problem, scale, &fit, start..end, expected.variance);
+            let error = error(problem, scale, &fit, rows.clone(), expected.variance);
             validated.push(Validated { fit, error });
         }
     }
     Ok(validated)
+}
+
+/// The same rows for all lengths, so that they are compared on equal terms.
+pub(crate) fn compared_rows(problem: &Problem<'_>, scales: &[Scale]) -> Range<usize> {
+    let (rows, inside) = (problem.rows(), problem.inside());
+    let full = || scales.iter().map(|scale| scale.full_rows(rows));
+    let start = full().map(|rows| rows.start).max().unwrap_or(0).min(inside.start + inside.len() / 4);
+    let end = full().map(|rows| rows.end).min().unwrap_or(rows).max(inside.start + 3 * inside.len() / 4);
+    start..end
 }
 
 /// The fit with the smallest error, or `None` if none predicts any row.

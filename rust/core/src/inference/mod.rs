@@ -10,6 +10,7 @@ pub(crate) mod over_record;
 pub(crate) mod scales;
 pub(crate) mod slow_curve;
 pub(crate) mod slow_equations;
+pub(crate) mod slow_points;
 pub(crate) mod slow_triangles;
 pub(crate) mod slowly_varying;
 pub(crate) mod window_averaging;

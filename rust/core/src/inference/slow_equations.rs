@@ -4,28 +4,18 @@
 use std::ops::Range;
 
 use crate::inference::slow_curve::Varying;
+use crate::inference::slow_points::{DENSITY, Points};
 use crate::inference::slow_triangles::Triangles;
 use crate::regression::constants::{Expected, pool};
 use crate::regression::fit::Fit;
-use crate::regression::layout::{Fields, Layout};
-use crate::regression::noise_correction::RowNoise;
 use crate::regression::problem::Problem;
-use crate::regression::solve::{SolveScratch, solve};
 use crate::regression::solved::{Solved, is_determined};
-use crate::regression::summary::absorb;
 use crate::regression::window_length::Scale;
-use crate::simd::f64x8::{Packet, WIDTH};
 use crate::simd::instructions::Instructions;
-use crate::simd::vectors::{Kernel, Lanes, dispatch};
+use crate::simd::vectors::dispatch;
 
 /// Coefficients of the polynomials in time.
 pub(crate) const QUADRATIC: usize = 3;
-
-/// Points within one bandwidth.
-const DENSITY: usize = 8;
-
-/// Equations that are absorbed at a time.
-const AT_A_TIME: usize = 6;
 
 /// The equations that windows leave for slow coefficients, which come first among their constants.
 pub(crate) struct Slow<'a> {
@@ -51,15 +41,15 @@ impl Slow<'_> {
         std::iter::once(0).chain(self.breaks.iter().copied()).zip(ends).map(|(a, b)| a..b)
     }
 
-    /// Fits the slow coefficients, polynomials in time of so many terms, to equations up to `reach` rows away, leaving out those nearer than `hole`
-    /// rows. Returns `None` if they are not determined.
+    /// Fits the slow coefficients, polynomials in time of so many terms, to equations up to `reach` rows away: without those nearer than `hole`
+    /// rows, and with them. Returns `None` if they are not determined.
     pub(crate) fn fit(
         &self,
         equations: &[Triangles],
         terms: usize,
         (reach, hole): (f64, f64),
         instructions: Instructions,
-    ) -> Option<Varying> {
+    ) -> Option<[Varying; 2]> {
         let spacing = reach / DENSITY as f64;
         let stretches: Vec<Range<usize>> = self.stretches().collect();
         let solve = |(rows, equations): (&Range<usize>, &Triangles)| {
@@ -69,30 +59,44 @@ impl Slow<'_> {
             let (coefficients, start) = (self.coefficients, rows.start);
             dispatch(instructions, Points { equations, coefficients, terms, start, reach, hole, count })
         };
-        let solved: Vec<Solved> = stretches.iter().zip(equations).map(solve).collect();
-        let starts = solved.iter().scan(0, |next, solved| Some(std::mem::replace(next, *next + solved.len())));
-        let starts = stretches.iter().map(|rows| rows.start as f64).zip(starts).collect();
-        let solved = Solved::join(&solved.iter().collect::<Vec<_>>());
+        let solved: Vec<[Solved; 2]> = stretches.iter().zip(equations).map(solve).collect();
+        let starts = solved.iter().scan(0, |next, [one, _]| Some(std::mem::replace(next, *next + one.len())));
+        let starts: Vec<_> = stretches.iter().map(|rows| rows.start as f64).zip(starts).collect();
+        let curve = |which: usize| {
+            let solved = Solved::join(&solved.iter().map(|both| &both[which]).collect::<Vec<_>>());
+            self.curve(&solved, terms, (spacing, starts.clone()), instructions)
+        };
+        Some([curve(0)?, curve(1)?])
+    }
+
+    /// The curves through solved points.
+    fn curve(
+        &self,
+        solved: &Solved,
+        terms: usize,
+        (spacing, stretches): (f64, Vec<(f64, usize)>),
+        instructions: Instructions,
+    ) -> Option<Varying> {
         let points = solved.len();
         let fields = solved.fields;
         let constants = if fields.layout.constant == 0 {
             Vec::new()
         } else {
-            pool(&solved, 0..points, Expected::UNKNOWN, instructions)?.values
+            pool(solved, 0..points, Expected::UNKNOWN, instructions)?.values
         };
         let value = |coefficient: usize, point: usize| {
-            is_determined(&solved, point)
-                .then(|| crate::regression::solved::local(&solved, point, &constants, coefficient))
+            is_determined(solved, point)
+                .then(|| crate::regression::solved::local(solved, point, &constants, coefficient))
         };
         let mut values = Vec::new();
         let mut variances = Vec::new();
         for coefficient in 0..self.coefficients {
             values.push(fill(&(0..points).map(|point| value(coefficient * terms, point)).collect::<Vec<_>>())?);
             let variance = solved.field(fields.covariance(coefficient * terms, coefficient * terms));
-            let variance = (0..points).map(|point| is_determined(&solved, point).then(|| variance[point]));
+            let variance = (0..points).map(|point| is_determined(solved, point).then(|| variance[point]));
             variances.push(fill(&variance.collect::<Vec<_>>())?);
         }
-        Some(Varying { spacing, stretches: starts, values, variances, constants })
+        Some(Varying { spacing, stretches, values, variances, constants })
     }
 
     /// The right-hand side of an equation of a window, with what the slow coefficients of the previous round took from it.
@@ -139,82 +143,6 @@ fn fill(values: &[Option<f64>]) -> Option<Vec<f64>> {
         values.iter().enumerate().filter_map(|(place, value)| value.map(|value| (place, value))).collect();
     let nearest = |place: usize| known.iter().min_by_key(|(other, _)| other.abs_diff(place)).map(|(_, value)| *value);
     (0..values.len()).map(|place| values[place].or_else(|| nearest(place))).collect()
-}
-
-/// The kernel: eight points at a time.
-pub(crate) struct Points<'a> {
-    /// The equations of the stretch that they lie in, of which so many coefficients are slow.
-    equations: &'a Triangles,
-    coefficients: usize,
-    /// Coefficients of the polynomials in time.
-    terms: usize,
-    /// The first row of the stretch.
-    start: usize,
-    reach: f64,
-    hole: f64,
-    count: usize,
-}
-
-impl Kernel for Points<'_> {
-    type Output = Solved;
-
-    #[inline(always)]
-    fn run<S: Lanes>(self, _simd: S) -> Solved {
-        let Self { equations, coefficients: slow_ones, terms, start, reach, hole, count: points } = self;
-        let spacing = reach / DENSITY as f64;
-        let all = equations.unknowns;
-        let layout = Layout { windowed: terms * slow_ones, linear: false, constant: all - slow_ones };
-        let columns = layout.columns();
-        let noise = RowNoise::new(&vec![[].as_slice(); 2 * layout.windowed + layout.constant + 1], 0.0);
-        let mut solved = Solved::new(layout, 0, points);
-        let mut scratch = SolveScratch::new(layout);
-        let mut summary = vec![Packet::ZERO; layout.size()];
-        let mut rows = vec![Packet::ZERO; AT_A_TIME * all * columns];
-        let mut fields = vec![Packet::ZERO; Fields { layout }.size()];
-        for first in (0..points).step_by(WIDTH) {
-            summary.fill(Packet::ZERO);
-            let point = |lane: usize| start as f64 + (first + lane) as f64 * spacing;
-            let places = &equations.places;
-            let near = places.partition_point(|(row, _)| *row < point(0) - reach)
-                ..places.partition_point(|(row, _)| *row <= point(WIDTH - 1) + reach);
-            for from in near.clone().step_by(AT_A_TIME) {
-                let mut count = 0;
-                let some = from..near.end.min(from + AT_A_TIME);
-                for (&(row, counts), triangle) in places[some.clone()].iter().zip(equations.triangles(some)) {
-                    let distance: [f64; WIDTH] = std::array::from_fn(|lane| (row - point(lane)) / reach);
-                    let weight = Packet(distance.map(|distance| {
-                        let seen = distance.abs() < 1.0 && distance.abs() * reach >= hole;
-                        if seen { 1.0 - distance * distance } else { 0.0 }
-                    }));
-                    let root = weight.sqrt();
-                    let distance = Packet(distance);
-                    for (i, entries) in triangle.chunks_exact(all + 1).enumerate() {
-                        let row_of = &mut rows[count * columns..(count + 1) * columns];
-                        row_of.fill(Packet::ZERO);
-                        for (j, &entry) in entries.iter().enumerate().skip(i) {
-                            let mut value = root * Packet::splat(entry);
-                            if j >= slow_ones {
-                                row_of[layout.windowed + j - slow_ones] = value;
-                                continue;
-                            }
-                            for term in 0..terms {
-                                row_of[j * terms + term] = value;
-                                value = value * distance;
-                            }
-                        }
-                        count += 1;
-                    }
-                    for (count, weight) in summary[layout.sums()].0.iter_mut().zip(weight.0) {
-                        *count += if counts && weight > 0.0 { all as f64 } else { 0.0 };
-                    }
-                }
-                absorb(layout, &mut summary, &mut rows, count, false);
-            }
-            solve(layout, &summary, &noise, Some(1.0), &mut scratch, &mut fields);
-            solved.put(first, &fields);
-        }
-        solved
-    }
 }
 
 /// Squared errors over the noise variance are clipped to this, so that single rows do not dominate.
@@ -305,7 +233,9 @@ mod tests {
         let companions = vec![rows.regressors[1].companion.as_slice()];
         let slow =
             Slow { fit: &fit, coefficients: 1, companions, current: None, weights: &ones, rows: ROWS, breaks: &[] };
-        slow.fit(&slow.equations(), QUADRATIC, (reach, hole), Instructions::Scalar).expect("a curve")
+        let [without, with] =
+            slow.fit(&slow.equations(), QUADRATIC, (reach, hole), Instructions::Scalar).expect("curves");
+        if hole > 0.0 { without } else { with }
     }
 
     /// The largest distance between two curves, the ends left out, where points reach over half of what they see.

@@ -1,6 +1,6 @@
 //! What windows leave of their equations for the slow coefficients: triangles, laid end to end.
 
-use std::ops::Range;
+use crate::simd::f64x8::{Packet, WIDTH};
 
 /// The equations of windows times the roots of their weights, the right-hand side last.
 pub(crate) struct Triangles {
@@ -24,11 +24,15 @@ impl Triangles {
         &mut self.entries[first..]
     }
 
-    /// Some of them.
+    /// An entry of eight of them.
     #[inline(always)]
-    pub(crate) fn triangles(&self, some: Range<usize>) -> impl Iterator<Item = &[f64]> {
+    pub(crate) fn gather(&self, some: &[usize; WIDTH], entry: usize) -> Packet {
         let size = self.unknowns * (self.unknowns + 1);
-        self.entries[some.start * size..some.end * size].chunks_exact(size)
+        let mut values = [0.0; WIDTH];
+        for (value, one) in values.iter_mut().zip(some) {
+            *value = self.entries[one * size + entry];
+        }
+        Packet(values)
     }
 }
 
@@ -48,10 +52,11 @@ mod tests {
                 rows.iter_mut().enumerate().for_each(|(place, value)| *value = entry(one, place));
             }
             assert_eq!(all.places, [(0.0, true), (1.5, true), (3.0, false), (4.5, true), (6.0, true)]);
-            for some in [0..5, 1..3, 4..5, 2..2, 5..5] {
-                let expected: Vec<Vec<f64>> =
-                    some.clone().map(|one| (0..size).map(|place| entry(one, place)).collect()).collect();
-                assert_eq!(all.triangles(some).collect::<Vec<_>>(), expected);
+            for some in [[0, 1, 2, 3, 4, 3, 2, 1], [4; WIDTH]] {
+                for place in 0..size {
+                    let expected = some.map(|one| entry(one, place));
+                    assert_eq!(all.gather(&some, place).0, expected);
+                }
             }
         }
     }

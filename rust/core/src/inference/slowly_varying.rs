@@ -8,7 +8,8 @@
 use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::exec::stages::Stages;
-use crate::inference::cross_validation::validate;
+use crate::inference::constancy::BLOCKS;
+use crate::inference::cross_validation::{compared_rows, error, validate};
 use crate::inference::slow_curve::Varying;
 use crate::inference::slow_equations::{QUADRATIC, Slow};
 use crate::regression::constants::Expected;
@@ -20,8 +21,9 @@ use crate::simd::instructions::Instructions;
 /// Bandwidths tried, as multiples of the neighbourhood that a prediction leaves out.
 const REACHES: [f64; 10] = [1.6, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 23.0, 32.0];
 
-/// The part of the shortest stretch between jumps that windows span at most.
-const STRETCH: usize = 8;
+/// The part of the record, or of its shortest stretch between jumps, that windows span at most: one whose parts are told to differ is followed
+/// from part to part.
+const STRETCH: usize = BLOCKS;
 
 /// Rounds of estimating the slow coefficients, each starting from the last one's result.
 const ROUNDS: usize = 3;
@@ -40,6 +42,9 @@ pub(crate) struct SlowCoefficients {
     pub(crate) equations_of: Scale,
     /// Mean squared error of predicting rows, over the noise's variance.
     pub(crate) error: f64,
+    /// The same where a row is predicted by slow coefficients from equations without it; the error where nothing may jump, for nothing is
+    /// compared with it.
+    pub(crate) predicted: f64,
     /// Bandwidth: rows on either side that they are estimated from.
     pub(crate) reach: f64,
 }
@@ -74,16 +79,15 @@ pub(crate) fn find(
     let whole = rows.len() as f64;
     let ends = breaks.iter().copied().chain([rows.len()]);
     let shortest = std::iter::once(0).chain(breaks.iter().copied()).zip(ends).map(|(start, end)| end - start).min();
-    // Between jumps there must be windows to leave out and others to predict with.
-    let most = shortest.filter(|_| !breaks.is_empty()).map_or(usize::MAX, |shortest| shortest / STRETCH);
-    let shortened = |scale: Scale| {
+    let mut most = shortest.unwrap_or(0) / STRETCH;
+    let shortened = |scale: Scale, most: usize| {
         let short = scales.iter().rev().find(|one| one.span() <= most);
         if scale.span() <= most { scale } else { short.or(scales.first()).copied().unwrap_or(scale) }
     };
-    let mut scale = shortened(first);
+    let mut scale = shortened(first, most);
     let mut found: Option<SlowCoefficients> = None;
     let mut last: Option<f64> = None;
-    for _ in 0..ROUNDS {
+    for round in 1..=ROUNDS {
         let current = found.as_ref().map(|found| &found.varying);
         let rhs = found.as_ref().map_or_else(|| rows.rhs.clone(), |found| found.rhs.clone());
         let problem = model.problem(rows, &rhs, noise, None);
@@ -98,17 +102,17 @@ pub(crate) fn find(
         let reaches: Vec<f64> =
             REACHES.iter().map(|multiple| multiple * hole).take_while(|reach| 2.0 * reach <= whole).collect();
         let triangles = equations.equations();
-        let mut best: Option<(usize, Varying, f64)> = None;
+        let mut best: Option<(usize, [Varying; 2], f64)> = None;
         let mut least = f64::INFINITY;
         let mut consider = |terms: usize, reach: f64| {
-            let fitted = |hole: f64| equations.fit(&triangles, terms, (reach, hole), instructions);
-            let (Some(leave_gap_out), Some(full)) = (fitted(hole), fitted(0.0)) else { return false };
+            let fitted = equations.fit(&triangles, terms, (reach, hole), instructions);
+            let Some([leave_gap_out, full]) = fitted else { return false };
             let error = equations.error(&problem, &leave_gap_out, &full, scale, expected.variance);
             let counts = if terms == 1 { simpler * error } else { error };
             let is_better = best.is_none() || counts < least;
             if is_better {
                 least = counts;
-                best = Some((terms, full, reach));
+                best = Some((terms, [leave_gap_out, full], reach));
             }
             is_better
         };
@@ -117,17 +121,28 @@ pub(crate) fn find(
         if !breaks.is_empty() {
             consider(1, 2.0 * whole);
         }
-        let Some((terms, varying, reach)) = best else { return Ok(None) };
+        let Some((terms, [leave_gap_out, varying], reach)) = best else { return Ok(None) };
         last = (terms > 1).then_some(reach);
+        if last.is_some() && last == reaches.first().copied() {
+            // Shorter bandwidths need shorter windows.
+            most = most.min(scale.span() / 2);
+        }
         let rhs = without(rows, slow, &varying);
         let problem = rest.problem(rows, &rhs, noise, None);
         let validated = validate(&problem, scales, expected, instructions, stages)?;
         let Some(next) = validated.iter().min_by(|a, b| a.error.total_cmp(&b.error)) else { return Ok(None) };
-        let error = next.error;
         let best = next.fit.scale.unwrap_or(scale);
-        let reach = reach.min(whole / 2.0);
-        found = Some(SlowCoefficients { varying, rhs, scale: best, equations_of: scale, error, reach });
-        scale = shortened(best);
+        let mut predicted = next.error;
+        if round == ROUNDS && !rows.jumps.is_empty() {
+            let rhs = without(rows, slow, &leave_gap_out);
+            let problem = rest.problem(rows, &rhs, noise, None);
+            let fit = Fit::with_leave_gap_out(&problem, best, expected, instructions, stages)?;
+            let rows = compared_rows(&problem, scales);
+            predicted = fit.map_or(f64::INFINITY, |fit| error(&problem, best, &fit, rows, expected.variance));
+        }
+        let (error, reach) = (next.error, reach.min(whole / 2.0));
+        found = Some(SlowCoefficients { varying, rhs, scale: best, equations_of: scale, error, predicted, reach });
+        scale = shortened(best, most);
     }
     Ok(found)
 }
@@ -214,6 +229,33 @@ mod tests {
         assert!((squares / ROWS as f64).sqrt() < 0.018, "{}", (squares / ROWS as f64).sqrt());
         let score = (scores / ROWS as f64).sqrt();
         assert!((0.3..2.5).contains(&score), "{score}");
+    }
+
+    #[test]
+    fn windows_become_short_where_a_coefficient_bends_quickly_beside_one_that_rests() {
+        // What rests suits windows of half the record; the bump's are a sixteenth of it.
+        let bump = |row: f64| 0.6 * (-0.5 * ((row - 0.5 * ROWS as f64) / 40.0).powi(2)).exp();
+        let mut rows = rows(ROWS, |_| [1.0, 0.0], DEVIATION);
+        for row in 0..ROWS {
+            rows.rhs[row] += bump(row as f64) * rows.regressors[1].value[row];
+        }
+        let scales = Scale::all(ROWS, 3);
+        let longest = *scales.last().expect("lengths");
+        let search = SlowSearch {
+            rows: &rows,
+            model: &model(),
+            coefficients: 1,
+            noise: 0.0,
+            expected: white(DEVIATION * DEVIATION),
+            scales: &scales,
+            breaks: &[],
+            simpler: 1.0,
+            instructions: Instructions::Scalar,
+        };
+        let found = staged(|stages| find(&search, longest, stages)).expect("a curve");
+        let off = (0..ROWS).map(|row| (found.varying.at(0, row as f64).0 - CONSTANTS[0] - bump(row as f64)).powi(2));
+        let off = (off.sum::<f64>() / ROWS as f64).sqrt();
+        assert!(found.equations_of.span() <= ROWS / 16 && off < 0.03, "{}, {off}", found.equations_of.span());
     }
 
     #[test]

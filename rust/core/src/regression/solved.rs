@@ -53,6 +53,15 @@ impl Solved {
         self.values[self.fields.count() * self.padded + place] = 0.0;
     }
 
+    /// Writes eight windows, each so many after the one before; those beyond the last are left out.
+    pub(crate) fn put_apart(&mut self, place: usize, apart: usize, fields: &[Packet]) {
+        for (field, values) in fields.iter().zip(self.values.chunks_exact_mut(self.padded.max(WIDTH))) {
+            for (value, place) in field.0.iter().zip((place..self.count).step_by(apart)) {
+                values[place] = *value;
+            }
+        }
+    }
+
     /// Writes eight windows.
     pub(crate) fn put(&mut self, place: usize, fields: &[Packet]) {
         for (field, value) in fields.iter().enumerate() {

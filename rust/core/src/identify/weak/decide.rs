@@ -205,9 +205,11 @@ impl Session<'_, '_, '_> {
             let simpler = if decided.constants_jump { SIMPLER } else { 1.0 };
             let jumping = slowly_varying::SlowSearch { breaks: &rows.jumps, simpler, ..search };
             let jumping = slowly_varying::find(&jumping, first, &mut self.stages)?;
-            let error =
-                |one: &Option<slowly_varying::SlowCoefficients>| one.as_ref().map_or(f64::INFINITY, |one| one.error);
-            found = if simpler * error(&jumping) < error(&found) { jumping } else { found };
+            // A curve that bends quickly comes near the rows that it was taken from, a jump or not: it is judged by others.
+            let predicted = |one: &Option<slowly_varying::SlowCoefficients>| {
+                one.as_ref().map_or(f64::INFINITY, |one| one.predicted)
+            };
+            found = if simpler * predicted(&jumping) < predicted(&found) { jumping } else { found };
         }
         decided.found = found;
         decided.fit = None;

@@ -1,0 +1,299 @@
+//! Local polynomials in time fitted to equations around many points, with and without those near each.
+
+use crate::inference::slow_triangles::Triangles;
+use crate::regression::layout::{Fields, Layout};
+use crate::regression::noise_correction::RowNoise;
+use crate::regression::solve::{SolveScratch, solve};
+use crate::regression::solved::Solved;
+use crate::regression::summary::{absorb, merge};
+use crate::simd::f64x8::{Packet, WIDTH};
+use crate::simd::vectors::{Kernel, Lanes};
+
+/// Points within one bandwidth.
+pub(crate) const DENSITY: usize = 8;
+
+/// Equations that are absorbed at a time.
+const AT_A_TIME: usize = 6;
+
+/// One coefficient as a parabola beside two constants, the most frequent layout: the compiler unrolls its loops.
+const BESIDE_TWO: Layout = Layout { windowed: 3, linear: false, constant: 2 };
+
+/// The kernel: eight points at a time, each with the equations around it. Returns them without equations nearer than the hole, and with all.
+pub(crate) struct Points<'a> {
+    /// The equations of the stretch that they lie in, of which so many coefficients are slow.
+    pub(crate) equations: &'a Triangles,
+    pub(crate) coefficients: usize,
+    /// Coefficients of the polynomials in time.
+    pub(crate) terms: usize,
+    /// The first row of the stretch.
+    pub(crate) start: usize,
+    pub(crate) reach: f64,
+    pub(crate) hole: f64,
+    pub(crate) count: usize,
+}
+
+impl Kernel for Points<'_> {
+    type Output = [Solved; 2];
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _simd: S) -> [Solved; 2] {
+        let constant = self.equations.unknowns - self.coefficients;
+        let layout = Layout { windowed: self.terms * self.coefficients, linear: false, constant };
+        if layout == BESIDE_TWO && self.coefficients == 1 && S::F64_LANES > 1 {
+            self.solve::<S>(BESIDE_TWO, 1, 3)
+        } else {
+            let (coefficients, terms) = (self.coefficients, self.terms);
+            self.solve::<S>(layout, coefficients, terms)
+        }
+    }
+}
+
+impl Points<'_> {
+    #[inline(always)]
+    fn solve<S: Lanes>(self, layout: Layout, slow: usize, terms: usize) -> [Solved; 2] {
+        let noise = RowNoise::new(&vec![[].as_slice(); 2 * layout.windowed + layout.constant + 1], 0.0);
+        let mut solved = [Solved::new(layout, 0, self.count), Solved::new(layout, 0, self.count)];
+        let mut scratch = SolveScratch::new(layout);
+        let mut sides = [Side::new(layout), Side::new(layout)];
+        let mut merged = vec![Packet::ZERO; layout.columns() * layout.columns()];
+        let mut fields = vec![Packet::ZERO; Fields { layout }.size()];
+        // Points side by side lie far apart: each sees equations of its own, and none that another sees alone.
+        let apart = self.count.div_ceil(WIDTH);
+        for first in 0..apart {
+            sides.iter_mut().for_each(Side::clear);
+            let nearby = AroundPoints::new(&self, first, apart);
+            for step in 0..nearby.steps {
+                let seen = nearby.seen(&self, step);
+                for (side, weight) in sides.iter_mut().zip(seen.weights) {
+                    if weight != Packet::ZERO {
+                        side.push((layout, slow, terms), self.equations, &seen, weight);
+                    }
+                }
+            }
+            let [outside, inside] = &mut sides;
+            outside.absorb(layout);
+            inside.absorb(layout);
+            solve(layout, &outside.summary, &noise, Some(1.0), &mut scratch, &mut fields);
+            solved[0].put_apart(first, apart, &fields);
+            merge(layout, &mut outside.summary, &inside.summary, 0.0, &mut merged);
+            solve(layout, &outside.summary, &noise, Some(1.0), &mut scratch, &mut fields);
+            solved[1].put_apart(first, apart, &fields);
+        }
+        solved
+    }
+}
+
+/// The equations around eight points.
+struct AroundPoints {
+    points: [f64; WIDTH],
+    /// The first equation of each, and how many there are.
+    first: [usize; WIDTH],
+    count: [usize; WIDTH],
+    /// The largest of these numbers.
+    steps: usize,
+}
+
+/// One equation of each of eight points: its place, its distance over the reach, and its weight outside the hole and inside.
+struct Seen {
+    places: [usize; WIDTH],
+    distance: Packet,
+    weights: [Packet; 2],
+    /// Whether it counts.
+    counts: [bool; WIDTH],
+}
+
+impl AroundPoints {
+    #[inline(always)]
+    fn new(points: &Points<'_>, first: usize, apart: usize) -> Self {
+        let spacing = points.reach / DENSITY as f64;
+        let places = &points.equations.places;
+        let mut nearby = Self { points: [0.0; WIDTH], first: [0; WIDTH], count: [0; WIDTH], steps: 0 };
+        for lane in 0..WIDTH {
+            let index = first + lane * apart;
+            let point = points.start as f64 + index as f64 * spacing;
+            nearby.points[lane] = point;
+            if index < points.count {
+                let begin = places.partition_point(|(row, _)| *row < point - points.reach);
+                let end = places.partition_point(|(row, _)| *row <= point + points.reach);
+                (nearby.first[lane], nearby.count[lane]) = (begin, end - begin);
+                nearby.steps = nearby.steps.max(end - begin);
+            }
+        }
+        nearby
+    }
+
+    /// The equations that are so many after the first of each point.
+    #[inline(always)]
+    fn seen(&self, points: &Points<'_>, step: usize) -> Seen {
+        let mut seen =
+            Seen { places: [0; WIDTH], distance: Packet::ZERO, weights: [Packet::ZERO; 2], counts: [false; WIDTH] };
+        for lane in 0..WIDTH {
+            if step < self.count[lane] {
+                let place = self.first[lane] + step;
+                let (row, counts) = points.equations.places[place];
+                let distance = (row - self.points[lane]) / points.reach;
+                let is_outside = distance.abs() * points.reach >= points.hole;
+                (seen.places[lane], seen.counts[lane], seen.distance.0[lane]) = (place, counts, distance);
+                seen.weights[usize::from(!is_outside)].0[lane] = (1.0 - distance * distance).max(0.0);
+            }
+        }
+        seen
+    }
+}
+
+/// What is summed up outside the hole, or inside.
+struct Side {
+    summary: Vec<Packet>,
+    rows: Vec<Packet>,
+    /// Rows that are to be absorbed.
+    waiting: usize,
+}
+
+impl Side {
+    fn new(layout: Layout) -> Self {
+        let unknowns = layout.regressors();
+        let rows = vec![Packet::ZERO; AT_A_TIME * unknowns * layout.columns()];
+        Self { summary: vec![Packet::ZERO; layout.size()], rows, waiting: 0 }
+    }
+
+    fn clear(&mut self) {
+        self.summary.fill(Packet::ZERO);
+        self.waiting = 0;
+    }
+
+    /// Adds one equation of each point.
+    #[inline(always)]
+    fn push(
+        &mut self,
+        (layout, slow, terms): (Layout, usize, usize),
+        equations: &Triangles,
+        seen: &Seen,
+        weight: Packet,
+    ) {
+        let (all, columns) = (slow + layout.constant, layout.columns());
+        let root = weight.sqrt();
+        for i in 0..all {
+            let row = &mut self.rows[self.waiting * columns..(self.waiting + 1) * columns];
+            row.fill(Packet::ZERO);
+            for j in i..=all {
+                let mut value = root * equations.gather(&seen.places, i * (all + 1) + j);
+                if j >= slow {
+                    row[layout.windowed + j - slow] = value;
+                    continue;
+                }
+                for term in 0..terms {
+                    row[j * terms + term] = value;
+                    value = value * seen.distance;
+                }
+            }
+            self.waiting += 1;
+        }
+        for (count, (&counts, weight)) in self.summary[layout.sums()].0.iter_mut().zip(seen.counts.iter().zip(weight.0))
+        {
+            *count += if counts && weight > 0.0 { all as f64 } else { 0.0 };
+        }
+        if self.waiting == AT_A_TIME * all {
+            self.absorb(layout);
+        }
+    }
+
+    #[inline(always)]
+    fn absorb(&mut self, layout: Layout) {
+        absorb(layout, &mut self.summary, &mut self.rows, self.waiting, false);
+        self.waiting = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::simulated::{assert_near, random};
+    use crate::regression::solved::{is_determined, local};
+    use crate::simd::instructions::Instructions;
+    use crate::simd::vectors::dispatch;
+
+    const EQUATIONS: usize = 300;
+    /// Triangles of some hundred equations, six at a time.
+    const ROUNDING: f64 = 1e-10;
+
+    fn parabola(row: f64) -> f64 {
+        3.0 - 0.02 * row + 1e-4 * row * row
+    }
+
+    /// Equations of a parabola beside so many constants, which are 1, 2 and so on; some are missing, and noise is added to the right-hand sides.
+    fn equations(constants: usize, deviation: f64) -> Triangles {
+        let all = 1 + constants;
+        let (entries, noise) = (random(7, EQUATIONS * all * all), random(8, EQUATIONS * all));
+        let mut found = Triangles::new(all);
+        for one in (0..EQUATIONS).filter(|one| one % 17 != 3 && !(100..115).contains(one)) {
+            let row = 2.0 * one as f64;
+            let rows = found.push(row, true);
+            for i in 0..all {
+                for j in i..all {
+                    let entry = entries[(one * all + i) * all + j];
+                    rows[i * (all + 1) + j] = entry;
+                    rows[i * (all + 1) + all] += entry * if j == 0 { parabola(row) } else { j as f64 };
+                }
+                rows[i * (all + 1) + all] += deviation * noise[one * all + i];
+            }
+        }
+        found
+    }
+
+    fn solved(equations: &Triangles, hole: f64, instructions: Instructions) -> [Solved; 2] {
+        let points = Points { equations, coefficients: 1, terms: 3, start: 0, reach: 80.0, hole, count: 61 };
+        dispatch(instructions, points)
+    }
+
+    #[test]
+    fn a_parabola_is_found_with_and_without_the_equations_near_a_point() {
+        for constants in 0..4 {
+            let values: Vec<f64> = (1..=constants).map(|one| one as f64).collect();
+            for one in solved(&equations(constants, 0.0), 30.0, Instructions::Scalar) {
+                for point in 0..one.len() {
+                    assert!(is_determined(&one, point));
+                    assert_near(local(&one, point, &values, 0), parabola(10.0 * point as f64), ROUNDING);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_left_out_is_what_lies_within_the_hole() {
+        let noisy = equations(2, 1.0);
+        let mut holed = Triangles::new(3);
+        let centre = 300.0;
+        let size = 12;
+        for (place, &(row, counts)) in
+            noisy.places.iter().enumerate().filter(|(_, (row, _))| (row - centre).abs() >= 30.0)
+        {
+            let rows = holed.push(row, counts);
+            (0..size).for_each(|entry| rows[entry] = noisy.gather(&[place; WIDTH], entry).0[0]);
+        }
+        let at = |solved: &Solved| local(solved, 30, &[1.0, 2.0], 0);
+        let [without, with] = solved(&noisy, 30.0, Instructions::Scalar);
+        let [nothing_left_out, all] = solved(&noisy, 0.0, Instructions::Scalar);
+        let [_, alone] = solved(&holed, 0.0, Instructions::Scalar);
+        assert_near(at(&without), at(&alone), ROUNDING);
+        assert!((at(&without) - at(&with)).abs() > 1e-3);
+        for point in 0..61 {
+            let near = |one: &Solved| local(one, point, &[1.0, 2.0], 0);
+            assert_near(near(&all), near(&with), ROUNDING);
+            assert_near(near(&all), near(&nothing_left_out), ROUNDING);
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        for constants in 1..4 {
+            let equations = equations(constants, 1.0);
+            let [one, other] =
+                [Instructions::Scalar, Instructions::current()].map(|which| solved(&equations, 25.0, which));
+            for (one, other) in one.iter().zip(&other) {
+                for field in 0..one.fields.size() {
+                    assert_eq!(one.field(field), other.field(field));
+                }
+            }
+        }
+    }
+}
