@@ -136,7 +136,6 @@ def test_weights_of_batches_and_lists_are_those_of_their_records() -> None:
         ({"velocity": np.ones(1000)}, "got velocity beside them"),
         ({"instrument": np.ones(1000)}, "got instrument beside them"),
         ({"stiffness": tvident.Expansion("legendre")}, "got an Expansion beside them"),
-        ({"ensemble_axis": 0}, "weights= is not supported beside ensemble_axis="),
     ],
 )
 def test_what_does_not_go_with_weights_is_said(beside: dict[str, Any], message: str) -> None:

@@ -374,9 +374,8 @@ class Task:
                     f"lag must be shorter than the record of {samples * data.period:.6g} s; got {late:.6g} s; "
                     "give it in seconds, or align the channels"
                 )
-        found_earlier = self._request.lag_samples
-        if found_earlier is not None and len(found_earlier) == data.records:
-            return list(found_earlier)
+        if len(earlier := self._request.lag_samples or ()) == data.records:
+            return list(earlier)
         return [None if late == "auto" else late / data.period for late in lags]
 
     def _angle_zeros(self) -> list[float | None]:
@@ -411,7 +410,7 @@ class Task:
             used |= of_windows(self._names, found)
             lag = {"lag": request.lag}
         else:
-            chosen = [name for name in names if "auto" in self._each(name) or name in request.kept]
+            chosen = [one for one in names if "auto" in self._each(one) or one in request.kept]
             used["angle_zero"] = by_record([0.0 if one.angle_zero is None else one.angle_zero[0] for one in found])
             used["shown_noise"] = [one.shown_noise for one in found if one.shown_noise is not None] or None
             used["variation"] = "constant" if request.form.variation == "constant" else "linear"
@@ -425,8 +424,8 @@ class Task:
                 }
             elif "lag" in request.kept:
                 chosen.append("lag")
-                lag |= {"lag_stderr": request.lag_stderr}
-                lag |= {"lag_samples": list(request.lag_samples)} if request.lag_samples is not None else {}
+                kept = {"lag_stderr": request.lag_stderr, "lag_samples": request.lag_samples}
+                lag |= {name: value for name, value in kept.items() if value is not None}
         kinds = dict.fromkeys(COEFFICIENTS, "known")
         for place, unknown in enumerate(self._unknowns):
             turned_out = {one.unknowns[place].kind for one in found}

@@ -60,7 +60,9 @@ mod tests {
     /// The error over a record of rows with some errors and weights.
     fn over(rows: &[[f64; 2]]) -> OverRecord {
         let mut sums = ErrorSums::default();
-        rows.iter().for_each(|&[error, weight]| sums.add(error, weight));
+        for &[error, weight] in rows {
+            sums.add(error, weight);
+        }
         sums.over_record()
     }
 

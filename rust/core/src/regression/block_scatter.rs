@@ -12,7 +12,7 @@ use crate::regression::block_products::{Eliminated, Products};
 const INDEPENDENT: f64 = 2.0;
 
 /// What a part of a block says of the constants.
-pub(crate) struct Part {
+pub(crate) struct BlockPart {
     /// What it pulls them by, corrected for the angle's noise.
     pub(crate) score: Vec<f64>,
     /// The information on each.
@@ -20,8 +20,8 @@ pub(crate) struct Part {
 }
 
 /// All parts of all blocks.
-pub(crate) struct Parts {
-    pub(crate) parts: Vec<Part>,
+pub(crate) struct BlockParts {
+    pub(crate) parts: Vec<BlockPart>,
     /// Independent rows that they hold.
     pub(crate) independent: f64,
     /// Windowed unknowns of their blocks.
@@ -40,8 +40,8 @@ pub(crate) struct Finer<'a> {
 
 impl Finer<'_> {
     /// What the parts of all blocks say beside given constants. `eliminated` is what is left of each block; nothing where it says nothing.
-    pub(crate) fn scores(&self, eliminated: &[Option<Eliminated>], constants: &[f64]) -> Parts {
-        let mut found = Parts { parts: Vec::new(), independent: 0.0, unknowns: 0.0 };
+    pub(crate) fn scores(&self, eliminated: &[Option<Eliminated>], constants: &[f64]) -> BlockParts {
+        let mut found = BlockParts { parts: Vec::new(), independent: 0.0, unknowns: 0.0 };
         for (block, eliminated) in self.blocks.iter().zip(eliminated) {
             let Some(eliminated) = eliminated else { continue };
             let parts = self.of_block(block, eliminated, constants);
@@ -52,11 +52,11 @@ impl Finer<'_> {
         found
     }
 
-    fn of_block(&self, block: &Range<usize>, eliminated: &Eliminated, constants: &[f64]) -> Vec<Part> {
+    fn of_block(&self, block: &Range<usize>, eliminated: &Eliminated, constants: &[f64]) -> Vec<BlockPart> {
         let (size, first) = (constants.len() + 1, eliminated.factors.len());
         let count = (block.len() / self.length).max(1);
-        let empty = || Part { score: vec![0.0; constants.len()], told: vec![0.0; constants.len()] };
-        let mut parts: Vec<Part> = (0..count).map(|_| empty()).collect();
+        let empty = || BlockPart { score: vec![0.0; constants.len()], told: vec![0.0; constants.len()] };
+        let mut parts: Vec<BlockPart> = (0..count).map(|_| empty()).collect();
         let mut rows = vec![0.0_f64; count];
         let (half, centre) = self.products.centre(block);
         let mut row_values = vec![0.0; self.products.columns()];
@@ -82,7 +82,7 @@ impl Finer<'_> {
         for i in 0..constants.len() {
             let entry = |j: usize| eliminated.rest[i * size + j];
             let beside = constants.iter().enumerate().map(|(j, value)| entry(j) * value).sum::<f64>();
-            let sum = |of: fn(&Part) -> &Vec<f64>| parts.iter().map(|part| of(part)[i]).sum::<f64>();
+            let sum = |of: fn(&BlockPart) -> &Vec<f64>| parts.iter().map(|part| of(part)[i]).sum::<f64>();
             let pulled = sum(|part| &part.score) - (entry(constants.len()) - beside);
             let told = sum(|part| &part.told) - entry(i);
             for (part, rows) in parts.iter_mut().zip(&rows) {
