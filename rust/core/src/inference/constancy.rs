@@ -42,8 +42,9 @@ const FREEDOM: f64 = 10.0;
 /// Parts that say how much neighbours scatter, at least; so many must be driven.
 const FEWEST_DRIVEN: usize = 2 * PARTS;
 
-/// Standard deviations by which squares of noise exceed their mean by chance.
+/// Standard deviations by which the median of squares of noise is larger by chance, and one of them for a single square, over the median.
 const FREE: f64 = 5.0;
+const SCATTER_OF_MEDIAN: f64 = 2.34;
 
 /// Probability below which a difference is significant: once in 2000 records.
 pub const NO_CHANCE: f64 = 5e-4;
@@ -169,7 +170,7 @@ fn is_free(problem: &Problem<'_>, rows: &Range<usize>, expected: Expected, infla
     let torque = median(used().map(|row| problem.rhs[row] / problem.root(row)).collect());
     let square = |row: usize| (problem.rhs[row] - torque * problem.root(row)).powi(2);
     let count = used().count() as f64;
-    let chance = 1.0 + FREE * (2.0 * expected.variance_inflation / count).sqrt();
+    let chance = 1.0 + FREE * SCATTER_OF_MEDIAN * (expected.variance_inflation / count).sqrt();
     median(used().map(square).collect()) <= MEDIAN * chance * inflation * expected.torque
 }
 

@@ -173,7 +173,7 @@ fn spread(told: &[Vec<f64>], constants: usize) -> f64 {
 }
 
 /// Constants from the products that are left of all blocks.
-struct Solved {
+struct SolvedBlocks {
     values: Vec<f64>,
     /// The inverse of the normal matrix, row by row.
     inverse: Vec<f64>,
@@ -181,7 +181,7 @@ struct Solved {
 }
 
 /// Solves the products that are left of all blocks for the constants, and gives their covariance.
-fn solve(parts: &[Vec<f64>], constants: usize, lags: usize) -> Option<Solved> {
+fn solve(parts: &[Vec<f64>], constants: usize, lags: usize) -> Option<SolvedBlocks> {
     let size = constants + 1;
     let told = parts.iter().filter(|part| part.iter().any(|&value| value != 0.0)).count();
     if told < BLOCKS_OF_A_CONSTANT * constants + 2 {
@@ -199,7 +199,7 @@ fn solve(parts: &[Vec<f64>], constants: usize, lags: usize) -> Option<Solved> {
     let scores: Vec<Vec<f64>> = parts.iter().map(score).collect();
     let few = told as f64 / (told - 1) as f64;
     let covariance = scattered(&inverse, &scores, lags).into_iter().map(|value| few * value).collect();
-    Some(Solved { values, inverse, covariance })
+    Some(SolvedBlocks { values, inverse, covariance })
 }
 
 /// The covariance of constants by how the scores of blocks, or of parts of them, scatter, where so many neighbours share samples.
@@ -222,7 +222,7 @@ fn scattered(inverse: &[f64], scores: &[Vec<f64>], lags: usize) -> Vec<f64> {
 }
 
 /// Constants with errors by how parts of the blocks scatter, or the blocks where these scatter more; `None` where parts are too few, too.
-fn with_finer(solved: Solved, finer: &Finer<'_>, eliminated: &[Option<Eliminated>]) -> Option<Solved> {
+fn with_finer(solved: SolvedBlocks, finer: &Finer<'_>, eliminated: &[Option<Eliminated>]) -> Option<SolvedBlocks> {
     let constants = solved.values.len();
     let found = finer.scores(eliminated, &solved.values);
     let told: Vec<Vec<f64>> = found.parts.iter().map(|part| part.told.clone()).collect();
@@ -242,7 +242,7 @@ fn with_finer(solved: Solved, finer: &Finer<'_>, eliminated: &[Option<Eliminated
     let moves = |place: usize| finer.products.model.constant[place] < MOTION;
     let is_told = |place: usize| solved.values[place].powi(2) > TOLD * TOLD * covariance[place * (constants + 1)];
     let mut moving = (0..constants).filter(|&place| moves(place)).peekable();
-    (moving.peek().is_none() || moving.any(is_told)).then_some(Solved { covariance, ..solved })
+    (moving.peek().is_none() || moving.any(is_told)).then_some(SolvedBlocks { covariance, ..solved })
 }
 
 /// The sum of products.
