@@ -203,6 +203,29 @@ def test_what_a_recorder_did_is_named_with_its_cure(spoil: Any, words: str) -> N
     assert not identified(recorded).record_status & Status.CHANNEL_SUSPECTED
 
 
+def test_channels_that_were_drawn_in_straight_lines_are_named() -> None:
+    """Lines between samples weaken fast motion: the inertia was .4 % off, 15 standard errors, without a word."""
+    recorded = rig(8, 10.0)
+    samples = np.arange(recorded.time.size)
+
+    def drawn(channel: Array) -> Array:
+        return np.interp(samples, samples[::5], channel[::5])
+
+    for angle, torque, name in (
+        (recorded.angle, drawn(recorded.torque), "torque"),
+        (drawn(recorded.angle), recorded.torque, "angle"),
+    ):
+        found = tvident.identify(angle, torque, sample_rate=RATE)
+        assert found.record_status & Status.CHANNEL_SUSPECTED
+        words = f"the {name} lies on straight lines between every 5th sample"
+        assert any(advice.startswith(words) and "keep every 5th sample of both" in advice for advice in found.advice)
+    # What was done to both changes no equation; and samples that have their own times are resampled here.
+    both = tvident.identify(drawn(recorded.angle), drawn(recorded.torque), sample_rate=RATE)
+    own = tvident.identify(recorded.angle, recorded.torque[::5], t=(recorded.time, recorded.time[::5]))
+    for found in (both, own):
+        assert not any("straight lines" in advice for advice in found.advice)
+
+
 def friction_with_rests(seed: int) -> tuple[Array, Array]:
     """Simulate a joint that moves to and fro and stands still between: friction holds whatever torque there is."""
     generator = np.random.default_rng(seed)

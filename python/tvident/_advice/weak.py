@@ -187,6 +187,11 @@ class Explained:
                     f"is clipped: {amount:.1%} of its samples lie at its largest or smallest value: they count as missing; record with a "
                     "larger range"
                 )
+            elif defect == "interpolated":
+                cure = (
+                    f"lies on straight lines between every {amount:.0f}th sample, which weakens its fast motion: keep every "
+                    f"{amount:.0f}th sample of both channels, or give what was recorded with times of its own, t=(…, …)"
+                )
             elif defect in {"held", "filtered"}:
                 cure = comes_late(self.found, (name, defect, amount), self.period)
             else:

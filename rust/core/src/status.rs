@@ -47,7 +47,7 @@ impl Status {
     /// Test functions of different widths find different parameters, and no range of widths agrees: the record does not obey the equation.
     pub const SCALES_DISAGREE: Self = Self(1 << 14);
 
-    /// A channel seems to be clipped, held, wrapped or filtered by more than a lag.
+    /// A channel seems to be clipped, held, interpolated, wrapped or filtered by more than a lag.
     pub const CHANNEL_SUSPECTED: Self = Self(1 << 15);
 
     /// Every flag that exists, with its name.

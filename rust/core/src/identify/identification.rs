@@ -104,7 +104,7 @@ pub struct WeakDetails {
     pub free_offset: FreeOffset,
     /// What may have been left out.
     pub suspects: Vec<Suspect>,
-    /// What was done to angle and torque, then velocity and acceleration where they were measured: clipped, held, wrapped or filtered samples.
+    /// What was done to angle and torque, then velocity and acceleration where they were measured: clipped, held, interpolated, wrapped or filtered samples.
     pub defects: Vec<Vec<Defect>>,
     /// The part of the record that rests, where a term of friction asks for it: equations there say nothing of friction and are left out.
     pub resting: f64,

@@ -1,4 +1,4 @@
-//! What a recorder did to a channel: clipped, held or wrapped samples, recognised by their repeats and extremes.
+//! What a recorder did to a channel: clipped, held, interpolated or wrapped samples, recognised by their repeats, extremes and straight lines.
 
 use crate::record::samples::{Samples, is_usable};
 use crate::record::subsample::stretches;
@@ -24,6 +24,9 @@ const IN_BEAT: f64 = 0.99;
 const FEWEST_CHANGES: usize = 50;
 const CHANGES_OF_HOLDS: f64 = 0.5;
 
+/// Samples lie on a straight line if they bend by no more than so many roundings of the largest value.
+const STRAIGHT: f64 = 16.0;
+
 /// A wrapped angle jumps by nearly its whole range, and changes by less than this part of it elsewhere.
 const WHOLE: f64 = 0.8;
 const STEADY: f64 = 0.1;
@@ -43,6 +46,8 @@ pub enum Defect {
     LeftOut(f64),
     /// Every value stands for so many samples.
     Held(usize),
+    /// Samples lie on straight lines from one to the next but so many.
+    Interpolated(usize),
     /// The angle jumps by so much.
     Wrapped(f64),
     /// The angle jumps between two samples at so many places, where samples were lost.
@@ -59,6 +64,7 @@ impl Defect {
             Self::Clipped { .. } => "clipped",
             Self::LeftOut(_) => "left out",
             Self::Held(_) => "held",
+            Self::Interpolated(_) => "interpolated",
             Self::Wrapped(_) => "wrapped",
             Self::Broken(_) => "broken",
             Self::Filtered(_) => "filtered",
@@ -87,7 +93,7 @@ impl Defect {
             | Self::LeftOut(amount)
             | Self::Wrapped(amount)
             | Self::Filtered(amount) => amount,
-            Self::Held(count) | Self::Broken(count) => count as f64,
+            Self::Held(count) | Self::Interpolated(count) | Self::Broken(count) => count as f64,
         }
     }
 }
@@ -126,7 +132,10 @@ pub(crate) fn defects(channel: &dyn Samples) -> Vec<Defect> {
         return Vec::new();
     }
     let parts: Vec<&[f64]> = parts.iter().map(Vec::as_slice).collect();
-    [wrapped(&parts, most - least), held(&parts), clipped(&parts, [least, most])].into_iter().flatten().collect()
+    let largest = most.abs().max(least.abs());
+    let found =
+        [wrapped(&parts, most - least), held(&parts), interpolated(&parts, largest), clipped(&parts, [least, most])];
+    found.into_iter().flatten().collect()
 }
 
 /// The changes from sample to sample, of usable ones.
@@ -178,19 +187,37 @@ fn held(parts: &[&[f64]]) -> Option<Defect> {
     if 3 * still < samples {
         return None;
     }
-    (2..=LONGEST_HOLD).rev().find_map(|hold| {
+    beat(parts, 2, |pair| pair[0] != pair[1]).map(Defect::Held)
+}
+
+/// Whether a channel was drawn in straight lines between samples that were recorded: all others have no second difference.
+fn interpolated(parts: &[&[f64]], largest: f64) -> Option<Defect> {
+    let rounding = STRAIGHT * f64::EPSILON * largest;
+    let bends = |three: &[f64]| (three[0] - 2.0 * three[1] + three[2]).abs() > rounding;
+    let samples = parts.iter().fold(0, |samples, part| samples + part.len());
+    let moves = |three: &&[f64]| (three[1] - three[0]).abs() > rounding;
+    let straight = parts.iter().flat_map(|part| part.windows(3)).filter(moves).filter(|three| !bends(three)).count();
+    if 3 * straight < samples {
+        return None;
+    }
+    beat(parts, 3, bends).map(Defect::Interpolated)
+}
+
+/// Every how many samples something is seen in some neighbours: in one beat, and often; the largest such number.
+fn beat(parts: &[&[f64]], neighbours: usize, is_seen: impl Fn(&[f64]) -> bool) -> Option<usize> {
+    let samples = parts.iter().fold(0, |samples, part| samples + part.len());
+    (2..=LONGEST_HOLD).rev().find(|&hold| {
         let (mut all, mut in_beat) = (0, 0);
         for part in parts {
             let mut beats = vec![0; hold];
-            for (place, pair) in part.windows(2).enumerate().filter(|(_, pair)| pair[0] != pair[1]) {
-                let _ = pair;
+            for (place, _) in part.windows(neighbours).enumerate().filter(|(_, neighbours)| is_seen(neighbours)) {
                 beats[place % hold] += 1;
             }
             all += beats.iter().sum::<usize>();
             in_beat += beats.into_iter().max().unwrap_or(0);
         }
         let often = all as f64 >= CHANGES_OF_HOLDS * samples as f64 / hold as f64;
-        (all >= FEWEST_CHANGES && often && in_beat as f64 >= IN_BEAT * all as f64).then_some(Defect::Held(hold))
+        all >= FEWEST_CHANGES && often && in_beat as f64 >= IN_BEAT * all as f64
     })
 }
 
@@ -223,6 +250,9 @@ mod tests {
         assert_eq!(of(|sample| (wave(sample) * 5.0).round() / 5.0), []);
         assert_eq!(of(|sample| wave(sample.clamp(400, 2500))), []);
         assert_eq!(of(|_| 1.0), []);
+        // A machine that turns at one speed, and one that is driven to and fro at one.
+        assert_eq!(of(|sample| 0.1 * sample as f64), []);
+        assert_eq!(of(|sample| (0.01 * (sample % 400) as f64 - 2.0).abs()), []);
         assert_eq!(of(|_| f64::NAN), []);
     }
 
@@ -238,6 +268,13 @@ mod tests {
         Within { channel: &values.as_slice(), limits }.read(1, &mut read);
         assert!(read[0].is_nan() && read[1] == -2.0 && read[2].is_nan(), "{read:?}");
         assert_eq!(of(|sample| wave(sample / 5 * 5)), [Defect::Held(5)]);
+        for every in [2, 5, 50] {
+            let line = |sample: usize| {
+                let (before, part) = (sample / every * every, (sample % every) as f64 / every as f64);
+                wave(before) * (1.0 - part) + wave(before + every) * part
+            };
+            assert_eq!(of(line), [Defect::Interpolated(every)]);
+        }
         let found = of(|sample| (sample as f64 * 0.01).rem_euclid(1.0));
         assert!(matches!(found[..], [Defect::Wrapped(jump)] if (jump - 0.99).abs() < 0.01), "{found:?}");
     }

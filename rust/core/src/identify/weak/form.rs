@@ -131,7 +131,15 @@ fn defects_of_motion(motion: &Motion<'_>) -> Vec<Vec<Defect>> {
     let of_angle =
         if is_alone(&motion.measured) { defects(motion.angle) } else { angle.map_or_else(Vec::new, defects) };
     let rates = rates.map(|rate| rate.map_or_else(Vec::new, defects_of_rate));
-    [of_angle, defects_of_torque(motion.torque)].into_iter().chain(rates).collect()
+    let mut found: Vec<Vec<Defect>> = [of_angle, defects_of_torque(motion.torque)].into_iter().chain(rates).collect();
+    let interpolated = |one: &Defect| matches!(one, Defect::Interpolated(_));
+    let alike = found[0].iter().find(|one| interpolated(one)).is_some_and(|one| found[1].contains(one));
+    for (channel, defects) in found.iter_mut().enumerate() {
+        // Resampling here may draw straight lines, whose noise is known; and what was done to both channels alike changes no equation.
+        let known = alike || motion.measured.passed.get(channel).is_some_and(Option::is_some);
+        defects.retain(|one| !(interpolated(one) && known));
+    }
+    found
 }
 
 /// The samples before which some were lost: only of an angle that was measured alone and uniformly, and as it was recorded otherwise.
@@ -319,5 +327,5 @@ fn defects_of_rate(rate: &dyn Samples) -> Vec<Defect> {
 
 /// What was done to the torque. One that stays at a limit is what the drive does, and wrapping is for angles.
 fn defects_of_torque(torque: &dyn Samples) -> Vec<Defect> {
-    defects(torque).into_iter().filter(|defect| matches!(defect, Defect::Held(_))).collect()
+    defects(torque).into_iter().filter(|defect| matches!(defect, Defect::Held(_) | Defect::Interpolated(_))).collect()
 }
