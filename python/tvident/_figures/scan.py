@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from tvident._figures.style import FAINT, FOUND, MUTED, Place, legend, panels, style, unit_of
+from tvident._figures.style import FAINT, FOUND, OTHER, Place, legend, panels, style, unit_of
 
 Array = npt.NDArray[np.float64]
 
@@ -97,7 +97,7 @@ def plot_scan(scan: Scanned, ax: Place = None) -> Figure:
                     linewidth=0,
                     label="plateau",
                 )
-            for chosen, colour, label in ((agree, FOUND, "these agree"), (~agree, MUTED, "others")):
+            for chosen, colour, label in ((agree, FOUND, "these agree"), (~agree, OTHER, "others")):
                 if chosen.any():
                     panel.errorbar(
                         scan.band[chosen], values[chosen], 2 * error[chosen], color=colour, label=label, **bars

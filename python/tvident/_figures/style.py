@@ -21,8 +21,8 @@ Array: TypeAlias = npt.NDArray[np.float64]
 Place: TypeAlias = Axes | Sequence[Axes] | npt.NDArray[Any] | None
 """Where to draw: on axes of the user's own, or on new ones."""
 
-INK, MUTED, FAINT = "#22303c", "#5b6b79", "#c3ccd4"
-"""Colours of titles, of labels, of frames and recorded samples."""
+INK, MUTED, OTHER, FAINT = "#22303c", "#5b6b79", "#7d8b97", "#c3ccd4"
+"""Colours of titles, of labels, of what stands beside what was found, of frames and recorded samples."""
 
 FOUND, TRUTH, ACCENT = "#0072b2", "#d55e00", "#00b060"
 """Colours of what was found, what is true, what was chosen: told apart by colour-blind eyes too. Blue and vermilion are those of Okabe and
