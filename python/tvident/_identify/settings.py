@@ -367,13 +367,18 @@ def _of_result(earlier: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str
             raise ValueError(
                 f"settings hold no {name}, since it was known at every sample; got None; pass {name}= again"
             )
-    own = earlier.get("own_terms")
-    if own and "terms" not in given:
+    if "terms" not in given:
+        check_no_own_terms(earlier.get("own_terms"), [name for name, _ in terms])
+    return asked | {"terms": terms}
+
+
+def check_no_own_terms(own: Sequence[str] | None, names: Sequence[str]) -> None:
+    """Refuse settings with terms of the user's own where no terms are given."""
+    if own:
         raise ValueError(
             f"settings hold no functions, and term {own[0]!r} is one of the user's own; got no terms; pass terms= again, "
-            f"with all of {', '.join(name for name, _ in terms)}"
+            f"with all of {', '.join(names)}"
         )
-    return asked | {"terms": terms}
 
 
 def _check_names(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Mapping[str, Any]) -> None:

@@ -15,6 +15,7 @@ from tvident._derivatives import plan
 from tvident._equation import LINEAR_UNITS, OFFSET, UNITS, Unknown, all_terms
 from tvident._identify.columns import WINDOW_OF_TERMS, Columns
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, WeakForm, exponent_of
+from tvident._identify.settings import check_no_own_terms
 from tvident._units import ROTARY, Axis, axis_of, times_in_seconds
 
 if TYPE_CHECKING:
@@ -219,11 +220,7 @@ def _channels(trials: Trials | None, masses: Sequence[Masses]) -> tuple[Sequence
 def _terms(given: Any, earlier: Earlier | None) -> tuple[list[Unknown], list[tuple[str, str | None]]]:
     """Return terms, and their names and kinds; no kind where an earlier result tells it."""
     if given is None and earlier is not None:
-        if earlier.own_terms:
-            raise ValueError(
-                f"settings hold no functions, and term {earlier.own_terms[0]!r} is one of the user's own; got no terms; pass terms= again, "
-                f"with all of {', '.join(earlier.terms)}"
-            )
+        check_no_own_terms(earlier.own_terms, earlier.terms)
         given = earlier.terms
     terms = all_terms(((OFFSET, "constant"),) if given is None else given, "constant")
     if earlier is None:

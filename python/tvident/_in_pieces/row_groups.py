@@ -62,14 +62,14 @@ class ParquetRows:
                 found[one.name if named_unit(one.name)[1] else with_unit(one.name, unit)] = one.name
         return found
 
-    def group_of(self, sample: int) -> int:
+    def begin_of_group(self, sample: int) -> int:
         """Return the first sample of the row group that a sample is in."""
-        return self._first[int(np.searchsorted(self._first, sample, side="right")) - 1]
+        return self._first[self._group_of(sample)]
 
     def batches(self, name: str, first: int) -> Iterator[tuple[int, npt.NDArray[Any]]]:
         """Give the samples of a column from one on, with the number of the first of each batch."""
-        place = self.group_of(first)
-        groups = range(self._first.index(place), self._file.num_row_groups)
+        group = self._group_of(first)
+        place, groups = self._first[group], range(group, self._file.num_row_groups)
         # One column has nothing for several threads to do.
         for batch in self._file.iter_batches(_BATCH, groups, [name], use_threads=False):
             yield place, np.asarray(batch.column(0).to_numpy(zero_copy_only=False))
@@ -77,6 +77,9 @@ class ParquetRows:
 
     def close(self) -> None:
         self._file.close()
+
+    def _group_of(self, sample: int) -> int:
+        return int(np.searchsorted(self._first, sample, side="right")) - 1
 
 
 @dataclass
@@ -93,7 +96,12 @@ class ParquetColumn:
             return self._whole(end)[first:end]
         reached = self._kept[-1][0] + self._kept[-1][1].size if self._kept else -1
         # Going on within a row group is never longer than from its first row.
-        if self._going is None or not self._kept or first < self._kept[0][0] or self.rows.group_of(first) > reached:
+        if (
+            self._going is None
+            or not self._kept
+            or first < self._kept[0][0]
+            or self.rows.begin_of_group(first) > reached
+        ):
             self._going, self._kept, reached = self.rows.batches(self.name, first), [], -1
         while reached < end:
             batch = next(self._going, None)
