@@ -18,6 +18,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
+use crate::noise::median::{MEDIAN_OF_SQUARES, median};
 use crate::regression::constants::{Expected, pool};
 use crate::regression::fit::Fit;
 use crate::regression::problem::Problem;
@@ -30,9 +31,6 @@ pub(crate) const BLOCKS: usize = 8;
 
 /// Parts of a block that are compared with their neighbours.
 const PARTS: usize = 8;
-
-/// The median of a χ² variable with one degree of freedom.
-const MEDIAN: f64 = 0.454_936;
 
 /// The scatter of parts, over that which noise explains, from which on it is no chance, and the degrees of freedom that the median of all
 /// knows it with.
@@ -167,17 +165,13 @@ fn longest_run(holds: &[bool], places: Range<usize>) -> Option<Range<usize>> {
 /// Whether no torque acts in most of some rows: about its median there, which an offset takes, it is within chance of its noise.
 fn is_free(problem: &Problem<'_>, rows: &Range<usize>, expected: Expected, inflation: f64) -> bool {
     let used = || rows.clone().filter(|&row| problem.usable[row] && problem.root(row) > 0.0);
-    let torque = median(used().map(|row| problem.rhs[row] / problem.root(row)).collect());
+    let mut torques: Vec<f64> = used().map(|row| problem.rhs[row] / problem.root(row)).collect();
+    let Some(torque) = median(&mut torques) else { return false };
     let square = |row: usize| (problem.rhs[row] - torque * problem.root(row)).powi(2);
-    let count = used().count() as f64;
-    let chance = 1.0 + FREE * SCATTER_OF_MEDIAN * (expected.variance_inflation / count).sqrt();
-    median(used().map(square).collect()) <= MEDIAN * chance * inflation * expected.torque
-}
-
-/// The middle of some numbers; NaN of none.
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() { f64::NAN } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    let mut squares: Vec<f64> = used().map(square).collect();
+    let scattered = SCATTER_OF_MEDIAN * (expected.variance_inflation / squares.len() as f64).sqrt();
+    let most = MEDIAN_OF_SQUARES * (1.0 + FREE * scattered) * inflation * expected.torque;
+    median(&mut squares).is_some_and(|square| square <= most)
 }
 
 /// The constants of some rows as if there were no others, and their covariance: in windows as long as they are, or in the longest that jumps
@@ -221,8 +215,7 @@ fn scatter(parts: &[(f64, f64)], driven: usize) -> Option<f64> {
     if 2 * bends.len() < driven.max(FEWEST_DRIVEN) {
         return None;
     }
-    let middle = bends.len() / 2;
-    Some(*bends.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN)
+    median(&mut bends).map(|bend| bend / MEDIAN_OF_SQUARES)
 }
 
 /// Compares estimates of the same number, each with its variance.
@@ -233,9 +226,8 @@ fn compare(parts: &[(f64, f64)]) -> Option<Test> {
         return None;
     }
     let mut variances: Vec<f64> = usable.iter().map(|(_, variance)| *variance).collect();
-    let middle = variances.len() / 2;
     // A block with an accidentally small variance must not decide alone.
-    let least = 0.5 * *variances.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let least = 0.5 * median(&mut variances)?;
     let weight = |variance: f64| 1.0 / variance.max(least);
     let total: f64 = usable.iter().map(|(_, variance)| weight(*variance)).sum();
     let mean = usable.iter().map(|(value, variance)| weight(*variance) * value).sum::<f64>() / total;

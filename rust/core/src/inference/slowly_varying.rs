@@ -201,21 +201,26 @@ mod tests {
         rows
     }
 
-    #[test]
-    fn a_slow_coefficient_is_followed_beside_a_quick_one() {
-        let (rows, scales) = (changing(), Scale::all(ROWS, 3));
+    /// What a search for one coefficient that varies finds, which begins with windows of a length.
+    fn found_from(rows: &Rows, scales: &[Scale], first: Scale) -> Option<SlowCoefficients> {
         let search = SlowSearch {
-            rows: &rows,
+            rows,
             model: &model(),
             coefficients: 1,
             noise: 0.0,
             expected: white(DEVIATION * DEVIATION),
-            scales: &scales,
+            scales,
             breaks: &[],
             simpler: 1.0,
             instructions: Instructions::Scalar,
         };
-        let found = staged(|stages| find(&search, scales[2], stages)).expect("a curve");
+        staged(|stages| find(&search, first, stages))
+    }
+
+    #[test]
+    fn a_slow_coefficient_is_followed_beside_a_quick_one() {
+        let (rows, scales) = (changing(), Scale::all(ROWS, 3));
+        let found = found_from(&rows, &scales, scales[2]).expect("a curve");
         // Rows are predicted with little more than their noise.
         assert!(found.error < 1.3, "{}", found.error);
         assert!((found.varying.constants[0] - CONSTANTS[1]).abs() < 0.02);
@@ -241,18 +246,7 @@ mod tests {
         }
         let scales = Scale::all(ROWS, 3);
         let longest = *scales.last().expect("lengths");
-        let search = SlowSearch {
-            rows: &rows,
-            model: &model(),
-            coefficients: 1,
-            noise: 0.0,
-            expected: white(DEVIATION * DEVIATION),
-            scales: &scales,
-            breaks: &[],
-            simpler: 1.0,
-            instructions: Instructions::Scalar,
-        };
-        let found = staged(|stages| find(&search, longest, stages)).expect("a curve");
+        let found = found_from(&rows, &scales, longest).expect("a curve");
         let off = (0..ROWS).map(|row| (found.varying.at(0, row as f64).0 - CONSTANTS[0] - bump(row as f64)).powi(2));
         let off = (off.sum::<f64>() / ROWS as f64).sqrt();
         assert!(found.equations_of.span() <= ROWS / 16 && off < 0.03, "{}, {off}", found.equations_of.span());

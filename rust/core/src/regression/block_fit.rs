@@ -9,7 +9,7 @@
 use std::ops::Range;
 
 use crate::equation::rows::Rows;
-use crate::regression::block_products::{Eliminated, Products, ROWS_OF_AN_UNKNOWN, inverse};
+use crate::regression::block_products::{Eliminated, Products, ROWS_OF_AN_UNKNOWN, dot, inverse};
 use crate::regression::block_scatter::Finer;
 use crate::regression::model::Model;
 
@@ -225,12 +225,11 @@ fn scattered(inverse: &[f64], scores: &[Vec<f64>], lags: usize) -> Vec<f64> {
 fn with_finer(solved: SolvedBlocks, finer: &Finer<'_>, eliminated: &[Option<Eliminated>]) -> Option<SolvedBlocks> {
     let constants = solved.values.len();
     let found = finer.scores(eliminated, &solved.values);
-    let told: Vec<Vec<f64>> = found.parts.iter().map(|part| part.told.clone()).collect();
+    let (scores, told): (Vec<_>, Vec<_>) = found.parts.into_iter().map(|part| (part.score, part.told)).unzip();
     let free = found.independent - found.unknowns - constants as f64;
     if spread(&told, constants) < SPREAD_BESIDE_WINDOWED || free < found.independent / MOST_OF_THE_PARTS {
         return None;
     }
-    let scores: Vec<Vec<f64>> = found.parts.into_iter().map(|part| part.score).collect();
     let by_parts = scattered(&solved.inverse, &scores, 1.min(scores.len().saturating_sub(1)));
     let few = found.independent / free;
     let more: Vec<f64> = (0..constants)
@@ -243,11 +242,6 @@ fn with_finer(solved: SolvedBlocks, finer: &Finer<'_>, eliminated: &[Option<Elim
     let is_told = |place: usize| solved.values[place].powi(2) > TOLD * TOLD * covariance[place * (constants + 1)];
     let mut moving = (0..constants).filter(|&place| moves(place)).peekable();
     (moving.peek().is_none() || moving.any(is_told)).then_some(SolvedBlocks { covariance, ..solved })
-}
-
-/// The sum of products.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

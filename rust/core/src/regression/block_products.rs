@@ -28,8 +28,19 @@ impl Products<'_> {
         (half, 0.5 * (block.start + block.end) as f64 - 0.5)
     }
 
+    /// Does something with every usable row of a block: its place, its time from the centre in seconds, and its columns, which may be changed.
+    pub(crate) fn for_each_row(&self, block: &Range<usize>, mut work: impl FnMut(usize, f64, &mut [f64])) {
+        let (half, centre) = self.centre(block);
+        let mut columns = vec![0.0; self.columns()];
+        for row in block.clone().filter(|&row| self.rows.usable[row]) {
+            let time = (row as f64 - centre) * self.rows.period;
+            self.fill(row, time, half, &mut columns);
+            work(row, time, &mut columns);
+        }
+    }
+
     /// The columns of a row.
-    pub(crate) fn fill(&self, row: usize, time: f64, half: f64, into: &mut [f64]) {
+    fn fill(&self, row: usize, time: f64, half: f64, into: &mut [f64]) {
         let mut place = 0;
         for &index in &self.model.windowed {
             let regressor = &self.rows.regressors[index];
@@ -46,18 +57,15 @@ impl Products<'_> {
 
     /// The products of a block below and on the diagonal, and the powers of time summed over its rows, of which the first counts them.
     pub(crate) fn of(&self, block: &Range<usize>) -> (Vec<f64>, [f64; 3]) {
-        let (count, (half, centre)) = (self.columns(), self.centre(block));
-        let (mut products, mut row_values) = (vec![0.0; count * count], vec![0.0; count]);
-        let mut times = [0.0; 3];
-        for row in block.clone().filter(|&row| self.rows.usable[row]) {
-            let time = (row as f64 - centre) * self.rows.period;
-            self.fill(row, time, half, &mut row_values);
+        let count = self.columns();
+        let (mut products, mut times) = (vec![0.0; count * count], [0.0; 3]);
+        self.for_each_row(block, |_, time, values| {
             for i in 0..count {
-                let factor = row_values[i];
-                products[i * count..=i * count + i].iter_mut().zip(&row_values).for_each(|(p, v)| *p += factor * v);
+                let factor = values[i];
+                products[i * count..=i * count + i].iter_mut().zip(&*values).for_each(|(p, v)| *p += factor * v);
             }
             times.iter_mut().zip([1.0, time, time * time]).for_each(|(sum, power)| *sum += power);
-        }
+        });
         (products, times)
     }
 
@@ -173,6 +181,11 @@ pub(crate) fn inverse(matrix: &[f64], count: usize) -> Option<Vec<f64>> {
         }
     }
     Some((0..count).flat_map(|i| work[i * wide + count..(i + 1) * wide].to_vec()).collect())
+}
+
+/// The sum of products.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

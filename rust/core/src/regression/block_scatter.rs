@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use crate::regression::block_products::{Eliminated, Products};
+use crate::regression::block_products::{Eliminated, Products, dot};
 
 /// Independent rows in a part as long as a test function: its rows are correlated over a third of that.
 const INDEPENDENT: f64 = 2.0;
@@ -58,33 +58,29 @@ impl Finer<'_> {
         let empty = || BlockPart { score: vec![0.0; constants.len()], told: vec![0.0; constants.len()] };
         let mut parts: Vec<BlockPart> = (0..count).map(|_| empty()).collect();
         let mut rows = vec![0.0_f64; count];
-        let (half, centre) = self.products.centre(block);
-        let mut row_values = vec![0.0; self.products.columns()];
-        for row in block.clone().filter(|&row| self.products.rows.usable[row]) {
-            let time = (row as f64 - centre) * self.products.rows.period;
-            self.products.fill(row, time, half, &mut row_values);
-            row_values.iter_mut().zip(self.scale).for_each(|(value, scale)| *value /= scale);
+        self.products.for_each_row(block, |row, _, values| {
+            values.iter_mut().zip(self.scale).for_each(|(value, scale)| *value /= scale);
             for (place, factors) in eliminated.factors.iter().enumerate() {
-                let own = row_values[place];
-                row_values[place + 1..].iter_mut().zip(factors).for_each(|(value, factor)| *value -= factor * own);
+                let own = values[place];
+                values[place + 1..].iter_mut().zip(factors).for_each(|(value, factor)| *value -= factor * own);
             }
-            let (left, rhs) = row_values[first..].split_at(constants.len());
-            let residual = rhs[0] - left.iter().zip(constants).map(|(value, factor)| value * factor).sum::<f64>();
+            let (left, rhs) = values[first..].split_at(constants.len());
+            let residual = rhs[0] - dot(left, constants);
             let place = (row - block.start) * count / block.len();
             rows[place] += 1.0;
             for (i, value) in left.iter().enumerate() {
                 parts[place].score[i] += value * residual;
                 parts[place].told[i] += value * value;
             }
-        }
+        });
         // What the angle's noise adds is spread over the rows alike.
         let whole = rows.iter().sum::<f64>().max(1.0);
         for i in 0..constants.len() {
-            let entry = |j: usize| eliminated.rest[i * size + j];
-            let beside = constants.iter().enumerate().map(|(j, value)| entry(j) * value).sum::<f64>();
+            let entries = &eliminated.rest[i * size..(i + 1) * size];
+            let corrected = entries[constants.len()] - dot(entries, constants);
             let sum = |of: fn(&BlockPart) -> &Vec<f64>| parts.iter().map(|part| of(part)[i]).sum::<f64>();
-            let pulled = sum(|part| &part.score) - (entry(constants.len()) - beside);
-            let told = sum(|part| &part.told) - entry(i);
+            let pulled = sum(|part| &part.score) - corrected;
+            let told = sum(|part| &part.told) - entries[i];
             for (part, rows) in parts.iter_mut().zip(&rows) {
                 part.score[i] -= pulled * rows / whole;
                 part.told[i] = (part.told[i] - told * rows / whole).max(0.0);

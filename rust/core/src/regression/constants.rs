@@ -7,6 +7,7 @@
 use std::ops::Range;
 
 use crate::least_squares::stacked_qr::Summary;
+use crate::noise::median::median;
 use crate::regression::layout::Layout;
 use crate::regression::row_covariance::RowCovariance;
 use crate::regression::solved::{Solved, is_determined};
@@ -74,11 +75,7 @@ pub(crate) fn pool(
             .filter(|(misfit, weight)| misfit.is_finite() && **weight > 0.0)
             .map(|(misfit, _)| *misfit)
             .collect();
-        if sorted.is_empty() {
-            break;
-        }
-        let middle = sorted.len() / 2;
-        let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let Some(median) = median(&mut sorted) else { break };
         let counts = &full.field(fields.count())[windows.clone()];
         for ((count, weight), misfit) in counts.iter().zip(&mut weights).zip(&misfits) {
             let independent = (count / expected.variance_inflation - 2.0).max(1.0);

@@ -6,6 +6,7 @@ use std::ops::Range;
 use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
+use crate::noise::median::median;
 use crate::regression::constants::{Expected, Pooled, pool};
 use crate::regression::dyadic_windows::{WindowShape, solve_windows};
 use crate::regression::problem::Problem;
@@ -220,11 +221,7 @@ impl Fit {
             .map(|window| local(&self.full, window, &self.pooled.values, unknown))
             .filter(|v| v.is_finite())
             .collect();
-        if values.is_empty() {
-            return 0.0;
-        }
-        let middle = values.len() / 2;
-        *values.select_nth_unstable_by(middle, f64::total_cmp).1
+        median(&mut values).unwrap_or(0.0)
     }
 }
 

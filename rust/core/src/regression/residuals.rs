@@ -2,22 +2,16 @@
 
 use crate::error::Error;
 use crate::exec::stages::Stages;
+use crate::noise::median::{MEDIAN_OF_SQUARES, median};
 use crate::regression::fit::Fit;
 use crate::regression::predictor::{Predictor, without_constants};
 use crate::regression::problem::Problem;
 use crate::regression::solved::is_determined;
 
-/// The median of squares of normal noise over their variance.
-const MEDIAN: f64 = 0.454_936;
-
 /// The variance of the usual one of some rows, whatever a few of them are like; nothing without rows.
 pub(crate) fn usual_variance(left: &[f64], rows: &[bool]) -> Option<f64> {
     let mut squares: Vec<f64> = left.iter().zip(rows).filter(|(_, row)| **row).map(|(left, _)| left * left).collect();
-    if squares.is_empty() {
-        return None;
-    }
-    let middle = squares.len() / 2;
-    Some(*squares.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN)
+    median(&mut squares).map(|square| square / MEDIAN_OF_SQUARES)
 }
 
 /// The residual of every row and whether the fit determines it; zero where it does not.

@@ -15,6 +15,7 @@ use crate::identify::strong::streaming::{Chunk, Identified, equations, identify_
 use crate::lanes::output::Elements;
 use crate::least_squares::plan::{Regressions, RollingLeastSquares};
 use crate::local_polynomials::plan::LocalPolynomials;
+use crate::noise::median::{MEDIAN_OF_SQUARES, median};
 use crate::record::subsample::stretches;
 
 /// Windows that are looked at in a long record, and in how many stretches at most.
@@ -26,9 +27,6 @@ const DENSITY: usize = 8;
 
 /// A squared difference counts at most so many times what the median says of its mean: a jump is no error of the windows around it.
 const MOST: f64 = 25.0;
-
-/// The median of a χ² variable with one degree of freedom.
-const MEDIAN: f64 = 0.454_936;
 
 /// What windows around samples say: unknowns and their standard errors, one slice an unknown.
 #[derive(Clone, Copy, Debug)]
@@ -297,11 +295,7 @@ fn factors(unknowns: usize, taken: impl IntoIterator<Item = Taken>) -> Option<Ve
     let mut squares = vec![Vec::new(); unknowns];
     taken.into_iter().for_each(|taken| taken.add(&mut squares));
     let factor = |squares: &mut Vec<f64>| {
-        if squares.is_empty() {
-            return None;
-        }
-        let middle = squares.len() / 2;
-        let most = MOST / MEDIAN * *squares.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let most = MOST / MEDIAN_OF_SQUARES * median(squares)?;
         let mean = squares.iter().map(|square| square.min(most)).sum::<f64>() / squares.len() as f64;
         Some(mean.sqrt().max(1.0))
     };

@@ -2,7 +2,8 @@
 
 use crate::error::Error;
 use crate::exec::pool::Watch;
-use crate::noise::breaks::windows::{Size, borders, median, orthonormal, product, take_off};
+use crate::noise::breaks::windows::{Size, borders, orthonormal, product, take_off};
+use crate::noise::median::median;
 use crate::record::samples::{Samples, all_usable};
 
 /// A shift stands out by so many times that of the usual window, and that of what is left beside it.

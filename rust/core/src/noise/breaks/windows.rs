@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::exec::pool::Watch;
+use crate::noise::median::median;
 use crate::record::samples::{Samples, all_usable};
 use crate::record::subsample::stretches;
 
@@ -122,10 +123,4 @@ pub(crate) fn product(one: &[f64], other: &[f64]) -> f64 {
 /// The standard deviation of a normal variable that has such magnitudes.
 pub(crate) fn deviation(magnitudes: &mut [f64]) -> Option<f64> {
     median(magnitudes).map(|magnitude| magnitude / MEDIAN)
-}
-
-/// The median, of an even number the larger of both.
-pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

@@ -8,7 +8,7 @@ use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::report::tracks::Tracks;
 use crate::identify::weak::report::window_sums::WindowSums;
 use crate::identify::weak::session::Session;
-use crate::noise::breaks::windows::median;
+use crate::noise::median::median;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::layout::symmetric;
