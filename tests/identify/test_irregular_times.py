@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import numpy.typing as npt
@@ -87,6 +87,25 @@ def test_results_are_at_the_times_of_the_grid_and_settings_repeat_them() -> None
     again = tvident.identify(angle, torque, t=t, settings=result.settings)
     assert np.array_equal(again.stiffness, result.stiffness, equal_nan=True)
     assert again.settings["spline_order"] == result.settings["spline_order"]
+
+
+def test_splines_of_settings_are_taken_and_not_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is said of the splines is said of those that are used."""
+    t = jittered(4, 1.0)
+    call = {"t": t, "method": tvident.WeakForm(window_length=161, exponent=8), "terms": (), **CONSTANT}
+    result = tvident.identify(*taken(4, t, (1e-3, 0.1)), **call)
+    other = 3 if result.settings["spline_order"] != 3 else 5
+    settings = {**result.settings, "spline_order": other, "bridged": 2.5}
+
+    def looked_for(*_: object) -> NoReturn:
+        raise AssertionError("splines were looked for")
+
+    monkeypatch.setattr("tvident._clocks.clock.chosen_order", looked_for)
+    monkeypatch.setattr("tvident._clocks.clock.longest_bridged", looked_for)
+    again = tvident.identify(*taken(4, t, (1e-3, 0.1)), **{**call, "method": "auto"}, settings=settings)
+    assert (again.settings["spline_order"], again.settings["bridged"]) == (other, 2.5)
+    assert f"by splines of order {other}" in again.reasons[0]
+    assert again.constants != result.constants
 
 
 @pytest.mark.parametrize(("jitter", "noise"), [(0.3, (1e-3, 0.1)), (1.0, (1e-2, 0.1))])

@@ -1,7 +1,7 @@
 """Brings channels whose times are not uniform onto a uniform grid, and says what was done."""
 
-from tvident._clocks.clock import Clock, Evened, as_earlier, clock_of
+from tvident._clocks.clock import Clock, Evened, clock_of
 from tvident._clocks.grid import Grid, grid_of
 from tvident._clocks.two import TwoClocks, two_clocks
 
-__all__ = ["Clock", "Evened", "Grid", "TwoClocks", "as_earlier", "clock_of", "grid_of", "two_clocks"]
+__all__ = ["Clock", "Evened", "Grid", "TwoClocks", "clock_of", "grid_of", "two_clocks"]

@@ -112,11 +112,48 @@ class Evened:
 
 
 def clock_of(
-    grid: Grid, channels: Mapping[str, npt.NDArray[np.number]], quantisation: float | None, workers: int | None
+    grid: Grid,
+    channels: Mapping[str, npt.NDArray[np.number]],
+    quantisation: float | None,
+    workers: int | None,
+    earlier: Mapping[str, Any] | None = None,
 ) -> Clock:
-    """Return how channels are brought onto a grid: in their own time, or by number where they are smooth in that."""
-    order = chosen_order(grid, channels)
-    grid = replace(grid, bridged=longest_bridged(grid, channels, order))
+    """Return how channels are brought onto a grid: in their own time, or by number where they are smooth in that.
+
+    Settings of an earlier result that hold a clock say what is done; what is wrong with the times is said again.
+
+    Raises
+    ------
+    TypeError
+        If settings hold no order of splines.
+    """
+    kind = None if earlier is None else earlier.get("times")
+    if earlier is None or kind not in {"true", "even", "lost"} or (kind == "lost" and grid.jitter > 0):
+        return _told(*_splines(grid, channels, {}), channels, quantisation, workers)
+    order = earlier.get("spline_order")
+    if order not in {0, 1, 3, 5, 7}:
+        raise TypeError(f"spline_order of settings must be 0, 1, 3, 5 or 7; got {order!r}; pass result.settings")
+    return _as_earlier(_told(*_splines(grid, channels, earlier), channels, quantisation, workers), kind, order)
+
+
+def _splines(
+    grid: Grid, channels: Mapping[str, npt.NDArray[np.number]], earlier: Mapping[str, Any]
+) -> tuple[Grid, int]:
+    """Return the grid with the longest step that splines go over, and their order: what settings hold, and otherwise what is best."""
+    order, bridged = earlier.get("spline_order") or chosen_order(grid, channels), earlier.get("bridged")
+    if not (isinstance(bridged, int | float) and bridged > 0):
+        bridged = longest_bridged(grid, channels, order)
+    return replace(grid, bridged=float(bridged)), order
+
+
+def _told(
+    grid: Grid,
+    order: int,
+    channels: Mapping[str, npt.NDArray[np.number]],
+    quantisation: float | None,
+    workers: int | None,
+) -> Clock:
+    """Return what times are like, and what is done with them by splines of an order."""
     if grid.jitter == 0:
         return Clock(grid, "lost", order, _lost(grid, order))
     share = f"steps of time scatter by {grid.jitter:.2g} of a step"
@@ -153,21 +190,11 @@ def clock_of(
     )
 
 
-def as_earlier(clock: Clock, earlier: Mapping[str, Any] | None) -> Clock:
-    """Return the clock that settings of an earlier result hold, itself where they hold none; what is wrong with the times is said again."""
-    kind = None if earlier is None else earlier.get("times")
-    if earlier is None or kind not in {"true", "even", "lost"}:
-        return clock
-    order, grid = earlier.get("spline_order"), clock.grid
-    if order not in {0, 1, 3, 5, 7}:
-        raise TypeError(f"spline_order of settings must be 0, 1, 3, 5 or 7; got {order!r}; pass result.settings")
-    if kind == "lost" and grid.jitter > 0:
-        return clock
-    bridged = earlier.get("bridged")
-    if isinstance(bridged, int | float) and bridged > 0:
-        grid = replace(grid, bridged=float(bridged))
+def _as_earlier(clock: Clock, kind: Kind, order: int) -> Clock:
+    """Return the clock of an earlier result, with what is wrong with the times now."""
+    grid = clock.grid
     if kind == clock.kind:
-        return replace(clock, grid=grid, order=order)
+        return replace(clock, order=order)
     words = "channels were brought onto a uniform grid as in the earlier result"
     if clock.kind == "even":
         doubt = (

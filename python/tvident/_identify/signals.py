@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
-from tvident._clocks import Clock, Grid, as_earlier, clock_of
+from tvident._clocks import Clock, Grid, clock_of
 from tvident._derivatives import quantisation_step
 from tvident._identify.settings import Request
 
@@ -65,7 +65,7 @@ class Signals:
         if self.instruments is not None:
             recorded["instrument"] = self.instruments
         request = with_own_step(request, self.channels)
-        clock = as_earlier(clock_of(grid, recorded, request.quantisation, workers), earlier)
+        clock = clock_of(grid, recorded, request.quantisation, workers, earlier)
         evened = clock.evened(recorded, propagate=propagate, workers=workers)
         records = int(np.prod(self.torques.shape[:-1], dtype=int))
         signals = Signals(
