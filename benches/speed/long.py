@@ -9,7 +9,9 @@ from typing import Any
 
 import dask.array as da
 import numpy as np
+import pyarrow as pa
 from distributed import Client, LocalCluster
+from pyarrow import parquet
 
 import tvident
 import tvident.dask
@@ -37,15 +39,18 @@ def _options(angle: signals.Array, torque: signals.Array, options: Mapping[str, 
     return more
 
 
-def _from_file(samples: int, **options: Any) -> Callable[[float], Duel]:
-    """Pit a call from file to file against one on arrays in memory, one thread each."""
+def _from_file(samples: int, ending: str = ".npy", **options: Any) -> Callable[[float], Duel]:
+    """Pit a call from a file of some kind to .npy against one on arrays in memory, one thread each."""
 
     def prepare(share: float) -> Duel:
         angle, torque = signals.recording(max(int(samples * share), 100_000))
         more = _options(angle, torque, {"workers": 1, **options})
         folder = tempfile.TemporaryDirectory(prefix="tvident-bench-")
-        source, target = Path(folder.name, "in.npy"), Path(folder.name, "out.npy")
-        np.save(source, np.stack([angle, torque], axis=1))
+        source, target = Path(folder.name, f"in{ending}"), Path(folder.name, "out.npy")
+        if ending == ".parquet":
+            parquet.write_table(pa.table({"0": angle, "1": torque}), source)
+        else:
+            np.save(source, np.stack([angle, torque], axis=1))
 
         def from_file() -> tvident.FileIdentification:
             return tvident.identify_file(source, target, angle="0", torque="1", **more)
@@ -109,6 +114,20 @@ LONG = [
         "the same, `step=1`: 91 bytes a sample are written twice",
         "`identify` of arrays in memory",
         _from_file(2_000_000, method="paper"),
+        most=1.3,
+    ),
+    Row(
+        "file-parquet",
+        "`identify_file`, Parquet to .npy, paper's method, `step=100`, 4·10⁶ samples",
+        "`identify` of arrays in memory",
+        _from_file(4_000_000, ".parquet", method="paper", step=100),
+        most=1.3,
+    ),
+    Row(
+        "file-parquet-long",
+        "the same, 10⁷ samples, whose columns are decoded as they are needed",
+        "`identify` of arrays in memory",
+        _from_file(10_000_000, ".parquet", method="paper", step=100),
         most=1.3,
     ),
     Row(

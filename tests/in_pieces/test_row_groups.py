@@ -59,3 +59,22 @@ def test_on_the_way_within_a_row_group_nothing_is_decoded_twice(
     assert begun == [0]
     assert column.read(0, 10)[0] == 0
     assert begun == [0, 0]
+
+
+def test_a_short_column_is_decoded_once_and_not_copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pa, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    values = np.arange(float(SAMPLES))
+    parquet.write_table(pa.table({"angle": values}), tmp_path / "in.parquet", row_group_size=700)
+    decoded: list[str] = []
+    whole = ParquetRows.whole
+
+    def noted(rows: ParquetRows, name: str) -> object:
+        decoded.append(name)
+        return whole(rows, name)
+
+    monkeypatch.setattr(ParquetRows, "whole", noted)
+    column = ParquetColumn(ParquetRows(tmp_path / "in.parquet"), "angle")
+    later, all_of_it = column.read(8000, 8010), column.read(0, SAMPLES)
+    assert decoded == ["angle"]
+    assert np.array_equal(all_of_it, values)
+    assert np.shares_memory(later, all_of_it)

@@ -17,10 +17,13 @@ _BATCH = 1 << 17
 """Rows that are decoded at a time: a row group may be as long as the file."""
 
 _KEPT = 1 << 22
-"""A column of at most so many rows stays once it is decoded, 32 MiB: windows that tell the scatter lie all over the record.
+"""A column of at most so many rows is decoded at once and stays, 32 MiB: windows that tell the scatter lie all over the record.
 
 What is decoded on the way to them is as much as all that follows.
 """
+
+_BUFFER = 1 << 16
+"""Bytes that are read at a time, and at least a page: without a buffer the reader takes memory for all of a column of a row group."""
 
 
 @dataclass
@@ -41,7 +44,7 @@ class ParquetRows:
             ) from None
         try:
             # Read-ahead would hold whole row groups.
-            self._file = parquet.ParquetFile(self.path, pre_buffer=False, memory_map=False)
+            self._file = parquet.ParquetFile(self.path, pre_buffer=False, memory_map=False, buffer_size=_BUFFER)
         except (ArrowException, OSError) as error:
             raise FileError(
                 f"{printable(self.path)}: must be whole; pyarrow says: {printable(error, 200)}; copy it again"
@@ -75,6 +78,12 @@ class ParquetRows:
             yield place, np.asarray(batch.column(0).to_numpy(zero_copy_only=False))
             place += batch.num_rows
 
+    def whole(self, name: str) -> npt.NDArray[Any]:
+        """Return all samples of a column, where the decoder put them."""
+        column = self._file.read_row_groups(range(self._file.num_row_groups), [name], use_threads=False).column(0)
+        parts = [np.asarray(part.to_numpy(zero_copy_only=False)) for part in column.chunks]
+        return np.concatenate(parts) if len(parts) != 1 else parts[0]
+
     def close(self) -> None:
         self._file.close()
 
@@ -93,7 +102,8 @@ class ParquetColumn:
 
     def read(self, first: int, end: int) -> npt.NDArray[Any]:
         if self.rows.samples <= _KEPT:
-            return self._whole(end)[first:end]
+            self._kept = self._kept or [(0, self.rows.whole(self.name))]
+            return self._kept[0][1][first:end]
         reached = self._kept[-1][0] + self._kept[-1][1].size if self._kept else -1
         # Going on within a row group is never longer than from its first row.
         if (
@@ -113,23 +123,3 @@ class ParquetColumn:
             self._kept = [one for one in self._kept if one[0] + one[1].size > first]
         parts = [values[max(first - place, 0) : end - place] for place, values in self._kept if place < end]
         return np.concatenate(parts) if len(parts) != 1 else parts[0]
-
-    def _whole(self, end: int) -> npt.NDArray[Any]:
-        """Return all samples, of which those before one are there."""
-        if self._going is None:
-            self._going = self.rows.batches(self.name, 0)
-        _, whole = self._kept[0] if self._kept else (0, np.empty(0))
-        reached = self._kept[0][0] if self._kept else 0
-        while reached < end:
-            batch = next(self._going, None)
-            if batch is None:
-                break
-            place, values = batch
-            if not whole.size:
-                whole = np.empty(self.rows.samples, values.dtype)
-            # Whole numbers are floats in a batch where some are missing.
-            whole = whole.astype(np.result_type(whole, values), copy=False)
-            reached = place + values.size
-            whole[place:reached] = values
-        self._kept = [(reached, whole)]
-        return whole
