@@ -70,7 +70,9 @@ class Fitted:
     Attributes
     ----------
     values : ndarray, shape (columns,)
-    covariance : ndarray, shape (columns, columns)
+    root : ndarray, shape (columns, k)
+        A root of their covariance C = root rootᵀ. Functions that are hardly told from each other have factors whose variances cancel in a
+        curve; sums of squares of the root's products do not.
     misfit : float
         The sum of squares of whitened residuals.
     observations : float
@@ -82,11 +84,16 @@ class Fitted:
     """
 
     values: Array
-    covariance: Array
+    root: Array
     misfit: float
     observations: float
     factor: Array | None
     beside: Array | None = None
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the values, shape (columns, columns)."""
+        return np.asarray(self.root @ self.root.T)
 
     @cached_property
     def condition(self) -> float:
@@ -200,16 +207,18 @@ class Linearised:
             white, before = self.whitening.whiten(design, some.start, before)
             yield white
 
-    def covariance_of_residuals(self, unknowns: Sequence[ExpandedUnknown], fitted: Fitted) -> Array:
-        """Return a covariance that follows from the whitened residuals and their correlation (Newey and West), not from the noise."""
+    def root_of_residuals(self, unknowns: Sequence[ExpandedUnknown], fitted: Fitted) -> Array:
+        """Return a root of the covariance that follows from whitened residuals and their correlation (Newey and West), not from noise."""
         record = self.record
         reach = int(np.ceil(4 * (max(1, record.rows) / 100) ** (2 / 9))) + record.lags
         middle = np.zeros((fitted.values.size, fitted.values.size))
         if fitted.beside is not None:
-            middle += _products(fitted.beside[:, :-1])
+            middle += _products(fitted.beside[:, :-1] @ fitted.root)
         last = np.zeros((0, fitted.values.size))
         for white in self.whitened(unknowns):
-            scores = white[:, :-1] * (white[:, -1] - white[:, :-1] @ fitted.values)[:, np.newaxis]
+            # Times the root columns are orthonormal, however hard they are to tell apart.
+            left = white[:, -1] - white[:, :-1] @ fitted.values
+            scores = white[:, :-1] @ fitted.root * left[:, np.newaxis]
             chain, new = np.concatenate([last, scores]), len(scores)
             for lag in range(reach + 1):
                 late = chain[max(lag, len(chain) - new) :]
@@ -217,7 +226,10 @@ class Linearised:
                 weight = 1 - lag / (reach + 1)
                 middle += product if lag == 0 else weight * (product + product.T)
             last = chain[-reach:]
-        return np.asarray(fitted.covariance @ middle @ fitted.covariance)
+        if not np.isfinite(middle).all():
+            return np.full_like(fitted.root, np.nan)
+        squares, axes = np.linalg.eigh(middle)
+        return np.asarray(fitted.root @ (axes * np.sqrt(np.maximum(squares, 0.0))))
 
 
 def _products(rows: Array) -> Array:
@@ -275,7 +287,7 @@ def solved(factor: Array, observations: float, *, is_well: bool) -> Fitted:
             return nothing
         inverse = (right.T / singular) @ left.T
     inverse = inverse / norm[:, np.newaxis]
-    return Fitted(inverse @ rhs, inverse @ inverse.T, float(factor[size, size] ** 2), observations, scaled)
+    return Fitted(inverse @ rhs, inverse, float(factor[size, size] ** 2), observations, scaled)
 
 
 def _inverse(triangle: Array) -> Array:

@@ -24,17 +24,18 @@ class Rival:
         Akaike's, of all sizes that were tried; that of the size that was taken counts as any.
     basis : Basis
     factors : ndarray, shape (size,)
-    covariance : ndarray, shape (size, size)
+    root : ndarray, shape (size, k)
+        A root of their covariance.
     """
 
     weight: float
     basis: Basis
     factors: Array
-    covariance: Array
+    root: Array
 
     def curve(self, functions: Array) -> tuple[Array, Array]:
         """Return the curve and its variance where functions have these values, shape (places, size)."""
-        return functions @ self.factors, np.einsum("ij,jk,ik->i", functions, self.covariance, functions)
+        return functions @ self.factors, ((functions @ self.root) ** 2).sum(axis=1)
 
 
 def scatter(rivals: Sequence[Rival], functions: Callable[[Basis], Array]) -> Array | float:

@@ -246,7 +246,7 @@ class SizeSearch:
             fitted = around.solve(unknowns, self._unseen_of(unknowns))
             for one, place in placed(unknowns):
                 if one.basis is not None:
-                    rival = Rival(weight, one.basis, fitted.values[place], fitted.covariance[place, place])
+                    rival = Rival(weight, one.basis, fitted.values[place], fitted.root[place])
                     found.setdefault(one.name, []).append(rival)
         return found
 
@@ -311,15 +311,15 @@ def along_record(basis: Basis, factors: Array, rate: int = 0) -> Array:
     return found
 
 
-def errors_along(basis: Basis, covariance: Array, rivals: Sequence[Rival] = ()) -> Array:
-    """Return the standard errors of a curve at every sample of a record, with what the choice of its size adds."""
+def errors_along(basis: Basis, root: Array, rivals: Sequence[Rival] = ()) -> Array:
+    """Return standard errors of a curve at every sample: from a root of its factors' covariance, and what the choice of its size adds."""
     samples = basis.coordinates[0].places.size
     found = np.empty(samples)
     for first in range(0, samples, AT_A_TIME):
         some = slice(first, min(samples, first + AT_A_TIME))
         functions = basis.along(some, 0)
-        variance = np.einsum("ij,jk,ik->i", functions, covariance, functions)
-        found[some] = np.sqrt(np.maximum(variance, 0) + scatter(rivals, _functions_at(some)))
+        variance = ((functions @ root) ** 2).sum(axis=1)
+        found[some] = np.sqrt(variance + scatter(rivals, _functions_at(some)))
     return found
 
 

@@ -76,12 +76,12 @@ class ExpandedOutcome:
         """Return the same with errors that know of residuals larger than the noise, and of their correlation."""
         if not self.ratio > 1:
             return self
-        covariance = (
-            self.around.covariance_of_residuals(self.unknowns, self.fitted)
+        root = (
+            self.around.root_of_residuals(self.unknowns, self.fitted)
             if self.ratio > _core.NOISE_MODEL_FAILS
-            else self.fitted.covariance * self.ratio
+            else self.fitted.root * np.sqrt(self.ratio)
         )
-        return replace(self, fitted=replace(self.fitted, covariance=covariance))
+        return replace(self, fitted=replace(self.fitted, root=root))
 
     @cached_property
     def curves(self) -> dict[str, ExpandedParameter]:
@@ -91,7 +91,8 @@ class ExpandedOutcome:
             if one.basis is None:
                 continue
             expansion = self.given.expansions[one.name]
-            own, covariance = self.fitted.values[place], self.fitted.covariance[place, place]
+            own, root = self.fitted.values[place], self.fitted.root[place]
+            covariance = np.asarray(root @ root.T)
             sizes = [each.sizes[one.name] for each in self.tried]
             limits = tuple(each.limits for each in one.basis.coordinates)
             shown = of_powers(own, covariance) if expansion.is_of_powers else (own, covariance)
@@ -111,7 +112,7 @@ class ExpandedOutcome:
                 unit_of="s" if expansion.is_of_time else unit_said(expansion.of),
                 _basis=one.basis,
                 _own=own,
-                _own_covariance=covariance,
+                _own_root=root,
                 _rivals=self.rivals.get(one.name, ()),
             )
         return found
@@ -124,13 +125,13 @@ class ExpandedOutcome:
         errors: dict[str, Array] = {}
         constants: dict[str, tuple[Any, Any]] = {}
         for one, place in placed(self.unknowns):
-            own, covariance = self.fitted.values[place], self.fitted.covariance[place, place]
+            own, root = self.fitted.values[place], self.fitted.root[place]
             if one.basis is None:
-                constants[one.name] = (float(own[0]), float(np.sqrt(covariance[0, 0])))
+                constants[one.name] = (float(own[0]), float(np.linalg.norm(root[0])))
                 values[one.name], errors[one.name] = (np.full(count, number) for number in constants[one.name])
             else:
                 values[one.name] = along_record(one.basis, own)[step]
-                errors[one.name] = errors_along(one.basis, covariance, self.rivals.get(one.name, ()))[step]
+                errors[one.name] = errors_along(one.basis, root, self.rivals.get(one.name, ()))[step]
         if "angle_zero" in constants:
             moved, error = constants["angle_zero"]
             constants["angle_zero"] = (given.zero + moved, error)

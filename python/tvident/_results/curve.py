@@ -85,7 +85,7 @@ class ExpandedParameter:
     unit_of: str = "s"
     _basis: Basis | None = field(default=None, repr=False)
     _own: Array = field(default_factory=lambda: np.zeros(0), repr=False)
-    _own_covariance: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
+    _own_root: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
     _rivals: Sequence[Rival] = field(default=(), repr=False)
 
     @property
@@ -188,7 +188,7 @@ class ExpandedParameter:
         By the delta method, from the covariance of all factors: docs/expansions.md.
         """
         functions, inside, shape = self._at(positions)
-        variance = np.einsum("ij,jk,ik->i", functions, self._own_covariance, functions)
+        variance = ((functions @ self._own_root) ** 2).sum(axis=1)
         places = self._places(positions)
         variance = np.maximum(variance, 0) + scatter(self._rivals, lambda basis: basis.at(places))
         return np.where(inside, np.sqrt(np.maximum(variance, 0)), np.nan).reshape(shape)
