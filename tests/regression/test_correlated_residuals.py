@@ -81,6 +81,34 @@ def test_errors_are_those_of_the_definition() -> None:
         np.testing.assert_allclose(found.stderr[row], expected, rtol=1e-9)
 
 
+@pytest.mark.parametrize("regressors", [1, 2, 3, 4, 5, 9])
+@pytest.mark.parametrize("lags", [0, 3])
+def test_errors_of_any_number_of_regressors_are_those_of_the_definition(regressors: int, lags: int) -> None:
+    generator = np.random.default_rng(7 + regressors)
+    window, rows = 61, 300
+    A = np.stack([np.ones(rows), *generator.standard_normal((regressors - 1, rows)).cumsum(axis=1)], axis=1)
+    b = A.sum(axis=1) + correlated(generator, rows, 0.4)
+    found = tvident.rolling_least_squares(A, b, window, covariance="hac", lags=lags)
+
+    def held(row: int) -> slice:
+        return slice(
+            min(max(row - window // 2, 0), rows - window), min(max(row - window // 2, 0), rows - window) + window
+        )
+
+    residuals = [b[row] - A[row] @ np.linalg.lstsq(A[held(row)], b[held(row)])[0] for row in range(rows)]
+    products, together = A * np.array(residuals)[:, None], lags + 1
+    sums = np.array([products[row : row + together].sum(axis=0) for row in range(rows - lags)])
+    for row in range(40, 260, 11):
+        some = sums[held(row).start : held(row).stop - lags]
+        given_back = window / (window - lags) / together / (1 - (lags + regressors) / window)
+        triangle = np.linalg.qr(A[held(row)], mode="r")
+        inverse = np.linalg.inv(triangle)
+        expected = np.linalg.norm(np.sqrt(given_back) * some @ inverse @ inverse.T, axis=0)
+        # An inverse of a normal matrix, here and there, is wrong by ε κ², and so is each of the products between two of them.
+        rounding = 4 * regressors * np.finfo(float).eps * found.condition[row] ** 2
+        np.testing.assert_allclose(found.stderr[row], expected, rtol=rounding + 1e-13)
+
+
 def test_any_cutting_gives_the_same_errors() -> None:
     A, b = problem(3, 40_000, 0.5)
     one = tvident.rolling_least_squares(A, b, 101, covariance="hac", workers=1)

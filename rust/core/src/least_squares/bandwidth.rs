@@ -14,8 +14,9 @@ pub(crate) struct Neighbours {
 }
 
 impl Neighbours {
+    #[inline(always)]
     pub(crate) fn add(&mut self, one: f64, next: f64) {
-        self.squares += f64::midpoint(one * one, next * next);
+        self.squares += 0.5 * (one * one + next * next);
         self.products += one * next;
     }
 

@@ -13,12 +13,13 @@ use crate::exec::huge_pages::zeros;
 use crate::exec::pool::{Piece, Watch};
 use crate::exec::stages::Stages;
 use crate::least_squares::bandwidth::{Bandwidth, Neighbours};
-use crate::least_squares::error_scale::{ErrorScale, TILE};
+use crate::least_squares::error_scale::ErrorScale;
+use crate::least_squares::givens_factor::MOST_REGRESSORS;
 use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares};
-use crate::least_squares::sliding_sums::{sliding_sums, sums_of_block};
-use crate::record::samples::is_usable;
+use crate::least_squares::row_products::{RowProducts, multiply, pairs, side_by_side};
+use crate::least_squares::sliding_sums::{begin, slide, sliding_sums};
 use crate::record::subsample::stretches;
-use crate::simd::vectors::{Kernel, Lanes, dispatch};
+use crate::simd::vectors::{Kernel, Lanes, MOST_LANES, dispatch};
 use crate::status::Status;
 
 /// Rows in a piece of work, about: what is kept of them stays in the second nearest cache.
@@ -86,46 +87,14 @@ struct Fits<'a> {
     status: &'a [u16],
 }
 
-/// Regressors times residuals of some rows, side by side, zero where there are none.
-#[derive(Default)]
-struct RowProducts {
-    first: isize,
-    /// As many numbers a row as [`numbers_of_a_row`] says.
-    values: Vec<f64>,
-    /// Rows that count before each row.
-    counts: Vec<u32>,
-    /// The columns that a row's products are made of, one after the other: regressors, the right-hand side, weights.
-    columns: Vec<f64>,
-}
-
 /// Memory of one thread.
 #[derive(Default)]
 struct Scratch {
     products: RowProducts,
-    /// Sums of neighbouring rows, then of one block and of the next the products of each pair of these, and the sums of the block.
+    /// Sums of neighbouring rows, then of the products of each pair of these: the sums of one block, and the suffixes of the next.
     neighbours: Vec<f64>,
     here: Vec<f64>,
     next: Vec<f64>,
-    sums: Vec<f64>,
-}
-
-/// Numbers of a row that stand side by side for so many regressors: whole vectors.
-const fn numbers_of_a_row(regressors: usize) -> usize {
-    if regressors <= 4 {
-        4
-    } else if regressors <= 8 {
-        8
-    } else {
-        16
-    }
-}
-
-/// So many numbers of each of some rows. What they held before is left there.
-fn side_by_side<const N: usize>(numbers: &mut Vec<f64>, rows: usize) -> &mut [[f64; N]] {
-    if numbers.len() < rows * N {
-        numbers.resize(rows * N, 0.0);
-    }
-    numbers[..rows * N].as_chunks_mut::<N>().0
 }
 
 impl Fits<'_> {
@@ -147,7 +116,9 @@ impl Fits<'_> {
     fn own_fits(&self, rows: &Range<usize>) -> Option<Range<usize>> {
         let fits = self.centre(rows.start)..self.centre(rows.end - 1) + 1;
         let is_inside = rows.start >= self.plan.window / 2 && fits.len() == rows.len();
-        (is_inside && fits.clone().all(|row| self.is_valid(row))).then_some(fits)
+        // No early return, so that the loop becomes vector instructions.
+        let any = || self.status[fits.clone()].iter().fold(0, |any, flags| any | flags);
+        (is_inside && any() & Status::INVALID.bits() == 0).then_some(fits)
     }
 
     /// The result whose window lies best around each of some rows, or the number of rows where there is none.
@@ -177,69 +148,56 @@ impl Fits<'_> {
 
     /// The products of some rows; those outside of the record are zero.
     #[inline(always)]
-    fn products(&self, range: Range<isize>, products: &mut RowProducts) {
-        let (p, row_size, total) = (self.plan.regressors, numbers_of_a_row(self.plan.regressors), self.rows());
+    fn products<S: Lanes, const N: usize, const R: usize>(
+        &self,
+        simd: S,
+        range: Range<isize>,
+        products: &mut RowProducts,
+    ) {
+        let (p, total) = (if R == 0 { self.plan.regressors } else { R }, self.rows());
         let clamp = |row: isize| row.clamp(0, total.cast_signed()).unsigned_abs();
         let rows = clamp(range.start)..clamp(range.end);
-        let length = (range.end - range.start).max(0).unsigned_abs();
-        products.first = range.start;
-        products.values.clear();
-        products.values.resize(length * row_size, 0.0);
-        products.counts.clear();
-        products.counts.resize(length + 1, 0);
-        if !rows.is_empty() {
-            let RowProducts { values, counts, columns, .. } = products;
-            let sources = self.equations.columns[..p].iter().chain([&self.equations.columns[p + self.rhs]]);
-            if columns.len() < (p + 2) * rows.len() {
-                columns.resize((p + 2) * rows.len(), 0.0);
-            }
-            let columns = &mut columns[..(p + 2) * rows.len()];
-            columns[(p + 1) * rows.len()..].fill(1.0);
-            for (source, into) in sources.chain(&self.equations.weights).zip(columns.chunks_mut(rows.len())) {
-                source.read(rows.start, into);
-            }
-            let (columns, rest) = columns.split_at_mut(p * rows.len());
-            let (residuals, weights) = rest.split_at_mut(rows.len());
-            self.take_off_fits(&rows, columns, residuals);
-            let skipped = (rows.start.cast_signed() - range.start).unsigned_abs();
-            let (values, counts) = (&mut values[skipped * row_size..], &mut counts[skipped + 1..]);
-            for ((count, residual), weight) in counts.iter_mut().zip(&mut *residuals).zip(&*weights) {
-                let counted = is_usable(*residual) && *weight > 0.0;
-                *count = u32::from(counted);
-                *residual = if counted { weight * *residual } else { 0.0 };
-            }
-            for (place, (row, &residual)) in values.chunks_exact_mut(row_size).zip(&*residuals).enumerate() {
-                for (product, column) in row.iter_mut().zip(columns.chunks_exact(rows.len())) {
-                    // A row that does not count may hold what is no number.
-                    *product = if residual == 0.0 { 0.0 } else { residual * column[place] };
-                }
-            }
-        }
-        let mut before = 0;
-        for count in &mut products.counts {
-            before += *count;
-            *count = before;
-        }
-    }
-
-    /// Takes off what fits explain of some rows, whose regressors stand one after the other.
-    #[inline(always)]
-    fn take_off_fits(&self, rows: &Range<usize>, columns: &[f64], residuals: &mut [f64]) {
-        let all = columns.chunks(rows.len()).zip(&self.parameters);
-        if let Some(fits) = self.own_fits(rows) {
-            for (column, parameters) in all {
-                for ((residual, x), parameter) in residuals.iter_mut().zip(column).zip(&parameters[fits.clone()]) {
-                    *residual -= x * parameter;
-                }
-            }
+        let (length, count) = ((range.end - range.start).max(0).unsigned_abs(), rows.len());
+        let RowProducts { first, values, counts, columns } = products;
+        *first = range.start;
+        let values = side_by_side::<N>(values, length + MOST_LANES);
+        counts.resize(length + 1, 0);
+        if rows.is_empty() {
+            values.fill([0.0; N]);
+            counts.fill(0);
             return;
         }
-        let fits = self.nearest(rows.clone());
-        for (column, parameters) in all {
-            for ((residual, x), &fit) in residuals.iter_mut().zip(column).zip(&fits) {
-                *residual -= x * parameters.get(fit).copied().unwrap_or(f64::NAN);
+        let skipped = (rows.start.cast_signed() - range.start).unsigned_abs();
+        values[..skipped].fill([0.0; N]);
+        counts[..=skipped].fill(0);
+        let given = p + 1 + usize::from(self.equations.weights.is_some());
+        let own_fits = self.own_fits(&rows);
+        let wanted = (given + if own_fits.is_some() { 0 } else { p }) * count;
+        if columns.len() < wanted {
+            columns.resize(wanted, 0.0);
+        }
+        let (columns, rest) = columns[..wanted].split_at_mut(given * count);
+        let sources = self.equations.columns[..p].iter().chain([&self.equations.columns[p + self.rhs]]);
+        for (source, into) in sources.chain(&self.equations.weights).zip(columns.chunks_mut(count)) {
+            source.read(rows.start, into);
+        }
+        let mut parameters: [&[f64]; MOST_REGRESSORS] = Default::default();
+        if let Some(fits) = own_fits {
+            parameters.iter_mut().zip(&self.parameters).for_each(|(into, all)| *into = &all[fits.clone()]);
+        } else {
+            let fits = self.nearest(rows);
+            for ((into, all), place) in parameters.iter_mut().zip(&self.parameters).zip(rest.chunks_mut(count)) {
+                for (parameter, &fit) in place.iter_mut().zip(&fits) {
+                    *parameter = all.get(fit).copied().unwrap_or(f64::NAN);
+                }
+                *into = place;
             }
         }
+        let places = skipped..skipped + count;
+        let counted = &mut counts[places.start + 1..=places.end];
+        let all = multiply(simd, columns, &parameters[..p], &mut values[places.start..], counted);
+        values[places.end..].fill([0.0; N]);
+        counts[places.end + 1..].fill(all);
     }
 
     /// Over how many rows residuals are correlated, as stretches of the record show.
@@ -247,17 +205,9 @@ impl Fits<'_> {
         let pieces = stretches(self.rows(), LEARNT_OF.max(8 * self.plan.window), 8)
             .map(|rows| Piece { size: rows.len(), content: rows })
             .collect();
-        let (p, row_size) = (self.plan.regressors, numbers_of_a_row(self.plan.regressors));
+        let p = self.plan.regressors;
         let of_rows = |rows: Range<usize>, products: &mut RowProducts| {
-            self.products(rows.start.cast_signed()..rows.end.cast_signed(), products);
-            let mut sums = vec![Neighbours::default(); p];
-            for (regressor, sums) in sums.iter_mut().enumerate() {
-                let at = |row: usize| products.values[row * row_size + regressor];
-                for row in 1..rows.len() {
-                    sums.add(at(row - 1), at(row));
-                }
-            }
-            sums
+            dispatch(self.plan.instructions, Correlations { fits: self, rows, products })
         };
         let found = stages.map(pieces, RowProducts::default, of_rows)?;
         let mut all = vec![Neighbours::default(); p];
@@ -286,6 +236,44 @@ impl Fits<'_> {
     }
 }
 
+/// The kernel that learns how neighbours in some rows are correlated, by regressor.
+struct Correlations<'a, 'b, 'c> {
+    fits: &'a Fits<'b>,
+    rows: Range<usize>,
+    products: &'c mut RowProducts,
+}
+
+impl Kernel for Correlations<'_, '_, '_> {
+    type Output = Vec<Neighbours>;
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, simd: S) -> Vec<Neighbours> {
+        match self.fits.plan.regressors {
+            1 => self.run_with::<S, 4, 1>(simd),
+            2 => self.run_with::<S, 4, 2>(simd),
+            3 => self.run_with::<S, 4, 3>(simd),
+            4 => self.run_with::<S, 4, 4>(simd),
+            ..=8 => self.run_with::<S, 8, 0>(simd),
+            _ => self.run_with::<S, 16, 0>(simd),
+        }
+    }
+}
+
+impl Correlations<'_, '_, '_> {
+    #[inline(always)]
+    fn run_with<S: Lanes, const N: usize, const R: usize>(self, simd: S) -> Vec<Neighbours> {
+        let Self { fits, rows, products } = self;
+        fits.products::<S, N, R>(simd, rows.start.cast_signed()..rows.end.cast_signed(), products);
+        let mut sums: [Neighbours; N] = std::array::from_fn(|_| Neighbours::default());
+        for rows in products.values.as_chunks::<N>().0[..rows.len()].windows(2) {
+            for (regressor, sums) in sums.iter_mut().enumerate() {
+                sums.add(rows[0][regressor], rows[1][regressor]);
+            }
+        }
+        sums[..fits.plan.regressors].to_vec()
+    }
+}
+
 /// The kernel that writes the standard errors of the windows of some rows.
 struct Sandwich<'a, 'b, 'c> {
     fits: &'a Fits<'b>,
@@ -299,36 +287,37 @@ impl Kernel for Sandwich<'_, '_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<S: Lanes>(self, _simd: S) {
+    fn run<S: Lanes>(self, simd: S) {
         // Numbers of a row side by side, of the pairs of them, and of the regressors where these are few.
         match self.fits.plan.regressors {
-            1 => self.run_with::<4, 1, 1>(),
-            2 => self.run_with::<4, 4, 2>(),
-            3 => self.run_with::<4, 8, 3>(),
-            4 => self.run_with::<4, 16, 4>(),
-            5 => self.run_with::<8, 16, 0>(),
-            ..=8 => self.run_with::<8, 40, 0>(),
-            _ => self.run_with::<16, 136, 0>(),
+            1 => self.run_with::<S, 4, 1, 1>(simd),
+            2 => self.run_with::<S, 4, 8, 2>(simd),
+            3 => self.run_with::<S, 4, 8, 3>(simd),
+            4 => self.run_with::<S, 4, 16, 4>(simd),
+            5 => self.run_with::<S, 8, 16, 0>(simd),
+            ..=8 => self.run_with::<S, 8, 40, 0>(simd),
+            _ => self.run_with::<S, 16, 136, 0>(simd),
         }
     }
 }
 
 impl Sandwich<'_, '_, '_> {
     #[inline(always)]
-    fn run_with<const N: usize, const P: usize, const R: usize>(self) {
+    fn run_with<S: Lanes, const N: usize, const P: usize, const R: usize>(self, simd: S) {
         let Self { fits, bandwidth, rows, mut errors, scratch } = self;
         let p = if R == 0 { fits.plan.regressors } else { R };
-        let Scratch { products, neighbours, here, next, sums } = scratch;
+        let Scratch { products, neighbours, here, next } = scratch;
         let (correlated, length) = (bandwidth.rows, fits.plan.window - bandwidth.rows + 1);
         let first = rows.start.cast_signed() - fits.plan.before.cast_signed();
         // Blocks are tied to the rows of the record: those of windows, and those of neighbours before them.
         let of_block = |row: isize, length: usize| row.div_euclid(length.cast_signed()) * length.cast_signed();
-        let begin = of_block(first, length);
-        let begin_of_neighbours = of_block(begin, correlated);
+        let from = of_block(first, length);
+        let from_neighbours = of_block(from, correlated);
         let end = of_block(first + rows.len().cast_signed(), length) + 2 * length.cast_signed();
-        fits.products(begin_of_neighbours..end + correlated.cast_signed(), products);
+        let count = (end - from_neighbours).unsigned_abs().next_multiple_of(correlated);
+        let until = from_neighbours + (count + correlated).cast_signed();
+        fits.products::<S, N, R>(simd, from_neighbours..until, products);
         let of_rows = products.values.as_chunks::<N>().0;
-        let count = (end - begin_of_neighbours).unsigned_abs();
         let neighbours = if correlated == 1 {
             &of_rows[..count]
         } else {
@@ -336,48 +325,27 @@ impl Sandwich<'_, '_, '_> {
             sliding_sums(correlated, of_rows, sums);
             sums
         };
-        let neighbours = &neighbours[(begin - begin_of_neighbours).unsigned_abs()..];
-        let [mut here, mut next, sums] = [here, next, sums].map(|vectors| side_by_side::<P>(vectors, length));
-        squares(p, &neighbours[..length], next);
+        let neighbours = &neighbours[(from - from_neighbours).unsigned_abs()..];
+        let [mut here, mut next] = [here, next].map(|vectors| side_by_side::<P>(vectors, length));
+        let of_pairs = |row: &[f64; N]| pairs::<N, P>(p, row);
+        begin(&neighbours[..length], of_pairs, next);
         let scale = ErrorScale::new(fits.plan, fits.normal, fits.rows(), bandwidth);
-        let mut tile = vec![[0.0; TILE]; p * (p + 1) / 2];
-        let skipped = (first - begin).unsigned_abs();
-        let mut done = 0;
+        let counts = (products.first, &*products.counts);
+        let skipped = (first - from).unsigned_abs();
         for (block, after) in neighbours[length..].chunks_exact(length).enumerate() {
-            // What was next is here, and stays in the nearest cache until its sums are used.
             std::mem::swap(&mut here, &mut next);
-            squares(p, after, next);
-            sums_of_block(here, next, sums);
+            slide(after, of_pairs, here, next);
+            // Windows by where they begin after the first block.
             let wanted = skipped.max(block * length)..(skipped + rows.len()).min((block + 1) * length);
             if wanted.is_empty() {
                 break;
             }
-            for some in sums[wanted.start - block * length..wanted.end - block * length].chunks(TILE) {
-                for (pair, tile) in tile.iter_mut().enumerate() {
-                    for (into, sum) in tile.iter_mut().zip(some) {
-                        *into = sum[pair];
-                    }
-                }
-                let places = done..done + some.len();
-                let some_rows = rows.start + places.start..rows.start + places.end;
-                let into = errors.iter_mut().map(|errors| &mut errors[places.clone()]);
-                scale.write::<R>(some_rows, &tile, (products.first, &products.counts), into);
-                done = places.end;
-            }
-        }
-    }
-}
-
-/// The products of each pair of the first numbers of rows.
-#[inline(always)]
-fn squares<const N: usize, const P: usize>(numbers: usize, rows: &[[f64; N]], products: &mut [[f64; P]]) {
-    for (products, row) in products.iter_mut().zip(rows) {
-        let mut pair = 0;
-        for i in 0..numbers {
-            for k in i..numbers {
-                products[pair] = row[i] * row[k];
-                pair += 1;
-            }
+            let done = wanted.start - skipped..wanted.end - skipped;
+            let some_rows = rows.start + done.start..rows.start + done.end;
+            let sums = &here[wanted.start - block * length..wanted.end - block * length];
+            let mut into: [&mut [f64]; MOST_REGRESSORS] = Default::default();
+            into.iter_mut().zip(&mut errors).for_each(|(into, errors)| *into = &mut errors[done.clone()]);
+            scale.write::<S, P, R>(simd, some_rows, sums, counts, &mut into[..p]);
         }
     }
 }

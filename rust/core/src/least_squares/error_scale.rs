@@ -3,28 +3,14 @@
 use std::ops::Range;
 
 use crate::least_squares::bandwidth::Bandwidth;
-use crate::least_squares::givens_factor::MOST_REGRESSORS;
 use crate::least_squares::plan::RollingLeastSquares;
+use crate::simd::vectors::{Lanes, MOST_LANES};
 
 /// Windows that are finished together.
-pub(crate) const TILE: usize = 256;
-
-/// Windows whose numbers stay in registers until they are finished.
-const AT_ONCE: usize = 8;
+const TILE: usize = 256;
 
 /// Windows that keep less of the variance than this beside what their fit takes have no standard error.
 const LEAST_LEFT: f64 = 0.05;
-
-/// Some numbers from a place on; zero beyond the last.
-#[inline(always)]
-fn some(numbers: &[f64], first: usize) -> [f64; AT_ONCE] {
-    let rest = &numbers[first..];
-    rest.first_chunk().copied().unwrap_or_else(|| {
-        let mut some = [0.0; AT_ONCE];
-        some[..rest.len()].copy_from_slice(rest);
-        some
-    })
-}
 
 /// Makes standard errors of the sums over windows.
 pub(crate) struct ErrorScale<'a> {
@@ -34,8 +20,9 @@ pub(crate) struct ErrorScale<'a> {
     /// Rows of the record.
     total: usize,
     correlated: f64,
-    /// One over the roots of what the sums of neighbours keep of the variance, by regressor.
-    kept: Vec<f64>,
+    /// By pair of regressors, what sums are to be multiplied by: what those of neighbours keep of the variance is given back, and pairs off the
+    /// diagonal count twice.
+    factors: Vec<f64>,
     /// For a window all of whose rows count.
     whole: f64,
 }
@@ -48,58 +35,111 @@ impl<'a> ErrorScale<'a> {
         total: usize,
         bandwidth: &Bandwidth,
     ) -> Self {
-        let kept = bandwidth.kept.iter().map(|kept| kept.sqrt().recip()).collect();
-        let scale = Self { plan, normal, total, correlated: bandwidth.rows as f64, kept, whole: 0.0 };
+        let kept: Vec<f64> = bandwidth.kept.iter().map(|kept| kept.sqrt().recip()).collect();
+        let of_pair = |i: usize, k: usize| kept[i] * kept[k] * if i == k { 1.0 } else { 2.0 };
+        let factors =
+            (0..kept.len()).flat_map(|i| (i..kept.len()).map(move |k| (i, k))).map(|(i, k)| of_pair(i, k)).collect();
+        let scale = Self { plan, normal, total, correlated: bandwidth.rows as f64, factors, whole: 0.0 };
         let rows = plan.window as f64;
         Self { whole: scale.of(rows, 0.0, rows), ..scale }
     }
 
-    /// Writes the errors of some windows, where the diagonals of their normal matrices are, from the sums of squares of each. `counts` are the
-    /// rows that count before each row from a first one on. There are `R` regressors, or zero where the compiler does not know how many.
+    /// Writes the errors of some windows, where the diagonals of their normal matrices are, from the sums of the products of each pair, of
+    /// which `P` stand side by side. `counts` are the rows that count before each row from a first one on. There are `R` regressors, or zero
+    /// where the compiler does not know how many.
     #[inline(always)]
-    pub(crate) fn write<'c, const R: usize>(
+    pub(crate) fn write<S: Lanes, const P: usize, const R: usize>(
         &self,
+        simd: S,
         rows: Range<usize>,
-        sums: &[[f64; TILE]],
+        sums: &[[f64; P]],
         counts: (isize, &[u32]),
-        errors: impl Iterator<Item = &'c mut [f64]>,
+        errors: &mut [&mut [f64]],
     ) {
-        let p = if R == 0 { self.plan.regressors } else { R };
-        let kept = &self.kept[..p];
-        let mut scale = [0.0; TILE];
-        for (scale, row) in scale.iter_mut().zip(rows.clone()) {
-            *scale = self.of_window(row, counts);
-        }
-        let normal = |i: usize, k: usize| {
-            let (i, k) = (i.min(k), i.max(k));
-            &self.normal[i * (2 * p - i - 1) / 2 + k - i - 1][rows.clone()]
-        };
-        for (a, into) in errors.enumerate() {
-            for first in (0..into.len().min(TILE)).step_by(AT_ONCE) {
-                let mut of_normal = [[0.0; AT_ONCE]; MOST_REGRESSORS];
-                for (k, of) in of_normal[..p].iter_mut().enumerate() {
-                    *of = some(if k == a { into } else { normal(a, k) }, first);
-                }
-                let mut variance = [0.0; AT_ONCE];
-                for b in 0..p {
-                    let mut inner = [0.0; AT_ONCE];
-                    for c in 0..p {
-                        let kept = kept[b] * kept[c];
-                        let (i, k) = (b.min(c), b.max(c));
-                        let sum = &sums[i * p - i * i.saturating_sub(1) / 2 + k - i][first..first + AT_ONCE];
-                        for ((inner, of), sum) in inner.iter_mut().zip(&of_normal[c]).zip(sum) {
-                            *inner += kept * of * sum;
-                        }
-                    }
-                    for ((variance, of), inner) in variance.iter_mut().zip(&of_normal[b]).zip(&inner) {
-                        *variance += of * inner;
-                    }
-                }
-                for ((error, variance), scale) in into[first..].iter_mut().zip(&variance).zip(&scale[first..]) {
-                    // Where there are no parameters there is no error, and it stays NaN.
-                    *error = (scale * variance).sqrt() + 0.0 * *error;
+        let mut scales = [0.0; TILE];
+        for (sums, first) in sums.chunks(TILE).zip(rows.clone().step_by(TILE)) {
+            let scales = &mut scales[..sums.len()];
+            self.of_windows(first, counts, scales);
+            for (place, sums) in (0..).step_by(S::F64_LANES).zip(sums.chunks(S::F64_LANES)) {
+                let (row, scales) = (first + place, &scales[place..]);
+                let into = (row - rows.start, &mut *errors);
+                if sums.len() == S::F64_LANES {
+                    self.write_some::<S, P, R, true>(simd, row, sums, scales, into);
+                } else {
+                    self.write_some::<S, P, R, false>(simd, row, sums, scales, into);
                 }
             }
+        }
+    }
+
+    /// The same for as many windows as a vector holds, or fewer.
+    #[inline(always)]
+    fn write_some<S: Lanes, const P: usize, const R: usize, const FULL: bool>(
+        &self,
+        simd: S,
+        row: usize,
+        sums: &[[f64; P]],
+        scales: &[f64],
+        (place, errors): (usize, &mut [&mut [f64]]),
+    ) {
+        let (p, count) = (if R == 0 { self.plan.regressors } else { R }, sums.len());
+        let some = |numbers: &[f64]| {
+            if FULL { simd.load(numbers, 0) } else { simd.partial_load_f64s(&numbers[..count]) }
+        };
+        let mut of_pairs = [simd.splat_f64s(0.0); P];
+        turn(simd, sums, &mut of_pairs);
+        for (sum, &factor) in of_pairs.iter_mut().zip(&self.factors) {
+            *sum = simd.mul_f64s(*sum, simd.splat_f64s(factor));
+        }
+        // By pair of regressors, as the sums are.
+        let (mut of_normal, mut above, mut place_of) = ([simd.splat_f64s(0.0); P], 0, 0);
+        for (i, errors) in errors[..p].iter().enumerate() {
+            for k in i..p {
+                of_normal[place_of] = if i == k {
+                    some(&errors[place..])
+                } else {
+                    above += 1;
+                    some(&self.normal[above - 1][row..])
+                };
+                place_of += 1;
+            }
+        }
+        let pair = |i: usize, k: usize| i.min(k) * (2 * p - i.min(k) - 1) / 2 + i.max(k);
+        let scale = some(scales);
+        for a in 0..p {
+            let mut variance = simd.splat_f64s(0.0);
+            for b in 0..p {
+                let mut inner = simd.splat_f64s(0.0);
+                for c in b..p {
+                    inner = simd.mul_add_f64s(of_pairs[pair(b, c)], of_normal[pair(a, c)], inner);
+                }
+                variance = simd.mul_add_f64s(inner, of_normal[pair(a, b)], variance);
+            }
+            // Where there are no parameters the diagonal is NaN, and so is the error.
+            let error = simd.sqrt_f64s(simd.mul_f64s(scale, variance));
+            let into = &mut errors[a][place..];
+            if FULL {
+                simd.store(into, 0, error);
+            } else {
+                simd.partial_store_f64s(&mut into[..count], error);
+            }
+        }
+    }
+
+    /// What the sums over the windows of some rows are to be multiplied by.
+    #[inline(always)]
+    fn of_windows(&self, first: usize, (begin, counts): (isize, &[u32]), scales: &mut [f64]) {
+        let start = first.cast_signed() - self.plan.before.cast_signed();
+        let end = start + (scales.len() + self.plan.window - 1).cast_signed();
+        if start >= 0 && end <= self.total.cast_signed() {
+            let at = |row: isize| counts[(row - begin).unsigned_abs()] as usize;
+            if at(end) - at(start) == (end - start).unsigned_abs() {
+                scales.fill(self.whole);
+                return;
+            }
+        }
+        for (scale, row) in scales.iter_mut().zip(first..) {
+            *scale = self.of_window(row, (begin, counts));
         }
     }
 
@@ -131,5 +171,27 @@ impl<'a> ErrorScale<'a> {
         // What fits take of the sums of neighbours: of one row the part p / w, of B rows about (B + p - 1) / w.
         let left = 1.0 - (self.correlated + self.plan.regressors as f64 - 1.0) / count;
         if left < LEAST_LEFT || complete <= 0.0 { f64::NAN } else { spanned / (complete * self.correlated * left) }
+    }
+}
+
+/// The numbers of some rows, of which there are at most as many as a vector holds, one vector for each number.
+#[inline(always)]
+fn turn<S: Lanes, const P: usize>(simd: S, rows: &[[f64; P]], columns: &mut [S::f64s; P]) {
+    let mut square = [simd.splat_f64s(0.0); MOST_LANES];
+    let square = &mut square[..S::F64_LANES];
+    if P % S::F64_LANES != 0 {
+        for (number, column) in columns.iter_mut().enumerate() {
+            let mut values = [0.0; MOST_LANES];
+            values.iter_mut().zip(rows).for_each(|(value, row)| *value = row[number]);
+            *column = simd.load(&values, 0);
+        }
+        return;
+    }
+    for (number, columns) in (0..).step_by(S::F64_LANES).zip(columns.chunks_exact_mut(S::F64_LANES)) {
+        for (vector, row) in square.iter_mut().zip(rows) {
+            *vector = simd.load(row, number);
+        }
+        simd.transpose(square);
+        columns.copy_from_slice(square);
     }
 }

@@ -1,30 +1,48 @@
 //! Sums over neighbouring rows of numbers that stand side by side, by blocks: nothing is ever subtracted.
+//!
+//! So many rows from any row on are a suffix of one block and a prefix of the next. The prefixes of a block and its suffixes are made in
+//! one loop, from both of its ends: each addition waits for the one before it, and two chains of them keep the processor busy.
 
-/// Sums of `length` rows from each row on, as a suffix of one block of rows and a prefix of the next. The first block begins with the first
-/// row; there must be `length` rows more than there are sums.
+/// Replaces the suffixes of a block by the sums over as many rows as a block has, from each of its rows on, and writes the suffixes of the
+/// next block. `of` says which numbers of a row are summed.
 #[inline(always)]
-pub(crate) fn sliding_sums<const N: usize>(length: usize, rows: &[[f64; N]], sums: &mut [[f64; N]]) {
-    for (block, sums) in sums.chunks_mut(length).enumerate() {
-        let (here, next) = rows[block * length..].split_at(length);
-        sums_of_block(here, next, sums);
+pub(crate) fn slide<T, const N: usize>(
+    next: &[T],
+    of: impl Fn(&T) -> [f64; N],
+    sums: &mut [[f64; N]],
+    suffixes: &mut [[f64; N]],
+) {
+    let (mut prefix, mut suffix) = ([0.0; N], [0.0; N]);
+    let ends = next.iter().zip(next.iter().rev());
+    for ((sum, into), (first, last)) in sums.iter_mut().zip(suffixes.iter_mut().rev()).zip(ends) {
+        add(sum, &prefix);
+        add(&mut prefix, &of(first));
+        add(&mut suffix, &of(last));
+        *into = suffix;
     }
 }
 
-/// Sums over as many rows as a block has, from the first rows of the block on: `here` are its rows, `next` those after it.
+/// The suffixes of a first block, which [`slide`] takes for sums to be.
 #[inline(always)]
-pub(crate) fn sums_of_block<const N: usize>(here: &[[f64; N]], next: &[[f64; N]], sums: &mut [[f64; N]]) {
+pub(crate) fn begin<T, const N: usize>(block: &[T], of: impl Fn(&T) -> [f64; N], suffixes: &mut [[f64; N]]) {
     let mut suffix = [0.0; N];
-    for row in here[sums.len()..].iter().rev() {
-        add(&mut suffix, row);
+    for (row, into) in block.iter().zip(suffixes).rev() {
+        add(&mut suffix, &of(row));
+        *into = suffix;
     }
-    for (sum, row) in sums.iter_mut().zip(here).rev() {
-        add(&mut suffix, row);
-        *sum = suffix;
-    }
-    let mut prefix = [0.0; N];
-    for (sum, row) in sums.iter_mut().zip(next) {
-        add(sum, &prefix);
-        add(&mut prefix, row);
+}
+
+/// Sums of `length` rows from each row on. The first block begins with the first row; there must be a block of rows more than there are sums,
+/// which are those of whole blocks.
+#[inline(always)]
+pub(crate) fn sliding_sums<const N: usize>(length: usize, rows: &[[f64; N]], sums: &mut [[f64; N]]) {
+    let (Some(first), blocks) = (rows.get(..length), sums.len() / length) else { return };
+    let mut beyond = vec![[0.0; N]; length];
+    begin(first, |row| *row, &mut sums[..length]);
+    for block in 1..=blocks {
+        let (before, after) = sums.split_at_mut(block * length);
+        let suffixes = if block < blocks { &mut after[..length] } else { &mut beyond[..] };
+        slide(&rows[block * length..][..length], |row| *row, &mut before[(block - 1) * length..], suffixes);
     }
 }
 
@@ -41,7 +59,7 @@ mod tests {
 
     #[test]
     fn sums_slide_over_blocks() {
-        for (length, count) in [(1, 7), (4, 16), (5, 1), (3, 20)] {
+        for (length, count) in [(1, 7), (4, 16), (5, 5), (3, 21)] {
             let rows: Vec<[f64; 4]> = (0..count + length).map(|row| [row as f64, 1.0, 0.0, -1.0]).collect();
             let mut sums = vec![[f64::NAN; 4]; count];
             sliding_sums(length, &rows, &mut sums);
