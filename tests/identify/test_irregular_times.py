@@ -152,6 +152,20 @@ def test_stamps_that_jitter_are_told_from_samples_that_do() -> None:
     assert not true.record_status & Status.CHANNEL_SUSPECTED
 
 
+def test_stamps_that_jitter_by_a_whole_step_do_not_change_the_rate() -> None:
+    """Steps that splines would not go over, since the motion is no motion in such a time, are no gaps of samples taken evenly."""
+    simulated = tvident.simulate_torsional_rig(seed=81)
+    generator = np.random.default_rng(101)
+    generator.uniform(size=20_000)
+    stamps = np.sort(np.arange(20_000) + generator.uniform(-0.5, 0.5, 20_000)) / RATE
+    result = tvident.identify(simulated.angle, simulated.torque, t=stamps)
+    assert result.settings["times"] == "even"
+    # A line through 20 000 stamps that scatter by 0.29 of a step has a slope with an error of 4e-7 of its own.
+    assert abs(result.settings["sample_rate"] / RATE - 1) < 5 * 4e-7
+    by_rate = tvident.identify(simulated.angle, simulated.torque, sample_rate=result.settings["sample_rate"])
+    np.testing.assert_array_equal(result.stiffness, by_rate.stiffness)
+
+
 @pytest.mark.parametrize("burst", [0, 300])
 def test_lost_samples_are_missing_samples(burst: int) -> None:
     t = jittered(4, 0.0)

@@ -183,7 +183,7 @@ def _told(
         grid,
         "even",
         0,
-        f"samples were taken to be even at {rate:.9g} Hz{_gaps(grid)}",
+        f"samples were taken to be even at {rate:.9g} Hz{_gaps(replace(grid, bridged=grid.longest))}",
         f"{share}, but the {name} is smooth in sample number and not in time, where its noise is {math.sqrt(ratio):.2g} times as large: "
         "the stamps jitter, not the samples, as behind a buffer; samples were taken to be even; give "
         f"sample_rate={rate:.9g} to say so",

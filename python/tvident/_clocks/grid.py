@@ -40,8 +40,10 @@ class Grid:
         Of the grid.
     places : ndarray, shape (n,)
         Times of the record's samples in periods from the start on.
+    longest : float
+        The longest step in periods that is no gap of the record.
     bridged : float
-        The longest step in periods that is no gap.
+        The longest step in periods that splines go over: as long, or shorter where they do not predict what lies in it.
     jitter : float
         By how much steps scatter, as the share of a period within which times that scatter so lie; 0 where samples lie on the grid.
     """
@@ -50,6 +52,7 @@ class Grid:
     period: float
     samples: int
     places: Numbers
+    longest: float
     bridged: float
     jitter: float
 
@@ -68,7 +71,7 @@ class Grid:
     def numbers(self) -> npt.NDArray[np.int64]:
         """Places on the grid of samples that were taken evenly, whatever their times say; gaps count as the samples that they take."""
         steps = np.diff(self.places)
-        counts = np.where(steps > self.bridged, np.rint(steps), 1).astype(np.int64)
+        counts = np.where(steps > self.longest, np.rint(steps), 1).astype(np.int64)
         return np.concatenate([[0], np.cumsum(counts)])
 
 
@@ -101,7 +104,7 @@ def grid_of(times: Numbers) -> Grid:
             f"t must have no gaps that take nine tenths of the time; steps are {usual:g} s mostly, but the one to t[{place}] is "
             f"{steps[place - 1]:g} s; identify the parts before and after it on their own{arguments.clock_changed(float(steps[place - 1]))}"
         )
-    return Grid(float(times[0]), period, samples, places, longest / period, jitter)
+    return Grid(float(times[0]), period, samples, places, longest / period, longest / period, jitter)
 
 
 def _with_lost_samples(times: Numbers, steps: Numbers, usual: float) -> tuple[float, Numbers] | None:

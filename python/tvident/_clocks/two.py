@@ -120,4 +120,4 @@ def _grid(times: Any, samples: int, time_unit: str | None) -> Grid:
         except arguments.NotUniformError as error:
             return grid_of(error.times)
         start = float(arguments.times_of(times).flat[0])
-    return Grid(start, period, samples, np.arange(samples, dtype=np.float64), _GAP, 0.0)
+    return Grid(start, period, samples, np.arange(samples, dtype=np.float64), _GAP, _GAP, 0.0)
