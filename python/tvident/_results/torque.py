@@ -9,13 +9,19 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._derivatives import fit_local_polynomials
-from tvident._equation import BUILT_IN, OFFSET
+from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET
 from tvident._results.response import Model, every_sample, without_gaps
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
 _BLOCK = 1 << 14
 """Samples that are transformed together: they stay in the cache."""
+
+SHORTEST = 9
+"""Samples that a window of the motion at single samples has at least."""
+
+POLYNOMIALS: dict[str, Any] = {"max_order": 4, "criterion": "aicc", "selection": "window"}
+"""Of the motion at single samples."""
 
 _TOUCHED = 1e-9
 """Averages of a mask above this hold a masked sample; below it they are rounding."""
@@ -45,20 +51,41 @@ def compared(
         smooth, velocity, acceleration = np.asarray(fit.derivatives, np.float64)
         # Rows of the strong form need whole windows: off their centres, and across what is missing, derivatives are no measurement.
         touched = touched_by(~np.isfinite(angle), settings["window_length"] // 2)
-        return on_time, np.where(touched, np.nan, _sum(model, (smooth, velocity, acceleration), lambda values: values))
+        predicted = _sum(model, (smooth, velocity, acceleration), lambda values: values, (smooth, velocity))
+        return on_time, np.where(touched, np.nan, predicted)
     half = settings["window_length"] // 2
     kernels = kernels_of(half, settings["exponent"], model.period)
     missing = ~(np.isfinite(angle) & np.isfinite(on_time))
     touched = touched_by(missing, half)
     filled = np.where(missing, 0.0, angle)
     acceleration, velocity, smooth = correlated_with(filled, kernels)
-    predicted = _sum(model, (smooth, velocity, acceleration), lambda values: correlated_with(values, kernels[2:])[0])
+    # Terms are functions of the motion at the samples: an average of the angle, cubed, is no average of its cube.
+    is_curved = bool(set(model.values) - {*COEFFICIENTS, OFFSET})
+    at_samples = _at_samples(filled, half, model.period) if is_curved else (smooth, velocity)
+    predicted = _sum(
+        model,
+        (smooth, velocity, acceleration),
+        lambda values: correlated_with(values, kernels[2:])[0],
+        at_samples,
+    )
     (measured,) = correlated_with(np.where(missing, 0.0, on_time), kernels[2:])
     return np.where(touched, np.nan, measured), np.where(touched, np.nan, predicted)
 
 
-def _sum(model: Model, motion: tuple[Array, Array, Array], averaged: Callable[[Array], Array]) -> Array:
-    """Return the left-hand side of the equation of motion."""
+def _at_samples(angle: Array, half: int, period: float) -> tuple[Array, Array]:
+    """Return angle and velocity at the samples, by local polynomials in windows half as long as the test function."""
+    fit: Any = fit_local_polynomials(angle, max(SHORTEST, half | 1), delta=period, **POLYNOMIALS)
+    smooth, velocity, _ = np.asarray(fit.derivatives, np.float64)
+    return smooth, velocity
+
+
+def _sum(
+    model: Model,
+    motion: tuple[Array, Array, Array],
+    averaged: Callable[[Array], Array],
+    at_samples: tuple[Array, Array],
+) -> Array:
+    """Return the left-hand side of the equation of motion; terms are averages of functions of the motion at the samples."""
     angle, velocity, acceleration = motion
     t = model.start + np.arange(angle.size) * model.period
     known = {"inertia": acceleration, "damping": velocity, "stiffness": angle}
@@ -69,10 +96,12 @@ def _sum(model: Model, motion: tuple[Array, Array, Array], averaged: Callable[[A
         elif name in known:
             regressor = known[name]
         elif name in model.own:
-            regressor = _where_known(np.asarray(model.own[name].values(t, angle.copy(), velocity.copy())), averaged)
+            regressor = _where_known(
+                np.asarray(model.own[name].values(t, *(one.copy() for one in at_samples))), averaged
+            )
         else:
             inner = model.stribeck[:1] if BUILT_IN[name].inner else ()
-            regressor = averaged(BUILT_IN[name].function(np, angle, velocity, *inner))
+            regressor = averaged(BUILT_IN[name].function(np, *at_samples, *inner))
         total = total + np.broadcast_to(every_sample(factor, angle.size, 1), angle.shape) * regressor
     return np.asarray(total)
 
