@@ -54,7 +54,7 @@ def pendulum(seed: int = 0, *, noise: float = 1e-4) -> tuple[Array, Array]:
     return angle + noise * generator.standard_normal(t.size), np.asarray(torque)
 
 
-@pytest.mark.parametrize("terms", [(0.0, 0.0), (40.0, 0.0), (0.0, 3.0), (-2.0, 1.0)], ids=str)
+@pytest.mark.parametrize("terms", [(0.0, 0.0), (40.0, 0.0), (0.0, 3.0), (-2.0, 1.0), (0.0, -8.0)], ids=str)
 def test_the_response_is_that_of_the_equation(terms: tuple[float, float]) -> None:
     generator = np.random.default_rng(7)
     n, delta = 150, 0.01

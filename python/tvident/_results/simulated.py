@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._equation import OFFSET
-from tvident._results.held_back import HeldBack, evaluated, parts_of
+from tvident._results.held_back import MORE_PARTS, PARTS, HeldBack, evaluated, parts_of
 from tvident._results.recorded import Recorded, begins_once, both_or_none, still_there
 from tvident._results.response import Model, accounted_for, every_sample
-from tvident._results.torque import compared
+from tvident._results.torque import POLYNOMIALS, SHORTEST, compared
 from tvident._status import Status
 from tvident._units import LINEAR, ROTARY, factor_said, scaled
 
@@ -22,10 +22,6 @@ Array: TypeAlias = npt.NDArray[np.float64]
 
 POOR = 2.0
 """Beside a gap values count whose errors are up to so many times the usual ones."""
-
-_SHORTEST = 9
-_POLYNOMIALS = {"max_order": 4, "criterion": "aicc", "selection": "window"}
-"""Of the motion at single samples."""
 
 
 class Simulated:
@@ -220,7 +216,11 @@ class Simulated:
             self._held_back = self._hold_back()
         return self._held_back
 
-    def _hold_back(self) -> HeldBack:
+    def _hold_back(self, ahead: int | None = None) -> HeldBack:
+        """Return how much the model explains of what it is not fitted to: of the last tenth of every tenth, one test function ahead.
+
+        Or so many samples ahead, of more parts that are as short: then what changes is known beside each.
+        """
         recorded = self._recorded
         if recorded is None:
             return HeldBack(
@@ -232,14 +232,16 @@ class Simulated:
             return HeldBack(why_not="there is no record")
         length = self.settings["window_length"]
         length = int(np.max(length)) if isinstance(length, list) and length else length
-        parts = parts_of(recorded.angles.shape[-1], length if isinstance(length, int) else 1)
+        length = ahead or length
+        samples = recorded.angles.shape[-1]
+        parts = parts_of(samples, length if isinstance(length, int) else 1, PARTS if ahead is None else MORE_PARTS)
         angles = recorded.angles.astype(np.float64)
         for _, first, end in parts:
             angles[..., first:end] = np.nan
         try:
             rest = recorded.again(angles)
             model = rest._model(rest._beside_gaps())  # noqa: SLF001 - of this class
-            found = evaluated(model, recorded.angles, recorded.torques, parts, length)
+            found = evaluated(model, recorded.angles, recorded.torques, parts, length, simulated=ahead is None)
             return found if found.why_not else replace(found, ahead=length * model.period)
         except ValueError as error:
             return HeldBack(why_not=str(error))
@@ -309,6 +311,15 @@ class Simulated:
         return self.__dict__ | {"_recorded": None}
 
 
+def predicted_ahead(result: Simulated, ahead: int | None) -> tuple[float, float]:
+    """Return how much of what is held back is predicted so many samples ahead, in percent; and how much where nothing sudden happens.
+
+    By default one test function ahead, of the parts of :meth:`Simulated.held_back`. NaN where that is not known.
+    """
+    found = result.held_back() if ahead is None else result._hold_back(ahead)  # noqa: SLF001 - of this file
+    return float(np.max(found.predicted)), found.steady
+
+
 @np.errstate(all="ignore")
 def predicted_at_samples(result: Simulated) -> Array:
     """Return the torque that the equation of one record predicts at every sample, not averaged, and as late as the recorded one.
@@ -322,8 +333,8 @@ def predicted_at_samples(result: Simulated) -> Array:
     if not isinstance(length, int):
         # Nothing was determined.
         return np.full(recorded.angles.size, np.nan)
-    length = max(_SHORTEST, length // 2 | 1)
-    settings = {"form": "strong", "window_length": length, **_POLYNOMIALS}
+    length = max(SHORTEST, length // 2 | 1)
+    settings = {"form": "strong", "window_length": length, **POLYNOMIALS}
     _, predicted = compared(model, recorded.angles, recorded.torques, settings)
     late = float(model.lags[0])
     if late == 0:

@@ -48,6 +48,8 @@ pub struct System<'a> {
 pub(crate) enum Shape {
     /// Applied in place.
     Named(fn(&mut [f64])),
+    /// What is left of it beside a line through the origin of this slope.
+    BesideLine(fn(&mut [f64]), f64),
     /// With the Stribeck velocity.
     Stribeck(f64),
 }
@@ -56,14 +58,18 @@ impl Shape {
     /// The function of one value.
     pub(crate) fn at(self, value: f64) -> f64 {
         match self {
-            Self::Named(function) => {
-                let mut values = [value];
-                function(&mut values);
-                values[0]
-            }
+            Self::Named(function) => named(function, value),
+            Self::BesideLine(function, slope) => named(function, value) - slope * value,
             Self::Stribeck(velocity) => sign(value) * (-(value / velocity).powi(2)).exp(),
         }
     }
+}
+
+/// A function that works in place, of one value.
+fn named(function: fn(&mut [f64]), value: f64) -> f64 {
+    let mut values = [value];
+    function(&mut values);
+    values[0]
 }
 
 /// A function and its factor: one value, or one a sample.
@@ -88,6 +94,21 @@ pub(crate) fn between(column: &[f64], sample: usize) -> f64 {
         [value] => *value,
         _ => 0.5 * (column[sample] + column[sample + 1]),
     }
+}
+
+/// An angle at which a function is its tangent at zero.
+const NEAR: f64 = 1e-6;
+
+/// What is left of a stiffness that a term cancels.
+const CANCELS: f64 = 0.5;
+
+/// A column's value at a sample.
+fn at(column: &[f64], sample: usize) -> f64 {
+    if column.len() == 1 { column[0] } else { column[sample] }
+}
+
+fn largest(column: &[f64]) -> f64 {
+    column.iter().fold(0.0, |most, value| most.max(value.abs()))
 }
 
 impl KnownSystem {
@@ -134,7 +155,26 @@ impl KnownSystem {
                 TermFunction::Direction => columns.of_velocity.push((Shape::Named(signs), factor)),
             }
         }
+        columns.against_stiffness();
         columns
+    }
+
+    /// Gives the stiffness the lines of terms that cancel it, such as that of a weight beside a spring of the other sign.
+    ///
+    /// Apart, both would be fast as their difference is not: every step would have to be as short as the faster one asks for.
+    fn against_stiffness(&mut self) {
+        for (shape, factor) in &mut self.of_angle {
+            let Shape::Named(function) = *shape else { continue };
+            let slope = named(function, NEAR) / NEAR;
+            let stiffness = &self.coefficients[2];
+            let beside: Vec<f64> = (0..stiffness.len().max(factor.len()))
+                .map(|sample| at(stiffness, sample) + slope * at(factor, sample))
+                .collect();
+            if largest(&beside) < CANCELS * largest(stiffness) {
+                self.coefficients[2] = beside;
+                *shape = Shape::BesideLine(function, slope);
+            }
+        }
     }
 
     /// Whether the response is the sum of what state and torque cause each.
@@ -178,6 +218,34 @@ mod tests {
         assert_eq!(shape.at(0.0), 0.0);
         assert!((shape.at(2.0) - (-1.0_f64).exp()).abs() < 1e-15 && shape.at(-2.0) == -shape.at(2.0));
         assert!((shape.at(f64::MIN_POSITIVE) - 1.0).abs() < 1e-15);
+    }
+
+    /// A weight of -3e5 N m beside a spring of 3e5 N m/rad: what is left of both is their sum, and slow. A weight alone stays as it is.
+    #[test]
+    fn what_a_weight_cancels_of_a_spring_is_no_part_of_the_system() {
+        let torque: &[f64] = &[0.0, 1.0];
+        let read = |stiffness: f64, weight: f64| {
+            let gravity = BuiltInTerm::named("gravity").expect("it is built in");
+            KnownSystem::read(&System {
+                coefficients: [1e-5, 0.01, stiffness].map(Factor::Number),
+                terms: vec![(SystemTerm::BuiltIn(gravity), Factor::Number(weight))],
+                torque: &torque,
+                lag: 0.0,
+                delta: 1e-3,
+                bridged: 0,
+            })
+        };
+        for (stiffness, weight, left) in [(3e5, -3e5 + 1.5, 1.5), (0.0, 2.0, 0.0), (3.0, 2.0, 3.0)] {
+            let columns = read(stiffness, weight);
+            let [found] = columns.coefficients[2][..] else { panic!("one stiffness") };
+            assert!((found - left).abs() < 1e-6, "{found}");
+            let (shape, factor) = &columns.of_angle[0];
+            for angle in [-0.3_f64, 1e-3, 2.0] {
+                let expected = stiffness * angle + weight * angle.sin();
+                let whole = found * angle + factor[0] * shape.at(angle);
+                assert!((whole - expected).abs() <= 8.0 * f64::EPSILON * stiffness.max(weight.abs()), "{whole}");
+            }
+        }
     }
 
     #[test]
