@@ -220,7 +220,8 @@ def test_a_servo_whose_stiffness_is_none_hears_so(folder_of_recordings: Path) ->
     angle, torque = channels["data.2"], channels["data.5"]
     alone = tvident.identify(angle, torque, sample_rate=1000, angle_unit="rad")
     assert alone.record_status & Status.SCALES_DISAGREE
-    assert alone.advice[0].startswith("the stiffness is not told from zero: try stiffness=0")
+    assert alone.advice[0].startswith("stiffness is none (")
+    assert ": try stiffness=0; then 99.99" in alone.advice[0]
     assert "23 widths of the test function were tried; none of them determined the constants" in alone.reasons
     assert "different parameters" not in alone.summary()
     # The catalogue's numbers.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,9 @@ _TESTED = {"inertia": "auto", "damping": "auto", "stiffness": "windowed"}
 _MOST = 1 << 14
 """Samples in the middle of a record that are tried in weak form."""
 
+_PART, _FUNCTIONS = 1 << 15, 64
+"""Samples, and test functions, that tell what is missing: records twice as long are tried on a part."""
+
 _MUCH_BETTER = 0.1
 """Swapped channels leave at most this part of what is unpredicted."""
 
@@ -62,8 +65,12 @@ def is_to_be_tried(data: Data, request: Request, found: Sequence[_core.Identific
 
 def is_told_by_weak_form(data: Data, request: Request) -> bool:
     """Return whether a record is a single one in strong form, of which the weak form takes any part as well."""
-    is_plain = not (data.motion.recorded or data.batch or data.weights or data.clock) and data.instruments is None
-    return isinstance(request.form, StrongForm) and is_plain and data.time.size > 0
+    return isinstance(request.form, StrongForm) and _is_plain(data) and data.time.size > 0
+
+
+def _is_plain(data: Data) -> bool:
+    """Return whether a record has nothing beside an angle and a torque, of which any part can be taken."""
+    return not (data.motion.recorded or data.batch or data.weights or data.clock) and data.instruments is None
 
 
 def is_doubted(flags: int) -> bool:
@@ -150,18 +157,34 @@ class TriedInWeakForm(_AskedOfRecord):
         }
         asked = {**kinds, "terms": self.asked_terms, "lag": self.request.lag}
         request = resolve(WeakForm(), asked, None, 1 / data.period)
-        part = replace(
-            data,
-            angles=data.angles[..., some],
-            torques=data.torques[..., some],
-            time=data.time[some],
-            mask=None if data.mask is None else data.mask[..., some],
-            step=1,
-            labels=None,
-            doubts=(),
-            moved=(),
-        )
-        return self.run(replace(request, period=self.request.period), part, diagnose=True)
+        return self.run(replace(request, period=self.request.period), _part_of(data, some), diagnose=True)
+
+
+def _part_of(data: Data, some: slice) -> Data:
+    """Return a part of a plain record."""
+    return replace(
+        data,
+        angles=data.angles[..., some],
+        torques=data.torques[..., some],
+        time=data.time[some],
+        mask=None if data.mask is None else data.mask[..., some],
+        step=1,
+        labels=None,
+        doubts=(),
+        moved=(),
+    )
+
+
+def _busiest(torque: Any, length: int) -> slice:
+    """Return the part of a record, of so many samples, in which the middle half of the torque spreads most."""
+    parts = [slice(first, first + length) for first in range(0, torque.size - length + 1, length)]
+
+    def spread(part: slice) -> float:
+        there = torque[part][np.isfinite(torque[part])]
+        # Half a part that is missing tells half as much.
+        return float(np.subtract(*np.percentile(there, [75, 25]))) * there.size if there.size else 0.0
+
+    return max(parts, key=spread)
 
 
 def _some(value: Any, some: slice) -> Any:
@@ -183,7 +206,7 @@ class Improvement(_AskedOfRecord):
 
     def words(self, result: Identification, words: Words) -> Words:
         """Return words that begin with what to change, without what was tried in vain."""
-        trial = Trial(self._identify, result, self.given, self.asked_terms, self._suspects)
+        trial = self._trial(result)
         advice = trial.advice() or self._exchanged(result)
         useless, given_well = ([], []) if advice is not None else trial.useless()
         dropped = self._explained.suspicions(self._suspects if advice is not None else useless)
@@ -198,6 +221,23 @@ class Improvement(_AskedOfRecord):
         # What is tried differs little from what it is compared with where unknowns cannot be told apart.
         before = next((place + 1 for place, line in enumerate(rest) if NOT_TOLD_APART in line), 0)
         return replace(words, advice=(*rest[:before], *([] if advice is None else [advice]), *rest[before:]))
+
+    def _trial(self, result: Identification) -> Trial:
+        """Return the trial of the record, or of its busiest part where that tells as much."""
+        data, length = self.data, result.settings["window_length"]
+        part = max(_PART, _FUNCTIONS * length) if isinstance(length, int) else _PART
+        if _is_plain(data) and data.time.size >= 2 * part:
+            some = _busiest(data.torques, part)
+            given = {name: kind if isinstance(kind, str) else _some(kind, some) for name, kind in self.given.items()}
+            identify = partial(self._identify, _part_of(data, some))
+            try:
+                found = identify(**given, terms=self.asked_terms, lag=self.request.lag, diagnose=True)
+            except ValueError:
+                # So little of the part is there that nothing can be identified in it.
+                found = None
+            if found is not None:
+                return Trial(identify, found, given, self.asked_terms, self._suspects)
+        return Trial(partial(self._identify, data), result, self.given, self.asked_terms, self._suspects)
 
     def _exchanged(self, result: Identification) -> str | None:
         """Return the question whether channels are swapped, where that explains next to everything with positive parameters.
@@ -217,9 +257,9 @@ class Improvement(_AskedOfRecord):
             )
         except ValueError:
             return None
-        left = unexplained(found)
+        left = unexplained(found).share
         is_right = all(one.value > BEYOND_CHANCE * one.stderr for one in map(found.value, COEFFICIENTS))
-        if not (is_right and left <= NEXT_TO_NOTHING and left <= _MUCH_BETTER * unexplained(result)):
+        if not (is_right and left <= NEXT_TO_NOTHING and left <= _MUCH_BETTER * unexplained(result).share):
             return None
         return (
             f"are the channels of angle and torque swapped? With one in the other's place inertia, damping and stiffness are positive, "
@@ -249,9 +289,9 @@ class Improvement(_AskedOfRecord):
         present = {*suspects, *(one.name for one in self.terms)}
         return suspects + [name for name in dict.fromkeys(others) if name not in present]
 
-    def _identify(self, *, lag: Any, terms: Any, diagnose: bool = False, **given: Any) -> Identification:
+    def _identify(self, data: Data, *, lag: Any, terms: Any, diagnose: bool = False, **given: Any) -> Identification:
         form = WeakForm(**{name: given.pop(name) for name in _LENGTHS if name in given})
         asked = {**given, "terms": terms, "lag": lag, "quantisation": self.request.quantisation}
         # An angle that turns is unwrapped by now.
         request = replace(resolve(form, asked, None, 1 / self.data.period), period=self.request.period)
-        return self.run(request, replace(self.data, step=1, labels=None, doubts=()), diagnose=diagnose)
+        return self.run(request, replace(data, step=1, labels=None, doubts=()), diagnose=diagnose)

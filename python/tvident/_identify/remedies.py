@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from tvident._arguments import percent, with_error
 from tvident._equation import BUILT_IN, COEFFICIENTS
-from tvident._results import TRIED, Identification
+from tvident._results import BECOMES, TRIED, Identification, predicted_ahead
 from tvident._status import DOUBTFUL_RECORD, Status
 
 _WORTH = 0.9
@@ -31,7 +31,58 @@ NEXT_TO_NOTHING = 0.01
 BEYOND_CHANCE = 4.0
 """Standard errors that a term must be away from nothing."""
 
+_ELSEWHERE = 3.0
+"""Standard errors from which on a better equation finds a parameter elsewhere."""
+
+_MATTERS = 0.01
+"""A share of a parameter by which it must move to be told."""
+
+_AGAINST = 0.1
+"""A share of a weight that a negative stiffness beside it may have: with more the two are told apart by nothing."""
+
 Call = dict[str, Any]
+
+
+class Unexplained(NamedTuple):
+    """Shares of the angle's variance that are not predicted of what is held back; infinite where that is not known.
+
+    Parameters
+    ----------
+    share : float
+        Of all parts.
+    steady : float
+        Without the parts that are predicted worst: where something changes suddenly nothing is foreseen, whatever the equation is.
+    """
+
+    share: float
+    steady: float
+
+
+@dataclass(frozen=True)
+class _Left:
+    """What a model leaves unexplained of what is held back, and what the model at hand does, predicted equally far ahead."""
+
+    least: Unexplained
+    now: Unexplained
+
+    @property
+    def ratio(self) -> float:
+        """The first over the second, or over all where the model at hand predicts nothing; infinite if it is the worse one of all parts."""
+        if not 0 < self.now.steady < np.inf:
+            return self.least.share
+        return self.least.steady / self.now.steady if self.least.share <= self.now.share else np.inf
+
+    def __str__(self) -> str:
+        before = f", not {percent(1 - self.now.share)}" if self.now.share < 1 else ""
+        return f"then {percent(1 - self.least.share)} {TRIED}{before}"
+
+
+@dataclass(frozen=True)
+class _Remedy:
+    """What to change, in words, and what it leaves unexplained beside the model at hand."""
+
+    ratio: float
+    words: str
 
 
 @dataclass(frozen=True)
@@ -57,6 +108,7 @@ class Trial:
     given: Mapping[str, Any]
     terms: Sequence[Any]
     suspects: Sequence[str]
+    _now: dict[int | None, Unexplained] = field(default_factory=dict, init=False, repr=False)
 
     def advice(self) -> str | None:
         """Return what to change, and what that explains; None where nothing that was tried is better by far."""
@@ -64,48 +116,54 @@ class Trial:
         if not any(isinstance(kind, str) for kind in constant.values()):
             return None
         call: Call = constant | {"terms": list(self.terms), "lag": self.result.settings["lag"]}
-        chosen, best = [], self._left(call)
+        of_constants = self._of_constants(call)
+        # What explains nothing with parameters that change is not explained by one term more either.
+        is_changing = "windowed" in self.result.settings["kinds"].values() and not self._explains_nothing
+        # Where a parameter changes constants explain too little to tell what is missing: they take what lets them follow the change.
+        beside = self._beside_changes(call) if is_changing else None
+        if of_constants is None or (beside is not None and of_constants.ratio > _AS_GOOD * beside.ratio):
+            return None if beside is None else beside.words
+        return of_constants.words
+
+    def _of_constants(self, call: Call) -> _Remedy | None:
+        """Return which suspects, or which stiffness of none, explain more where everything is constant."""
+        chosen, best = [], self._spread(call)
         while rest := [one for one in self.suspects if one not in chosen]:
-            left = {one: self._left(self._with(call, one)) for one in rest}
+            left = {one: self._spread(self._with(call, one)) for one in rest}
             next_one = min(rest, key=left.__getitem__)
             if not (np.isfinite(left[next_one]) and left[next_one] <= _WORTH * best):
                 break
             chosen.append(next_one)
             call, best = self._with(call, next_one), left[next_one]
         without = call | {"stiffness": 0.0}
-        # What explains nothing with parameters that change is not explained by one term more either.
-        if not chosen and not self._explains_nothing and "windowed" in self.result.settings["kinds"].values():
-            # Where a parameter changes constants explain too little to tell what is missing.
-            advice = self._beside_changes(call)
-            if advice is not None:
-                return advice
-        is_none = isinstance(self.given["stiffness"], str) and bool(self._left(without) <= _NOTHING * best < np.inf)
+        is_none = isinstance(self.given["stiffness"], str) and bool(self._spread(without) <= _NOTHING * best < np.inf)
         if self._explains_nothing and not chosen and not is_none:
             return None
         return self._compared(call, without if is_none else call, chosen)
 
-    def _beside_changes(self, call: Call) -> str | None:
-        """Return which one suspect explains more of what is held back, with parameters as they were asked for."""
-        found, changed_by = {}, dict[str, Call]()
+    def _beside_changes(self, call: Call) -> _Remedy | None:
+        """Return which one suspect explains more of what is held back, with parameters as they were asked for.
+
+        Each gets lengths of its own: those that were chosen follow what is missing.
+        """
         # Inertia and damping that may change take the place of what is missing.
         kinds = {name: call[name] if name != "stiffness" else kind for name, kind in self.given.items()}
+        found = {}
         for one in self.suspects:
             changed = self._with(call, one)
-            changed_by[one] = {"terms": changed["terms"], "lag": changed["lag"]}
-            # Which one is found with the lengths that were chosen, what it is worth with its own: choosing takes most of the time.
-            result = self.identify(**kinds, **changed_by[one], **self._lengths)
-            found[one] = unexplained(result) if _is_there(one, result) else np.inf
-        best = min(found, key=found.__getitem__)
-        now = unexplained(self.result)
-        if not found[best] <= _WORTH * now:
+            found[one] = self.identify(**kinds, terms=changed["terms"], lag=changed["lag"])
+        ratios = {one: self._left_of(result).ratio for one, result in found.items() if _is_there(one, result)}
+        best = min(ratios, key=ratios.__getitem__, default=None)
+        if best is None or not ratios[best] <= _BETTER:
             return None
-        result = self.identify(**kinds, **changed_by[best], diagnose=True)
-        least = unexplained(result)
-        if not (_is_there(best, result) and least <= _BETTER * now and _holds(least, lambda: result)):
+        changed = self._with(call, best)
+        result = self.identify(**kinds, terms=changed["terms"], lag=changed["lag"], diagnose=True)
+        left = self._left_of(result)
+        if not (_is_there(best, result) and left.ratio <= _BETTER and _holds(left.least.share, lambda: result)):
             return None
-        terms = [term if isinstance(term, str) else term.name for term in self._with(call, best)["terms"]]
+        terms = [term if isinstance(term, str) else term.name for term in changed["terms"]]
         change = f"lag={result.settings['lag']:.4g}" if best == "lag" else f"terms={terms}"
-        return f"{self._suspicion(best, result)}: try {change}; {_gain(least, now)}"
+        return _Remedy(left.ratio, f"{self._suspicion(best, result)}: try {change}; {left}{self._moved(result)}")
 
     def useless(self) -> tuple[list[str], list[str]]:
         """Return suspects that explain nothing, and constants that were given and predict as well as when they may change.
@@ -117,12 +175,12 @@ class Trial:
         call: Call = dict(self.given) | {"terms": list(self.terms), "lag": self.result.settings["lag"]}
         suspects = []
         if not changing and self.suspects:
-            best = self._left(call)
-            suspects = [one for one in self.suspects if not self._left(self._with(call, one)) <= _WORTH * best]
+            best = self._spread(call)
+            suspects = [one for one in self.suspects if not self._spread(self._with(call, one)) <= _WORTH * best]
         given = [name for name in COEFFICIENTS if isinstance(self.given[name], str) and self.given[name] == "constant"]
         if given and self.result.record_status & Status.KIND_CONTRADICTED:
             free = self.identify(**(call | dict.fromkeys(given, "auto")))
-            if not unexplained(free) <= _BETTER * unexplained(self.result):
+            if not self._left_of(free).ratio <= _BETTER:
                 return suspects, given
         return suspects, []
 
@@ -134,18 +192,13 @@ class Trial:
         is_lost = bool(self.result.record_status & Status.RANK_DEFICIENT)
         return is_lost and not any(np.isfinite(getattr(self.result, name)).any() for name in COEFFICIENTS)
 
-    @property
-    def _lengths(self) -> Call:
-        """Lengths of the test function and of windows, as they were chosen."""
-        return {name: self.result.settings[name] for name in ("window_length", "exponent", "regression_window")}
-
     def _identified(self, call: Call, *, diagnose: bool = False) -> Identification:
         window = {name: self.result.settings[name] for name in ("window_length", "exponent")}
         return self.identify(
             **(call | {"terms": [(term, "constant") for term in call["terms"]]}), **window, diagnose=diagnose
         )
 
-    def _left(self, call: Call) -> float:
+    def _spread(self, call: Call) -> float:
         """Return the variance of the residuals where everything is constant."""
         try:
             found = self._identified(call)
@@ -156,39 +209,60 @@ class Trial:
         spread = found.residual_std[np.isfinite(found.residual_std)]
         return float(np.median(spread)) ** 2 if spread.size else np.inf
 
-    def _compared(self, before: Call, call: Call, chosen: Sequence[str]) -> str | None:
+    def _left_of(self, found: Identification) -> _Left:
+        """Return what a result leaves unexplained, as far ahead as the longer of both test functions.
+
+        One test function ahead is another distance for each, and what is near is predicted by anything.
+        """
+        lengths = [one.settings["window_length"] for one in (found, self.result)]
+        ahead = max((length for length in lengths if isinstance(length, int)), default=None)
+        if ahead not in self._now:
+            self._now[ahead] = unexplained(self.result, ahead)
+        return _Left(unexplained(found, ahead), self._now[ahead])
+
+    def _compared(self, before: Call, call: Call, chosen: Sequence[str]) -> _Remedy | None:
         """Return the advice in words, if it explains more of what is held back than the model at hand."""
-        found, now = self._identified(call), unexplained(self.result)
+        found = self._identified(call)
         if call["lag"] == "auto":
             call = call | {"lag": float(f"{found.settings['lag']:.4g}")}
-        kept = {
-            name: call[name] if name == "stiffness" and call[name] == 0 else kind for name, kind in self.given.items()
-        }
+        is_none = call["stiffness"] != before["stiffness"]
+        kept = {name: call[name] if name == "stiffness" and is_none else kind for name, kind in self.given.items()}
         free = self.identify(**kept, terms=call["terms"], lag=call["lag"])
-        left, left_free = unexplained(found), unexplained(free)
+        left, left_free = self._left_of(found), self._left_of(free)
         changing = [name for name in COEFFICIENTS if free.settings["kinds"][name] in {"windowed", "varying"}]
-        is_simple = bool(changing) and left <= _AS_GOOD * left_free
-        least = left if is_simple else left_free
-        if not (is_simple or chosen or call["stiffness"] != before["stiffness"]):
+        is_simple = bool(changing) and left.ratio <= _AS_GOOD * left_free.ratio
+        best, of_best = (left, found) if is_simple else (left_free, free)
+        if not (is_simple or chosen or is_none):
             return None
-        if not least <= _BETTER * now or not _holds(least, lambda: self._identified(call, diagnose=True)):
+        if not best.ratio <= _BETTER or not _holds(best.least.share, lambda: self._identified(call, diagnose=True)):
             return None
         words = []
-        if call["stiffness"] != before["stiffness"]:
+        if is_none:
             value = self._identified(before).value("stiffness")
             words.append(
                 f"stiffness is none ({with_error(value.value, value.stderr)} {self.result.units['stiffness']}, all constant)"
             )
-        words += [self._suspicion(name, found) for name in chosen]
+        words += [self._suspicion(name, found if name == "lag" else of_best) for name in chosen]
         words = words or [f"{' and '.join(changing)} need not change"]
-        changes = [f"stiffness={call['stiffness']:g}"] if call["stiffness"] != before["stiffness"] else []
+        changes = [f"stiffness={call['stiffness']:g}"] if is_none else []
         if len(call["terms"]) > len(self.terms):
             shown = [term if isinstance(term, str) else term.name for term in call["terms"]]
             changes.append(f"terms={shown}")
         if "lag" in chosen:
             changes.append(f"lag={call['lag']:.4g}")
         changes += [f"{name}='constant'" for name in changing if is_simple and call[name] == "constant"]
-        return f"{', '.join(words)}: try {', '.join(changes)}; {_gain(least, now)}"
+        return _Remedy(best.ratio, f"{', '.join(words)}: try {', '.join(changes)}; {best}{self._moved(of_best)}")
+
+    def _moved(self, found: Identification) -> str:
+        """Return which parameters a better equation finds elsewhere, in words."""
+        words = []
+        for name in COEFFICIENTS:
+            if not isinstance(self.given[name], str) or found.settings["kinds"][name] == "known":
+                continue
+            (before, error, *_), (after, least, *_) = self.result.value(name), found.value(name)
+            if abs(after - before) > max(_ELSEWHERE * np.hypot(error, least), _MATTERS * abs(after)):
+                words.append(f", {name}{BECOMES}{with_error(after, least)} {found.units[name]}")
+        return "".join(words)
 
     def _suspicion(self, name: str, found: Identification) -> str:
         if name == "lag":
@@ -199,19 +273,23 @@ class Trial:
         return BUILT_IN[name].suspicion.format(amount=f"{with_error(value, error)} {found.units.get(name, '')}")
 
 
-def _gain(least: float, now: float) -> str:
-    before = f", not {percent(1 - now)}" if now < 1 else ""
-    return f"then {percent(1 - least)} {TRIED}{before}"
-
-
 def _is_there(name: str, found: Identification) -> bool:
-    """Return whether a term or a lag is beyond chance; friction that drives the motion is no friction."""
+    """Return whether a term or a lag is beyond chance, and can be what it is called."""
     if name == "lag":
         value, error = found.settings["lag"], found.settings.get("lag_stderr") or 0.0
     else:
         value, error, *_ = found.value(name)
-    drives = value <= 0 and name in BUILT_IN and BUILT_IN[name].dissipates
-    return bool(abs(value) > BEYOND_CHANCE * error and not drives)
+    return bool(abs(value) > BEYOND_CHANCE * error and _is_physical(name, value, found))
+
+
+def _is_physical(name: str, value: float, found: Identification) -> bool:
+    """Return whether friction resists the motion, and a weight pulls without a negative spring beside it."""
+    term = BUILT_IN.get(name)
+    if term is None:
+        return True
+    if term.spring == "instead":
+        return value > 0 and found.value("stiffness").value >= -_AGAINST * value
+    return value > 0 or not term.dissipates
 
 
 def _holds(share: float, again: Callable[[], Identification]) -> bool:
@@ -222,7 +300,7 @@ def _holds(share: float, again: Callable[[], Identification]) -> bool:
     return share <= NEXT_TO_NOTHING or not flags & DOUBTFUL_RECORD
 
 
-def unexplained(result: Identification) -> float:
-    """Return the share of the angle's variance that is not predicted one test function ahead; infinite where that is not known."""
-    predicted = float(np.max(result.held_back().predicted))
-    return 1 - predicted / 100 if np.isfinite(predicted) else np.inf
+def unexplained(result: Identification, ahead: int | None = None) -> Unexplained:
+    """Return what is not predicted so many samples ahead, by default one test function ahead."""
+    shares = [1 - predicted / 100 for predicted in predicted_ahead(result, ahead)]
+    return Unexplained(*(share if np.isfinite(share) else np.inf for share in shares))

@@ -12,7 +12,7 @@ from tvident._results.records import IdentifiedRecords, Shared, covariance_betwe
 from tvident._results.response import Model, accounted_for, every_sample, without_gaps
 from tvident._results.result import Identification
 from tvident._results.scan import Scan, scan_of
-from tvident._results.simulated import POOR, in_units_of, predicted_at_samples
+from tvident._results.simulated import POOR, in_units_of, predicted_ahead, predicted_at_samples
 from tvident._results.stored import plain_scan, plain_words, scan_from, words_from
 from tvident._results.summary import COLUMNS, row_of, sentences_of
 from tvident._results.told import Telling
@@ -28,9 +28,10 @@ from tvident._results.verdict import (
     verdict_of_trusted,
     why_not,
 )
-from tvident._results.words import TRIED, Words, of_batch
+from tvident._results.words import BECOMES, TRIED, Words, of_batch
 
 __all__ = [
+    "BECOMES",
     "CHANGING",
     "COLUMNS",
     "POOR",
@@ -68,6 +69,7 @@ __all__ = [
     "parts_of",
     "plain_scan",
     "plain_words",
+    "predicted_ahead",
     "predicted_at_samples",
     "relative_error",
     "row_of",

@@ -18,6 +18,12 @@ PARTS = 10
 
 _SHARE = 0.1
 
+_SUDDEN = 0.1
+"""The share of the parts that may hold a sudden change, which no model that was fitted beside it can foresee."""
+
+MORE_PARTS = 64
+"""Of which the ends are held back where equations are compared."""
+
 _FUNCTIONS = 10
 """Test functions that a part must be long, so that the held-back tenth of it is as long as one."""
 
@@ -38,6 +44,8 @@ class HeldBack:
         Why there are no numbers; empty if there are.
     ahead : float
         Seconds that a test function is long: what was predicted with a longer one cannot be compared with what was with a shorter one.
+    steady : float
+        As `predicted`, without the tenth of the parts that are predicted worst; of a single record.
     """
 
     simulated: Any = np.nan
@@ -45,6 +53,7 @@ class HeldBack:
     parts: int = PARTS
     why_not: str = ""
     ahead: float = np.nan
+    steady: float = np.nan
 
     def words(self) -> str:
         """Return it as a line."""
@@ -74,9 +83,9 @@ def where_held_back(parts: int) -> str:
     return few.get(parts, f"the last tenth of each of {parts} parts")
 
 
-def parts_of(samples: int, window_length: int) -> list[tuple[int, int, int]]:
-    """Return the parts of a record: first sample, first that is held back, end."""
-    count = min(PARTS, max(1, samples // (_FUNCTIONS * window_length)))
+def parts_of(samples: int, window_length: int, most: int = PARTS) -> list[tuple[int, int, int]]:
+    """Return the parts of a record, at most so many: first sample, first that is held back, end."""
+    count = min(most, max(1, samples // (_FUNCTIONS * window_length)))
     ends = [round(samples * part / count) for part in range(count + 1)]
     return [(begin, end - max(1, round(_SHARE * (end - begin))), end) for begin, end in pairwise(ends)]
 
@@ -87,8 +96,10 @@ def evaluated(
     torque: npt.NDArray[np.number],
     parts: list[tuple[int, int, int]],
     window_length: int,
+    *,
+    simulated: bool = True,
 ) -> HeldBack:
-    """Return what a model that was fitted to the rest explains of the ends of the parts."""
+    """Return what a model that was fitted to the rest explains of the ends of the parts; if asked for, simulated as well."""
     held = np.zeros(angle.shape[-1], bool)
     pieces, whole = [], []
     # Where a term is not linear the state takes many simulations; the last ten test functions tell it.
@@ -102,11 +113,25 @@ def evaluated(
     values = {name: without_gaps(value) if value.shape[-1] > 1 else value for name, value in model.values.items()}
     model = replace(model, values=values)
     # What a piece tells of its first half is no prediction: the piece before overwrites it.
-    shares = []
-    for spans in (whole, pieces[::-1]):
-        simulated, _ = model.respond(torque, angle=angle, spans=spans)
-        share = accounted_for(angle[..., held], simulated[..., held])
+    shares, response = [], np.empty(0)
+    for spans in (whole, pieces[::-1]) if simulated else (pieces[::-1],):
+        response, _ = model.respond(torque, angle=angle, spans=spans)
+        share = accounted_for(angle[..., held], response[..., held])
         shares.append(share if share.ndim else float(share))
     if not np.isfinite(shares[0]).any():
         return HeldBack(why_not="no sample that was held back has an angle and parameters")
-    return HeldBack(shares[0], shares[1], len(parts))
+    steady = _without_the_worst(angle, response, parts) if angle.ndim == 1 else np.nan
+    return HeldBack(shares[0] if simulated else np.nan, shares[-1], len(parts), steady=steady)
+
+
+def _without_the_worst(
+    angle: npt.NDArray[np.number], predicted: npt.NDArray[np.float64], parts: list[tuple[int, int, int]]
+) -> float:
+    """Return the share of the variance that is predicted of the parts, without those that are predicted worst, in percent."""
+    squares = np.nan_to_num((angle - predicted) ** 2, nan=np.inf)
+    errors = [squares[first:end].mean() for _, first, end in parts]
+    kept = np.argsort(errors)[: len(parts) - int(_SUDDEN * len(parts))]
+    there = np.zeros(angle.size, bool)
+    for place in kept:
+        there[parts[place][1] : parts[place][2]] = True
+    return float(accounted_for(angle[there], predicted[there]))

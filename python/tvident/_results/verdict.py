@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tvident._arguments import explained_in_words, percent, to_digits_of
-from tvident._results.words import OTHER_UNIT, TRIED
+from tvident._results.words import BECOMES, OTHER_UNIT, TRIED
 from tvident._status import Status
 from tvident._units import in_words_of
 
@@ -75,10 +75,18 @@ def _verdict(result: Any, share: float | None) -> str:
 
 def _of_one(result: Any, known: float | None) -> str:
     share = cache(lambda: explained(result) if known is None else known)  # a prediction of the whole record
-    reason = _distrusted(result, share)
+    reason = _distrusted(result, share) or _found_elsewhere(result.advice)
     if reason:
         return verdict_of_distrusted(result, reason)
     return verdict_of_trusted(result, _errors(result), share())
+
+
+def _found_elsewhere(advice: Sequence[str]) -> str | None:
+    """Return which parameters an equation that explains more finds elsewhere, in words."""
+    names = [name for name in _SYMBOLS if any(f" {name}{BECOMES}" in line for line in advice)]
+    if not names:
+        return None
+    return f"another equation explains more, and finds another {' and another '.join(names)}"
 
 
 def verdict_of_distrusted(result: Any, reason: str) -> str:

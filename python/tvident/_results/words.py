@@ -8,6 +8,9 @@ from dataclasses import dataclass
 TRIED = "of what is held back are predicted"
 """What advice says that was tried on the record."""
 
+BECOMES = " becomes "
+"""Between a parameter and the value that a better equation gives it, in advice."""
+
 OTHER_UNIT = ("degrees?", "milliseconds?")
 """How advice asks about units, of which all numbers depend."""
 
