@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
+from tvident._advice.lists import listed
 from tvident._equation import COEFFICIENTS
 from tvident._status import Status, stretches_of
 
@@ -134,14 +135,25 @@ def unexplained_here(found: _core.Identification, period: float, step: int) -> l
     flagged = found.status & Status.NOISE_MODEL != 0
     if found.outside_mask is not None or not flagged.any():
         return []
-    begins, ends = stretches_of(flagged)
-    seconds = period * step
-    shown = ", ".join(f"{a * seconds:.4g}-{b * seconds:.4g}" for a, b in list(zip(begins, ends, strict=True))[:_SHOWN])
-    more = " …" if begins.size > _SHOWN else ""
     words = (
-        f"in {flagged.mean():.1%} of the record (at {shown}{more} s) the residual exceeds what the noise explains: was the machine "
-        "touched, does something change there that no window follows, or is the noise larger? Errors are larger there, and values not "
-        "trusted: mask these samples, or give weights="
+        f"in {flagged.mean():.1%} of the record (at {_times(flagged, period * step)} s) the residual exceeds what the noise explains: was "
+        "the machine touched, does something change there that no window follows, or is the noise larger? Errors are larger there, and "
+        "values not trusted: mask these samples, or give weights="
+    )
+    return [words]
+
+
+def untold_here(found: _core.Identification, windowed: Sequence[str], period: float, step: int) -> list[str]:
+    """Return where the motion tells nothing of what is windowed, and what to do there."""
+    told_apart = np.asarray(found.condition) <= _core.HARDLY_TOLD_APART
+    # Of invalid samples, and where nothing is windowed, the flag is the record's.
+    flagged = (found.status & (Status.ILL_CONDITIONED | Status.INVALID) == Status.ILL_CONDITIONED) & told_apart
+    if not (windowed and flagged.any()):
+        return []
+    words = (
+        f"in {flagged.mean():.1%} of the record (at {_times(flagged, period * step)} s) the motion tells nothing of "
+        f"{listed(list(windowed))}: errors are as large as anything that the torques of this record suggest, and values are not trusted: "
+        "drive the machine there, or make it constant or 'varying', if it is"
     )
     return [words]
 
@@ -152,6 +164,13 @@ def one_factor(unknowns: Mapping[str, _core.Unknown]) -> list[str]:
     if len(changing) < len(COEFFICIENTS):
         return []
     inertia, damping, stiffness = [one.values / np.nanmean(one.values) - 1 for one in changing]
+def _times(flagged: npt.NDArray[np.bool_], seconds: float) -> str:
+    """Return when samples are flagged, so many seconds apart."""
+    begins, ends = stretches_of(flagged)
+    shown = ", ".join(f"{a * seconds:.4g}-{b * seconds:.4g}" for a, b in list(zip(begins, ends, strict=True))[:_SHOWN])
+    return shown + (" …" if begins.size > _SHOWN else "")
+
+
     errors = [_root_mean_square(one.stderr * one.factor / np.nanmean(one.values)) for one in changing]
     change = _root_mean_square(inertia)
     is_one = _root_mean_square(inertia - stiffness) < _ONE_FACTOR * change

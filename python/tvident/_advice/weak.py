@@ -19,6 +19,7 @@ from tvident._advice.events import (
     pulses,
     spikes,
     unexplained_here,
+    untold_here,
 )
 from tvident._advice.instrument import fed_back
 from tvident._advice.lists import listed
@@ -119,6 +120,7 @@ class Explained:
             *disagreement(self.found, self.names, self.units, flags),
             *self._misfit(flags),
             *unexplained_here(self.found, self.period, self.step),
+            *untold_here(self.found, self._windowed(), self.period, self.step),
             *one_factor(dict(zip(self.names, self.found.unknowns, strict=True))),
             *self._outside(),
             *self._contradictions(),
@@ -138,6 +140,10 @@ class Explained:
     def _changing(self) -> list[str]:
         """Return the names of the unknowns that are not constant."""
         return [name for name, one in zip(self.names, self.found.unknowns, strict=True) if one.kind != "constant"]
+
+    def _windowed(self) -> list[str]:
+        """Return the names of the unknowns that belong to windows."""
+        return [name for name, one in zip(self.names, self.found.unknowns, strict=True) if one.kind == "windowed"]
 
     def _noise(self) -> str:
         angle, torque = np.sqrt(self.found.noise or (np.nan, np.nan))

@@ -134,7 +134,9 @@ _ADVICE = {
     Status.CHANNEL_SUSPECTED: (
         "a channel seems to be clipped, held, interpolated, wrapped or filtered, or its stamps of time jitter: do as the summary says"
     ),
-    Status.ILL_CONDITIONED: "the regressors are nearly collinear: look at the standard errors first",
+    Status.ILL_CONDITIONED: (
+        "the regressors are nearly collinear, or the motion tells nothing of what is windowed there: look at the standard errors first"
+    ),
 }
 
 RECORD_FLAGS = (

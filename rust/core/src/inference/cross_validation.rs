@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::exec::stages::Stages;
+use crate::inference::moving::moving;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::predictor::{Predictor, without_constants};
@@ -35,24 +36,47 @@ pub(crate) fn validate(
     instructions: Instructions,
     stages: &mut Stages<'_, '_>,
 ) -> Result<Vec<Validated>, Error> {
-    let rows = compared_rows(problem, scales);
+    let compared = ComparedRows::new(problem, scales);
     let mut validated = Vec::new();
     for &scale in scales {
         if let Some(fit) = Fit::with_leave_gap_out(problem, scale, expected, instructions, stages)? {
-            let error = error(problem, scale, &fit, rows.clone(), expected.variance);
+            let error = compared.error(problem, scale, &fit, expected.variance);
             validated.push(Validated { fit, error });
         }
     }
     Ok(validated)
 }
 
-/// The same rows for all lengths, so that they are compared on equal terms.
-pub(crate) fn compared_rows(problem: &Problem<'_>, scales: &[Scale]) -> Range<usize> {
-    let (rows, inside) = (problem.rows(), problem.inside());
-    let full = || scales.iter().map(|scale| scale.full_rows(rows));
-    let start = full().map(|rows| rows.start).max().unwrap_or(0).min(inside.start + inside.len() / 4);
-    let end = full().map(|rows| rows.end).min().unwrap_or(rows).max(inside.start + 3 * inside.len() / 4);
-    start..end
+/// The same rows for all lengths, so that they are compared on equal terms, and which rows of the record move.
+pub(crate) struct ComparedRows {
+    rows: Range<usize>,
+    moving: Vec<bool>,
+}
+
+impl ComparedRows {
+    pub(crate) fn new(problem: &Problem<'_>, scales: &[Scale]) -> Self {
+        let (rows, inside) = (problem.rows(), problem.inside());
+        let full = || scales.iter().map(|scale| scale.full_rows(rows));
+        let start = full().map(|rows| rows.start).max().unwrap_or(0).min(inside.start + inside.len() / 4);
+        let end = full().map(|rows| rows.end).min().unwrap_or(rows).max(inside.start + 3 * inside.len() / 4);
+        let reach = scales.first().map_or(1, |scale| scale.reach);
+        Self { rows: start..end, moving: moving(problem, reach) }
+    }
+
+    /// Mean squared error, over the noise's variance, of predicting rows from the windows on both sides of them: of all, or of those that move, if it is
+    /// larger.
+    pub(crate) fn error(&self, problem: &Problem<'_>, scale: Scale, fit: &Fit, variance: f64) -> f64 {
+        let Some(squared) = squared_errors(problem, scale, fit, variance) else { return f64::NAN };
+        let [mut all, mut moving] = [(0.0, 0.0_f64); 2];
+        for (row, squared) in self.rows.clone().filter_map(|row| Some((row, squared(row)?))) {
+            all = (all.0 + squared, all.1 + 1.0);
+            if self.moving[row] {
+                moving = (moving.0 + squared, moving.1 + 1.0);
+            }
+        }
+        let mean = |(sum, count): (f64, f64)| sum / count;
+        if all.1 == 0.0 { f64::INFINITY } else { mean(all).max(mean(moving)) }
+    }
 }
 
 /// The fit with the smallest error, or `None` if none predicts any row.
@@ -94,14 +118,6 @@ pub(crate) fn not_ruled_out(
         differences.len() >= FEWEST_PARTS && (always || mean > WORSE * (squared / (count * (count - 1.0))).sqrt())
     };
     squares.iter().map(|squares| !is_worse(squares)).collect()
-}
-
-/// Mean squared error, over the noise's variance, of predicting rows from the windows on both sides of them.
-pub(crate) fn error(problem: &Problem<'_>, scale: Scale, fit: &Fit, rows: Range<usize>, variance: f64) -> f64 {
-    let Some(squared) = squared_errors(problem, scale, fit, variance) else { return f64::NAN };
-    let (sum, count) =
-        rows.filter_map(squared).fold((0.0, 0.0_f64), |(sum, count), squared| (sum + squared, count + 1.0));
-    if count > 0.0 { sum / count } else { f64::INFINITY }
 }
 
 /// The squared error of predicting a row from the windows on both sides of it, over the noise's variance and clipped.
@@ -210,7 +226,14 @@ mod tests {
         let fit = fit.expect("constants");
         // No window of another row but those within its reach holds the row; its own prediction is the only one that is not zero alone.
         let held = scale.span() + 1;
-        let found = error(&problem, scale, &fit, 600..800, 1.0);
+        let error = |moving: Range<usize>| {
+            let moving = (0..ROWS).map(|row| moving.contains(&row)).collect();
+            ComparedRows { rows: 600..800, moving }.error(&problem, scale, &fit, 1.0)
+        };
+        let found = error(0..ROWS);
         assert!(found >= MOST / 200.0 && found <= MOST * held as f64 / 200.0, "{found}");
+        // Where others do not move it counts among those that do; and it counts where it does not move itself.
+        assert!(error(650..750) >= found.max(MOST / 100.0));
+        assert_eq!(error(0..600), found);
     }
 }

@@ -6,6 +6,7 @@ pub(crate) mod explained;
 pub(crate) mod identifiability;
 pub(crate) mod jumps;
 pub(crate) mod missing_terms;
+pub(crate) mod moving;
 pub(crate) mod over_record;
 pub(crate) mod scales;
 pub(crate) mod slow_curve;

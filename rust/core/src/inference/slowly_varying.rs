@@ -9,7 +9,7 @@ use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::exec::stages::Stages;
 use crate::inference::constancy::BLOCKS;
-use crate::inference::cross_validation::{compared_rows, error, validate};
+use crate::inference::cross_validation::{ComparedRows, validate};
 use crate::inference::slow_curve::Varying;
 use crate::inference::slow_equations::{QUADRATIC, Slow};
 use crate::regression::constants::Expected;
@@ -137,8 +137,8 @@ pub(crate) fn find(
             let rhs = without(rows, slow, &leave_gap_out);
             let problem = rest.problem(rows, &rhs, noise, None);
             let fit = Fit::with_leave_gap_out(&problem, best, expected, instructions, stages)?;
-            let rows = compared_rows(&problem, scales);
-            predicted = fit.map_or(f64::INFINITY, |fit| error(&problem, best, &fit, rows, expected.variance));
+            let compared = ComparedRows::new(&problem, scales);
+            predicted = fit.map_or(f64::INFINITY, |fit| compared.error(&problem, best, &fit, expected.variance));
         }
         let (error, reach) = (next.error, reach.min(whole / 2.0));
         found = Some(SlowCoefficients { varying, rhs, scale: best, equations_of: scale, error, predicted, reach });

@@ -9,6 +9,7 @@ use std::ops::Range;
 use crate::error::Error;
 use crate::exec::pool::{ROWS, ranges};
 use crate::exec::stages::Stages;
+use crate::inference::moving::moving;
 use crate::inference::over_record::{ErrorSums, OverRecord};
 use crate::inference::windows_around::{Around, WindowAtRow};
 use crate::regression::constants::Expected;
@@ -185,20 +186,23 @@ impl View<'_, '_> {
             solved.push(Candidate { scale, cells, record: candidate.record });
         }
         let ready = ready(&solved);
+        let moving = moving(self.problem, self.reach);
         let work = |piece: Range<usize>, (): &mut ()| {
             let counted = piece.start.max(rows.start)..piece.end.min(rows.end);
             let both = solved.iter().zip(&ready);
-            both.map(|(candidate, ready)| self.sums(candidate, ready.as_ref(), counted.clone())).collect::<Vec<_>>()
+            both.map(|(candidate, ready)| self.sums(candidate, ready.as_ref(), (counted.clone(), &moving)))
+                .collect::<Vec<_>>()
         };
         let sums = stages.map(ranges(self.problem.rows()), || (), work)?;
         for (index, candidate) in candidates.iter_mut().enumerate() {
             for which in 0..POSITIONS {
-                let mut all = ErrorSums::default();
+                let [mut all, mut moving] = [ErrorSums::default(); 2];
                 for sums in &sums {
-                    all.merge(sums[index][which]);
+                    all.merge(sums[index][which][0]);
+                    moving.merge(sums[index][which][1]);
                 }
                 if all.count > 0.0 {
-                    candidate.record[which] = all.over_record();
+                    candidate.record[which] = if moving.count > 0.0 { moving } else { all }.over_record();
                 }
             }
         }
@@ -229,9 +233,14 @@ impl View<'_, '_> {
         (error * error / self.variance).min(MOST)
     }
 
-    /// Sums over rows, by position.
-    fn sums(&self, candidate: &Candidate, ready: Option<&Around<'_>>, rows: Range<usize>) -> [ErrorSums; POSITIONS] {
-        let mut sums = [ErrorSums::default(); POSITIONS];
+    /// Sums over rows, and over those of them that move, by position.
+    fn sums(
+        &self,
+        candidate: &Candidate,
+        ready: Option<&Around<'_>>,
+        (rows, moving): (Range<usize>, &[bool]),
+    ) -> [[ErrorSums; 2]; POSITIONS] {
+        let mut sums = [[ErrorSums::default(); 2]; POSITIONS];
         if rows.start >= rows.end {
             return sums;
         }
@@ -246,7 +255,8 @@ impl View<'_, '_> {
         for row in rows.filter(|&row| self.problem.usable[row]) {
             for (which, sums) in sums.iter_mut().enumerate() {
                 if let Some(window) = around.at_row(self.problem, row, which) {
-                    sums.add(self.error(&window, row), self.problem.weight(row));
+                    let (error, weight) = (self.error(&window, row), self.problem.weight(row));
+                    sums.iter_mut().take(1 + usize::from(moving[row])).for_each(|sums| sums.add(error, weight));
                 }
             }
         }

@@ -10,6 +10,7 @@ pub(crate) mod dyadic_windows;
 pub(crate) mod fit;
 pub(crate) mod layout;
 pub(crate) mod limits;
+pub(crate) mod magnitudes;
 pub(crate) mod model;
 pub(crate) mod newey_west;
 pub(crate) mod noise_correction;

@@ -11,6 +11,7 @@ use crate::inference::identifiability::is_mostly_noise;
 use crate::inference::window_averaging::{Averages, average};
 use crate::regression::constants::weakest;
 use crate::regression::limits::{HARDLY_TOLD_APART, NOISE_MODEL_FAILS};
+use crate::regression::magnitudes::Magnitudes;
 use crate::regression::model::Model;
 use crate::regression::predictor::without_constants;
 use crate::regression::residuals::residuals;
@@ -151,12 +152,19 @@ impl MergedSession<'_, '_, '_> {
         };
         let column = |one: usize, other: usize| (0..rows.len()).map(move |row| joint(one, other, row));
         let errors = (0..windowed.len()).map(|one| column(one, one).map(|variance| variance.max(0.0).sqrt()).collect());
+        let errors: Vec<Vec<f64>> = errors.collect();
+        let problem = fitted.model.problem(rows, &rows.rhs, 1.0, None);
+        let reach = fitted.scales.first().map_or(1, |scale| scale.reach);
+        let untold = Magnitudes::new(&problem, &fit.pooled.values).untold(&errors, reach);
+        for (status, _) in status.iter_mut().zip(untold).filter(|(_, untold)| *untold) {
+            *status |= Status::ILL_CONDITIONED.bits();
+        }
         let all = windowed.len() + count;
         let pairs: Vec<_> = (0..windowed.len()).flat_map(|one| (one + 1..all).map(move |other| (one, other))).collect();
         let covariances = pairs.iter().map(|&(one, other)| column(one, other).collect()).collect();
         let element = |place: usize| windowed.get(place).copied().unwrap_or_else(|| constant[place - windowed.len()]);
         let pairs = pairs.iter().map(|&(one, other)| (element(one), element(other))).collect();
-        AtRows { status, errors: errors.collect(), covariances, pairs }
+        AtRows { status, errors, covariances, pairs }
     }
 
     /// What windows that are as short as can be and yet do not follow leave of every windowed element: rows are predicted worse than noise

@@ -13,6 +13,7 @@ use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::layout::symmetric;
 use crate::regression::limits::{NOISE_MODEL_FAILS, UNEXPLAINED};
+use crate::regression::magnitudes::Magnitudes;
 use crate::regression::predictor::without_constants;
 use crate::regression::problem::Problem;
 use crate::regression::sandwich::joint_covariance;
@@ -68,6 +69,10 @@ impl Session<'_, '_, '_> {
         let slow_slopes = slowly.split_off(slow);
         let (mut errors, mut covariances, pairs) = self.errors_at_rows(fitted, &tracks)?;
         let Tracks { first, values, slopes, condition, mut status, .. } = tracks;
+        let untold = Magnitudes::new(plain, constants).untold(&errors[..problem.layout.windowed], weak.reach());
+        for (status, _) in status.iter_mut().zip(untold).filter(|(_, untold)| *untold) {
+            *status |= Status::ILL_CONDITIONED.bits();
+        }
         let least = UNEXPLAINED * rows.mean_square();
         for (place, factor) in left.unexplained(least, &fitted.errors.expected) {
             status[place] |= Status::NOISE_MODEL.bits();
