@@ -111,9 +111,15 @@ def jumps_beside_pulses(found: _core.Identification) -> list[int]:
     return [jump for jump in found.jumps if jump not in ends]
 
 
-def comes_late(found: _core.Identification, defect: tuple[str, str, float], period: float) -> str:
-    """Return what to do about a channel that is filtered beside a lag, or holds values: its name, what was done, and how much of it."""
+def comes_late(found: _core.Identification, defect: tuple[str, str, float], period: float, *, late: bool) -> str:
+    """Return what to do about a channel that is filtered, `late` or not, or holds values: its name, what was done, and how much of it."""
     name, what, amount = defect
+    if what == "filtered" and not late:
+        return (
+            "seems to be low-passed by a filter that delays nothing, such as filtfilt, and the other channel is not: its fast motion is "
+            f"weaker, which changes parameters by {100 * amount:.2g} % or more, as their errors say: pass the other channel through the "
+            "same filter, or give both as they were recorded"
+        )
     if what == "filtered":
         return (
             f"seems to be filtered: a lag explains most, a filter remains, which changes parameters by up to {100 * amount:.2g} %, as "
@@ -158,12 +164,6 @@ def untold_here(found: _core.Identification, windowed: Sequence[str], period: fl
     return [words]
 
 
-def one_factor(unknowns: Mapping[str, _core.Unknown]) -> list[str]:
-    """Return that the gain of a channel may drift, where inertia and stiffness change by one factor, and damping is not constant."""
-    changing = [unknowns[name] for name in COEFFICIENTS if name in unknowns and unknowns[name].kind != "constant"]
-    if len(changing) < len(COEFFICIENTS):
-        return []
-    inertia, damping, stiffness = [one.values / np.nanmean(one.values) - 1 for one in changing]
 def _times(flagged: npt.NDArray[np.bool_], seconds: float) -> str:
     """Return when samples are flagged, so many seconds apart."""
     begins, ends = stretches_of(flagged)
@@ -171,6 +171,12 @@ def _times(flagged: npt.NDArray[np.bool_], seconds: float) -> str:
     return shown + (" …" if begins.size > _SHOWN else "")
 
 
+def one_factor(unknowns: Mapping[str, _core.Unknown]) -> list[str]:
+    """Return that the gain of a channel may drift, where inertia and stiffness change by one factor, and damping is not constant."""
+    changing = [unknowns[name] for name in COEFFICIENTS if name in unknowns and unknowns[name].kind != "constant"]
+    if len(changing) < len(COEFFICIENTS):
+        return []
+    inertia, damping, stiffness = [one.values / np.nanmean(one.values) - 1 for one in changing]
     errors = [_root_mean_square(one.stderr * one.factor / np.nanmean(one.values)) for one in changing]
     change = _root_mean_square(inertia)
     is_one = _root_mean_square(inertia - stiffness) < _ONE_FACTOR * change

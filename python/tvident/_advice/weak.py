@@ -199,7 +199,9 @@ class Explained:
                     f"{amount:.0f}th sample of both channels, or give what was recorded with times of its own, t=(…, …)"
                 )
             elif defect in {"held", "filtered"}:
-                cure = comes_late(self.found, (name, defect, amount), self.period)
+                cure = comes_late(
+                    self.found, (name, defect, amount), self.period, late=bool(self.lag or self.found.lag)
+                )
             else:
                 cure = f"jumps by {amount:.4g} rad: it is wrapped, give period={_period(amount):.8g}, or the period that it has"
             words.append(f"the {name} {cure}")

@@ -7,6 +7,7 @@ pub(crate) mod colour;
 pub(crate) mod correlated;
 pub(crate) mod defects;
 pub(crate) mod fused;
+pub(crate) mod low_passed;
 pub(crate) mod median;
 pub(crate) mod passed;
 pub(crate) mod quantisation;

@@ -3,7 +3,7 @@
 /// The largest magnitude a sample may have: its square, summed over a long window and weighted, must not overflow.
 ///
 /// Larger values are treated like infinities.
-const LARGEST: f64 = 1e140;
+pub(crate) const LARGEST: f64 = 1e140;
 
 /// A record of one channel.
 ///

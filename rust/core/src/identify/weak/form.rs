@@ -115,10 +115,10 @@ fn without(
             defects[0].iter_mut().for_each(Defect::leave_out);
         }
         defects[0].extend((!lost.is_empty()).then_some(Defect::Broken(lost.len())));
-        // The channel that is late is the one that is filtered, unless something else was done to it.
-        let late = usize::from(found.lag.map_or(lag, |lag| lag.value) > 0.0);
-        let filtered = found.filtered.filter(|_| defects[late].is_empty());
-        defects[late].extend(filtered.map(Defect::Filtered));
+        // Unless something else was done to it.
+        if let Some((channel, part)) = found.filtered.filter(|&(channel, _)| defects[channel].is_empty()) {
+            defects[channel].push(Defect::Filtered(part));
+        }
         let doubtful = defects.iter().flatten().any(Defect::is_doubtful);
         let suspected = if doubtful { Status::CHANNEL_SUSPECTED } else { Status::GOOD };
         WeakIdentified { record_status: found.record_status | suspected, resting, defects, ..found }

@@ -48,8 +48,8 @@ pub(crate) struct WeakIdentified {
     pub(crate) suspects: Vec<Suspect>,
     /// The estimated lag, or `None` if it was given or is not determined.
     pub(crate) lag: Option<Lag>,
-    /// By which part of them constants may be wrong because a filter does more than the lag explains, if it does.
-    pub(crate) filtered: Option<f64>,
+    /// Which channel is filtered by more than the lag explains, and by which part of them constants may be wrong by that, if one is.
+    pub(crate) filtered: Option<(usize, f64)>,
     /// The angle at which the spring is relaxed, or `None` if it was not needed.
     pub(crate) angle_zero: Option<AngleZero>,
     /// How much better an offset would predict that is free in every window.

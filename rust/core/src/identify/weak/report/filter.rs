@@ -4,14 +4,21 @@
 //! the filter did. What is left begins with the torque's second and third derivative: `(1 + a₁s + a₂s² + …) e^{-τs}` undoes filter and lag, and is one
 //! for a lag alone. So both derivatives are added to the equations, together with the rate, which corrects the lag. If they are not nothing, the
 //! constants are wrong by no less than about what they change.
+//!
+//! A filter that is run forwards and backwards is late by nothing, and weakens fast motion all the same. Of a channel whose noise falls up to the highest
+//! frequency the second derivative is asked without a lag: `1 + (ω/ω₀)^2n` undoes such a filter, which is convex as `ω²` is, and the rest is taken by inertia
+//! and stiffness. Its sign says which channel it was.
 
 use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::identify::weak::decided::Decided;
+use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::report::missing_terms::stretches_to_judge;
 use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::CONSPICUOUS;
+use crate::noise::low_passed::is_low_passed;
 use crate::regression::fit::Fit;
+use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
 use crate::regression::problem::Problem;
 use crate::regression::residuals::residuals;
@@ -26,17 +33,36 @@ const CURVATURE: usize = 1;
 /// By what part the noise of the torque may be another one than that which derivatives are corrected for.
 const UNSURE: f64 = 0.1;
 
+/// A filter without a lag that changes no parameter by more than this part of it is not worth a word.
+pub(crate) const LEAST_CHANGE: f64 = 1e-3;
+
+/// A filter of one channel.
+pub(crate) struct LeftOfFilter {
+    /// By how much the constants, those that change slowly first, change beside derivatives of the torque.
+    pub(crate) changes: Vec<f64>,
+    /// Whether it is the torque's, and late.
+    pub(crate) of_torque: bool,
+    pub(crate) late: bool,
+}
+
 impl Session<'_, '_, '_> {
-    /// By how much the constants, those that change slowly first, change beside derivatives of the torque that a lag would leave nothing for, or
-    /// `None` where nothing speaks against a lag alone.
+    /// What a lag, or none, leaves of a filter, or `None` where nothing speaks of one.
     pub(crate) fn left_of_filter(
         &mut self,
         weak: &WeakRows,
         decided: &Decided,
         fit: &Fit,
-    ) -> Result<Option<Vec<f64>>, Error> {
+        errors: &Errors,
+    ) -> Result<Option<LeftOfFilter>, Error> {
         // A mask is there because other equations hold elsewhere, and rows of the torque's derivatives reach out of it.
-        if !self.options.diagnose || self.record.lag == 0.0 || self.record.mask.is_some() {
+        if !self.options.diagnose || self.record.mask.is_some() {
+            return Ok(None);
+        }
+        // Noise of an angle that was fused or integrated falls of itself, and equations that leave too much lack something else.
+        let (late, record) = (self.record.lag != 0.0, &self.record);
+        let may_be = !late && record.noise.is_none() && errors.error <= NOISE_MODEL_FAILS;
+        let low_passed = [record.angle, record.torque].map(|channel| may_be && is_low_passed(channel));
+        if !late && low_passed == [false; 2] {
             return Ok(None);
         }
         let stretches = stretches_to_judge(weak, decided, fit);
@@ -73,7 +99,8 @@ impl Session<'_, '_, '_> {
         let problem = Problem { correlated: Some(model.correlated(&rows, &covariance, &mut self.stages)?), ..problem };
         let count = before.pooled.values.len();
         let mut is_left = false;
-        for derivative in CURVATURE..DERIVATIVES.len() {
+        let judged = if late { CURVATURE..DERIVATIVES.len() } else { CURVATURE..CURVATURE + 1 };
+        for derivative in judged {
             let place = count + derivative;
             let variance = beside.variance_of(&problem, place, &covariance, &mut self.stages)?;
             let mut most = CONSPICUOUS * variance.sqrt();
@@ -88,7 +115,10 @@ impl Session<'_, '_, '_> {
         }
         let change = |(beside, before): (&f64, &f64)| beside - before;
         let changes = || beside.pooled.values.iter().zip(&before.pooled.values).map(change).collect();
-        Ok(is_left.then(changes))
+        let of_torque = if late { self.record.lag > 0.0 } else { beside.pooled.values[count + CURVATURE] > 0.0 };
+        // What is said of a channel must be seen in it, too.
+        is_left &= late || low_passed[usize::from(of_torque)];
+        Ok(is_left.then(|| LeftOfFilter { changes: changes(), of_torque, late }))
     }
 }
 

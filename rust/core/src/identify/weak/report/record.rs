@@ -13,6 +13,7 @@ use crate::identify::weak::outside_mask::Inside;
 use crate::identify::weak::report::at_rows::Fitted;
 use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::report::explained::Explained;
+use crate::identify::weak::report::filter::{LEAST_CHANGE, LeftOfFilter};
 use crate::identify::weak::session::Session;
 use crate::inference::constancy::NO_CHANCE;
 use crate::inference::identifiability::is_mostly_noise;
@@ -51,15 +52,15 @@ impl Session<'_, '_, '_> {
         let Some(all) = all.as_deref() else { return Ok((self.undetermined(found, decided)?, None)) };
         found.condition = all.pooled.condition;
         found.weakest = weakest(&all.full, &all.pooled.weights);
-        let changes;
-        (found.covariance, changes) = self.covariance_of(&problem, &weak, decided, (fit, all), &errors)?;
+        let left;
+        (found.covariance, left) = self.covariance_of(&problem, &weak, decided, (fit, all), &errors)?;
 
         let slow = decided.slow.len();
         let count = ordered.constant.len();
         let mut values = vec![0.0; slow];
         values.extend(&fit.pooled.values);
         found.constants = constants(decided, &values, &found.covariance);
-        found.filtered = changes.as_ref().map(|changes| largest_part(&found.constants, &changes[slow..]));
+        found.filtered = left.as_ref().and_then(|left| filtered(left, &found.constants, slow));
         found.unexplained = match explained {
             Explained::Plainly => false,
             Explained::NoTorque => true,
@@ -97,7 +98,7 @@ impl Session<'_, '_, '_> {
             all,
             errors: &errors,
             covariance: &found.covariance,
-            changes: changes.as_deref().unwrap_or_default(),
+            changes: left.as_ref().map_or(&[], |left| left.changes.as_slice()),
             constants: &values,
         };
         let (results, pairs) = self.at_rows(&fitted, tracks)?;
@@ -114,7 +115,7 @@ impl Session<'_, '_, '_> {
         Ok((found, Some(results)))
     }
 
-    /// The covariance of the constants, and by how much they change beside what a lag leaves of a filter, if it does leave something.
+    /// The covariance of the constants, and what a lag leaves of a filter, if it does leave something.
     fn covariance_of(
         &mut self,
         problem: &Problem<'_>,
@@ -122,7 +123,7 @@ impl Session<'_, '_, '_> {
         decided: &Decided,
         (fit, all): (&Fit, &Fit),
         errors: &Errors,
-    ) -> Result<(Vec<f64>, Option<Vec<f64>>), Error> {
+    ) -> Result<(Vec<f64>, Option<LeftOfFilter>), Error> {
         let mut covariance = match self.covariance_beside_lag(problem, weak, decided, fit, errors)? {
             Some(covariance) => covariance,
             None => all.covariance(problem, &errors.covariance, &mut self.stages)?,
@@ -130,11 +131,11 @@ impl Session<'_, '_, '_> {
         for entry in &mut covariance {
             *entry *= errors.inflation;
         }
-        let changes = self.left_of_filter(weak, decided, fit)?;
-        if let Some(changes) = &changes {
-            add_changes(&mut covariance, changes);
+        let left = self.left_of_filter(weak, decided, fit, errors)?;
+        if let Some(left) = &left {
+            add_changes(&mut covariance, &left.changes);
         }
-        Ok((covariance, changes))
+        Ok((covariance, left))
     }
 
     /// Whether a constant differs between parts of the record. An offset that drifts by next to nothing of the torque, as noise of low
@@ -223,6 +224,12 @@ fn add_changes(covariance: &mut [f64], changes: &[f64]) {
             covariance[one * changes.len() + other] += change * with;
         }
     }
+}
+
+/// Which channel is filtered, and the largest change of a constant, those that change slowly left out, as a part of it.
+fn filtered(left: &LeftOfFilter, constants: &[Constant], slow: usize) -> Option<(usize, f64)> {
+    let part = largest_part(constants, &left.changes[slow..]);
+    (left.late || part > LEAST_CHANGE).then_some((usize::from(left.of_torque), part))
 }
 
 /// The largest change of a coefficient of the motion, as a part of it.
