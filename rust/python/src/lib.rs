@@ -98,6 +98,7 @@ mod _core {
 
     #[pymodule_init]
     fn first(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        crate::reserve::grow_stack();
         crate::arrays::look_up_numpy(module.py())
     }
 

@@ -4,6 +4,7 @@
 //! no more, the reserve is given up, and the watch of the call sees to it that the call ends with a `MemoryError`.
 
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::hint;
 use std::ptr;
 use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering};
 use std::thread;
@@ -15,6 +16,9 @@ const BYTES: usize = 40 << 20;
 
 /// Parts of the reserve, given up one after the other.
 const PARTS: usize = 3;
+
+/// Bytes of the stack that calls need, at most: 140 kB were seen, and what Python needs is beside them.
+const STACK: usize = 1 << 18;
 
 /// How often memory is tried again, since another thread may just be giving up a part.
 const TRIES: usize = 100;
@@ -47,6 +51,13 @@ pub(crate) fn fill() -> Result<(), usize> {
         MISSED.store(0, Ordering::Release);
     }
     Ok(())
+}
+
+/// Makes the calling thread's stack as long as calls need it. The stack of a process's first thread grows as it is used, and the process ends where there
+/// is no memory for that.
+#[inline(never)]
+pub(crate) fn grow_stack() {
+    hint::black_box(&mut [0_u8; STACK]);
 }
 
 /// Bytes that could not be had since the reserve was last filled.

@@ -23,6 +23,19 @@ pub(crate) fn ask_for(bytes: usize) -> Result<(), Error> {
     got.map_err(|_| Error::Memory { bytes })
 }
 
+/// How many parts of so many bytes there is memory for side by side, of some that are wanted.
+pub(crate) fn how_many(wanted: usize, bytes: usize) -> usize {
+    let mut parts: Vec<Vec<u8>> = Vec::new();
+    while parts.len() < wanted {
+        let mut part = Vec::new();
+        if part.try_reserve_exact(bytes).is_err() {
+            break;
+        }
+        parts.push(std::hint::black_box(part));
+    }
+    parts.len()
+}
+
 /// Gives the memory that was freed back to the system, where the C library keeps it: glibc keeps columns of up to 32 MB for reuse, and beside
 /// results of a long record what was needed on the way to them would still be there.
 pub(crate) fn give_back() {
@@ -49,5 +62,7 @@ mod tests {
             assert_eq!(ask_for(bytes), Err(Error::Memory { bytes }));
         }
         assert_eq!(ask_for_numbers(usize::MAX / 2), Err(Error::Memory { bytes: usize::MAX }));
+        assert_eq!([0, 3].map(|wanted| how_many(wanted, 1 << 24)), [0, 3]);
+        assert_eq!(how_many(3, 1 << 60), 0);
     }
 }

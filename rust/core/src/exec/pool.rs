@@ -222,9 +222,9 @@ thread_local! {
 
 /// Begins one thread of a pool, and waits until it has what it needs: for what is dropped at its end a thread asks the C library for memory,
 /// which ends the process where there is none. Threads that began side by side would take it from each other, since each may take addresses for
-/// allocations of its own.
+/// allocations of its own. A thread that has none of its own cannot use what is free among those of others, so less must not do.
 fn begin(thread: ThreadBuilder) -> io::Result<()> {
-    memory::ask_for(THREAD).map_err(|error| io::Error::new(io::ErrorKind::OutOfMemory, error.to_string()))?;
+    memory::ask_for(THREAD + ARENA).map_err(|error| io::Error::new(io::ErrorKind::OutOfMemory, error.to_string()))?;
     let (begun, wait) = mpsc::channel();
     let builder = match thread.name() {
         Some(name) => thread::Builder::new().name(name.to_owned()),
@@ -242,7 +242,21 @@ fn begin(thread: ThreadBuilder) -> io::Result<()> {
     Ok(())
 }
 
-/// The pool of this process, with at least so many threads.
+/// A pool of so many threads, or of as many as there is memory for.
+fn with_at_most(threads: usize) -> Result<ThreadPool, Error> {
+    memory::ask_for(threads.saturating_mul(THREAD))?;
+    let threads = memory::how_many(threads, THREAD + ARENA);
+    if threads == 0 {
+        return Err(Error::Memory { bytes: THREAD + ARENA });
+    }
+    let builder = ThreadPoolBuilder::new().num_threads(threads).thread_name(|index| format!("tvident-{index}"));
+    builder.spawn_handler(begin).build().map_err(|error| match memory::ask_for(threads.min(SOME) * (THREAD + ARENA)) {
+        Ok(()) => Error::Threads { threads, cause: error.to_string() },
+        Err(error) => error,
+    })
+}
+
+/// The pool of this process, with at least so many threads if there is memory for them.
 ///
 /// The threads of a pool that is outgrown end with the last call that uses it.
 fn pool(threads: usize) -> Result<Arc<ThreadPool>, Error> {
@@ -252,21 +266,14 @@ fn pool(threads: usize) -> Result<Arc<ThreadPool>, Error> {
     {
         return Ok(Arc::clone(&owned.pool));
     }
-    memory::ask_for(threads.saturating_mul(THREAD))?;
-    let builder = ThreadPoolBuilder::new().num_threads(threads).thread_name(|index| format!("tvident-{index}"));
-    let pool = builder.spawn_handler(begin).build().map_err(|error| {
-        match memory::ask_for(threads.min(SOME) * (THREAD + ARENA)) {
-            Ok(()) => Error::Threads { threads, cause: error.to_string() },
-            Err(error) => error,
-        }
-    })?;
+    let pool = with_at_most(threads)?;
     // Threads that begin when memory has run out end the process.
     pool.broadcast(|_| ());
     let pool = Arc::new(pool);
     let fresh = Owned { process, pool: Arc::clone(&pool) };
     // A call that was faster may have stored a larger pool; then this one ends with its call.
     let outgrown = newest().and_then(|mut newest| {
-        let is_outgrown = newest.as_ref().is_none_or(|owned| !owned.serves(process, threads));
+        let is_outgrown = newest.as_ref().is_none_or(|owned| !owned.serves(process, fresh.pool.current_num_threads()));
         if is_outgrown { newest.replace(fresh) } else { None }
     });
     if let Some(outgrown) = outgrown.filter(|owned| owned.process != process) {
