@@ -267,6 +267,7 @@ fn settled(
             noise: [0.0; 2],
             channel_noise,
             scan: Scan::default(),
+            narrowed: false,
             free_offset: FreeOffset::default(),
             best_before: None,
             stages,
