@@ -38,8 +38,9 @@ pub(crate) fn validate(
 ) -> Result<Vec<Validated>, Error> {
     let compared = ComparedRows::new(problem, scales);
     let mut validated = Vec::new();
-    for &scale in scales {
-        if let Some(fit) = Fit::with_leave_gap_out(problem, scale, expected, instructions, stages)? {
+    for some in Scale::together(scales, problem.rows()) {
+        let fits = Fit::of_lengths(problem, some, expected, instructions, stages)?;
+        for (&scale, fit) in some.iter().zip(fits).filter_map(|(scale, fit)| Some((scale, fit?))) {
             let error = compared.error(problem, scale, &fit, expected.variance);
             validated.push(Validated { fit, error });
         }

@@ -64,17 +64,24 @@ impl Fit {
         instructions: Instructions,
         stages: &mut Stages<'_, '_>,
     ) -> Result<Option<Self>, Error> {
-        let (leave_gap_out, full) = scale.solve_leave_gap_out(problem, instructions, stages)?;
-        let pooled = pool(&full, 0..full.len(), expected, instructions);
-        let (step, span) = (scale.step, scale.span());
-        Ok(pooled.map(|pooled| Self {
-            scale: Some(scale),
-            leave_gap_out: Some(leave_gap_out),
-            full,
-            pooled,
-            step,
-            span,
-        }))
+        Ok(Self::of_lengths(problem, &[scale], expected, instructions, stages)?.pop().flatten())
+    }
+
+    /// The same for several lengths of windows, which have one step.
+    pub(crate) fn of_lengths(
+        problem: &Problem<'_>,
+        scales: &[Scale],
+        expected: Expected,
+        instructions: Instructions,
+        stages: &mut Stages<'_, '_>,
+    ) -> Result<Vec<Option<Self>>, Error> {
+        let solved = Scale::solve_leave_gap_out(scales, problem, instructions, stages)?;
+        let fit = |(&scale, [leave_gap_out, full]): (&Scale, [Solved; 2])| {
+            let pooled = pool(&full, 0..full.len(), expected, instructions)?;
+            let (step, span) = (scale.step, scale.span());
+            Some(Self { scale: Some(scale), leave_gap_out: Some(leave_gap_out), full, pooled, step, span })
+        };
+        Ok(scales.iter().zip(solved).map(fit).collect())
     }
 
     /// Solves another problem in the same windows.

@@ -37,12 +37,19 @@ impl Solved {
 
     /// Joins consecutive windows.
     pub(crate) fn join(parts: &[&Self]) -> Self {
-        let mut all = Self::new(parts[0].fields.layout, parts[0].first, parts.iter().map(|part| part.count).sum());
+        Self::join_first(parts, parts.iter().map(|part| part.count).sum())
+    }
+
+    /// Joins so many of consecutive windows.
+    pub(crate) fn join_first(parts: &[&Self], count: usize) -> Self {
+        let mut all = Self::new(parts[0].fields.layout, parts[0].first, count);
         for field in 0..all.fields.size() {
-            let mut place = field * all.padded;
+            let values = &mut all.values[field * all.padded..][..count];
+            let mut place = 0;
             for part in parts {
-                all.values[place..place + part.count].copy_from_slice(part.field(field));
-                place += part.count;
+                let end = (place + part.count).min(count);
+                values[place..end].copy_from_slice(&part.field(field)[..end - place]);
+                place = end;
             }
         }
         all
@@ -128,6 +135,10 @@ mod tests {
             assert_eq!(all.field(field), expected);
         }
         assert_eq!([-4, -3, 26, 27].map(|window| all.place(window)), [None, Some(0), Some(29), None]);
+        for count in [0, 11, 12, 30] {
+            let some = Solved::join_first(&parts.iter().collect::<Vec<_>>(), count);
+            (0..all.fields.size()).for_each(|field| assert_eq!(some.field(field), &all.field(field)[..count]));
+        }
     }
 
     #[test]

@@ -17,6 +17,9 @@ use crate::simd::instructions::Instructions;
 /// Cells in a piece of work.
 const PIECE: usize = 512;
 
+/// Of at most so many rows windows of several lengths are solved together.
+const MOST_TOGETHER: usize = 1 << 15;
+
 /// Rows of the smallest blocks: a third of a test function's half-width.
 const FINEST: usize = 2;
 
@@ -178,41 +181,34 @@ impl Scale {
         instructions: Instructions,
         stages: &mut Stages<'_, '_>,
     ) -> Result<Solved, Error> {
-        let [_, _, full] = self.shapes();
-        Ok(self.solve_shapes(problem, &[full], instructions, stages)?.swap_remove(0))
+        let ([_, _, full], cells) = (self.shapes(), self.full_cells(problem.rows()).len());
+        Ok(solve_shapes(problem, self.step, &[(full, cells)], instructions, stages)?.swap_remove(0))
     }
 
-    /// Solves the windows that leave the gap out and the full ones, in parallel.
+    /// Solves the windows of lengths that have one step, those that leave the gap out and the full ones, in parallel.
     pub(crate) fn solve_leave_gap_out(
-        self,
+        scales: &[Self],
         problem: &Problem<'_>,
         instructions: Instructions,
         stages: &mut Stages<'_, '_>,
-    ) -> Result<(Solved, Solved), Error> {
-        let [_, leave_gap_out, full] = self.shapes();
-        let mut solved = self.solve_shapes(problem, &[leave_gap_out, full], instructions, stages)?;
-        let full = solved.swap_remove(1);
-        Ok((solved.swap_remove(0), full))
+    ) -> Result<Vec<[Solved; 2]>, Error> {
+        let Some(first) = scales.first() else { return Ok(Vec::new()) };
+        let of = |scale: &Self| {
+            let ([_, leave_gap_out, full], cells) = (scale.shapes(), scale.full_cells(problem.rows()).len());
+            [(leave_gap_out, cells), (full, cells)]
+        };
+        let shapes: Vec<_> = scales.iter().flat_map(of).collect();
+        let mut solved = solve_shapes(problem, first.step, &shapes, instructions, stages)?.into_iter();
+        Ok(std::iter::from_fn(|| Some([solved.next()?, solved.next()?])).collect())
     }
 
-    /// Solves windows of some shapes around all cells whose full windows lie within the rows.
-    fn solve_shapes(
-        self,
-        problem: &Problem<'_>,
-        shapes: &[WindowShape],
-        instructions: Instructions,
-        stages: &mut Stages<'_, '_>,
-    ) -> Result<Vec<Solved>, Error> {
-        let cells = self.full_cells(problem.rows());
-        let firsts = cells.clone().step_by(PIECE);
-        let pieces = firsts.map(|first| first..(first + PIECE.cast_signed()).min(cells.end));
-        let pieces = pieces.map(|blocks| Piece { size: blocks.len() * self.step, content: blocks });
-        let work = |blocks: Range<isize>, (): &mut ()| solve_windows(problem, self.step, &blocks, shapes, instructions);
-        let solved = stages.map(pieces.collect(), || (), work)?;
-        if solved.is_empty() {
-            return Ok(vec![Solved::new(problem.layout, 0, 0); shapes.len()]);
+    /// Lengths in turn, those of one step together: they share the sums of their blocks. Of many rows one by one, for the memory.
+    pub(crate) fn together(scales: &[Self], rows: usize) -> Vec<&[Self]> {
+        if rows > MOST_TOGETHER {
+            scales.chunks(1).collect()
+        } else {
+            scales.chunk_by(|a, b| a.step == b.step).collect()
         }
-        Ok((0..shapes.len()).map(|shape| join_shape(&solved, shape)).collect())
     }
 
     /// Solves the windows of some cells on this thread.
@@ -248,13 +244,39 @@ impl Scale {
     }
 }
 
+/// Solves windows of some shapes, so many of each, around the first cells and those that follow.
+fn solve_shapes(
+    problem: &Problem<'_>,
+    step: usize,
+    shapes: &[(WindowShape, usize)],
+    instructions: Instructions,
+    stages: &mut Stages<'_, '_>,
+) -> Result<Vec<Solved>, Error> {
+    let end = shapes.iter().map(|(_, cells)| *cells).max().unwrap_or(0).cast_signed();
+    let pieces = (0..end).step_by(PIECE).map(|first| first..(first + PIECE.cast_signed()).min(end));
+    let pieces = pieces.map(|blocks| Piece { size: blocks.len() * step, content: blocks });
+    let alone: Vec<WindowShape> = shapes.iter().map(|(shape, _)| shape.clone()).collect();
+    let work = |blocks: Range<isize>, (): &mut ()| solve_windows(problem, step, &blocks, &alone, instructions);
+    let solved = stages.map(pieces.collect(), || (), work)?;
+    if solved.is_empty() {
+        return Ok(vec![Solved::new(problem.layout, 0, 0); shapes.len()]);
+    }
+    let of =
+        |(shape, (_, cells)): (usize, &(WindowShape, usize))| Solved::join_first(&of_shape(&solved, shape), *cells);
+    Ok(shapes.iter().enumerate().map(of).collect())
+}
+
 /// Joins the parts of each shape.
 fn join(parts: &[Vec<Solved>]) -> Cells {
     Cells { one_sided: join_shape(parts, 0), leave_gap_out: join_shape(parts, 1), full: join_shape(parts, 2) }
 }
 
 fn join_shape(parts: &[Vec<Solved>], shape: usize) -> Solved {
-    Solved::join(&parts.iter().map(|part| &part[shape]).collect::<Vec<_>>())
+    Solved::join(&of_shape(parts, shape))
+}
+
+fn of_shape(parts: &[Vec<Solved>], shape: usize) -> Vec<&Solved> {
+    parts.iter().map(|part| &part[shape]).collect()
 }
 
 #[cfg(test)]
@@ -329,7 +351,8 @@ mod tests {
             let whole = staged(|stages| scale.solve(&problem, &all, Instructions::Scalar, stages));
             let some = 5.min(all.end - 1)..9.min(all.end);
             let part = scale.solve_here(&problem, &some, Instructions::Scalar);
-            let (gap, full) = staged(|stages| scale.solve_leave_gap_out(&problem, Instructions::Scalar, stages));
+            let alone = staged(|stages| Scale::solve_leave_gap_out(&[scale], &problem, Instructions::Scalar, stages));
+            let [gap, full] = &alone[0];
             for cell in some {
                 let pairs = [
                     (&whole.one_sided, &part.one_sided),
@@ -347,6 +370,27 @@ mod tests {
                     assert_eq!(full.field(count)[place], whole.full.field(count)[same]);
                     assert_eq!(full.field(count)[place], scale.span() as f64);
                     assert_eq!(gap.field(count)[place], 2.0 * scale.one_sided() as f64);
+                }
+            }
+        }
+    }
+    #[test]
+    fn lengths_of_one_step_are_the_same_together_and_alone() {
+        let rows = rows(900, |time| [time.sin(), time.cos()], 0.1);
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let scales = Scale::all(900, 6);
+        let together = Scale::together(&scales, 900);
+        assert!(together.iter().any(|some| some.len() > 4) && together.concat() == scales);
+        assert_eq!(Scale::together(&scales, MOST_TOGETHER + 1).len(), scales.len());
+        for some in together {
+            let all = staged(|stages| Scale::solve_leave_gap_out(some, &problem, Instructions::Scalar, stages));
+            assert_eq!(all.len(), some.len());
+            for (scale, both) in some.iter().zip(&all) {
+                let alone =
+                    staged(|stages| Scale::solve_leave_gap_out(&[*scale], &problem, Instructions::Scalar, stages));
+                for (one, other) in both.iter().zip(&alone[0]) {
+                    assert_eq!((one.first, one.len()), (other.first, scale.full_cells(900).len()));
+                    (0..one.fields.size()).for_each(|field| assert_eq!(one.field(field), other.field(field)));
                 }
             }
         }
