@@ -56,6 +56,18 @@ def test_the_spring_is_relaxed_at_another_angle(zero: float) -> None:
         assert not result.record_status & (Status.KIND_CONTRADICTED | Status.NOISE_MODEL | Status.SCALES_DISAGREE)
 
 
+@pytest.mark.parametrize("seed", SEEDS)
+def test_few_rows_of_many_lead_to_the_same_zero(seed: int) -> None:
+    """With little noise test functions are narrow and rows many, of which few compare windows while an angle is only tried."""
+    record = tvident.simulate_torsional_rig(20.0, seed=seed, pattern="slider", angle_noise=1e-5, torque_snr_db=60.0)
+    result = tvident.identify(record.angle + 0.3, record.torque, sample_rate=1000)
+    value, error = result.constants["angle_zero"]
+    assert abs(value - 0.3) < ERRORS * error
+    inertia = result.value("inertia")
+    assert abs(inertia.value - record.inertia[0]) < ERRORS * inertia.stderr
+    assert result.record_status == 0
+
+
 def test_the_size_of_the_zero_changes_nothing_else() -> None:
     small, large = identified(0, -0.3), identified(0, 3.0)
     # Both are found by steps that end at a fiftieth of an error.

@@ -15,6 +15,9 @@ use crate::simd::instructions::Instructions;
 /// Squared errors over the noise variance are clipped to this, so that single rows do not dominate.
 const MOST: f64 = 9.0;
 
+/// So many of the longest windows that some rows hold are tried again on all rows, where one of them is best.
+pub(crate) const OVERLAP: usize = 2;
+
 /// Parts of the rows that must compare a length with the best, and standard errors beyond which it predicts worse.
 const FEWEST_PARTS: usize = 6;
 const WORSE: f64 = 3.0;
@@ -80,6 +83,52 @@ impl ComparedRows {
     }
 }
 
+/// Lengths of windows that few rows ruled out, and their errors.
+pub(crate) type RuledOut = Vec<(Scale, f64)>;
+
+/// Lengths of windows that few rows, which lie in some parts, do not rule out, and the errors of the others. So many of the shortest are held by these rows;
+/// longer ones are ruled out with the longest that are held.
+pub(crate) fn rule_out(
+    few: &Problem<'_>,
+    parts: &[Range<usize>],
+    (scales, held): (&[Scale], usize),
+    expected: Expected,
+    instructions: Instructions,
+    stages: &mut Stages<'_, '_>,
+) -> Result<(Vec<Scale>, RuledOut), Error> {
+    let found = validate(few, &scales[..held], expected, instructions, stages)?;
+    let stays = not_ruled_out(few, &found, parts, expected.variance);
+    let out = found.iter().zip(stays).filter(|(_, stays)| !stays);
+    let out: RuledOut = out.filter_map(|(one, _)| Some((one.fit.scale?, one.error))).collect();
+    let is_out = |scale: &Scale| out.iter().any(|(one, _)| one == scale);
+    let longest = &scales[held.saturating_sub(OVERLAP)..held];
+    let left = if longest.iter().all(is_out) { &scales[..held] } else { scales };
+    Ok((left.iter().copied().filter(|scale| !is_out(scale)).collect(), out))
+}
+
+/// The best of the lengths that are left, and its error on the rows that all lengths are compared on. Fits of short windows are as large as the record:
+/// none is kept.
+pub(crate) fn best_length(
+    problem: &Problem<'_>,
+    (scales, left): (&[Scale], &[Scale]),
+    expected: Expected,
+    instructions: Instructions,
+    stages: &mut Stages<'_, '_>,
+) -> Result<Option<(Scale, f64)>, Error> {
+    let compared = ComparedRows::new(problem, scales);
+    let mut best: Option<(Scale, f64)> = None;
+    for some in Scale::together(left, problem.rows()) {
+        let fits = Fit::of_lengths(problem, some, expected, instructions, stages)?;
+        for (&scale, fit) in some.iter().zip(fits).filter_map(|(scale, fit)| Some((scale, fit?))) {
+            let error = compared.error(problem, scale, &fit, expected.variance);
+            if best.is_none_or(|(_, least)| error.total_cmp(&least).is_lt()) {
+                best = Some((scale, error));
+            }
+        }
+    }
+    Ok(best)
+}
+
 /// The fit with the smallest error, or `None` if none predicts any row.
 pub(crate) fn best(validated: &[Validated]) -> Option<&Validated> {
     validated.iter().filter(|one| one.error.is_finite()).min_by(|a, b| a.error.total_cmp(&b.error))
@@ -87,12 +136,7 @@ pub(crate) fn best(validated: &[Validated]) -> Option<&Validated> {
 
 /// Which of some lengths parts of the rows do not rule out. Those are ruled out that predict worse than the best in every part, or on average by
 /// more than that differs between parts. A length that too few parts compare with the best is not ruled out.
-pub(crate) fn not_ruled_out(
-    problem: &Problem<'_>,
-    validated: &[Validated],
-    parts: &[Range<usize>],
-    variance: f64,
-) -> Vec<bool> {
+fn not_ruled_out(problem: &Problem<'_>, validated: &[Validated], parts: &[Range<usize>], variance: f64) -> Vec<bool> {
     let squares: Vec<Vec<f64>> = validated
         .iter()
         .map(|one| {

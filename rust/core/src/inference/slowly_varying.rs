@@ -5,16 +5,21 @@
 //! fall with the distance. The bandwidth is chosen by cross-validation: a point's own neighbourhood is left out to
 //! predict its rows.
 
+use std::borrow::Cow;
+use std::ops::Range;
+
 use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::exec::stages::Stages;
 use crate::inference::constancy::BLOCKS;
-use crate::inference::cross_validation::{ComparedRows, validate};
+use crate::inference::cross_validation::{ComparedRows, best_length, rule_out};
 use crate::inference::slow_curve::Varying;
 use crate::inference::slow_equations::{QUADRATIC, Slow};
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
+use crate::regression::problem::Problem;
+use crate::regression::subsample::{few_stretches, places_of, thinned_column, thinned_rows};
 use crate::regression::window_length::Scale;
 use crate::simd::instructions::Instructions;
 
@@ -67,6 +72,42 @@ pub(crate) struct SlowSearch<'a> {
     pub(crate) instructions: Instructions,
 }
 
+/// Few of many rows, and how many of the shortest lengths of windows they hold.
+struct FewRows {
+    rows: Rows,
+    stretches: Vec<Range<usize>>,
+    held: usize,
+}
+
+impl FewRows {
+    fn of(rows: &Rows, scales: &[Scale]) -> Option<Self> {
+        let (stretches, held) = few_stretches(rows.len(), scales)?;
+        Some(Self { rows: thinned_rows(rows, &stretches), stretches, held })
+    }
+}
+
+impl SlowSearch<'_> {
+    /// The length of windows that predicts best what slow coefficients leave, and its error. A few rows rule out most lengths.
+    fn best_length(
+        &self,
+        problem: &Problem<'_>,
+        rest: &Model,
+        few: &mut Option<FewRows>,
+        stages: &mut Stages<'_, '_>,
+    ) -> Result<Option<(Scale, f64)>, Error> {
+        let &Self { noise, expected, scales, instructions, .. } = self;
+        let left = match few {
+            Some(FewRows { rows, stretches, held }) => {
+                rows.rhs = thinned_column(problem.rhs, stretches);
+                let few = rest.problem(rows, &rows.rhs, noise, None);
+                Cow::Owned(rule_out(&few, &places_of(stretches), (scales, *held), expected, instructions, stages)?.0)
+            }
+            None => Cow::Borrowed(scales),
+        };
+        best_length(problem, (scales, &left), expected, instructions, stages)
+    }
+}
+
 /// Estimates slow coefficients, or returns `None` if they are not determined. `first` is the length of windows to begin with.
 pub(crate) fn find(
     search: &SlowSearch<'_>,
@@ -87,6 +128,7 @@ pub(crate) fn find(
     let mut scale = shortened(first, most);
     let mut found: Option<SlowCoefficients> = None;
     let mut last: Option<f64> = None;
+    let mut few = FewRows::of(rows, scales);
     for round in 1..=ROUNDS {
         let current = found.as_ref().map(|found| &found.varying);
         let rhs = found.as_ref().map_or_else(|| rows.rhs.clone(), |found| found.rhs.clone());
@@ -129,10 +171,8 @@ pub(crate) fn find(
         }
         let rhs = without(rows, slow, &varying);
         let problem = rest.problem(rows, &rhs, noise, None);
-        let validated = validate(&problem, scales, expected, instructions, stages)?;
-        let Some(next) = validated.iter().min_by(|a, b| a.error.total_cmp(&b.error)) else { return Ok(None) };
-        let best = next.fit.scale.unwrap_or(scale);
-        let mut predicted = next.error;
+        let Some((best, error)) = search.best_length(&problem, &rest, &mut few, stages)? else { return Ok(None) };
+        let mut predicted = error;
         if round == ROUNDS && !rows.jumps.is_empty() {
             let rhs = without(rows, slow, &leave_gap_out);
             let problem = rest.problem(rows, &rhs, noise, None);
@@ -140,7 +180,7 @@ pub(crate) fn find(
             let compared = ComparedRows::new(&problem, scales);
             predicted = fit.map_or(f64::INFINITY, |fit| compared.error(&problem, best, &fit, expected.variance));
         }
-        let (error, reach) = (next.error, reach.min(whole / 2.0));
+        let reach = reach.min(whole / 2.0);
         found = Some(SlowCoefficients { varying, rhs, scale: best, equations_of: scale, error, predicted, reach });
         scale = shortened(best, most);
     }

@@ -67,6 +67,11 @@ pub(crate) fn few_stretches(rows: usize, scales: &[Scale]) -> Option<(Vec<Range<
     (held > 1).then(|| (stretches_of_blocks(rows, few, STRETCHES), held))
 }
 
+/// Whether rows are so many that those in few stretches are much fewer.
+pub(crate) fn are_many(rows: usize) -> bool {
+    rows > 2 * FEW_ROWS
+}
+
 /// Where stretches begin and end among the rows in them.
 pub(crate) fn places_of(stretches: &[Range<usize>]) -> Vec<Range<usize>> {
     let lengths = stretches.iter().map(Range::len);

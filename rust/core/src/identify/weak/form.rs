@@ -270,6 +270,7 @@ fn settled(
             narrowed: false,
             free_offset: FreeOffset::default(),
             best_before: None,
+            is_rough: false,
             stages,
         };
         let model = session.model();

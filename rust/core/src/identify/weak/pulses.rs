@@ -215,7 +215,7 @@ impl Session<'_, '_, '_> {
         over.sort_unstable();
         over.dedup();
         let aside = chosen.weak.rows.set_aside(over);
-        let mut fitted = self.fit_first(chosen, model)?;
+        let mut fitted = self.roughly(|session| session.fit_first(chosen, model))?;
         self.test(&chosen.weak.rows, &mut fitted)?;
         chosen.weak.rows.take_back(aside);
         let usable = chosen.weak.rows.usable.clone();

@@ -36,6 +36,8 @@ pub(crate) struct Session<'a, 'b, 'c> {
     pub(crate) free_offset: FreeOffset,
     /// Samples of the windows that were best a step before, where little changed since: the best ones are near.
     pub(crate) best_before: Option<usize>,
+    /// Whether few rows of many compare lengths of windows.
+    pub(crate) is_rough: bool,
     pub(crate) stages: Stages<'b, 'c>,
 }
 

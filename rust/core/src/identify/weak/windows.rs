@@ -5,22 +5,15 @@ use crate::error::Error;
 use crate::identify::kinds::Kind;
 use crate::identify::weak::decided::{Decided, rows_of};
 use crate::identify::weak::session::Session;
-use crate::inference::cross_validation::{Validated, best, not_ruled_out, validate};
+use crate::inference::cross_validation::{OVERLAP, RuledOut, Validated, best, rule_out, validate};
 use crate::regression::constants::misfits;
 use crate::regression::fit::Fit;
-use crate::regression::problem::Problem;
-use crate::regression::subsample::{few_stretches, holds, places_of, stretches_of_rows, thinned_rows};
+use crate::regression::subsample::{are_many, few_stretches, holds, places_of, stretches_of_rows, thinned_rows};
 use crate::regression::window_length::Scale;
 use crate::weak_form::weak_rows::WeakRows;
 
-/// So many of the longest windows that stretches of a long record hold are tried again on all of it, where one of them is best.
-const OVERLAP: usize = 2;
-
 /// So many lengths on either side of the one that was best a step before are tried first.
 const NEAR: usize = 2;
-
-/// Lengths of windows that few rows ruled out, and their errors.
-type RuledOut = Vec<(Scale, f64)>;
 
 /// Lengths of windows that were compared by how well they predict, and the others.
 struct ComparedLengths {
@@ -71,7 +64,11 @@ impl Session<'_, '_, '_> {
         if tried.is_empty() {
             return Err(self.too_short());
         }
-        let ComparedLengths { validated, ruled_out } = match self.near_best_before(weak, decided, &tried)? {
+        let mut compared = self.compared_roughly(rows, decided, &tried)?;
+        if compared.is_none() {
+            compared = self.near_best_before(weak, decided, &tried)?;
+        }
+        let ComparedLengths { validated, ruled_out } = match compared {
             Some(compared) => compared,
             None => self.compare(rows, decided, &tried)?,
         };
@@ -90,6 +87,30 @@ impl Session<'_, '_, '_> {
         decided.correlated = Some(correlated);
         decided.fit = Fit::new(&problem, scale, decided.expected, instructions, &mut self.stages)?;
         Ok(())
+    }
+
+    /// Works with lengths of windows that few rows of many compare: good enough for what is only tried.
+    pub(crate) fn roughly<R>(&mut self, work: impl FnOnce(&mut Self) -> Result<R, Error>) -> Result<R, Error> {
+        self.is_rough = true;
+        let done = work(self);
+        self.is_rough = false;
+        done
+    }
+
+    /// How well windows predict few rows of many, where that is enough; `None` too where windows longer than these rows hold may be better.
+    fn compared_roughly(
+        &mut self,
+        rows: &Rows,
+        decided: &Decided,
+        lengths: &[Scale],
+    ) -> Result<Option<ComparedLengths>, Error> {
+        let stretches = few_stretches(rows.len(), lengths).filter(|_| self.is_rough && are_many(rows.len()));
+        let Some((stretches, held)) = stretches else { return Ok(None) };
+        let validated = self.validate(&thinned_rows(rows, &stretches), decided, &lengths[..held])?;
+        let best = best(&validated).and_then(|best| best.fit.scale);
+        let is_inside = best
+            .is_some_and(|best| held == lengths.len() || !lengths[held.saturating_sub(OVERLAP)..held].contains(&best));
+        Ok(is_inside.then_some(ComparedLengths { validated, ruled_out: Vec::new() }))
     }
 
     /// How well windows near the length that was best a step before predict, or `None` if none is known or a length farther away may be better.
@@ -117,51 +138,36 @@ impl Session<'_, '_, '_> {
         let (scales, ruled_out) = self.rule_out(rows, decided, lengths)?;
         let all = |validated| Ok(ComparedLengths { validated, ruled_out });
         let Some(stretches) = stretches_of_rows(rows.len()).filter(|_| scales.len() > 1) else {
-            return all(self.validate(rows, decided, &scales, |_, found| found)?);
+            return all(self.validate(rows, decided, &scales)?);
         };
         let short = scales.partition_point(|scale| holds(*scale));
-        let found = self.validate(&thinned_rows(rows, &stretches), decided, &scales[..short], |_, found| found)?;
+        let found = self.validate(&thinned_rows(rows, &stretches), decided, &scales[..short])?;
         let held = lengths.partition_point(|scale| holds(*scale)).saturating_sub(OVERLAP);
         let long = scales.partition_point(|scale| lengths[..held].contains(scale));
         all(match best(&found).and_then(|best| best.fit.scale) {
             Some(best) if short == scales.len() || !scales[long..].contains(&best) => found,
-            Some(_) => self.validate(rows, decided, &scales[long..], |_, found| found)?,
+            Some(_) => self.validate(rows, decided, &scales[long..])?,
             // The stretches miss the few rows that there are.
-            None => self.validate(rows, decided, &scales, |_, found| found)?,
+            None => self.validate(rows, decided, &scales)?,
         })
     }
 
-    /// Lengths of windows that a few rows do not rule out, and the errors of the others. Those that are too long for these rows are ruled out with the
-    /// longest that are not.
+    /// Lengths of windows that a few rows do not rule out, and the errors of the others.
     fn rule_out(&mut self, rows: &Rows, decided: &Decided, scales: &[Scale]) -> Result<(Vec<Scale>, RuledOut), Error> {
         let Some((stretches, held)) = few_stretches(rows.len(), scales) else {
             return Ok((scales.to_vec(), Vec::new()));
         };
-        let parts = places_of(&stretches);
-        let variance = decided.expected.variance;
-        let ruled_out = |problem: &Problem<'_>, found: Vec<Validated>| -> RuledOut {
-            let stays = not_ruled_out(problem, &found, &parts, variance);
-            let out = found.iter().zip(stays).filter(|(_, stays)| !stays);
-            out.filter_map(|(one, _)| Some((one.fit.scale?, one.error))).collect()
-        };
-        let out = self.validate(&thinned_rows(rows, &stretches), decided, &scales[..held], ruled_out)?;
-        let is_out = |scale: &Scale| out.iter().any(|(one, _)| one == scale);
-        let longest = &scales[held.saturating_sub(OVERLAP)..held];
-        let left = if longest.iter().all(is_out) { &scales[..held] } else { scales };
-        Ok((left.iter().copied().filter(|scale| !is_out(scale)).collect(), out))
+        let few = thinned_rows(rows, &stretches);
+        let correlated = decided.model.correlated(&few, &decided.covariance, &mut self.stages)?;
+        let problem = decided.model.problem(&few, &few.rhs, self.noise[0], Some(&correlated));
+        let (parts, instructions) = (places_of(&stretches), self.options.instructions);
+        rule_out(&problem, &parts, (scales, held), decided.expected, instructions, &mut self.stages)
     }
 
     /// Fits in windows of some lengths, compared by how well they predict some rows.
-    fn validate<R>(
-        &mut self,
-        rows: &Rows,
-        decided: &Decided,
-        scales: &[Scale],
-        then: impl FnOnce(&Problem<'_>, Vec<Validated>) -> R,
-    ) -> Result<R, Error> {
+    fn validate(&mut self, rows: &Rows, decided: &Decided, scales: &[Scale]) -> Result<Vec<Validated>, Error> {
         let correlated = decided.model.correlated(rows, &decided.covariance, &mut self.stages)?;
         let problem = decided.model.problem(rows, &rows.rhs, self.noise[0], Some(&correlated));
-        let found = validate(&problem, scales, decided.expected, self.options.instructions, &mut self.stages)?;
-        Ok(then(&problem, found))
+        validate(&problem, scales, decided.expected, self.options.instructions, &mut self.stages)
     }
 }

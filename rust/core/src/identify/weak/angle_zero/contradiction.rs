@@ -10,6 +10,7 @@ use crate::identify::weak::session::Session;
 use crate::inference::constancy::NO_CHANCE;
 use crate::regression::model::Model;
 use crate::regression::residuals::residuals;
+use crate::regression::subsample::are_many;
 use crate::weak_form::weak_rows::WeakRows;
 
 /// What is left of rows follows the stiffness beyond so many standard errors, as a term is suspected.
@@ -34,7 +35,15 @@ impl Session<'_, '_, '_> {
         if !is_odd {
             return Ok(false);
         }
-        self.free_offset = FreeOffset { error, free: self.error_of(chosen, &with_free_offset(model, offset))? };
+        let free = with_free_offset(model, offset);
+        let is_many = are_many(chosen.weak.rows.len());
+        let [few, free] = self.roughly(|session| {
+            let few = if is_many { session.error_of(chosen, model)? } else { error };
+            Ok([few, session.error_of(chosen, &free)?])
+        })?;
+        // Few of many rows tell what part a free offset leaves.
+        let free = if is_many && few.is_finite() { error * free / few } else { free };
+        self.free_offset = FreeOffset { error, free };
         Ok(self.free_offset.is_better())
     }
 

@@ -30,7 +30,7 @@ impl Session<'_, '_, '_> {
     pub(crate) fn guess_angle_zero(&mut self, model: &Model, offset: usize) -> Result<Option<f64>, Error> {
         let free = with_free_offset(model, offset);
         // If the zero alone is amiss, a free offset leaves no more than the noise of the channels.
-        let mut chosen = self.choose_first(&free, &mut None)?;
+        let mut chosen = self.roughly(|session| session.choose_first(&free, &mut None))?;
         let decided = self.take_fitted(&mut chosen, &free)?;
         Ok(decided.fit.as_ref().and_then(|fit| slope(&windows(&decided.model, fit)?)))
     }

@@ -100,7 +100,7 @@ impl Session<'_, '_, '_> {
         let FreeOffset { error, free } = self.free_offset;
         let (fitted, rows) = (chosen.fitted.take(), chosen.weak.rows.clone());
         self.move_zero(chosen, guess);
-        let rests = self.approach(chosen, model)?;
+        let rests = self.roughly(|session| session.approach(chosen, model))?;
         let with = chosen.fitted.as_ref().map_or(f64::INFINITY, |fitted| fitted.error);
         let zero = std::mem::take(&mut self.record.angle_zero);
         // Moving them back would leave rounding.
