@@ -151,16 +151,15 @@ class Trial:
         found = {}
         for one in self.suspects:
             changed = self._with(call, one)
-            found[one] = self.identify(**kinds, terms=changed["terms"], lag=changed["lag"])
-        ratios = {one: self._left_of(result).ratio for one, result in found.items() if _is_there(one, result)}
-        best = min(ratios, key=ratios.__getitem__, default=None)
-        if best is None or not ratios[best] <= _BETTER:
+            found[one] = self.identify(**kinds, terms=changed["terms"], lag=changed["lag"], diagnose=True)
+        left_of = {one: self._left_of(result) for one, result in found.items() if _is_there(one, result)}
+        best = min(left_of, key=lambda one: left_of[one].ratio, default=None)
+        if best is None or not left_of[best].ratio <= _BETTER:
+            return None
+        left, result = left_of[best], found[best]
+        if not _holds(left.least.share, lambda: result):
             return None
         changed = self._with(call, best)
-        result = self.identify(**kinds, terms=changed["terms"], lag=changed["lag"], diagnose=True)
-        left = self._left_of(result)
-        if not (_is_there(best, result) and left.ratio <= _BETTER and _holds(left.least.share, lambda: result)):
-            return None
         terms = [term if isinstance(term, str) else term.name for term in changed["terms"]]
         change = f"lag={result.settings['lag']:.4g}" if best == "lag" else f"terms={terms}"
         return _Remedy(left.ratio, f"{self._suspicion(best, result)}: try {change}; {left}{self._moved(result)}")
