@@ -15,7 +15,9 @@ import tvident
 from parameters import long
 from tvident import Status
 from tvident._command_line import main
+from tvident._files import copy_text
 from tvident._in_pieces import call, choices
+from tvident._in_pieces import copied as copied_module
 
 SAMPLES = 70_001
 """Four pieces of the tests, the last of another length."""
@@ -284,6 +286,30 @@ def test_what_another_input_left_is_not_used(rig: tvident.Recording) -> None:
     tvident.identify_file(write("in.npy", rig.angle, -rig.torque), "out.npy", **options)
     whole = tvident.identify(rig.angle, -rig.torque, sample_rate=1000, method="paper")
     assert np.array_equal(np.load("out.npy")["stiffness"], whole.stiffness, equal_nan=True)
+
+
+@pytest.mark.parametrize("ending", ["npy", "csv", "zarr"])
+def test_a_recording_that_is_written_to_while_it_is_read_gives_no_result(
+    rig: tvident.Recording, ending: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = write(f"in.{ending}", rig.angle, rig.torque)
+    changed = (
+        next(one for one in sorted(Path(source).rglob("*")) if one.is_file()) if ending == "zarr" else Path(source)
+    )
+
+    def append(*_: object) -> None:
+        with changed.open("ab") as file:
+            file.write(b"0.1,0.")
+
+    def copied(*given: Any) -> Any:
+        append()
+        return copy_text(*given)
+
+    monkeypatch.setattr(copied_module, "copy_text", copied)
+    options: dict[str, Any] = {"angle": "angle", "torque": "torque", "sample_rate": 1000, "method": "paper", "step": 50}
+    with pytest.raises(tvident.recordings.FileError, match=rf"in\.{ending}.*must stay as it is while it is read"):
+        tvident.identify_file(source, "out.npy", **options, progress=None if ending == "csv" else append)
+    assert not Path("out.npy").exists()
 
 
 def test_units_and_times_of_the_file_are_used(rig: tvident.Recording) -> None:

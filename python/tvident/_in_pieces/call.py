@@ -155,11 +155,13 @@ def identify_file(
         "lag": lag,
         "quantisation": quantisation,
     }
+    is_text = source_path.suffix.lower() in TEXT
+    mark = mark_of(source_path) if source_path.exists() else ""
     told = {
         "version": version("tvident"),
         "instructions": _core.instructions(),
         "recording": [
-            mark_of(source_path) if source_path.exists() else "",
+            mark,
             angle,
             torque,
             sample_rate,
@@ -171,10 +173,12 @@ def identify_file(
         "asked": [repr(method), repr(given), nan_policy, every, repr(dict(settings or {}))],
     }
     with ExitStack() as stack, arguments.reporter(progress, "identification") as report:
-        source, kept = _opened(source_path, place, told)
+        source, kept = _opened(source_path, place, told, mark if is_text else None)
         stack.callback(source.close)
         try:
             recording = _recording(source, (angle, torque, t), (angle_unit, torque_unit), (delta, sample_rate))
+            if not is_text:
+                recording = replace(recording, opened=(source_path, mark))
             weighted = weights is not None
             if weights is not None:
                 recording = replace(recording, weights=_of_length(source, "weights", weights, recording.samples)[0])
@@ -187,11 +191,11 @@ def identify_file(
             raise
 
 
-def _opened(path: Path, output: Path, told: Mapping[str, Any]) -> tuple[Source, Kept]:
-    """Return the recording, as rows of numbers where it is text, and what is kept of an earlier call."""
-    if path.suffix.lower() in TEXT and path.is_file():
+def _opened(path: Path, output: Path, told: Mapping[str, Any], of_text: str | None) -> tuple[Source, Kept]:
+    """Return the recording, as rows of numbers where it is a text with a mark, and what is kept of an earlier call."""
+    if of_text is not None and path.is_file():
         kept = Kept(output, told)
-        return copied(path, kept.folder), kept
+        return copied(path, kept.folder, of_text), kept
     return opened(path), Kept(output, told)
 
 

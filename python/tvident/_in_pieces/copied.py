@@ -9,16 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from tvident._files import FileError, FileWarning, copy_text, printable
+from tvident._in_pieces.recorded import check_same
 from tvident._in_pieces.sources import ColumnOfRows, RowsOfFile, Source
 
 
-def copied(path: Path, folder: Path) -> Source:
+def copied(path: Path, folder: Path, mark: str) -> Source:
     """Return the columns of a text, which are copied to a folder unless they are there.
 
     Raises
     ------
     FileError
-        If the text cannot be read as it is meant.
+        If the text cannot be read as it is meant, or is not what it was when the mark was taken: its last line may be a part of one.
     """
     rows, named = folder / "recording", folder / "recording.json"
     if not named.exists():
@@ -28,6 +29,7 @@ def copied(path: Path, folder: Path) -> Source:
                 found = copy_text(path, file, said.append)
         except FileError as error:
             raise FileError(f"{printable(path)}: cannot be read as text: {error}") from None
+        check_same(path, mark)
         for message in said:
             warnings.warn(f"{printable(path)}: {message}", FileWarning, stacklevel=4)
         beside = folder / "recording.json.new"

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident._files import FileError, printable
 from tvident._identify import Held, Span
+from tvident._in_pieces.kept import mark_of
 from tvident._in_pieces.sources import SourceChannel
 from tvident._units import Axis, axis_of
 from tvident._units import Channel as Said
@@ -35,6 +38,8 @@ class RecordingOfFile:
         What the channels are multiplied by.
     weights : SourceChannel, optional
         Of the samples.
+    opened : (Path, str), optional
+        The file that is read, and what told it from others when it was opened.
     """
 
     angle: SourceChannel
@@ -44,6 +49,7 @@ class RecordingOfFile:
     period: float
     axis: Axis
     weights: SourceChannel | None = None
+    opened: tuple[Path, str] | None = None
 
     def held(self, spans: Sequence[Span]) -> Held:
         """Read some parts."""
@@ -62,9 +68,34 @@ class RecordingOfFile:
         native = samples.astype(samples.dtype.newbyteorder("="), copy=False)
         return native if factor == 1 else native.astype(np.float64) * factor
 
+    def check_unchanged(self) -> None:
+        """Check that all pieces were read of one recording.
+
+        Raises
+        ------
+        FileError
+            If the file is another than when it was opened.
+        """
+        if self.opened is not None:
+            check_same(*self.opened)
+
     def times(self, first: int, end: int, step: int) -> npt.NDArray[np.float64]:
         """Return the times of every `step`-th of some samples: of those whose numbers are its multiples."""
         return self.begin + np.arange(first + -first % step, end, step, dtype=np.float64) * self.period
+
+
+def check_same(path: Path, mark: str) -> None:
+    """Check that a file is still what it was.
+
+    Raises
+    ------
+    FileError
+        If it is not.
+    """
+    if not path.exists() or mark_of(path) != mark:
+        raise FileError(
+            f"{printable(path)}: must stay as it is while it is read; it was written to or removed; call again when it is complete"
+        )
 
 
 def units_of(angle: str, torque: str, angle_unit: str | None, torque_unit: str | None) -> Axis:

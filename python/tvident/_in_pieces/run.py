@@ -117,6 +117,7 @@ class Run:
             self._keep(work, *work.piece(piece, self._progress(piece)))
             if self._report is not None:
                 self._report(piece[1], self._samples)
+        self._asked.recording.check_unchanged()
         return self._written(settings, work)
 
     def _keep(self, work: Work, columns: Columns, note: Any) -> None:
