@@ -15,12 +15,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 import tvident
 from tvident._live import Inlet, LiveClock, Outlet
 
-SECONDS = float(os.environ.get("TVIDENT_LIVE", "4"))
+SECONDS = float(os.environ.get("TVIDENT_LIVE", "10"))
 """Of the test with a real outlet at 1 kHz; a minute in ``make test-live``."""
 
 RIG = tvident.simulate_torsional_rig(duration=2.0, seed=2)
@@ -138,6 +139,69 @@ def test_losses_are_found_where_they_are_and_jitter_is_none() -> None:
     assert np.array_equal(lost, [3000, 3001, 3002, 3003, 12_000])
     assert clock.rate.period == pytest.approx(1e-3 * (1 + 80e-6), abs=5 * clock.rate.error)
     assert re.search(r"drift -(79|80)\.", "\n".join(clock.words()))
+
+
+def test_samples_that_came_twice_and_clocks_that_were_set_keep_windows_apart() -> None:
+    stamps = np.arange(6000) * 1e-3 + 7.0
+    twice = np.insert(stamps, 3000, stamps[2990:3000])
+    set_back, set_forward = (stamps + np.where(np.arange(6000) < 3000, 0.0, by) for by in (-50.0, 5000.0))
+    faster = np.r_[stamps[:3000], stamps[3000] + np.arange(3000) * 5e-4]
+    for given, repeated, jumps, said in (
+        (twice, 10, 0, "10 samples more came"),
+        (set_back, 0, 1, "jumped 1 times"),
+        (set_forward, 0, 1, "jumped 1 times"),
+    ):
+        clock, numbers = clocked(given.tolist())
+        assert (clock.lost, clock.repeated, clock.jumps) == (0, repeated, jumps)
+        assert np.array_equal(np.flatnonzero(np.isnan(numbers)), [3000])
+        assert said in "\n".join(clock.words())
+        assert clock.rate.period == pytest.approx(1e-3, rel=1e-9)
+    clock, numbers = clocked(faster.tolist())
+    assert clock.repeated == pytest.approx(1500, abs=2)
+    # No window of more than three samples holds none that is missing.
+    assert np.diff(np.flatnonzero(np.isnan(numbers))).max() <= 3
+    # Samples of one buffer have one stamp, and come out as they came.
+    for place in (0, 31):
+        clock, numbers = clocked(np.repeat(stamps[place::32], 32)[:5900].tolist())
+        assert (clock.lost, clock.repeated, len(numbers)) == (0, 0, 5900)
+    clock, _ = clocked([*stamps[:3000], stamps[3001], stamps[3000], *stamps[3002:]])
+    assert "1 stamps are before the one that came last" in "\n".join(clock.words())
+    clock, _ = clocked((1000 * stamps[:100]).tolist())
+    assert "say their unit" in "\n".join(clock.words())
+
+
+def test_samples_without_a_stamp_keep_their_places() -> None:
+    stamps = np.delete(np.arange(6000) * 1e-3 + 7.0, slice(3020, 3030))
+    stamps[3001:3040] = np.nan
+    stamps[3045] = np.nan
+    _, numbers = clocked(stamps.tolist())
+    there = np.array(numbers)[~np.isnan(numbers)]
+    assert np.array_equal(there, np.arange(5990))
+
+
+def test_counters_that_begin_anew_repeat_or_overtake() -> None:
+    numbers, stamps = np.arange(2000), np.arange(2000) * 1e-3
+
+    def counted(order: npt.NDArray[np.int_], counter: npt.NDArray[np.int_]) -> tuple[LiveClock, list[float]]:
+        clock = LiveClock(1e-3)
+        rows = [
+            row
+            for number, count in zip(order.tolist(), counter.tolist(), strict=True)
+            for row in clock.rows((float(stamps[number]), float(number), 0.0), float(count))
+        ]
+        return clock, [row[1] for row in rows]
+
+    # Eight bits: 253 to 257 are lost where the counter begins anew.
+    some = np.delete(numbers, slice(253, 258))
+    clock, found = counted(some, some % 256)
+    assert (clock.lost, clock.jumps, len(found)) == (5, 0, 2000)
+    assert np.array_equal(np.flatnonzero(np.isnan(found)), np.arange(253, 258))
+    # One came twice, and one too late for its place.
+    order = np.r_[numbers[:900], 899, numbers[900:1000], 1001, 1000, numbers[1002:]]
+    clock, found = counted(order, order)
+    assert (clock.lost, clock.repeated, clock.jumps, len(found)) == (1, 2, 0, 2000)
+    assert np.array_equal(np.flatnonzero(np.isnan(found)), [1000])
+    assert np.array_equal(np.delete(found, 1000), np.delete(numbers, 1000))
 
 
 def test_a_rate_that_is_not_the_nominal_one_is_said() -> None:

@@ -9,10 +9,13 @@ Row = tuple[float, float, float]
 """Time, angle, torque."""
 
 _WAIT = 16
-"""Samples that decide whether a late stamp was late alone, or samples were lost before it."""
+"""Samples that decide whether a stamp was late or early alone, or samples were lost or repeated before it."""
 
 _HALF = 0.5
 """Periods: a stamp that is later belongs to the next sample."""
+
+_MOVES = 0.25
+"""Periods from stamp to stamp, at least, where they say how samples follow each other: those of one buffer are alike."""
 
 _FOLLOW = 0.05
 """Part of a stamp's lateness by which the next one is expected later: the clock is followed over some 20 samples."""
@@ -65,57 +68,83 @@ class Rate:
 class LiveClock:
     """Puts samples in order by their stamps, and what was lost between them as NaN.
 
-    A stamp that is late alone, since a driver held it back, is followed by ones that are not; after a loss all are late. So a late stamp
-    waits for the next 16, and whole periods that all of them are late are lost samples. With a counter nothing has to wait.
+    A stamp that is late alone, since a driver held it back, is followed by ones that are not; after a loss all are late, and after
+    samples that came twice all are early. So a stamp that is off waits for the next 16, and whole periods that all of them are late are
+    lost samples. With a counter nothing has to wait. Where samples came twice or the clock was set, one NaN keeps windows apart.
 
     Parameters
     ----------
     period : float
         Nominal seconds from sample to sample.
+
+    Attributes
+    ----------
+    rate : Rate
+        Since the clock was set.
+    lost, repeated, jumps, back : int
+        Samples that did not come and that came twice or too late, how often clock or counter were set, and stamps that are before the
+        last one by half a period or more.
     """
 
     def __init__(self, period: float) -> None:
         self._period = period
         self._waiting: list[Row] = []
         self._next = 0
-        self._expected = math.nan
+        self._expected = self._last = math.nan
         self._counter: int | None = None
+        self._highest = 0
         self.rate = Rate()
-        self.lost = 0
-        self.jumps = 0
+        self.lost = self.repeated = self.jumps = self.back = 0
 
     def rows(self, row: Row, counter: float | None = None) -> list[Row]:
         """Take a sample, and return those that are in order now."""
         if counter is not None:
             return self._counted(row, counter)
-        if not math.isfinite(row[0]):
-            return [self._taken(row)]
-        if not self._waiting and not self._late(row, 0) >= _HALF:
+        step = (row[0] - self._last) / self._seconds()
+        if math.isfinite(row[0]):
+            self._last = row[0]
+        self.back += step <= -_HALF
+        off = self._off(row, len(self._waiting))
+        if step < -_WAIT:
+            # Nothing before it says when this one is due.
+            return [*self.rest(), *self._jumped(row[0]), self._taken(row)]
+        is_due = not abs(off) >= _HALF or -_MOVES < step < _MOVES
+        if not self._waiting and is_due:
             return [self._taken(row)]
         self._waiting.append(row)
-        is_settled = len(self._waiting) > _WAIT or self._late(row, len(self._waiting) - 1) < _HALF
-        return self._settled() if is_settled else []
+        return self._settled() if len(self._waiting) > _WAIT or abs(off) < _HALF else []
 
     def rest(self) -> list[Row]:
-        """Return what still waits, at the end."""
+        """Return what still waits, at the end: samples of one buffer say nothing of what was lost."""
         found: list[Row] = []
         while self._waiting:
-            found += self._settled()
+            if self._waiting[-1][0] - self._waiting[0][0] < _MOVES * self._seconds():
+                found += map(self._taken, self._waiting)
+                self._waiting.clear()
+            else:
+                found += self._settled()
         return found
 
     def _counted(self, row: Row, counter: float) -> list[Row]:
         """Take a sample that says its number."""
         if not math.isfinite(counter):
             return [self._taken(row)]
-        missing = 0 if self._counter is None else int(counter) - self._counter - 1
-        if not 0 <= missing <= _MOST_LOST:
-            self.jumps += 1
-            missing = 0
-        self._counter = int(counter)
-        return [*self._gap(missing), self._taken(row)]
+        number, before = int(counter), self._counter
+        by = 1 if before is None else number - before
+        if -_WAIT < by <= 0:
+            # It came before, or as missing: too late for its place.
+            self.repeated += 1
+            return []
+        if by < 0:
+            # Counters of some bits begin anew.
+            by %= 1 << self._highest.bit_length()
+        self._counter, self._highest = number, max(self._highest, number)
+        if not 1 <= by <= _MOST_LOST:
+            return [*self._jumped(row[0]), self._taken(row)]
+        return [*self._gap(by - 1), self._taken(row)]
 
-    def _late(self, row: Row, place: int) -> float:
-        """Return by how many periods a stamp comes late, with so many samples before it that wait."""
+    def _off(self, row: Row, place: int) -> float:
+        """Return by how many periods a stamp comes late, with so many samples before it that wait; less than zero where it is early."""
         return (row[0] - self._expected) / self._seconds() - place
 
     def _seconds(self) -> float:
@@ -125,17 +154,28 @@ class LiveClock:
         return shown if is_known else self._period
 
     def _settled(self) -> list[Row]:
-        """Return what waits up to the sample that is least late, after what was lost before them."""
-        late = [self._late(row, place) for place, row in enumerate(self._waiting)]
-        least = min(range(len(late)), key=late.__getitem__)
-        missing = max(math.floor(late[least] + _HALF), 0)
-        if missing > _MOST_LOST:
-            self.jumps += 1
-            self._expected, missing = self._waiting[0][0], 0
-        found = self._gap(missing)
+        """Return what waits up to the sample that is off least, after what was lost before them."""
+        off = [self._off(row, place) for place, row in enumerate(self._waiting)]
+        least = min(range(len(off)), key=lambda place: abs(off[place]) if math.isfinite(off[place]) else math.inf)
+        by = math.floor(off[least] + _HALF) if math.isfinite(off[least]) else 0
+        if by > _MOST_LOST:
+            found = self._jumped(self._waiting[0][0])
+        elif by < 0:
+            self.repeated -= by
+            self._next += by
+            self._expected += by * self._seconds()
+            found = [_apart(self._waiting[0][0])]
+        else:
+            found = self._gap(by)
         found += [self._taken(row) for row in self._waiting[: least + 1]]
         del self._waiting[: least + 1]
         return found
+
+    def _jumped(self, stamp: float) -> list[Row]:
+        """Begin anew with a clock that was set, and return what keeps windows from what was before."""
+        self.jumps += 1
+        self.rate, self._next, self._expected = Rate(), 0, stamp
+        return [_apart(stamp)]
 
     def _gap(self, missing: int) -> list[Row]:
         """Return so many samples that were lost."""
@@ -151,7 +191,7 @@ class LiveClock:
             self.rate.see(self._next, row[0])
             if math.isnan(self._expected):
                 self._expected = row[0]
-            late = max(-_HALF, min(_HALF, self._late(row, 0)))
+            late = max(-_HALF, min(_HALF, self._off(row, 0)))
             self._expected += _FOLLOW * late * self._seconds()
         self._next += 1
         self._expected += self._seconds()
@@ -171,7 +211,24 @@ class LiveClock:
                 said.append(
                     f"the rate differs by {drift / 1e4:+.2g} %: inertia is off by twice that; give --sample-rate {1 / period:.7g}"
                 )
-        said.append(
-            f"lost samples: {self.lost}" + (f"; the counter or clock jumped {self.jumps} times" if self.jumps else "")
-        )
+        said.append(f"lost samples: {self.lost}")
+        if self.lost > self.rate.count:
+            said.append(
+                "more samples are missing than came: check the sample rate, and that times are in seconds or say their unit"
+            )
+        if self.repeated:
+            said.append(
+                f"{self.repeated} samples more came than their stamps or numbers have room for: repeated, late, or of another rate"
+            )
+        if self.back:
+            said.append(
+                f"{self.back} stamps are before the one that came last: samples are out of order, or the clock was set"
+            )
+        if self.jumps:
+            said.append(f"the counter or clock jumped {self.jumps} times: no window goes over that")
         return said
+
+
+def _apart(stamp: float) -> Row:
+    """Return a missing sample that keeps windows on either side of it apart."""
+    return stamp, math.nan, math.nan
