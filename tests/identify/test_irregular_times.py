@@ -12,6 +12,7 @@ import pytest
 from scipy.interpolate import make_interp_spline
 
 import tvident
+from parameters import long
 from tvident import Status
 
 Array = npt.NDArray[np.float64]
@@ -150,6 +151,18 @@ def test_stamps_that_jitter_are_told_from_samples_that_do() -> None:
     assert tvident.Status.CHANNEL_SUSPECTED in other.record_status
     assert true.settings["times"] == "true"
     assert not true.record_status & Status.CHANNEL_SUSPECTED
+
+
+@pytest.mark.parametrize(("seed", "by"), [(4, 2.0), (7, 1.0), *long((1, 1.0), (6, 2.0))])
+def test_stamps_that_jitter_by_more_than_a_step_are_told_by_the_angle(seed: int, by: float) -> None:
+    """A torque that is mostly noise says nothing against it; the angle's noise would be a thousand times as large in time."""
+    simulated = tvident.simulate_torsional_rig(duration=20.0, seed=100 + seed, pattern="slider")
+    stamps = np.sort(simulated.time + by / RATE * np.random.default_rng(seed).uniform(-1, 1, simulated.time.size))
+    result = tvident.identify(simulated.angle, simulated.torque, t=stamps)
+    assert result.settings["times"] == "even"
+    assert tvident.Status.CHANNEL_SUSPECTED in result.record_status
+    value, error = result.constants["inertia"]
+    assert abs(value - simulated.inertia[0]) < 4 * error
 
 
 def test_stamps_that_jitter_by_a_whole_step_do_not_change_the_rate() -> None:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._clocks.grid import Grid
+from tvident._clocks.missing import bridge_of
 from tvident._clocks.order import chosen_order, longest_bridged
 
 Numbers = npt.NDArray[np.float64]
@@ -21,6 +22,9 @@ Kind = Literal["lost", "true", "even"]
 
 _TELLS = 2.0
 """A channel is smoother in one way than in the other where its noise there has so much less variance."""
+
+_AGAINST = 0.25
+"""A channel that is mostly noise tells little: it speaks against one that tells much from this power of the other's ratio on."""
 
 _FEWEST, _COMPARED = 64, 1 << 15
 """Samples whose roughness is compared, at least and at most."""
@@ -140,10 +144,13 @@ def _splines(
     grid: Grid, channels: Mapping[str, npt.NDArray[np.number]], earlier: Mapping[str, Any]
 ) -> tuple[Grid, int]:
     """Return the grid with the longest step that splines go over, and their order: what settings hold, and otherwise what is best."""
-    order, bridged = earlier.get("spline_order") or chosen_order(grid, channels), earlier.get("bridged")
-    if not (isinstance(bridged, int | float) and bridged > 0):
-        bridged = longest_bridged(grid, channels, order)
-    return replace(grid, bridged=float(bridged)), order
+    order, given = earlier.get("spline_order"), earlier.get("bridged")
+    bridged = float(given) if isinstance(given, int | float) and given > 0 else None
+    if grid.jitter == 0 and not (order and bridged):
+        bridge = bridge_of({name: grid.with_missing(values) for name, values in channels.items()}, order)
+        return replace(grid, bridged=bridged or bridge.longest), bridge.order
+    order = order or chosen_order(grid, channels)
+    return replace(grid, bridged=bridged or longest_bridged(grid, channels, order)), order
 
 
 def _told(
@@ -164,10 +171,11 @@ def _told(
         f"{share}: the channels were brought onto a uniform grid of {1 / grid.period:.6g} Hz by splines of order {order}{_gaps(grid)}",
     )
     said = _smoother(clock, channels, quantisation, workers)
-    in_time = [name for name, ratio in said.items() if ratio < 1 / _TELLS]
     in_number = {name: ratio for name, ratio in said.items() if ratio > _TELLS}
     if not in_number:
         return clock
+    against = min(1 / _TELLS, max(in_number.values()) ** -_AGAINST)
+    in_time = [name for name, ratio in said.items() if ratio < against]
     if in_time:
         return Clock(
             grid,
@@ -226,7 +234,8 @@ def _smoother(
     first = max(0, (grid.places.size - _COMPARED) // 2)
     part = slice(first, first + _COMPARED)
     places = grid.places[part] - math.ceil(grid.places[first])
-    grid = replace(grid, places=places, samples=math.floor(places[-1]) + 1)
+    # Over steps that splines do not follow well, too: where these are many nothing else would be left to compare.
+    grid = replace(grid, places=places, samples=math.floor(places[-1]) + 1, bridged=grid.longest)
     channels = {name: values[..., part] for name, values in channels.items()}
     clock, numbers = replace(clock, grid=grid), Clock(grid, "even", 0)
     in_time = clock.evened(channels, propagate=False, workers=workers)

@@ -74,6 +74,12 @@ class Grid:
         counts = np.where(steps > self.longest, np.rint(steps), 1).astype(np.int64)
         return np.concatenate([[0], np.cumsum(counts)])
 
+    def with_missing(self, values: npt.NDArray[np.number]) -> Numbers:
+        """Return samples that lie on the grid there, NaN where it has none."""
+        found = np.full((*values.shape[:-1], self.samples), np.nan)
+        found[..., np.rint(self.places).astype(np.int64)] = values
+        return found
+
 
 def grid_of(times: Numbers) -> Grid:
     """Return the grid of times that increase.

@@ -1,4 +1,4 @@
-"""The order of the splines by which channels are brought onto a grid: by predicted variance and bias."""
+"""The order of the splines by which channels whose times jitter are brought onto a grid: by predicted variance and bias."""
 
 from __future__ import annotations
 

@@ -271,10 +271,13 @@ def identify(
     order while steps scatter by up to 0.3 of a step. Beyond, that of the orders 1, 3 and 5 is taken whose noise and bias together are
     predicted to be least. The noise of the channels is that of their samples, and standard errors know what splines make of it. Steps much
     longer than the others are gaps, whose samples are missing; so are steps over which splines do not predict samples that are left out
-    elsewhere. Where a clock is uniform but lost samples, these are bridged in the same way. Where a channel is smooth in sample number and
-    not in time, the stamps jitter and not the samples, as behind a buffer: then samples are taken to be even, and the advice says so, with
-    CHANNEL_SUSPECTED. Where angle and torque have clocks of their own, both are brought onto a grid at the rate of the faster, so that
-    every sample of both counts. Results are at the times of the grid, ``time``. All this costs about 1 µs a sample.
+    elsewhere. Where a clock is uniform but lost samples, one or two in a row are bridged by splines of the order that misses samples left
+    out least, unless that adds more to the variance of the equations than is lost without them. So are missing values in weak form with
+    ``nan_policy="omit"``, in every channel its own, where short gaps would take more than a tenth of the equations. Where a channel is
+    smooth in sample number and not in time, the stamps jitter and not the samples, as behind a buffer: then samples are taken to be even,
+    and the advice says so, with CHANNEL_SUSPECTED. Where angle and torque have clocks of their own, both are brought onto a grid at the
+    rate of the faster, so that every sample of both counts. Results are at the times of the grid, ``time``. All this costs about 1 µs a
+    sample.
 
     See Also
     --------

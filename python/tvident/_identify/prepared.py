@@ -16,7 +16,7 @@ from tvident._equation import LINEAR_UNITS, UNITS
 from tvident._identify.channels import motion_channels
 from tvident._identify.data import Data
 from tvident._identify.expanded import ExpandedTask, expansions_of
-from tvident._identify.methods import StrongForm
+from tvident._identify.methods import StrongForm, WeakForm
 from tvident._identify.own_clocks import check_every_sample, lag_found, own_clocks
 from tvident._identify.robust import loss_of, with_clipped_torque
 from tvident._identify.settings import Request, resolve
@@ -107,12 +107,14 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         signals, request = signals.on_grid(
             grid, request, call["settings"], propagate=propagate, workers=call["workers"]
         )
+    elif clocks is None and not propagate and isinstance(request.form, WeakForm):
+        signals, request = signals.over_gaps(request, call["settings"], workers=call["workers"])
     moving = motion_channels(
         signals.channels,
         signals.period,
         has_spring=request.has_spring,
         quantisation=request.quantisation,
-        passed=signals.passed,
+        passed=signals.passed.get(next(iter(measured))),
     )
     data = Data(
         angles=moving.angles,
@@ -129,7 +131,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         labels=arguments.labels_of(first) if grid is None else None,
         axis=axis,
         clock=signals.clock,
-        passed=(signals.passed, signals.passed),
+        passed=(signals.passed.get(next(iter(measured))), signals.passed.get("torque")),
         weights=weighted,
         wanted=None if isinstance(request.form, StrongForm) else call.get("wanted"),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
-from tvident._clocks import Clock, Grid, clock_of
+from tvident._clocks import Bridged, Clock, Grid, bridged, clock_of
 from tvident._derivatives import quantisation_step
 from tvident._identify.settings import Request
 
@@ -33,10 +33,10 @@ class Signals:
         Seconds.
     period : float
         Seconds from one sample to the next.
-    clock : Clock, optional
-        How they were brought onto a grid; None where they were not.
-    passed : PassedNoise, optional
-        What that made of white noise.
+    clock : Clock or Bridged, optional
+        How they were brought onto a grid, or their short gaps bridged; None where neither was.
+    passed : mapping of str to PassedNoise
+        What that made of white noise, by channel.
     doubts : sequence of (int, str)
         What is wrong with the times, of every record.
     """
@@ -47,8 +47,8 @@ class Signals:
     mask: npt.NDArray[np.bool_] | None
     time: npt.NDArray[np.float64]
     period: float
-    clock: Clock | None = None
-    passed: _core.PassedNoise | None = None
+    clock: Clock | Bridged | None = None
+    passed: Mapping[str, _core.PassedNoise] = field(default_factory=dict)
     doubts: Sequence[tuple[int, str]] = ()
 
     def on_grid(
@@ -61,9 +61,7 @@ class Signals:
         workers: int | None,
     ) -> tuple[Signals, Request]:
         """Return the same on a grid, and the request with what is known at every sample there."""
-        recorded = {**self.channels, "torque": self.torques}
-        if self.instruments is not None:
-            recorded["instrument"] = self.instruments
+        recorded = self._recorded
         request = with_own_step(request, self.channels)
         clock = clock_of(grid, recorded, request.quantisation, workers, earlier)
         evened = clock.evened(recorded, propagate=propagate, workers=workers)
@@ -76,11 +74,30 @@ class Signals:
             evened.time,
             clock.period,
             clock,
-            evened.passed,
+            {} if evened.passed is None else dict.fromkeys(recorded, evened.passed),
             [(record, clock.doubt) for record in range(records) if clock.doubt],
         )
         known = {name: evened.known(value) for name, value in request.parameters.items()}
         return signals, replace(request, parameters=known)
+
+    def over_gaps(
+        self, request: Request, earlier: Mapping[str, Any] | None, *, workers: int | None
+    ) -> tuple[Signals, Request]:
+        """Return the same with short gaps bridged, and the request with what cannot be found any more."""
+        found = bridged(self._recorded, earlier, workers)
+        if found is None:
+            return self, request
+        request = with_own_step(request, self.channels)
+        channels = {name: found.channels[name] for name in self.channels}
+        instruments = found.channels.get("instrument")
+        signals = replace(self, channels=channels, torques=found.channels["torque"], instruments=instruments)
+        return replace(signals, clock=found, passed=found.passed), request
+
+    @property
+    def _recorded(self) -> dict[str, npt.NDArray[np.number]]:
+        """Everything that was recorded, by name."""
+        own = {} if self.instruments is None else {"instrument": self.instruments}
+        return {**self.channels, "torque": self.torques, **own}
 
 
 def with_own_step(request: Request, channels: _Channels) -> Request:

@@ -1,0 +1,61 @@
+"""Short gaps of a uniform clock: bridged by splines where that costs less than the equations over them."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from tvident._clocks import bridged
+from tvident._clocks.missing import Bridge, bridge_of
+
+Array = npt.NDArray[np.float64]
+SAMPLES = 6000
+
+
+def holed(values: Array, share: float, seed: int) -> Array:
+    return np.where(np.random.default_rng(seed).random(values.size) < share, np.nan, values)
+
+
+def wave(period: float) -> Array:
+    return np.asarray(np.sin(2 * np.pi * np.arange(SAMPLES) / period))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_order_is_the_one_that_misses_least(seed: int) -> None:
+    noise = np.random.default_rng(seed).standard_normal(SAMPLES)
+    assert bridge_of({"angle": holed(wave(9.0), 0.05, seed)}).order == 5
+    # Splines of high order pass more noise.
+    assert bridge_of({"angle": holed(wave(900.0) + noise, 0.05, seed)}).order == 1
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_gaps_are_bridged_where_splines_add_less_than_is_lost(seed: int) -> None:
+    slow, fast = (wave(period) + 1e-4 * np.random.default_rng(seed).standard_normal(SAMPLES) for period in (60.0, 10.0))
+    assert bridge_of({"angle": holed(slow, 0.01, seed)}).longest == 3
+    # Over two samples of ten splines are wrong by sixty times the noise, over one by four times.
+    assert bridge_of({"angle": holed(slow, 0.01, seed), "torque": holed(fast, 0.01, seed)}).longest == 2
+
+
+def test_samples_stay_as_they_are_and_rare_and_long_gaps_are_left_out() -> None:
+    angle, torque = wave(60.0), wave(40.0)
+    some = holed(angle, 0.05, 3)
+    some[1000:1010] = np.nan
+    found = bridged({"angle": some, "torque": torque}, None, 1)
+    assert found is not None
+    there = np.isfinite(some)
+    assert np.array_equal(found.channels["angle"][there], some[there])
+    assert found.channels["torque"] is torque
+    assert set(found.passed) == {"angle"}
+    assert np.isnan(found.channels["angle"][1000:1010]).all()
+    gone = ~there & np.isfinite(found.channels["angle"])
+    assert gone.sum() > 250
+    assert np.quantile(np.abs(found.channels["angle"] - angle)[gone], 0.95) < 1e-4
+    rare = angle.copy()
+    rare[::500] = np.nan
+    assert bridged({"angle": rare}, None, 1) is None
+    # What an earlier result did is done.
+    assert bridged({"angle": rare}, found.settings, 1) is not None
+    assert bridged({"angle": some}, {"spline_order": 5, "bridged": 1.5}, 1) is None
+    assert bridged({"angle": angle}, None, 1) is None
+    assert bridge_of({"angle": some}, order=3) == Bridge(3, 3.0)

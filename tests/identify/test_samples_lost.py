@@ -1,0 +1,126 @@
+"""Recordings that lost samples, jitter, or have a slower torque tell what the whole recordings tell."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.interpolate import make_interp_spline
+
+import tvident
+from identify.test_real_recordings import FRICTION, carriage
+from parameters import long
+
+Array = npt.NDArray[np.float64]
+
+LOSSES = [(0.01, 1), (0.1, 1), (0.05, 50), (0.1, 200)]
+"""Share of the samples, and how many in a row."""
+
+
+def lost(samples: int, share: float, burst: int, seed: int) -> npt.NDArray[np.bool_]:
+    gone = np.zeros(samples, bool)
+    for first in np.random.default_rng(seed).integers(0, samples - burst, round(share * samples / burst)):
+        gone[first : first + burst] = True
+    return gone
+
+
+def variants(t: Array, angle: Array, torque: Array, loss: tuple[float, int], seed: int) -> list[dict[str, Any]]:
+    """Give calls of a recording that lost samples: as NaN in both channels, in each its own, or not there at all."""
+    gone, other = (lost(t.size, *loss, each) for each in (seed, seed + 100))
+    missing = np.where(gone, np.nan, angle)
+    return [
+        {"angle": missing, "torque": np.where(gone, np.nan, torque), "sample_rate": 1000},
+        {"angle": missing, "torque": np.where(other, np.nan, torque), "sample_rate": 1000},
+        {"angle": angle[~gone], "torque": torque[~gone], "t": t[~gone]},
+    ]
+
+
+@cache
+def rig(seed: int) -> tuple[tvident.SimulatedRecording, tvident.Identification]:
+    simulated = tvident.simulate_torsional_rig(duration=20.0, seed=seed, pattern="slider")
+    return simulated, tvident.identify(simulated.angle, simulated.torque, sample_rate=1000)
+
+
+def error(result: tvident.Identification, simulated: tvident.SimulatedRecording) -> tuple[float, float]:
+    """Give the root mean square error of the stiffness where it is known, and how often it is within its 95 % interval."""
+    truth = np.interp(result.time, simulated.time, simulated.stiffness)
+    away, known = result.stiffness - truth, result.trusted & np.isfinite(result.stiffness)
+    inside = np.abs(away[known]) < 1.96 * result.stderr["stiffness"][known]
+    return float(np.sqrt(np.mean(away[known] ** 2))), float(inside.mean())
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+@pytest.mark.parametrize("seed", [1, *long(2, 3, 4, 5, 6)])
+def test_a_rig_that_lost_samples_is_the_whole_rig(loss: tuple[float, int], seed: int) -> None:
+    simulated, whole = rig(seed)
+    t, angle, torque = (np.asarray(one) for one in (simulated.time, simulated.angle, simulated.torque))
+    of_whole, covered = error(whole, simulated)
+    for call in variants(t, angle, torque, loss, seed):
+        result = tvident.identify(**call)
+        for name, (value, stderr) in result.constants.items():
+            # Both have most samples in common.
+            assert abs(value - whole.constants[name][0]) < 2 * stderr, name
+        away, inside = error(result, simulated)
+        assert inside > covered - 0.1
+        if loss[1] == 1:
+            # On average as large; windows of a single record may be chosen 20 % shorter.
+            assert away < 1.5 * of_whole
+            assert result.trusted.mean() > 0.98
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+@pytest.mark.parametrize("seed", [1, *long(2, 3)])
+def test_a_carriage_that_lost_samples_is_the_whole_carriage(
+    folder_of_recordings: Path, loss: tuple[float, int], seed: int
+) -> None:
+    position, force = carriage(folder_of_recordings)
+    t = np.arange(position.size) / 1000
+    kinds = {name: value for name, value in FRICTION.items() if name != "sample_rate"}
+    kinds |= {"inertia": "constant", "damping": "constant", "angle_unit": "m", "torque_unit": "N"}
+    whole = tvident.identify(position, force, sample_rate=1000, **kinds)
+    for call in variants(t, position, force, loss, seed):
+        result = tvident.identify(**call, **kinds)
+        for name, (value, stderr) in result.constants.items():
+            assert abs(value - whole.constants[name][0]) < 2 * stderr, name
+            assert stderr < 2.5 * whole.constants[name][1], name
+
+
+@pytest.mark.parametrize("seed", [1, *long(2)])
+def test_a_carriage_whose_times_are_shuffled_or_whose_force_is_slower_is_the_same(
+    folder_of_recordings: Path, seed: int
+) -> None:
+    position, force = carriage(folder_of_recordings)
+    t = np.arange(position.size) / 1000
+    kinds = {name: value for name, value in FRICTION.items() if name != "sample_rate"}
+    kinds |= {"inertia": "constant", "damping": "constant", "angle_unit": "m", "torque_unit": "N"}
+    whole = tvident.identify(position, force, sample_rate=1000, **kinds)
+    moved = t + 0.3e-3 * np.random.default_rng(seed).uniform(-1, 1, t.size)
+    moved = np.clip(moved, t[0], t[-1])
+    calls: list[dict[str, Any]] = [
+        {
+            "angle": make_interp_spline(t, position, k=5)(moved),
+            "torque": make_interp_spline(t, force, k=3)(moved),
+            "t": moved,
+        },
+        {"angle": position, "torque": force, "t": moved},
+        *({"angle": position, "torque": force[first::3], "t": (t, t[first::3])} for first in range(3)),
+    ]
+    for call in calls:
+        result = tvident.identify(**call, **kinds)
+        for name, (value, stderr) in result.constants.items():
+            assert abs(value - whole.constants[name][0]) < 2 * stderr, name
+
+
+def test_settings_repeat_a_result_with_lost_samples() -> None:
+    simulated, _ = rig(1)
+    t, angle, torque = (np.asarray(one) for one in (simulated.time, simulated.angle, simulated.torque))
+    call = variants(t, angle, torque, (0.1, 1), 7)[0]
+    first = tvident.identify(**call)
+    again = tvident.identify(**call, settings=first.settings)
+    assert np.array_equal(first.stiffness, again.stiffness, equal_nan=True)
+    assert "which were bridged by splines" in first.reasons[0]
+    assert first.settings["bridged"] == again.settings["bridged"]
