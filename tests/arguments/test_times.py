@@ -42,6 +42,8 @@ def test_a_lost_sample_is_never_taken_for_rounding(of: int, digits: int, lost: i
     ("t", "message"),
     [
         (np.round(COUNT / 512, 2), "t must tell samples apart; .* give sample_rate=512 instead of t"),
+        (COUNT // (COUNT.size // 2), r"t must increase; t\[1\] = 0.0 is that of the sample before"),
+        (COUNT.size // 2 < COUNT, r"t must increase; t\[1\] = 0.0 is that of the sample before"),
         (np.round(COUNT[:20] / 512, 3), "t must tell the sample rate to a thousandth; .* give sample_rate=5"),
         (COUNT / 512 + 1e-4 * np.sin(COUNT / 10), "t must be uniform; .* or give sample_rate=512 if only the clock"),
         (np.r_[COUNT, 5000], "t must be uniform; the step to .* resample the record onto a uniform grid$"),

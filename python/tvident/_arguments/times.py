@@ -186,7 +186,8 @@ def period_of_times(t: npt.ArrayLike, samples: int) -> float:
     slack = float(np.spacing(np.abs(seconds).max().astype(kind)))
     quantum = _quantum(seconds, slack)
     bounds = None if quantum is None else _periods(seconds, period, (1 + _SEARCHED) * quantum + 4 * slack)
-    if quantum is None or bounds is None:
+    # Times that most samples share may be of any rate.
+    if quantum is None or bounds is None or not bounds[0] > 0:
         raise _not_uniform(seconds, distance, period)
     shortest, longest = bounds
     rate = _plainest(1 / longest, 1 / shortest)
