@@ -12,7 +12,7 @@ import pytest
 from scipy.interpolate import make_interp_spline
 
 import tvident
-from identify.test_real_recordings import FRICTION, carriage
+from identify.test_real_recordings import FRICTION, carriage, recording
 from parameters import long
 
 Array = npt.NDArray[np.float64]
@@ -124,3 +124,32 @@ def test_settings_repeat_a_result_with_lost_samples() -> None:
     assert np.array_equal(first.stiffness, again.stiffness, equal_nan=True)
     assert "which were bridged by splines" in first.reasons[0]
     assert first.settings["bridged"] == again.settings["bridged"]
+
+
+@pytest.mark.parametrize(
+    ("name", "scale", "terms", "fine"),
+    [
+        ("pendulum.csv", 1.0, ["gravity", "coulomb", "offset"], 900.0),
+        ("robot_joint.csv", 10.1232, ["coulomb", "offset"], 400.0),
+    ],
+)
+def test_recordings_with_their_own_times_are_their_finely_resampled_selves(
+    folder_of_recordings: Path, name: str, scale: float, terms: list[str], fine: float
+) -> None:
+    columns = np.genfromtxt(recording(folder_of_recordings, name), delimiter=",", skip_header=1).T
+    t, angle, torque = columns[0], columns[1], scale * columns[3 if "pendulum" in name else 2]
+    kinds: dict[str, Any] = {"inertia": "constant", "damping": "constant", "stiffness": 0, "terms": terms}
+    own = tvident.identify(angle, torque, t=t, **kinds)
+    assert own.settings["times"] == "true"
+    grid = np.arange(t[0], t[-1], 1 / fine)
+    # The noise of a resampled channel is not white: a test function as long as the recording's own is given.
+    width = round(own.settings["window_length"] * fine / own.settings["sample_rate"]) | 1
+    resampled = tvident.identify(
+        make_interp_spline(t, angle, k=5)(grid),
+        make_interp_spline(t, torque, k=3)(grid),
+        sample_rate=fine,
+        method=tvident.WeakForm(window_length=width, exponent=own.settings["exponent"]),
+        **kinds,
+    )
+    for one, (value, stderr) in own.constants.items():
+        assert abs(resampled.constants[one][0] - value) < 2 * stderr, one
