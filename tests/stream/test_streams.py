@@ -270,6 +270,30 @@ def test_wrong_calls_say_what_would_be_right() -> None:
         tvident.IdentificationStream(sample_rate=1, method="paper").push([1.0, 2.0], 1.0)
 
 
+def test_pieces_of_nothing_change_nothing() -> None:
+    A, b = np.stack([ANGLE, TORQUE], axis=1), TORQUE
+
+    def rows(stream: Any, piece: slice) -> Any:
+        return stream.push(A[piece], b[piece])
+
+    def pairs(stream: Any, piece: slice) -> Any:
+        return stream.push(ANGLE[piece], TORQUE[piece])
+
+    weak = tvident.identify(ANGLE, TORQUE, sample_rate=1000).settings
+    for make, push, name in (
+        (lambda: tvident.LocalPolynomialStream(51), lambda one, piece: one.push(ANGLE[piece]), "derivatives"),
+        (lambda: tvident.RollingStream(50), rows, "rss"),
+        (lambda: tvident.IdentificationStream(sample_rate=1000, method="paper"), pairs, "stiffness"),
+        (lambda: tvident.IdentificationStream(sample_rate=1000, settings=weak), pairs, "stiffness"),
+    ):
+        stream = make()
+        outs = [push(stream, slice(*ends)) for ends in ((0, 0), (0, 1500), (1500, 1500), (1500, 3000), (3000, 3000))]
+        outs.append(stream.finish())
+        other = make()
+        whole = [push(other, slice(0, 3000)), other.finish()]
+        assert np.array_equal(joined(outs, name), joined(whole, name), equal_nan=True), name
+
+
 def test_a_short_stream_knows_nothing() -> None:
     stream = tvident.IdentificationStream(sample_rate=1000, method="paper")
     stream.push(ANGLE[:50], TORQUE[:50])

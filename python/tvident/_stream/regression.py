@@ -171,7 +171,8 @@ class RollingStream(Stream[StreamedRegression]):
         if self._stream is None:
             self._shape, self._one_rhs = _shape_of(regressors, rhs), rhs.ndim == 1
             self._stream = self._begun(None)
-        return self._given(self._stream.push(regressors.T, rhs.reshape(rhs.shape[0], -1).T))
+        columns = rhs[:, np.newaxis] if rhs.ndim == 1 else rhs
+        return self._given(self._stream.push(regressors.T, columns.T))
 
     def _check_end(self) -> None:
         """Check that rows have come."""
