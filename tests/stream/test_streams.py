@@ -270,6 +270,16 @@ def test_wrong_calls_say_what_would_be_right() -> None:
         tvident.IdentificationStream(sample_rate=1, method="paper").push([1.0, 2.0], 1.0)
 
 
+def test_a_stream_of_another_version_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = tvident.LocalPolynomialStream(51)
+    stream.push(ANGLE[:500])
+    kept = pickle.dumps(stream)
+    assert pickle.loads(kept).samples == 500  # noqa: S301 - our own
+    monkeypatch.setattr("tvident._stream.pieces._version", lambda: "9.9")
+    with pytest.raises(ValueError, match=r"one of tvident 0\.\S+ in 9\.9; begin another"):
+        pickle.loads(kept)  # noqa: S301 - our own
+
+
 def test_pieces_of_nothing_change_nothing() -> None:
     A, b = np.stack([ANGLE, TORQUE], axis=1), TORQUE
 

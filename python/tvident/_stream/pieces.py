@@ -12,6 +12,9 @@ from tvident import _arguments as arguments
 
 _FLOAT64 = np.dtype(np.float64)
 
+_MADE_BY = "version"
+"""What a state says beside its own: what another version keeps may mean something else."""
+
 Out = TypeVar("Out")
 
 
@@ -56,10 +59,17 @@ class Stream(Generic[Out]):
         """Check that there is something to end."""
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_stream": None if self._stream is None else self._stream.state()}
+        stream = None if self._stream is None else self._stream.state()
+        return {**self.__dict__, "_stream": stream, _MADE_BY: _version()}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
-        self.__dict__.update(state)
+        made_by, here = state.get(_MADE_BY), _version()
+        if made_by != here:
+            raise ValueError(
+                f"a stream goes on in the version that it was kept by; got one of tvident {made_by} in {here}; begin another, or install "
+                f"tvident=={made_by}"
+            )
+        self.__dict__.update({name: value for name, value in state.items() if name != _MADE_BY})
         self._stream = self._begun(state["_stream"])
 
     def _progress(self) -> str:
@@ -133,3 +143,10 @@ def piece(name: str, values: npt.ArrayLike) -> npt.NDArray[Any]:
             f"{name} must be one sample or several along one axis; got shape {array.shape}; make a stream for every record"
         )
     return np.atleast_1d(array)
+
+
+def _version() -> str:
+    """Return the version of this package."""
+    from importlib.metadata import version  # noqa: PLC0415 - takes long, and only streams that are kept need it
+
+    return version("tvident")
