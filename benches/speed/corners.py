@@ -59,11 +59,11 @@ def _against_plain(samples: int, signal: str, *positional: Any, **options: Any) 
     return prepare
 
 
-def _regression(**options: Any) -> Callable[[float], Duel]:
-    """Pit an option of `rolling_least_squares` against the plain call."""
+def _regression(count: int = 3, **options: Any) -> Callable[[float], Duel]:
+    """Pit an option of `rolling_least_squares` with so many regressors against the plain call."""
 
     def prepare(share: float) -> Duel:
-        regressors, sides = signals.regression(max(_LEAST, int(1_000_000 * share)))
+        regressors, sides = signals.regression(max(_LEAST, int(1_000_000 * share)), count)
 
         def work(**options: Any) -> Work:
             return lambda: tvident.rolling_least_squares(regressors, sides, 201, workers=1, **options)
@@ -191,6 +191,8 @@ CORNERS = [
             ("half-life", "half_life=50", _regression(alignment="trailing", half_life=50)),
             ("partial", "min_observations=50", _regression(min_observations=50)),
             ("correlated", 'covariance="hac"', _regression(covariance="hac")),
+            ("half-life-5", "half_life=50, five regressors", _regression(5, alignment="trailing", half_life=50)),
+            ("correlated-5", 'covariance="hac", five regressors', _regression(5, covariance="hac")),
         )
     ),
     Row("irregular", "`identify(t=)`, steps that scatter by 0.3 of a step", "uniform times", _irregular, most=6),

@@ -32,8 +32,8 @@ def recording(samples: int) -> tuple[Array, Array]:
     return angle, torque
 
 
-def regression(samples: int) -> tuple[Array, Array]:
-    """Return three regressors as columns, and what they explain but for noise."""
+def regression(samples: int, count: int = 3) -> tuple[Array, Array]:
+    """Return some regressors as columns, and what they explain but for noise."""
     generator = np.random.default_rng(21)
-    regressors = generator.standard_normal((samples, 3))
-    return regressors, regressors @ [1.0, 2.0, 3.0] + 0.1 * generator.standard_normal(samples)
+    regressors = generator.standard_normal((samples, count))
+    return regressors, regressors @ np.arange(1.0, count + 1) + 0.1 * generator.standard_normal(samples)

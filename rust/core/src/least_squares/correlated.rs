@@ -293,8 +293,9 @@ impl Kernel for Sandwich<'_, '_, '_> {
             1 => self.run_with::<S, 4, 1, 1>(simd),
             2 => self.run_with::<S, 4, 8, 2>(simd),
             3 => self.run_with::<S, 4, 8, 3>(simd),
-            4 => self.run_with::<S, 4, 16, 4>(simd),
-            5 => self.run_with::<S, 8, 16, 0>(simd),
+            4 => self.run_with::<S, 4, 12, 4>(simd),
+            5 => self.run_with::<S, 8, 16, 5>(simd),
+            6 => self.run_with::<S, 8, 24, 6>(simd),
             ..=8 => self.run_with::<S, 8, 40, 0>(simd),
             _ => self.run_with::<S, 16, 136, 0>(simd),
         }

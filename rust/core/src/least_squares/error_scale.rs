@@ -179,7 +179,7 @@ impl<'a> ErrorScale<'a> {
 fn turn<S: Lanes, const P: usize>(simd: S, rows: &[[f64; P]], columns: &mut [S::f64s; P]) {
     let mut square = [simd.splat_f64s(0.0); MOST_LANES];
     let square = &mut square[..S::F64_LANES];
-    if P % S::F64_LANES != 0 {
+    if P < S::F64_LANES {
         for (number, column) in columns.iter_mut().enumerate() {
             let mut values = [0.0; MOST_LANES];
             values.iter_mut().zip(rows).for_each(|(value, row)| *value = row[number]);
@@ -187,11 +187,13 @@ fn turn<S: Lanes, const P: usize>(simd: S, rows: &[[f64; P]], columns: &mut [S::
         }
         return;
     }
-    for (number, columns) in (0..).step_by(S::F64_LANES).zip(columns.chunks_exact_mut(S::F64_LANES)) {
+    for number in (0..P).step_by(S::F64_LANES) {
+        // The last vector begins among the numbers of the one before it where it would end beyond them.
+        let number = number.min(P - S::F64_LANES);
         for (vector, row) in square.iter_mut().zip(rows) {
             *vector = simd.load(row, number);
         }
         simd.transpose(square);
-        columns.copy_from_slice(square);
+        columns[number..number + S::F64_LANES].copy_from_slice(square);
     }
 }

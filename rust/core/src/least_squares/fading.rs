@@ -121,10 +121,12 @@ pub(crate) fn freedom<S: Lanes, H: Dimensions>(
     let mut variances = [simd.splat_f64s(0.0); MOST_REGRESSORS];
     for (i, variance) in variances[..p].iter_mut().enumerate() {
         for a in 0..p {
+            // What is off the diagonal counts twice.
             let mut sum = simd.splat_f64s(0.0);
-            for b in 0..p {
-                sum = simd.mul_add_f64s(sums[at(a, b)], normal[at(b, i)], sum);
+            for b in a + 1..p {
+                sum = simd.mul_add_f64s(sums[shape.entry(a, b)], normal[at(b, i)], sum);
             }
+            sum = simd.mul_add_f64s(sums[shape.entry(a, a)], normal[at(a, i)], simd.add_f64s(sum, sum));
             *variance = simd.mul_add_f64s(normal[at(a, i)], sum, *variance);
         }
     }

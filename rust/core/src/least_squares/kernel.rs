@@ -277,11 +277,13 @@ pub(crate) fn finish<S: Lanes, H: Dimensions>(
     tile.put(simd, slots.condition, offset, condition);
     tile.put(simd, slots.condition + 1, offset, simd.select_f64s(determined, flags, deficient));
 
-    let faded = summary.sums.as_ref().map(|sums| {
+    let mut faded = None;
+    // No closure: a large one is compiled on its own, without the instructions that were chosen.
+    if let Some(sums) = &summary.sums {
         let mut normal = shape.factor(simd.splat_f64s(0.0));
         freedom = simd.div_f64s(simd.splat_f64s(1.0), fading::freedom(simd, shape, values, sums, &mut normal));
-        normal
-    });
+        faded = Some(normal);
+    }
     if plan.normal {
         let pairs = (0..p).flat_map(|i| (i + 1..p).map(move |k| (i, k)));
         for (pair, (i, k)) in pairs.enumerate() {
