@@ -153,3 +153,24 @@ def test_recordings_with_their_own_times_are_their_finely_resampled_selves(
     )
     for one, (value, stderr) in own.constants.items():
         assert abs(resampled.constants[one][0] - value) < 2 * stderr, one
+
+
+def test_records_of_a_batch_that_lack_little_are_as_alone() -> None:
+    simulated, whole = rig(1)
+    angle, torque = np.asarray(simulated.angle), np.asarray(simulated.torque)
+    rare = angle.copy()
+    rare[7000] = np.nan
+    many = variants(np.asarray(simulated.time), angle, torque, (0.1, 1), 7)[0]
+    together = tvident.identify(
+        np.stack([angle, many["angle"], rare]), np.stack([torque, many["torque"], torque]), sample_rate=1000
+    )
+    alone = [whole, tvident.identify(**many), tvident.identify(rare, torque, sample_rate=1000)]
+    for place in (0, 2):
+        assert np.array_equal(together.stiffness[place], alone[place].stiffness, equal_nan=True)
+        assert np.array_equal(together.stderr["stiffness"][place], alone[place].stderr["stiffness"], equal_nan=True)
+    # What noise becomes where samples are bridged is known of a record alone, or of all.
+    for name, (value, stderr) in alone[1].constants.items():
+        assert abs(together.constants[name][0][1] - value) < 2 * stderr
+    same = tvident.identify(np.stack([many["angle"]] * 2), np.stack([many["torque"]] * 2), sample_rate=1000)
+    for place in (0, 1):
+        assert np.array_equal(same.stiffness[place], alone[1].stiffness, equal_nan=True)

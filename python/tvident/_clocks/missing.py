@@ -90,9 +90,7 @@ def bridge_of(channels: Mapping[str, npt.NDArray[np.number]], order: int | None 
 
 def _rows_of(values: npt.NDArray[np.number]) -> _Rows:
     """Return some records of a channel, NaN where nothing is known."""
-    rows = np.array(values.reshape(-1, values.shape[-1])[:_RECORDS], dtype=np.float64)
-    rows[~np.isfinite(rows)] = np.nan
-    return rows
+    return _records(values.reshape(-1, values.shape[-1])[:_RECORDS])
 
 
 def _missed(rows: _Rows, order: int, lost: int) -> tuple[Numbers, float]:
@@ -156,45 +154,72 @@ def bridged(
         Settings of an earlier result: what they say of bridges is done.
     workers : int, optional
     """
-    missing = {name: ~np.isfinite(values) for name, values in channels.items() if values.dtype.kind == "f"}
-    missing = {name: gone for name, gone in missing.items() if gone.any()}
-    some = {name: channels[name] for name, gone in missing.items() if _saved(gone) > 0}
-    if not some:
+    gappy = {name: values for name, values in channels.items() if values.dtype.kind == "f"}
+    gappy = {name: values for name, values in gappy.items() if not np.isfinite(values).all()}
+    if not gappy:
         return None
-    bridge = _earlier(earlier)
-    if bridge is None:
-        if all(_saved(missing[name]) < _FEW for name in some):
-            return None
-        bridge = bridge_of(some)
-    if bridge.longest < _MOST_LOST:
+    rows = {name: _records(values) for name, values in gappy.items()}
+    given, records = _earlier(earlier), len(next(iter(rows.values())))
+    bridges = [_bridge_of_record({name: row[place] for name, row in rows.items()}, given) for place in range(records)]
+    longest = max((one.longest for one in bridges if one is not None), default=0.0)
+    if not longest:
         return None
     found, passed, filled, lost = dict(channels), {}, 0, 0
-    for name, values in some.items():
-        samples = values.shape[-1]
-        places = np.arange(samples, dtype=np.float64)
-        resampling = _core.Resampling(places, samples, order=bridge.order, bridged=bridge.longest)
-        known = np.where(missing[name], np.nan, values)
-        found[name] = np.where(missing[name], resampling.onto_grid(known, workers=workers), values)
-        # Of a batch the record of which most is missing: it passes most noise.
-        rows = missing[name].reshape(-1, samples)
-        there = np.flatnonzero(~rows[int(rows.sum(axis=1).argmax())]).astype(np.float64)
-        passed[name] = _core.Resampling(there, samples, order=bridge.order, bridged=bridge.longest).passed_noise(
-            workers=workers
-        )
-        filled += int(np.count_nonzero(missing[name] & np.isfinite(found[name])))
-        lost += int(np.count_nonzero(missing[name]))
+    for name, values in gappy.items():
+        new = np.stack([_filled(row, bridge, workers) for row, bridge in zip(rows[name], bridges, strict=True)])
+        filled += int(np.count_nonzero(np.isfinite(new) & ~np.isfinite(rows[name])))
+        lost += int(np.count_nonzero(~np.isfinite(rows[name])))
+        found[name] = new.reshape(values.shape)
+        worst = int(np.count_nonzero(~np.isfinite(rows[name]), axis=1).argmax())
+        # What noise becomes is said of all records, so that records which lack nothing stay as they are alone.
+        if all(bridges) and _saved(rows[name][worst]) > 0:
+            there = np.flatnonzero(np.isfinite(rows[name][worst])).astype(np.float64)
+            passed[name] = _resampling(there, values.shape[-1], bridges[worst]).passed_noise(workers=workers)
+    orders = " and ".join(str(order) for order in sorted({one.order for one in bridges if one is not None}))
     words = (
-        f"{filled} of {lost} missing values lie in gaps of up to {math.floor(bridge.longest) - 1} samples, which were bridged by splines "
-        f"of order {bridge.order}"
+        f"{filled} of {lost} missing values lie in gaps of up to {math.floor(longest) - 1} samples, which were bridged by splines of order "
+        f"{orders}"
     )
-    return Bridged(found, passed, {"spline_order": bridge.order, "bridged": bridge.longest}, words)
+    # Every record of a batch has its own.
+    own = bridges[0] if records == 1 else None
+    settings: dict[str, float | str] = {} if own is None else {"spline_order": own.order, "bridged": own.longest}
+    return Bridged(found, passed, settings, words)
 
 
-def _saved(missing: npt.NDArray[np.bool_]) -> float:
-    """Return how many equations short gaps take, for each that they leave: of the record of a channel where they take most."""
-    rows = missing.reshape(-1, missing.shape[-1])
-    gaps = (sum(_gaps(row, lost) for lost in range(1, _MOST_LOST + 1)) for row in np.where(rows, np.nan, 0.0))
-    return math.expm1(_TEST_FUNCTION * max(gaps))
+def _records(values: npt.NDArray[np.number]) -> _Rows:
+    """Return the records of a channel, NaN where nothing is known."""
+    rows = np.array(values.reshape(-1, values.shape[-1]), dtype=np.float64)
+    rows[~np.isfinite(rows)] = np.nan
+    return rows
+
+
+def _bridge_of_record(channels: Mapping[str, Numbers], given: Bridge | None) -> Bridge | None:
+    """Return how short gaps of a record are bridged; None where there are none, or they are better left out."""
+    some = {name: row for name, row in channels.items() if _saved(row) > 0}
+    if not some or (given is None and all(_saved(row) < _FEW for row in some.values())):
+        return None
+    bridge = given or bridge_of(some)
+    return bridge if bridge.longest >= _MOST_LOST else None
+
+
+def _filled(row: Numbers, bridge: Bridge | None, workers: int | None) -> Numbers:
+    """Return a record with its short gaps bridged; samples that are there stay as they are."""
+    if bridge is None:
+        return row
+    places = np.arange(row.size, dtype=np.float64)
+    return np.where(
+        np.isfinite(row), row, _resampling(places, row.size, bridge).onto_grid(row[np.newaxis], workers=workers)[0]
+    )
+
+
+def _resampling(places: Numbers, samples: int, bridge: Bridge | None) -> _core.Resampling:
+    assert bridge is not None  # noqa: S101 - asked for where there is one
+    return _core.Resampling(places, samples, order=bridge.order, bridged=bridge.longest)
+
+
+def _saved(row: Numbers) -> float:
+    """Return how many equations short gaps take, for each that they leave."""
+    return math.expm1(_TEST_FUNCTION * sum(_gaps(row, lost) for lost in range(1, _MOST_LOST + 1)))
 
 
 def _earlier(settings: Mapping[str, object] | None) -> Bridge | None:
