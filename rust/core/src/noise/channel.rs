@@ -145,7 +145,7 @@ fn quietest_band(record: &dyn Samples, weights: Option<&[f64]>) -> f64 {
 }
 
 /// The mean power in every frequency band, and of how many independent powers each is the mean; none for a record that is too short.
-fn bands(record: &dyn Samples, weights: Option<&[f64]>) -> (Vec<f64>, f64) {
+pub(crate) fn bands(record: &dyn Samples, weights: Option<&[f64]>) -> (Vec<f64>, f64) {
     if record.len() < FEWEST_SEGMENTS * SEGMENT {
         return (Vec::new(), 1.0);
     }

@@ -1,5 +1,6 @@
 //! Whether a channel was low-passed: its noise falls with the frequency where that of a sensor, or of rounding, stays.
 
+use crate::noise::channel::bands;
 use crate::noise::spectrum::power;
 use crate::record::samples::Samples;
 
@@ -20,6 +21,21 @@ pub(crate) fn is_low_passed(channel: &dyn Samples) -> bool {
     let density = |eighth: usize| power[eighth * EIGHTH..(eighth + 1) * EIGHTH].iter().sum::<f64>();
     let [below, highest] = COMPARED.map(density);
     highest < FALLS * below
+}
+
+/// By what factor the power of a band of white noise is another one by chance, at most.
+const CHANCE: f64 = 2.0;
+
+/// The largest density of a torque that was low-passed where the angle shows nothing but noise: what equations leave of it may be noise up to that,
+/// of which the quietest band knows nothing. Zero where it was not.
+pub(crate) fn density_above_motion(angle: &dyn Samples, torque: &dyn Samples, weights: Option<&[f64]>) -> f64 {
+    if !is_low_passed(torque) {
+        return 0.0;
+    }
+    let [angle, torque] = [angle, torque].map(|channel| bands(channel, weights).0);
+    let quietest = angle.iter().copied().fold(f64::INFINITY, f64::min);
+    let still = angle.iter().zip(torque).filter(|(angle, _)| **angle <= CHANCE * quietest);
+    still.map(|(_, density)| density).fold(0.0, f64::max)
 }
 
 #[cfg(test)]
@@ -45,6 +61,18 @@ mod tests {
                 white.windows(3).map(|near| 0.25 * near[0] + 0.5 * near[1] + 0.25 * near[2]).collect();
             assert!(is_low_passed(&moving(&passed).as_slice()), "{place}");
         }
+    }
+
+    #[test]
+    fn the_noise_of_a_mean_of_two_is_that_above_the_motion() {
+        let noise = uniform(2 * SAMPLES + 1);
+        let [angle, torque] = [&noise[..SAMPLES], &noise[SAMPLES..]];
+        let mean: Vec<f64> = torque.windows(2).map(|near| 0.5 * (near[0] + near[1])).collect();
+        let density =
+            |torque: &[f64]| density_above_motion(&moving(angle).as_slice(), &moving(torque).as_slice(), None);
+        // Uniform noise has a variance of a twelfth; the second of sixteen bands of the mean has cos²(π/2 · 3/32) = 0.98 of it.
+        assert!((12.0 * density(&mean) - 0.98).abs() < 0.1, "{}", density(&mean));
+        assert_eq!(density(&torque[..SAMPLES]), 0.0);
     }
 
     #[test]

@@ -11,6 +11,7 @@ use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
 use crate::inference::cross_validation::left_of_rows;
+use crate::noise::low_passed::density_above_motion;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::limits::UNEXPLAINED;
@@ -107,14 +108,20 @@ impl Session<'_, '_, '_> {
     }
 
     /// Whether so much is left of the equations that they are wrong rather than noisy: a term is missing, or the torque is late. Windows hardly
-    /// longer than the test function follow what is wrong as if it were motion: they must leave next to nothing.
+    /// longer than the test function follow what is wrong as if it were motion: they must leave next to nothing. What a low-passed torque shows
+    /// above the motion is noise, however much it is.
     fn is_no_noise(&mut self, chosen: &mut Chosen, model: &Model) -> Result<bool, Error> {
         let fitted = self.take_fitted(chosen, model)?;
         let follows = |fit: &Fit| fit.scale.is_some() && chosen.weak.follow_anything(fit.span);
         let most = if fitted.fit.as_ref().is_some_and(follows) { LEFT_BY_SHORT } else { UNEXPLAINED };
         let is_more = fitted.expected.torque > most * chosen.weak.rows.mean_square();
         chosen.fitted = Some(fitted);
-        Ok(is_more)
+        Ok(is_more && self.noise[1] > MORE * self.density_above_motion())
+    }
+
+    /// The density of a low-passed torque's noise between the motion and where the filter ends it.
+    fn density_above_motion(&self) -> f64 {
+        density_above_motion(self.record.angle, self.record.torque, self.record.weights)
     }
 
     /// What a fit leaves of rows that it did not see, over the variance that is expected: of the usual row, so that jumps, touches and spikes
