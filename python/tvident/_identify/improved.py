@@ -17,7 +17,7 @@ from tvident._identify.data import Data
 from tvident._identify.methods import StrongForm, WeakForm
 from tvident._identify.remedies import BEYOND_CHANCE, NEXT_TO_NOTHING, Trial, unexplained
 from tvident._identify.settings import Request, resolve
-from tvident._identify.spikes import without_spikes
+from tvident._identify.used import as_used
 from tvident._results import TRIED, Identification, Words
 from tvident._status import Status
 from tvident._units import ROTARY
@@ -285,7 +285,7 @@ class Improvement(_AskedOfRecord):
         """What may be missing: what the core suspects, friction and a lag, and anything where no widths of the test function agree."""
         suspects = [one.name for one in self._explained.suspects]
         others = ["lag", FRICTION]
-        angles = without_spikes(self.data, [self.found]).angles
+        angles = as_used(self.data, [self.found]).angles
         is_large = float(np.nanmax(np.abs(angles), initial=0.0)) > _LARGE
         hardens = any(one in BUILT_IN and BUILT_IN[one].spring == "beside" for one in suspects)
         if self.data.axis.system is ROTARY and (hardens or is_large):

@@ -26,8 +26,8 @@ from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm, expone
 from tvident._identify.polynomials import Polynomials, odd_window
 from tvident._identify.searched import Searched, factor_of, search
 from tvident._identify.settings import Request, plain, resolve
-from tvident._identify.spikes import without_spikes
 from tvident._identify.told import Told
+from tvident._identify.used import as_used
 from tvident._results import Estimates, Identification, Recorded, Scan, Words, chosen, of_records, scan_of, settings_of
 
 Numbers = npt.NDArray[np.float64]
@@ -211,7 +211,7 @@ class Task:
             torques = (data.torques, *(data.torques + change() for change in data.moved))
             again = [self._replayed(settings, replace(data, torques=one)).estimates() for one in torques]
             batch = with_errors_of_alignment(batch, again[0], again[1:])
-        used = without_spikes(data, found)
+        used = as_used(data, found)
         lacking = lacking_terms(used, self._request, self._unknowns, found, self._polynomials, self._known)
         return names, Told(used, self._request, self._unknowns, found, batch, lacking)
 

@@ -37,7 +37,7 @@ class Recorded:
     Parameters
     ----------
     angles, torques : ndarray, shape (\*, n)
-        As they were used: copies where there were spikes.
+        As they were used: copies where there were spikes, clipped or lost samples.
     given : tuple of ndarray
         Both as they were given.
     own : mapping of str to FixedTerm

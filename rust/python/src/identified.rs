@@ -106,6 +106,8 @@ pub(crate) struct Identification {
     resting: f64,
     pulses: Vec<(usize, usize)>,
     spikes: Vec<(usize, usize, f64)>,
+    lost: Vec<usize>,
+    limits: Option<[f64; 2]>,
     scan: Option<Py<Scan>>,
     outside_mask: Option<Py<OutsideMask>>,
     /// With an instrument: the probability of the test of exogeneity, and the smallest F statistic of the first stage.
@@ -176,6 +178,8 @@ impl Identification {
             resting: weak.map_or(0.0, |weak| weak.resting),
             pulses: weak.map_or_else(Vec::new, |weak| weak.pulses.iter().map(|one| (one.start, one.end)).collect()),
             spikes: weak.map_or_else(Vec::new, |weak| weak.spikes.clone()),
+            lost: weak.map_or_else(Vec::new, |weak| weak.lost.clone()),
+            limits: weak.and_then(|weak| weak.limits),
             scan: weak.map(|weak| Scan::new(py, &weak.scan)).transpose()?,
             outside_mask: found
                 .weak

@@ -125,6 +125,8 @@ pub(crate) fn weak(
         resting: found.resting,
         pulses: found.pulses,
         spikes: found.spikes,
+        lost: found.lost,
+        limits: found.limits,
         scan: Scan { unknowns: found.scan.unknowns.iter().map(|&one| place(one)).collect(), ..found.scan },
         outside_mask,
     };

@@ -113,6 +113,10 @@ pub struct WeakDetails {
     /// Samples that stand out of their neighbours: the channel (0 for the angle, 1 for the torque), the sample, and what took its place, NaN where it
     /// was left out.
     pub spikes: Vec<(usize, usize, f64)>,
+    /// Samples before which some were lost: they count as missing.
+    pub lost: Vec<usize>,
+    /// Values at which the angle is clipped, where samples there count as missing: the smallest and the largest.
+    pub limits: Option<[f64; 2]>,
     /// Estimates by the width of the test function.
     pub scan: Scan,
     /// What the rows say that the mask keeps out; `None` without a mask.

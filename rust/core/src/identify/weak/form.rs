@@ -121,7 +121,7 @@ fn without(
         }
         let doubtful = defects.iter().flatten().any(Defect::is_doubtful);
         let suspected = if doubtful { Status::CHANNEL_SUSPECTED } else { Status::GOOD };
-        WeakIdentified { record_status: found.record_status | suspected, resting, defects, ..found }
+        WeakIdentified { record_status: found.record_status | suspected, resting, defects, lost, limits, ..found }
     })
 }
 

@@ -181,6 +181,8 @@ impl Session<'_, '_, '_> {
             jumps: decided.jumps.iter().map(|jump| jump.sample).collect(),
             pulses: Vec::new(),
             spikes: Vec::new(),
+            lost: Vec::new(),
+            limits: None,
             scan: Scan::default(),
             resting: 0.0,
             defects: Vec::new(),

@@ -1,4 +1,4 @@
-"""Channels without the spikes that were found in them."""
+"""Channels as they were used: without spikes, and without samples that count as missing."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from tvident import _core
 from tvident._identify.data import Data
 
 
-def without_spikes(data: Data, found: Sequence[_core.Identification]) -> Data:
-    """Return the data as they were used: copies where there were spikes, with what took their place.
+def as_used(data: Data, found: Sequence[_core.Identification]) -> Data:
+    """Return the data as they were used: copies where there were spikes, clipped or lost samples, with what took their place.
 
     Parameters
     ----------
@@ -21,11 +21,16 @@ def without_spikes(data: Data, found: Sequence[_core.Identification]) -> Data:
     found : sequence of _core.Identification
         Of every record.
     """
-    if not any(one.spikes for one in found):
+    if not any(one.spikes or one.lost or one.limits for one in found):
         return data
     channels: list[Any] = [np.array(one, np.float64) for one in (data.angles, data.torques)]
     rows = [one.reshape(-1, one.shape[-1]) for one in channels]
     for record, one in enumerate(found):
         for channel, sample, instead in one.spikes:
             rows[channel][record, sample] = instead
+        angle = rows[0][record]
+        angle[one.lost] = np.nan
+        if one.limits:
+            least, most = one.limits
+            angle[(angle <= least) | (angle >= most)] = np.nan
     return replace(data, angles=channels[0], torques=channels[1])
