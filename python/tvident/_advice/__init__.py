@@ -3,6 +3,7 @@
 from tvident._advice.collinear import NOT_TOLD_APART
 from tvident._advice.events import spikes_that_stay, without_numbers
 from tvident._advice.expansion import FoundExpansion, words_of_expansions
+from tvident._advice.gains import changes_of_gain
 from tvident._advice.instrument import fed_back_in_records, words_with_instrument
 from tvident._advice.plausible import Plausible
 from tvident._advice.search import FoundBySearch, words_of_search
@@ -16,6 +17,7 @@ __all__ = [
     "FoundBySearch",
     "FoundExpansion",
     "Plausible",
+    "changes_of_gain",
     "fed_back_in_records",
     "spikes_that_stay",
     "without_numbers",

@@ -3,30 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
 from tvident._advice.lists import listed
-from tvident._equation import COEFFICIENTS
 from tvident._status import Status, stretches_of
 
 _SHOWN = 6
 """Pulses that are listed at most."""
-
-_ONE_FACTOR = 0.2
-"""Inertia and stiffness change by one factor where they differ from it by less than this part of its change."""
-
-_CHANGES = 0.03
-"""A factor that changes by less is not worth a word: the root of its mean squared change."""
-
-_BEYOND_CHANCE = 4.0
-"""A change counts where it is larger than so many relative standard errors: errors of inertia and stiffness look like one factor, too."""
-
-_AGREES = 2.0
-"""Damping changes by the same factor where it differs from it by less than so many of its relative standard errors."""
 
 _TREATED = (
     ("angle", "what their neighbours say took their place"),
@@ -169,28 +156,3 @@ def _times(flagged: npt.NDArray[np.bool_], seconds: float) -> str:
     begins, ends = stretches_of(flagged)
     shown = ", ".join(f"{a * seconds:.4g}-{b * seconds:.4g}" for a, b in list(zip(begins, ends, strict=True))[:_SHOWN])
     return shown + (" …" if begins.size > _SHOWN else "")
-
-
-def one_factor(unknowns: Mapping[str, _core.Unknown]) -> list[str]:
-    """Return that the gain of a channel may drift, where inertia and stiffness change by one factor, and damping is not constant."""
-    changing = [unknowns[name] for name in COEFFICIENTS if name in unknowns and unknowns[name].kind != "constant"]
-    if len(changing) < len(COEFFICIENTS):
-        return []
-    inertia, damping, stiffness = [one.values / np.nanmean(one.values) - 1 for one in changing]
-    errors = [_root_mean_square(one.stderr * one.factor / np.nanmean(one.values)) for one in changing]
-    change = _root_mean_square(inertia)
-    is_one = _root_mean_square(inertia - stiffness) < _ONE_FACTOR * change
-    if not (is_one and change > max(_CHANGES, _BEYOND_CHANCE * errors[0])):
-        return []
-    # Damping is known worst, and says nothing where its errors are larger than what changes.
-    follows = _root_mean_square(damping - inertia) < _AGREES * errors[1] and errors[1] < change
-    what, rather = ("inertia, damping and stiffness", "all three") if follows else ("inertia and stiffness", "both")
-    words = (
-        f"{what} change by one factor ({np.nanmin(inertia):+.0%} to {np.nanmax(inertia):+.0%}): the gain of the torque or of the angle "
-        f"seems to drift, rather than {rather}: calibrate the channels; only ratios can be trusted, such as the natural frequency"
-    )
-    return [words]
-
-
-def _root_mean_square(values: npt.NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.nanmean(values**2)))

@@ -15,12 +15,12 @@ from tvident._advice.events import (
     comes_late,
     jumps_beside_pulses,
     lost_samples,
-    one_factor,
     pulses,
     spikes,
     unexplained_here,
     untold_here,
 )
+from tvident._advice.gains import changes_of_gain
 from tvident._advice.instrument import fed_back
 from tvident._advice.lists import listed
 from tvident._advice.scales import disagreement, scales_compared
@@ -121,7 +121,7 @@ class Explained:
             *self._misfit(flags),
             *unexplained_here(self.found, self.period, self.step),
             *untold_here(self.found, self._windowed(), self.period, self.step),
-            *one_factor(dict(zip(self.names, self.found.unknowns, strict=True))),
+            *changes_of_gain(self.found, self.names, self.period, self.step),
             *self._outside(),
             *self._contradictions(),
             *self._free_offset(),

@@ -14,6 +14,7 @@ from tvident._advice import (
     ExplainedStrong,
     FoundBySearch,
     Plausible,
+    changes_of_gain,
     fed_back_in_records,
     spikes_that_stay,
     without_numbers,
@@ -133,12 +134,21 @@ class Told:
         data = self.data
         flags = np.zeros(data.records, np.uint16)
         flags[[record for record, _ in data.doubts]] = Status.CHANNEL_SUSPECTED
+        flags[self._of_other_gains()] = Status.CHANNEL_SUSPECTED
         lacking = [record for record, term in enumerate(self.lacking) if term is not None]
         flags[lacking] |= np.uint16(Status.TERM_SUSPECTED)
         if not flags.any():
             return self.batch
         more: Any = flags.reshape(data.batch) if data.batch else Status(int(flags[0]))
         return replace(self.batch, record_status=self.batch.record_status | more)
+
+    def _of_other_gains(self) -> list[int]:
+        """Return the records in which the gain of a channel seems to change."""
+        if isinstance(self.request.form, StrongForm) or self.data.instruments is not None:
+            return []
+        names = [one.name for one in self.unknowns]
+        each = enumerate(self.found)
+        return [record for record, one in each if changes_of_gain(one, names, self.data.period, self.data.step)]
 
     def _of_records(self, names: Sequence[str], settings: Mapping[str, Any]) -> list[Words]:
         """Return what there is to say of each record in weak form, or with an instrument."""

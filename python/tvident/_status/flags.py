@@ -88,8 +88,8 @@ class Status(enum.IntFlag):
     equation of motion. Look at ``result.scan()``, and at what the summary advises."""
 
     CHANNEL_SUSPECTED = 32768
-    """A channel seems to be clipped, held, interpolated, wrapped or filtered by more than a lag, or its stamps of time jitter. The
-    summary says which, and what to do."""
+    """A channel seems to be clipped, held, interpolated, wrapped or filtered by more than a lag, its gain to change, or its stamps of time
+    to jitter. The summary says which, and what to do."""
 
     @property
     def advice(self) -> str:
@@ -132,7 +132,8 @@ _ADVICE = {
         "test functions of different widths find different parameters: the recording does not obey this equation, do not trust the numbers"
     ),
     Status.CHANNEL_SUSPECTED: (
-        "a channel seems to be clipped, held, interpolated, wrapped or filtered, or its stamps of time jitter: do as the summary says"
+        "a channel seems to be clipped, held, interpolated, wrapped or filtered, its gain to change, or its stamps of time to jitter: do "
+        "as the summary says"
     ),
     Status.ILL_CONDITIONED: (
         "the regressors are nearly collinear, or the motion tells nothing of what is windowed there: look at the standard errors first"
