@@ -42,6 +42,16 @@ def spikes(found: _core.Identification) -> list[str]:
     ]
 
 
+def unread(found: _core.Identification) -> list[str]:
+    """Return how many samples of each channel hold one value in place of a reading."""
+    return [
+        f"{len(places)} samples of the {name} hold one and the same value, to which it jumps and from which it comes back, as where a "
+        "reading fails: they count as missing"
+        for (name, _), places in zip(_TREATED, found.unread, strict=True)
+        if places
+    ]
+
+
 def without_numbers(
     angles: npt.NDArray[np.number], torques: npt.NDArray[np.number], records: Sequence[int]
 ) -> list[tuple[int, str]]:

@@ -18,6 +18,7 @@ from tvident._advice.events import (
     pulses,
     spikes,
     unexplained_here,
+    unread,
     untold_here,
 )
 from tvident._advice.gains import changes_of_gain
@@ -103,6 +104,7 @@ class Explained:
             *scales_compared(self.found, flags),
             *lost_samples(self.found),
             *spikes(self.found),
+            *unread(self.found),
             *self._rest(),
             *self._lag(),
             *self._angle_zero(),

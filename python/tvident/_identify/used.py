@@ -21,13 +21,15 @@ def as_used(data: Data, found: Sequence[_core.Identification]) -> Data:
     found : sequence of _core.Identification
         Of every record.
     """
-    if not any(one.spikes or one.lost or one.limits for one in found):
+    if not any(one.spikes or one.lost or one.limits or any(one.unread) for one in found):
         return data
     channels: list[Any] = [np.array(one, np.float64) for one in (data.angles, data.torques)]
     rows = [one.reshape(-1, one.shape[-1]) for one in channels]
     for record, one in enumerate(found):
         for channel, sample, instead in one.spikes:
             rows[channel][record, sample] = instead
+        for rows_of_one, places in zip(rows, one.unread, strict=True):
+            rows_of_one[record, places] = np.nan
         angle = rows[0][record]
         angle[one.lost] = np.nan
         if one.limits:

@@ -108,6 +108,7 @@ pub(crate) struct Identification {
     spikes: Vec<(usize, usize, f64)>,
     lost: Vec<usize>,
     limits: Option<[f64; 2]>,
+    unread: [Vec<usize>; 2],
     scan: Option<Py<Scan>>,
     outside_mask: Option<Py<OutsideMask>>,
     /// With an instrument: the probability of the test of exogeneity, and the smallest F statistic of the first stage.
@@ -180,6 +181,7 @@ impl Identification {
             spikes: weak.map_or_else(Vec::new, |weak| weak.spikes.clone()),
             lost: weak.map_or_else(Vec::new, |weak| weak.lost.clone()),
             limits: weak.and_then(|weak| weak.limits),
+            unread: weak.map_or_else(Default::default, |weak| weak.unread.clone()),
             scan: weak.map(|weak| Scan::new(py, &weak.scan)).transpose()?,
             outside_mask: found
                 .weak

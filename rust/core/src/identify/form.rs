@@ -127,6 +127,7 @@ pub(crate) fn weak(
         spikes: found.spikes,
         lost: found.lost,
         limits: found.limits,
+        unread: found.unread,
         scan: Scan { unknowns: found.scan.unknowns.iter().map(|&one| place(one)).collect(), ..found.scan },
         outside_mask,
     };

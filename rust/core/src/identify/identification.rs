@@ -117,6 +117,8 @@ pub struct WeakDetails {
     pub lost: Vec<usize>,
     /// Values at which the angle is clipped, where samples there count as missing: the smallest and the largest.
     pub limits: Option<[f64; 2]>,
+    /// Samples of angle and torque at which they hold one value in place of a reading: they count as missing.
+    pub unread: [Vec<usize>; 2],
     /// Estimates by the width of the test function.
     pub scan: Scan,
     /// What the rows say that the mask keeps out; `None` without a mask.

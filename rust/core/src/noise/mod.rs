@@ -14,6 +14,7 @@ pub(crate) mod quantisation;
 pub(crate) mod spectrum;
 pub(crate) mod spikes;
 pub(crate) mod transform;
+pub(crate) mod unread;
 
 pub use channel::{FEWEST_SAMPLES, noise, variance_after};
 pub use coherence::{CORRELATED_NOISE, noise_coherence};

@@ -24,6 +24,7 @@ use crate::noise::defects::{Defect, Within, defects};
 use crate::noise::passed::PassedNoise;
 use crate::noise::quantisation::quantisation_step;
 use crate::noise::spikes::{LONGEST, Repaired, spikes};
+use crate::noise::unread::unread;
 use crate::record::samples::Samples;
 use crate::regression::model::Model;
 use crate::simd::instructions::Instructions;
@@ -43,7 +44,7 @@ const PULSE_ROUNDS: usize = 2;
 /// The samples that count, and how much.
 type Counted<'a> = (Option<&'a [bool]>, Option<&'a [f64]>);
 
-/// Identifies one record in weak form, without spikes: those of the angle are replaced by what their neighbours say, those of the torque are left out,
+/// Identifies one record in weak form, without samples that were not read, and without spikes: those of the angle are replaced by what their neighbours say, those of the torque are left out,
 /// unless nothing is known without them: then they are what moves the machine.
 ///
 /// # Errors
@@ -55,9 +56,18 @@ pub(crate) fn identify_weak(
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<WeakIdentified, Error> {
-    let of_angle = if is_as_recorded(&motion.measured) { spikes(motion.angle, LONGEST[0], watch)? } else { Vec::new() };
-    let of_torque =
-        if motion.measured.passed[1].is_none() { spikes(motion.torque, LONGEST[1], watch)? } else { Vec::new() };
+    let as_recorded = [is_as_recorded(&motion.measured), motion.measured.passed[1].is_none()];
+    let not_read = [
+        if as_recorded[0] { unread(motion.angle, watch)? } else { Vec::new() },
+        if as_recorded[1] { unread(motion.torque, watch)? } else { Vec::new() },
+    ];
+    let angle = Broken { channel: motion.angle, places: &not_read[0] };
+    let torque = Broken { channel: motion.torque, places: &not_read[1] };
+    let is_read = not_read.iter().all(Vec::is_empty);
+    let read = if is_read { None } else { Some(Motion { angle: &angle, torque: &torque, ..motion.clone() }) };
+    let motion = read.as_ref().unwrap_or(motion);
+    let of_angle = if as_recorded[0] { spikes(motion.angle, LONGEST[0], watch)? } else { Vec::new() };
+    let of_torque = if as_recorded[1] { spikes(motion.torque, LONGEST[1], watch)? } else { Vec::new() };
     let angle = Repaired { channel: motion.angle, spikes: &of_angle };
     let repaired = if of_angle.is_empty() { None } else { Some(Motion { angle: &angle, ..motion.clone() }) };
     let motion = repaired.as_ref().unwrap_or(motion);
@@ -71,6 +81,7 @@ pub(crate) fn identify_weak(
     found.map(|mut found| {
         found.spikes = of_angle.iter().map(|spike| (0, spike.place, spike.instead)).collect();
         found.spikes.extend(left_out.iter().map(|&place| (1, place, f64::NAN)));
+        found.unread = not_read;
         found
     })
 }

@@ -71,6 +71,8 @@ pub(crate) struct WeakIdentified {
     /// Samples before which some were lost, and values at which the angle is clipped: such samples count as missing.
     pub(crate) lost: Vec<usize>,
     pub(crate) limits: Option<[f64; 2]>,
+    /// Samples of angle and torque at which they were not read: they count as missing.
+    pub(crate) unread: [Vec<usize>; 2],
     /// Estimates by the width of the test function.
     pub(crate) scan: Scan,
     /// What was done to angle, torque and other channels.

@@ -183,6 +183,7 @@ impl Session<'_, '_, '_> {
             spikes: Vec::new(),
             lost: Vec::new(),
             limits: None,
+            unread: [const { Vec::new() }; 2],
             scan: Scan::default(),
             resting: 0.0,
             defects: Vec::new(),
