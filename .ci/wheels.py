@@ -123,7 +123,8 @@ def check(wheel: Path) -> None:
     components = {one["name"] for bill in bills for one in bill["components"]}
     problems = {
         "has one library": len(libraries) == 1,
-        "says that it has types": "tvident/py.typed" in names and "tvident/_core.pyi" in names,
+        "says that it has types": {"tvident/py.typed", "tvident/_core.pyi", "tvident/_core_stubs/identification.pyi"}
+        <= set(names),
         "holds the licences": sum("/licenses/" in name for name in names) >= 3,  # noqa: PLR2004 - both, and which is which
         "holds the page of reports": {"tvident/_report/page.html", "tvident/_report/page.js"} <= set(names),
         "holds no tests": not [name for name in names if name.startswith(("tests", "benches", "docs"))],
