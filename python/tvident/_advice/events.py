@@ -25,16 +25,16 @@ _TREATED = (
 def lost_samples(found: _core.Identification) -> list[str]:
     """Return at how many places samples seem to be lost."""
     return [
-        f"the angle jumps between two samples at {amount:.0f} place{'' if amount == 1 else 's'}, as it does where samples are lost: "
-        "equations over such a place were left out; if a recorder loses samples, record their times"
-        for _, defect, amount in found.defects
-        if defect == "broken"
+        f"the angle jumps between two samples at {one.amount:.0f} place{'' if one.amount == 1 else 's'}, as it does where samples are "
+        "lost: equations over such a place were left out; if a recorder loses samples, record their times"
+        for one in found.defects
+        if one.name == "broken"
     ]
 
 
 def spikes(found: _core.Identification) -> list[str]:
     """Return how many samples of each channel stand far out of their neighbours, and what became of them."""
-    counts = Counter(channel for channel, _, _ in found.spikes)
+    counts = Counter(one.channel for one in found.spikes)
     return [
         f"{_out_of_neighbours(counts[channel], name)}: {treated}"
         for channel, (name, treated) in enumerate(_TREATED)
@@ -129,7 +129,7 @@ def comes_late(found: _core.Identification, defect: tuple[str, str, float], peri
         "both channels"
     )
     # The steps of an angle are motion for the equation, whatever its lag; and channels that both hold are late alike.
-    alone = name == "torque" and not any(channel == 0 and defect == "held" for channel, defect, _ in found.defects)
+    alone = name == "torque" and not any(one.channel == 0 and one.name == "held" for one in found.defects)
     return f"{cure}, or give lag={(amount - 1) / 2 * period:.3g} (seconds)" if alone else cure
 
 

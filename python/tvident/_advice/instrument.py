@@ -12,7 +12,8 @@ from tvident._status import Status
 
 def words_with_instrument(found: _core.Identification) -> Words:
     """Return what the instrument did in one record, and what to do if it tells too little."""
-    probability, strength = found.instrument or (float("nan"), 0.0)
+    test = found.instrument
+    probability, strength = (float("nan"), 0.0) if test is None else (test.exogeneity, test.strength)
     if Status.RANK_DEFICIENT in Status(found.record_status):
         cure = "it does not move the system in as many ways as there are unknowns, or is no channel of this record"
         return Words((), (f"the instrument does not determine the unknowns: {cure}: excite more frequencies",))

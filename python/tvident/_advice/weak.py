@@ -114,7 +114,7 @@ class Explained:
             *pulses(self.found, self.period),
             *self._jumps(),
         )
-        if any(defect == "wrapped" for _, defect, _ in self.found.defects):
+        if any(defect.name == "wrapped" for defect in self.found.defects):
             # A jump of a turn leaves nothing of the rest: what else looks wrong is its consequence.
             return Words(reasons, tuple(self._defects()))
         advice = (
@@ -148,7 +148,8 @@ class Explained:
         return [name for name, one in zip(self.names, self.found.unknowns, strict=True) if one.kind == "windowed"]
 
     def _noise(self) -> str:
-        angle, torque = np.sqrt(self.found.noise or (np.nan, np.nan))
+        noise = self.found.noise
+        angle, torque = (np.nan, np.nan) if noise is None else np.sqrt((noise.angle, noise.torque))
         of_angle, of_torque = ("rad", "N m") if self.units["stiffness"] == UNITS["stiffness"] else ("m", "N")
         return (
             f"noise, assumed to be white: {angle:.2g} {of_angle} in the angle, {torque:.2g} {of_torque} in the torque"
@@ -181,10 +182,11 @@ class Explained:
 
     def _defects(self) -> list[str]:
         words = []
-        for channel, defect, amount in self.found.defects:
+        for one in self.found.defects:
+            defect, amount = one.name, one.amount
             if defect == "broken":
                 continue
-            name = ("angle", "torque", "velocity", "acceleration")[channel]
+            name = ("angle", "torque", "velocity", "acceleration")[one.channel]
             if defect == "clipped":
                 cure = (
                     f"is clipped: {amount:.1%} of its samples lie at its largest or smallest value: make these NaN, or record with a "
@@ -216,18 +218,18 @@ class Explained:
             return [
                 "the record does not separate a lag of the torque from damping: lag 0 is used; excite more frequencies, or give lag="
             ]
-        value, error = self.found.lag
+        lag = self.found.lag
         return [
-            f"the torque is delayed by {value:.3f} ± {error:.1g} samples: with this lag its rate explains nothing more"
+            f"the torque is delayed by {lag.value:.3f} ± {lag.stderr:.1g} samples: with this lag its rate explains nothing more"
         ]
 
     def _angle_zero(self) -> list[str]:
         if self.found.angle_zero is None:
             return []
-        value, error = self.found.angle_zero
+        zero = self.found.angle_zero
         words = (
-            f"the spring is relaxed at {value:.4g} ± {error:.1g} {self.units['angle_zero']} of the encoder: its torque is stiffness times "
-            "(angle - this), since a constant offset alone is contradicted, and rows are predicted better so"
+            f"the spring is relaxed at {zero.value:.4g} ± {zero.stderr:.1g} {self.units['angle_zero']} of the encoder: its torque is "
+            "stiffness times (angle - this), since a constant offset alone is contradicted, and rows are predicted better so"
         )
         return [words]
 
@@ -259,8 +261,8 @@ class Explained:
             return []
         outside = self.found.outside_mask
         parts = [
-            f"{self.names[place]} {value:.4g} ± {error:.1g} instead of {self.found.unknowns[place].values[0]:.4g}"
-            for place, value, error in outside.differing
+            f"{self.names[one.unknown]} {one.value:.4g} ± {one.stderr:.1g} instead of {self.found.unknowns[one.unknown].values[0]:.4g}"
+            for one in outside.differing
         ]
         left = outside.residual_ratio
         if left is not None and left > _core.NOISE_MODEL_FAILS:
@@ -287,7 +289,7 @@ class Explained:
 
     def _kinds(self) -> list[str]:
         tests = {name: one.test for name, one in self._constants() if one.test is not None}
-        agreeing = {name: probability for name, (probability, _) in tests.items() if probability >= _core.NO_CHANCE}
+        agreeing = {name: test.probability for name, test in tests.items() if test.probability >= _core.NO_CHANCE}
         words = []
         if agreeing:
             chances = ", ".join(f"{probability:.2g}" for probability in agreeing.values())
@@ -365,13 +367,13 @@ class Explained:
     def _contradictions(self) -> list[str]:
         words = []
         for name, one in self._constants():
-            if one.test is None or one.test[0] >= _core.NO_CHANCE:
+            if one.test is None or one.test.probability >= _core.NO_CHANCE:
                 continue
             if name in COEFFICIENTS:
                 kind = "windowed" if name == "stiffness" else "auto"
                 words.append(
-                    f"{name} was given as constant, but parts of the record differ by {one.test[1]:.0%}: give {name}={kind!r}, or split "
-                    "the record"
+                    f"{name} was given as constant, but parts of the record differ by {one.test.spread:.0%}: give {name}={kind!r}, or "
+                    "split the record"
                 )
             else:
                 words.append(
@@ -382,11 +384,11 @@ class Explained:
     def _free_offset(self) -> list[str]:
         if self.found.free_offset is None:
             return []
-        error, free = self.found.free_offset
+        errors = self.found.free_offset
         others = [name for name in self.names if name not in {*COEFFICIENTS, OFFSET}]
         words = (
-            f"an offset that is free in every window predicts better: its cross-validation error is {free:.2f} times the variance of the "
-            f"noise, not {error:.2f}: give terms={[*others, (OFFSET, 'windowed')]}"
+            f"an offset that is free in every window predicts better: its cross-validation error is {errors.free:.2f} times the variance "
+            f"of the noise, not {errors.used:.2f}: give terms={[*others, (OFFSET, 'windowed')]}"
         )
         return [words]
 
@@ -396,7 +398,7 @@ class Explained:
     def _limits(self, flags: Status) -> list[str]:
         if Status.WINDOW_LIMIT not in flags:
             return []
-        lengths = [length for length, _ in self.found.lengths]
+        lengths = [one.samples for one in self.found.lengths]
         if lengths and self.found.regression_window <= min(lengths):
             if all(one.kind != "windowed" for one in self.found.unknowns):
                 return []

@@ -6,7 +6,7 @@ from typing import final
 import numpy as np
 import numpy.typing as npt
 
-from tvident._core_stubs.identification import Scan
+from tvident._core_stubs.identification import ConstancyTest, Estimate, Scan, TriedLength
 
 @final
 class MergedElement:
@@ -19,9 +19,9 @@ class MergedElement:
     @property
     def stderr(self) -> npt.NDArray[np.float64]: ...
     @property
-    def test(self) -> tuple[float, float] | None: ...
+    def test(self) -> ConstancyTest | None: ...
     @property
-    def spread(self) -> list[tuple[float, float]]: ...
+    def spread(self) -> list[Estimate]: ...
 
 @final
 class MergedIdentification:
@@ -32,7 +32,7 @@ class MergedIdentification:
     @property
     def regression_window(self) -> int: ...
     @property
-    def lengths(self) -> list[tuple[int, float]]: ...
+    def lengths(self) -> list[TriedLength]: ...
     @property
     def prediction_error(self) -> float: ...
     @property

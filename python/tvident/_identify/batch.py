@@ -76,8 +76,11 @@ def estimates(
             )
     if any(one.angle_zero is not None for one in found):
         # Elsewhere the spring is relaxed where the encoder is at zero: that is assumed, as a known number is.
-        zeros = [one.angle_zero or (0.0, 0.0) for one in found]
-        constants["angle_zero"] = (alone([value for value, _ in zeros]), alone([error for _, error in zeros]))
+        zeros = [one.angle_zero for one in found]
+        constants["angle_zero"] = (
+            alone([0.0 if zero is None else zero.value for zero in zeros]),
+            alone([0.0 if zero is None else zero.stderr for zero in zeros]),
+        )
     for name, value in known.items():
         values[name] = np.broadcast_to(np.asarray(value, dtype=np.float64), (*shape, count))
         errors[name] = np.broadcast_to(np.float64(0), (*shape, count))

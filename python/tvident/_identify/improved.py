@@ -52,7 +52,7 @@ def is_to_be_tried(data: Data, request: Request, found: Sequence[_core.Identific
     """Return whether something speaks against the model of a single record in weak form, and there is something to change."""
     if not isinstance(request.form, WeakForm) or data.instruments is not None or data.batch:
         return False
-    if any(defect in _MENDED_FIRST for _, defect, _ in found[0].defects):
+    if any(defect.name in _MENDED_FIRST for defect in found[0].defects):
         return False
     flags = found[0].record_status
     if flags & Status.RANK_DEFICIENT:

@@ -411,12 +411,12 @@ class Task:
             lag = {"lag": request.lag}
         else:
             chosen = [one for one in names if "auto" in self._each(one) or one in request.kept]
-            used["angle_zero"] = by_record([0.0 if one.angle_zero is None else one.angle_zero[0] for one in found])
+            used["angle_zero"] = by_record([0.0 if one.angle_zero is None else one.angle_zero.value for one in found])
             used["shown_noise"] = [one.shown_noise for one in found if one.shown_noise is not None] or None
             used["variation"] = "constant" if request.form.variation == "constant" else "linear"
             if request.lag == "auto":
                 chosen.append("lag")
-                lags = [one.lag or (0.0, None) for one in found]
+                lags = [(0.0, None) if one.lag is None else (one.lag.value, one.lag.stderr) for one in found]
                 lag = {
                     "lag": by_record([late * data.period for late, _ in lags]),
                     "lag_stderr": by_record([None if error is None else error * data.period for _, error in lags]),

@@ -26,8 +26,8 @@ def as_used(data: Data, found: Sequence[_core.Identification]) -> Data:
     channels: list[Any] = [np.array(one, np.float64) for one in (data.angles, data.torques)]
     rows = [one.reshape(-1, one.shape[-1]) for one in channels]
     for record, one in enumerate(found):
-        for channel, sample, instead in one.spikes:
-            rows[channel][record, sample] = instead
+        for spike in one.spikes:
+            rows[spike.channel][record, spike.sample] = spike.value
         for rows_of_one, places in zip(rows, one.unread, strict=True):
             rows_of_one[record, places] = np.nan
         angle = rows[0][record]

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _core
+
 _NO_CHANCE = 3.3
 """Standard deviations: once in 2000 records, as in the test of constancy."""
 
@@ -29,7 +31,6 @@ def excess(differences: npt.NDArray[np.float64], errors: npt.NDArray[np.float64]
     return max(ratio, 1.0) if normal > _NO_CHANCE else 1.0
 
 
-def differences_of(spread: Sequence[tuple[float, float]]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def differences_of(spread: Sequence[_core.Estimate]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Return by how much each trial differs, and the standard errors."""
-    both = np.array(spread, np.float64).reshape(-1, 2)
-    return both[:, 0], both[:, 1]
+    return np.array([one.value for one in spread]), np.array([one.stderr for one in spread])

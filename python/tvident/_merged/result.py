@@ -244,7 +244,7 @@ class MergedIdentification(Oscillating, Reported):
             self._scatter[name] = scatter
             self.kinds[name] = one.kind
             if one.test is not None:
-                self.tests[name] = one.test[0]
+                self.tests[name] = one.test.probability
             if one.kind == "constant":
                 self.constants[name] = (float(one.values[0]), float(one.stderr[0] * scatter**0.5))
             self.elements[name] = np.broadcast_to(one.values, size).copy()

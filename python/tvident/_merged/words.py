@@ -75,8 +75,8 @@ def _reasons_of(one: _core.MergedIdentification) -> list[str]:
             f"test functions of {first} to {last} samples agree, of {one.scan.tried} widths that were compared"
         )
     if one.lengths:
-        best = min(one.lengths, key=lambda length: length[1])
-        reasons.append(f"windows of {best[0]} samples predict best, of {len(one.lengths)} lengths that were tried")
+        best = min(one.lengths, key=lambda tried: tried.error)
+        reasons.append(f"windows of {best.samples} samples predict best, of {len(one.lengths)} lengths that were tried")
     return reasons
 
 

@@ -9,8 +9,83 @@ use tvident::identify::{
     FreeOffset, Identification as Found, InstrumentTest, Kind, Outside, Scan as FoundScan, Unknown as FoundUnknown,
     WeakDetails,
 };
-use tvident::inference::Suspect as FoundSuspect;
+use tvident::inference::{Suspect as FoundSuspect, Test};
 use tvident::noise::Defect;
+
+/// A number and its standard error.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+#[derive(Clone, Copy)]
+pub(crate) struct Estimate {
+    pub(crate) value: f64,
+    pub(crate) stderr: f64,
+}
+
+/// Whether a constant is one: the probability of such differences between parts of the record by chance, and how much they differ.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+#[derive(Clone, Copy)]
+pub(crate) struct ConstancyTest {
+    pub(crate) probability: f64,
+    pub(crate) spread: f64,
+}
+
+/// What the instrument told: the probability of the test of exogeneity, and the smallest F statistic of the first stage.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+#[derive(Clone, Copy)]
+pub(crate) struct Instrument {
+    pub(crate) exogeneity: f64,
+    pub(crate) strength: f64,
+}
+
+/// Cross-validation errors with the offset that was used, and with one that is free in every window.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+#[derive(Clone, Copy)]
+pub(crate) struct OffsetErrors {
+    pub(crate) used: f64,
+    pub(crate) free: f64,
+}
+
+/// Variances of the noise of the channels.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+#[derive(Clone, Copy)]
+pub(crate) struct ChannelNoise {
+    pub(crate) angle: f64,
+    pub(crate) torque: f64,
+}
+
+/// A length of windows that was tried, and its cross-validation error.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+#[derive(Clone, Copy)]
+pub(crate) struct TriedLength {
+    pub(crate) samples: usize,
+    pub(crate) error: f64,
+}
+
+/// What was done to a channel, by what it is called, and how much of it there is.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+#[derive(Clone, Copy)]
+pub(crate) struct ChannelDefect {
+    pub(crate) channel: usize,
+    pub(crate) name: &'static str,
+    pub(crate) amount: f64,
+}
+
+/// A sample that stands out of its neighbours, and what they say is its value.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+#[derive(Clone, Copy)]
+pub(crate) struct ChannelSpike {
+    pub(crate) channel: usize,
+    pub(crate) sample: usize,
+    pub(crate) value: f64,
+}
+
+/// An unknown that has another value elsewhere.
+#[pyclass(frozen, get_all, module = "tvident._core")]
+#[derive(Clone, Copy)]
+pub(crate) struct OtherValue {
+    pub(crate) unknown: usize,
+    pub(crate) value: f64,
+    pub(crate) stderr: f64,
+}
 
 /// One unknown: what it turned out to be, its values and their standard errors, and what a test of its constancy said.
 #[pyclass(frozen, get_all, module = "tvident._core")]
@@ -19,7 +94,7 @@ pub(crate) struct Unknown {
     values: Py<PyArray1<f64>>,
     stderr: Py<PyArray1<f64>>,
     factor: f64,
-    test: Option<(f64, f64)>,
+    test: Option<ConstancyTest>,
     untested: bool,
 }
 
@@ -35,7 +110,7 @@ pub(crate) struct Suspect {
 /// How a model fails outside the mask that it was found in.
 #[pyclass(frozen, get_all, module = "tvident._core")]
 pub(crate) struct OutsideMask {
-    differing: Vec<(usize, f64, f64)>,
+    differing: Vec<OtherValue>,
     residual_ratio: Option<f64>,
 }
 
@@ -87,9 +162,9 @@ pub(crate) struct Identification {
     record_status: u16,
     order: Py<PyArray1<u8>>,
     jumps: Vec<usize>,
-    noise: Option<(f64, f64)>,
+    noise: Option<ChannelNoise>,
     shown_noise: Option<f64>,
-    lengths: Vec<(usize, f64)>,
+    lengths: Vec<TriedLength>,
     prediction_error: f64,
     weighted: bool,
     pooling: Option<f64>,
@@ -97,22 +172,21 @@ pub(crate) struct Identification {
     weakest: Vec<f64>,
     mostly_noise: bool,
     unexplained: bool,
-    lag: Option<(f64, f64)>,
-    angle_zero: Option<(f64, f64)>,
-    /// Where an offset that is free in every window predicts better: the error with the one that was used, and with a free one.
-    free_offset: Option<(f64, f64)>,
+    lag: Option<Estimate>,
+    angle_zero: Option<Estimate>,
+    /// Where an offset that is free in every window predicts better.
+    free_offset: Option<OffsetErrors>,
     suspects: Vec<Py<Suspect>>,
-    defects: Vec<(usize, &'static str, f64)>,
+    defects: Vec<ChannelDefect>,
     resting: f64,
     pulses: Vec<(usize, usize)>,
-    spikes: Vec<(usize, usize, f64)>,
+    spikes: Vec<ChannelSpike>,
     lost: Vec<usize>,
     limits: Option<[f64; 2]>,
     unread: [Vec<usize>; 2],
     scan: Option<Py<Scan>>,
     outside_mask: Option<Py<OutsideMask>>,
-    /// With an instrument: the probability of the test of exogeneity, and the smallest F statistic of the first stage.
-    instrument: Option<(f64, f64)>,
+    instrument: Option<Instrument>,
 }
 
 impl Identification {
@@ -126,7 +200,7 @@ impl Identification {
                     values: array(unknown.values),
                     stderr: array(unknown.unscaled_stderr),
                     factor: unknown.factor,
-                    test: unknown.test.map(|test| (test.probability, test.spread)),
+                    test: unknown.test.map(ConstancyTest::from),
                     untested: unknown.untested,
                 },
             )
@@ -142,8 +216,11 @@ impl Identification {
                 },
             )
         };
-        let outside =
-            |outside: Outside| Py::new(py, OutsideMask { differing: outside.differing, residual_ratio: outside.left });
+        let outside = |outside: Outside| {
+            let other = |(unknown, value, stderr)| OtherValue { unknown, value, stderr };
+            let differing = outside.differing.into_iter().map(other).collect();
+            Py::new(py, OutsideMask { differing, residual_ratio: outside.left })
+        };
         let weak = found.weak.as_ref();
         Ok(Self {
             window_length: found.window_length,
@@ -156,11 +233,11 @@ impl Identification {
             status: PyArray1::from_vec(py, found.status.into_iter().map(Status::bits).collect()).unbind(),
             record_status: found.record_status.bits(),
             order: PyArray1::from_vec(py, found.order).unbind(),
-            instrument: instrument.map(|test| (test.exogeneity, test.strength)),
+            instrument: instrument.map(|test| Instrument { exogeneity: test.exogeneity, strength: test.strength }),
             jumps: found.jumps,
-            noise: weak.map(|weak| weak.noise.into()),
+            noise: weak.map(|weak| ChannelNoise { angle: weak.noise[0], torque: weak.noise[1] }),
             shown_noise: weak.map(|weak| weak.shown_noise),
-            lengths: weak.map(|weak| weak.lengths.clone()).unwrap_or_default(),
+            lengths: weak.map(|weak| tried(&weak.lengths)).unwrap_or_default(),
             prediction_error: weak.map_or(1.0, |weak| weak.prediction_error),
             weighted: weak.is_some_and(|weak| weak.weighted),
             pooling: weak.and_then(|weak| weak.pooling),
@@ -168,17 +245,19 @@ impl Identification {
             weakest: weak.map(|weak| weak.weakest.clone()).unwrap_or_default(),
             mostly_noise: weak.is_some_and(|weak| weak.mostly_noise),
             unexplained: weak.is_some_and(|weak| weak.unexplained),
-            lag: weak.and_then(|weak| weak.lag).map(|lag| (lag.value, lag.error)),
-            angle_zero: weak.and_then(|weak| weak.angle_zero).map(|zero| (zero.value, zero.error)),
+            lag: weak.and_then(|weak| weak.lag).map(|lag| Estimate { value: lag.value, stderr: lag.error }),
+            angle_zero: weak
+                .and_then(|weak| weak.angle_zero)
+                .map(|zero| Estimate { value: zero.value, stderr: zero.error }),
             free_offset: weak
                 .map(|weak| weak.free_offset)
                 .filter(FreeOffset::is_better)
-                .map(|offset| (offset.error, offset.free)),
+                .map(|offset| OffsetErrors { used: offset.error, free: offset.free }),
             suspects: weak.map_or(Ok(Vec::new()), |weak| weak.suspects.iter().map(suspect).collect::<PyResult<_>>())?,
             defects: weak.map(defects).unwrap_or_default(),
             resting: weak.map_or(0.0, |weak| weak.resting),
             pulses: weak.map_or_else(Vec::new, |weak| weak.pulses.iter().map(|one| (one.start, one.end)).collect()),
-            spikes: weak.map_or_else(Vec::new, |weak| weak.spikes.clone()),
+            spikes: weak.map(spikes).unwrap_or_default(),
             lost: weak.map_or_else(Vec::new, |weak| weak.lost.clone()),
             limits: weak.and_then(|weak| weak.limits),
             unread: weak.map_or_else(Default::default, |weak| weak.unread.clone()),
@@ -214,10 +293,27 @@ pub(crate) fn kind(name: &str) -> Option<Kind> {
     }
 }
 
-/// What was done to each channel, by what it is called, and how much of it there is.
-fn defects(weak: &WeakDetails) -> Vec<(usize, &'static str, f64)> {
+impl From<Test> for ConstancyTest {
+    fn from(test: Test) -> Self {
+        Self { probability: test.probability, spread: test.spread }
+    }
+}
+
+/// Lengths of windows and their errors, by name.
+pub(crate) fn tried(lengths: &[(usize, f64)]) -> Vec<TriedLength> {
+    lengths.iter().map(|&(samples, error)| TriedLength { samples, error }).collect()
+}
+
+/// What was done to each channel.
+fn defects(weak: &WeakDetails) -> Vec<ChannelDefect> {
     let of = |(channel, defects): (usize, &Vec<Defect>)| {
-        defects.iter().map(move |defect| (channel, defect.name(), defect.amount())).collect::<Vec<_>>()
+        let named = move |defect: &Defect| ChannelDefect { channel, name: defect.name(), amount: defect.amount() };
+        defects.iter().map(named).collect::<Vec<_>>()
     };
     weak.defects.iter().enumerate().flat_map(of).collect()
+}
+
+/// Samples that stand out of their neighbours.
+fn spikes(weak: &WeakDetails) -> Vec<ChannelSpike> {
+    weak.spikes.iter().map(|&(channel, sample, value)| ChannelSpike { channel, sample, value }).collect()
 }

@@ -40,7 +40,10 @@ mod _core {
     #[pymodule_export]
     use crate::automatic::{AutomaticEstimates, estimate_automatically};
     #[pymodule_export]
-    use crate::identified::{Identification, OutsideMask, Scan, Suspect, Unknown};
+    use crate::identified::{
+        ChannelDefect, ChannelNoise, ChannelSpike, ConstancyTest, Estimate, Identification, Instrument, OffsetErrors,
+        OtherValue, OutsideMask, Scan, Suspect, TriedLength, Unknown,
+    };
     #[pymodule_export]
     use crate::identify::{ConstantsOfRows, FactoredRows, StrongForm, WeakForm, identify, merged_rows};
     #[pymodule_export]

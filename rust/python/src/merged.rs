@@ -15,7 +15,7 @@ use tvident::identify::{
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
-use crate::identified::{Scan, kind, name};
+use crate::identified::{ConstancyTest, Estimate, Scan, TriedLength, kind, name, tried};
 use crate::records::{StridedSamples, flags, records};
 use crate::watch::watched;
 
@@ -26,8 +26,8 @@ pub(crate) struct MergedElement {
     kind: &'static str,
     values: Py<PyArray1<f64>>,
     stderr: Py<PyArray1<f64>>,
-    test: Option<(f64, f64)>,
-    spread: Vec<(f64, f64)>,
+    test: Option<ConstancyTest>,
+    spread: Vec<Estimate>,
 }
 
 /// What was found of everything.
@@ -36,7 +36,7 @@ pub(crate) struct MergedIdentification {
     window_length: usize,
     exponent: usize,
     regression_window: usize,
-    lengths: Vec<(usize, f64)>,
+    lengths: Vec<TriedLength>,
     prediction_error: f64,
     noise: (Vec<f64>, Vec<f64>),
     elements: Vec<Py<MergedElement>>,
@@ -183,8 +183,8 @@ pub(crate) fn identify_merged<'py>(
                 kind: name(one.kind),
                 values: array(one.values),
                 stderr: array(one.stderr),
-                test: one.test.map(|test| (test.probability, test.spread)),
-                spread: one.spread,
+                test: one.test.map(ConstancyTest::from),
+                spread: one.spread.into_iter().map(|(value, stderr)| Estimate { value, stderr }).collect(),
             },
         )
     };
@@ -192,7 +192,7 @@ pub(crate) fn identify_merged<'py>(
         window_length: found.window_length,
         exponent: found.exponent,
         regression_window: found.regression_window,
-        lengths: found.lengths,
+        lengths: tried(&found.lengths),
         prediction_error: found.prediction_error,
         noise: found.noise,
         elements: found.elements.into_iter().map(one).collect::<PyResult<_>>()?,
