@@ -166,8 +166,8 @@ def test_forms_are_values() -> None:
 @pytest.mark.parametrize(
     ("form", "settings", "message"),
     [
-        (tvident.StrongForm, {"exponent": 6}, "unexpected keyword argument 'exponent'"),
-        (tvident.WeakForm, {"max_order": 15}, "unexpected keyword argument 'max_order'"),
+        (tvident.StrongForm, {"exponent": 6}, "StrongForm has no option 'exponent'"),
+        (tvident.WeakForm, {"max_order": 15}, "WeakForm has no option 'max_order'"),
         (tvident.StrongForm, {"window_length": "auto"}, "window_length must be a number of samples.*got 'auto'.*201"),
         (tvident.StrongForm, {"regression_window": "auto"}, "regression_window must be a number.*200 in the paper"),
         (tvident.StrongForm, {"window_length": 200}, "window_length must be odd.*got 200; use 199 or 201"),
@@ -212,6 +212,29 @@ def test_settings_are_those_of_a_result() -> None:
 def test_an_option_that_there_is_not_is_told_what_is_right(options: dict[str, Any], words: str) -> None:
     with pytest.raises(TypeError, match=re.escape(words)):
         tvident.identify(np.zeros(100), np.zeros(100), **options)
+
+
+@pytest.mark.parametrize(
+    ("form", "options", "words"),
+    [
+        (
+            tvident.WeakForm,
+            {"max_order": 3},
+            "WeakForm has no option 'max_order'; it belongs to a form: use method=tvident.StrongForm(",
+        ),
+        (
+            tvident.StrongForm,
+            {"exponent": 6},
+            "StrongForm has no option 'exponent'; it belongs to a form: use method=tvident.WeakForm(",
+        ),
+        (tvident.StrongForm, {"equations": 200}, "use regression_window= of a form"),
+        (tvident.WeakForm, {"windowlength": 33}, "did you mean 'window_length'?"),
+    ],
+    ids=["strong", "weak", "old", "misspelt"],
+)
+def test_a_setting_of_the_other_form_is_told_where_it_belongs(form: Any, options: dict[str, Any], words: str) -> None:
+    with pytest.raises(TypeError, match=re.escape(words)):
+        form(**options)
 
 
 @pytest.mark.parametrize("method", ["paper", tvident.StrongForm()], ids=["paper", "strong"])

@@ -1,17 +1,19 @@
-"""What is said of an option that ``identify`` does not have: whose it is, what it is called, or what it may have been meant for."""
+"""What is said of an option that ``identify`` or a form does not have: whose it is, what it is called, or what may be meant."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import fields
 from functools import wraps
 from inspect import signature
 from typing import Any, TypeVar
 
 from tvident import _arguments as arguments
-from tvident._identify.methods import StrongForm, WeakForm
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+_Form = TypeVar("_Form", bound=type)
+
+_FORMS: dict[str, frozenset[str]] = {}
+"""The settings of each form, by its name."""
 
 _CALLED = {
     "form": "method=tvident.WeakForm() or tvident.StrongForm()",
@@ -26,15 +28,22 @@ _CALLED = {
 """What options are called that other libraries, and earlier versions, have under these names."""
 
 
-def explained(function: _Function) -> _Function:
+def explained_form(form: _Form) -> _Form:
+    """Return a form; a setting that it does not have is an error that says what would be right."""
+    _FORMS[form.__name__] = frozenset(signature(form).parameters)
+    form.__init__ = explained(form.__init__, form.__name__)  # type: ignore[misc] # a form is made by nothing else
+    return form
+
+
+def explained(function: _Function, called: str = "identify") -> _Function:
     """Return the function; an option that it does not have is an error that says what would be right."""
-    known = frozenset(signature(function).parameters)
+    known = frozenset(signature(function).parameters) - {"self"}
 
     @wraps(function)
     def call(*args: Any, **options: Any) -> Any:
         if not known.issuperset(options):
             name = next(name for name in options if name not in known)
-            raise TypeError(f"{function.__name__} has no option {arguments.shown(name)}; {_right(name, known)}")
+            raise TypeError(f"{called} has no option {arguments.shown(name)}; {_right(name, known)}")
         return function(*args, **options)
 
     return call  # type: ignore[return-value]  # takes what the function takes
@@ -44,7 +53,7 @@ def _right(name: str, known: frozenset[str]) -> str:
     """Return what would be right in place of an option that there is not."""
     if name in _CALLED:
         return f"use {_CALLED[name]}"
-    forms = [form.__name__ for form in (WeakForm, StrongForm) if name in {one.name for one in fields(form)}]
+    forms = [form for form, settings in _FORMS.items() if name in settings]
     if forms:
         return "it belongs to a form: use " + " or ".join(f"method=tvident.{form}({name}=…)" for form in forms)
     return arguments.nearest(name, known) or f"it has {', '.join(sorted(known))}"

@@ -8,12 +8,14 @@ from typing import Literal, TypeAlias, get_args
 from tvident import _arguments as arguments
 from tvident._choices import Criterion, Selection, Variation
 from tvident._derivatives import HIGHEST_ORDER, SHORTEST_WINDOW
+from tvident._identify.keywords import explained_form
 
 SHORTEST_TEST_FUNCTION = 9
 """Samples."""
 _LOWEST_EXPONENT, _HIGHEST_EXPONENT = 3, 20
 
 
+@explained_form
 @dataclass(frozen=True)
 class WeakForm:
     """The weak form: the equation of motion multiplied by a test function and integrated by parts, so that no derivative is estimated.
@@ -87,6 +89,7 @@ class WeakForm:
         arguments.one_of("variation", self.variation, ("auto", *get_args(Variation)))
 
 
+@explained_form
 @dataclass(frozen=True)
 class StrongForm:
     """The strong form, the paper's: derivatives of the angle by local polynomials, then least squares in a window around every sample.
