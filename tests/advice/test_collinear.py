@@ -43,7 +43,7 @@ def test_gravity_and_a_spring_at_small_angles(scale: float, kinds: dict[str, Any
     first = result.advice[0]
     assert "gravity" in first
     assert "stiffness" in first
-    assert "cannot be told apart" in first
+    assert "cannot be distinguished" in first
     assert "record larger angles" in first
 
 
@@ -53,11 +53,11 @@ def test_a_single_sine_asks_for_more_frequencies() -> None:
     angle = np.sin(2 * np.pi * 3 * time) + 1e-4 * generator.standard_normal(time.size)
     torque = 10 * angle + 0.01 * generator.standard_normal(time.size)
     result = tvident.identify(angle, torque, sample_rate=1000, **CONSTANT)
-    assert "inertia and stiffness cannot be told apart" in result.advice[0]
+    assert "inertia and stiffness cannot be distinguished" in result.advice[0]
     assert "excite two or more" in result.advice[0]
 
 
 def test_what_is_told_apart_is_not_named() -> None:
     rig = tvident.simulate_torsional_rig(duration=20, pattern="constant")
     result = tvident.identify(rig.angle, rig.torque, sample_rate=1000, terms=["coulomb", "offset"], **CONSTANT)
-    assert not any("told apart" in line for line in result.advice)
+    assert not any("distinguished" in line for line in result.advice)

@@ -1,4 +1,4 @@
-"""Lines that stand in one panel are told apart by colour-blind eyes too: in pictures as they are drawn, and in the page of reports.
+"""Lines that stand in one panel are distinguished by colour-blind eyes too: in pictures as they are drawn, and in the page of reports.
 
 Colour blindness is simulated as in G. M. Machado, M. M. Oliveira, L. A. F. Fernandes: A physiologically-based model for simulation of color
 vision deficiency, IEEE Transactions on Visualization and Computer Graphics 15(6), 2009, with the matrices of severity 1.0 for linear RGB.

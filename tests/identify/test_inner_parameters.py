@@ -114,10 +114,10 @@ def test_an_inner_parameter_is_found_within_its_error_and_nothing_else_is_biased
         scores.append(score)
     # The parameters of six records are some twenty independent numbers, whose mean square lies between these but for one of a thousand.
     assert 0.35 < np.mean(np.square(scores)) < 2.2
-    assert all(all(earned) for earned in result.settings["earned"].values())
+    assert all(all(needed) for needed in result.settings["needed"].values())
     inner = next(parameter for parameter in truth if "." in parameter)
     assert (result.constants[inner][1] < 0.1 * truth[inner]).all()
-    assert not any("does not earn" in line for line in result.advice)
+    assert not any("is not needed" in line for line in result.advice)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -125,9 +125,9 @@ def test_what_is_not_there_is_not_believed(name: str) -> None:
     _, nothing, noise, terms, truth = CASES[name]
     result = tvident.identify(*records(nothing, noise), terms=terms, **CONSTANT)
     # One of a hundred is believed by chance: more than one of six with a probability of 0.15 %.
-    believed = np.sum(next(iter(result.settings["earned"].values())))
+    believed = np.sum(next(iter(result.settings["needed"].values())))
     assert believed <= 1
-    assert sum("does not earn its place" in line for line in result.advice) == RECORDS - believed
+    assert sum("is not needed" in line for line in result.advice) == RECORDS - believed
     inner = next(parameter for parameter in truth if "." in parameter)
     low, high = (0.0, 0.2) if name == "delay" else (0.01, 0.3)
     if name != "stribeck":
@@ -221,7 +221,7 @@ def test_two_inner_parameters_are_searched_together_in_strong_form() -> None:
     for name, true in (("delay", 0.045), ("limit", 2.0)):
         value, error = result.constants[f"reflex.{name}"]
         assert abs(value - true) < 6 * error + 0.02 * true, name
-    assert result.settings["earned"] == {"reflex": True}
+    assert result.settings["needed"] == {"reflex": True}
 
 
 def test_stribeck_friction_is_simulated_with_what_was_found() -> None:

@@ -211,7 +211,7 @@ def test_what_disagrees_with_what_is_said_of_this_record(folder_of_recordings: P
     assert re.search(
         r"test functions of 11 to \d+ samples all find damping 37\d\.\d ± 4\.4 N s/m, not the 193 ± 24 above", words
     )
-    assert "none can be believed" not in words
+    assert "none can be trusted" not in words
 
 
 def test_a_servo_whose_stiffness_is_none_hears_so(folder_of_recordings: Path) -> None:

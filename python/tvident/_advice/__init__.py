@@ -1,6 +1,6 @@
 """Puts into words what was chosen, why, and what to do next."""
 
-from tvident._advice.collinear import NOT_TOLD_APART
+from tvident._advice.collinear import NOT_DISTINGUISHED
 from tvident._advice.events import spikes_that_stay, without_numbers
 from tvident._advice.expansion import FoundExpansion, words_of_expansions
 from tvident._advice.gains import changes_of_gain
@@ -11,7 +11,7 @@ from tvident._advice.strong import ExplainedStrong
 from tvident._advice.weak import Explained
 
 __all__ = [
-    "NOT_TOLD_APART",
+    "NOT_DISTINGUISHED",
     "Explained",
     "ExplainedStrong",
     "FoundBySearch",

@@ -1,4 +1,4 @@
-"""Which unknowns of a record cannot be told apart, and why: in words."""
+"""Which unknowns of a record cannot be distinguished, and why: in words."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tvident._advice.lists import listed
 from tvident._equation import BUILT_IN
 from tvident._status import Status
 
-NOT_TOLD_APART = "cannot be told apart"
+NOT_DISTINGUISHED = "cannot be distinguished"
 """Stands in the sentence: what else looks wrong may follow from it."""
 
 _TAKES_PART = 0.3
@@ -46,5 +46,5 @@ def collinear(found: _core.Identification, names: Sequence[str]) -> list[str]:
     else:
         cure = "a single frequency does not separate them; excite two or more, or give one of them as known"
     return [
-        f"{told} {NOT_TOLD_APART}: they are nearly collinear{noise} (condition {found.constants_condition:.0f}): {cure}"
+        f"{told} {NOT_DISTINGUISHED}: they are nearly collinear{noise} (condition {found.constants_condition:.0f}): {cure}"
     ]

@@ -32,8 +32,8 @@ def words_with_instrument(found: _core.Identification) -> Words:
         reasons.append(f"the instrument is strong: F statistic of the first stage {strength:.3g} (10 is enough)")
         return Words(tuple(reasons), ())
     weak = (
-        f"the instrument is weak: F statistic of the first stage {strength:.2g}, where 10 is needed; estimates lean towards least squares "
-        "and errors are too small: excite more, over a longer record, or take a channel nearer to the excitation"
+        f"the instrument is weak: F statistic of the first stage {strength:.2g}, where 10 is needed; estimates are biased towards least "
+        "squares and errors are too small: excite more, over a longer record, or take a channel nearer to the excitation"
     )
     return Words(tuple(reasons), (weak,))
 

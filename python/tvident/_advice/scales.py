@@ -54,9 +54,9 @@ def disagreement(
         return [words]
     if found.scan is None or not _is_wide(found.scan):
         words = (
-            "test functions of different widths find different parameters, and none can be believed: is a channel filtered, clipped, "
+            "test functions of different widths find different parameters, and none can be trusted: is a channel filtered, clipped, "
             "held or wrapped (give lag=, or make clipped samples NaN), is a term missing, or does a controller feed noise back into the "
-            "torque? result.scan().plot() shows where they part; do not trust these numbers"
+            "torque? result.scan().plot() shows where they differ; do not trust these numbers"
         )
         return [words]
     narrowest, widest = (found.scan.window_length[place] for place in found.scan.plateau or (0, 0))

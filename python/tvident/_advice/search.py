@@ -23,8 +23,8 @@ class FoundBySearch:
     value, error : float
     limits : (float, float)
         The range that was searched.
-    earned : bool
-        Whether the term earns its place.
+    needed : bool
+        Whether the term is needed.
     factor : float
         Of the term; its median where it changes.
     tried : int
@@ -43,7 +43,7 @@ class FoundBySearch:
     value: float
     error: float
     limits: tuple[float, float]
-    earned: bool
+    needed: bool
     factor: float
     tried: int
     gain: float = math.inf
@@ -69,9 +69,9 @@ class FoundBySearch:
         )
 
     def judgement(self) -> str:
-        """Return whether the term earns its place."""
+        """Return whether the term is needed."""
         term = self.parameter.term
-        if self.earned:
+        if self.needed:
             return f"with {term} the criterion is lower by {self.gain:.3g}, its inner parameters counted"
         how = f"higher by {-self.gain:.3g}" if self.gain <= 0 else f"lower by {self.gain:.3g} only"
         chance = (
@@ -87,9 +87,9 @@ class FoundBySearch:
         words: list[str] = []
         if not self.tried or not self.is_determined:
             return words
-        if not self.earned:
+        if not self.needed:
             words.append(
-                f"{term} does not earn its place: {self.judgement()}: leave it out; its error says that nothing is known of {name} but "
+                f"{term} is not needed: {self.judgement()}: leave it out; its error says that nothing is known of {name} but "
                 "the range"
             )
         elif self.at_end:
@@ -103,12 +103,12 @@ class FoundBySearch:
             words.append(
                 f"the best {name} is the {which} of its range, {self.value:.4g}: {wider}; its error means nothing there"
             )
-        if self.earned and self.lasts < _FEWEST_SAMPLES:
+        if self.needed and self.lasts < _FEWEST_SAMPLES:
             words.append(
                 f"{term} fades within {self.lasts:.2g} samples of a turn, so {name} and its factor depend on how the velocity was "
                 "smoothed, by more than their errors: record at a higher rate, or turn more slowly"
             )
-        if self.earned and self.parameter.limits is None and self.factor < 0:
+        if self.needed and self.parameter.limits is None and self.factor < 0:
             words.append(
                 f"{term} is negative: near rest the friction is smaller than beyond, not larger, as where it builds up over a distance "
                 f"(presliding) or the velocity is smoothed; what {name} is then is not a Stribeck velocity"

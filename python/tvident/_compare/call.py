@@ -40,7 +40,7 @@ def compare_models(
     r"""Compare candidates for the equation of motion on one record.
 
     Every model is identified in weak form with the same test function, so that all explain the same rows: that of the model with most
-    terms that the record tells apart. The criterion is equation (8) of
+    terms that the record distinguishes. The criterion is equation (8) of
     the paper, AICc = N ln(mean square of the residuals) + 2 k N/(N - k - 1), where N is the effective number of overlapping rows and k
     counts parameters (a windowed one as often as there are windows) and the variance.
 
@@ -124,7 +124,7 @@ def compare_models(
 def _richest_of_the_determined(
     angle: npt.ArrayLike, torque: npt.ArrayLike, common: Mapping[str, Any], calls: Mapping[str, Mapping[str, Any]]
 ) -> Identification:
-    """Return what was identified with the model of most terms that the record tells apart, or with that of most terms.
+    """Return what was identified with the model of most terms that the record distinguishes, or with that of most terms.
 
     What a record does not determine chooses no test function for models that it does: friction in one direction is an offset.
     """

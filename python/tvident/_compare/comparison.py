@@ -115,7 +115,7 @@ class ModelComparison:
         Returns
         -------
         str
-            One line a model, the best first; one line a parameter; which models the record hardly tells apart.
+            One line a model, the best first; one line a parameter; which models the record hardly distinguishes.
 
         See Also
         --------

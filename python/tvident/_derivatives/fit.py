@@ -31,7 +31,7 @@ class Sampled:
     times : ndarray, optional
         Time of every sample in seconds where the period does not tell it.
     unit : str
-        Of the samples; nothing where it, or the unit of time, is not known.
+        Of the samples; empty if it, or the unit of time, is not known.
     """
 
     step: int = 1
@@ -49,7 +49,7 @@ class Sampled:
 
 
 def unit_of_samples(samples: Any, *, is_timed: bool) -> str:
-    """Return the unit that samples or their name say, which derivatives by seconds have, too; nothing where time is counted in samples."""
+    """Return the unit that samples or their name say, which derivatives by seconds have, too; empty if time is counted in samples."""
     return unit_said(samples) or unit_named(samples) if is_timed else ""
 
 

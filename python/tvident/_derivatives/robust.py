@@ -85,8 +85,8 @@ def with_clipped_residuals(
     records = samples.reshape(-1, samples.shape[-1]).astype(np.float64)
 
     def clipped(some: Array, used: npt.NDArray[np.bool_]) -> Array:
-        def solve(sides: Array) -> Array:
-            return np.asarray(value(np.ascontiguousarray(sides.T)).T)
+        def solve(rhs: Array) -> Array:
+            return np.asarray(value(np.ascontiguousarray(rhs.T)).T)
 
         return np.asarray(pseudo_values(solve, some.T, used, length, _USUAL_PARAMETERS).T)
 

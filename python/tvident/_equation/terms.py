@@ -34,7 +34,7 @@ class Term:
         They are constant over a record, and found by a search for the lowest criterion of :func:`tvident.compare_models`, at 17 values
         first. ``constants["name.delay"]`` holds the value and its standard error (delta method), which the errors of all other
         parameters know of. :func:`tvident.identify` then costs about 10 to 20 times as much; ``settings=`` of a result repeats it
-        without a search. The summary says if the term does not earn its place, or if the best value is an end of the range.
+        without a search. The summary says if the term is not needed, or if the best value is an end of the range.
 
     Raises
     ------

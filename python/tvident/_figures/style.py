@@ -25,7 +25,7 @@ INK, MUTED, OTHER, FAINT = "#22303c", "#5b6b79", "#7d8b97", "#c3ccd4"
 """Colours of titles, of labels, of what stands beside what was found, of frames and recorded samples."""
 
 FOUND, TRUTH, ACCENT = "#0072b2", "#d55e00", "#00b060"
-"""Colours of what was found, what is true, what was chosen: told apart by colour-blind eyes too. Blue and vermilion are those of Okabe and
+"""Colours of what was found, is true, was chosen: distinguished by colour-blind eyes too. Blue and vermilion are those of Okabe and
 Ito; their green is as near to the blue as 17 (CIELAB) without short-wave cones, this one 23."""
 
 TIME_MAP = "cividis"

@@ -156,7 +156,7 @@ def _unit(name: str, *, degrees: bool) -> str:
 
 
 def _unit_of_state(name: str, *, degrees: bool) -> str:
-    """Return the unit of a value in a model's tree; nothing where the header does not say it."""
+    """Return the unit of a value in a model's tree; empty if the header does not say it."""
     state = _STATE.fullmatch(name)
     if state is None:
         last = name.replace("/", "_")

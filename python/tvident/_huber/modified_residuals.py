@@ -26,7 +26,7 @@ _SETTLED = 1e-3
 
 
 def pseudo_values(
-    solve: Callable[[Array], Array], sides: Array, is_used: npt.NDArray[np.bool_], length: int, count: int
+    solve: Callable[[Array], Array], rhs: Array, is_used: npt.NDArray[np.bool_], length: int, count: int
 ) -> Array:
     """Return right-hand sides whose least squares are those of Huber's loss, with their standard errors.
 
@@ -37,7 +37,7 @@ def pseudo_values(
     ----------
     solve : callable
         Returns what the windows around every row predict of right-hand sides.
-    sides : ndarray, shape (n, q)
+    rhs : ndarray, shape (n, q)
     is_used : ndarray of bool, shape (n,)
         Rows that count.
     length : int
@@ -45,12 +45,12 @@ def pseudo_values(
     count : int
         Regressors.
     """
-    clipped, left, limits = sides, np.zeros_like(sides), np.zeros_like(sides)
+    clipped, left, limits = rhs, np.zeros_like(rhs), np.zeros_like(rhs)
     for _ in range(_ROUNDS):
-        left = sides - solve(clipped)
+        left = rhs - solve(clipped)
         limits = LIMIT * _scales(left, is_used, length)
         there = np.isfinite(left) & np.isfinite(limits)
-        moved = np.where(there, sides - left + np.clip(left, -limits, limits), sides)
+        moved = np.where(there, rhs - left + np.clip(left, -limits, limits), rhs)
         change = np.abs(moved - clipped)[there & is_used[:, None]]
         allowed = (_SETTLED * limits / LIMIT)[there & is_used[:, None]]
         clipped = moved
@@ -60,7 +60,7 @@ def pseudo_values(
     # With p regressors in windows of n rows (Huber 1981, equation 6.7 of chapter 7).
     factor = (1 + count / length * (1 - inside) / inside) / inside
     there = np.isfinite(left) & np.isfinite(limits)
-    return np.where(there, sides - left + factor * np.clip(left, -limits, limits), sides)
+    return np.where(there, rhs - left + factor * np.clip(left, -limits, limits), rhs)
 
 
 def _scales(left: Array, is_used: npt.NDArray[np.bool_], length: int) -> Array:

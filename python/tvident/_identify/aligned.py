@@ -21,7 +21,7 @@ Late: TypeAlias = tuple[float, float]
 _FARTHEST = 0.1
 """Part of the record by which the torque may be late, at most."""
 
-_BELIEVED = 0.7
+_MOST_LEFT = 0.7
 """The best alignment leaves at most this part of what alignments leave on the middle."""
 
 _PARTS, _SHORTEST = 6, 1500
@@ -72,7 +72,7 @@ def aligned(
     errors: Late = (math.nan, math.nan)
     moves: tuple[Late, ...] = ()
     doubt = ""
-    if not share <= _BELIEVED:
+    if not share <= _MOST_LEFT:
         doubt = "the record hardly tells how the clocks of angle and torque are aligned: excite several frequencies, or give both times"
     for _ in range(_ROUNDS):
         data = data_of(late)

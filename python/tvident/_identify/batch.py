@@ -113,7 +113,7 @@ def with_inner(
     found: Estimates,
     inner: Mapping[str, _Numbers],
     unknown: Mapping[str, _Numbers],
-    earned: Mapping[str, npt.NDArray[np.bool_]],
+    needed: Mapping[str, npt.NDArray[np.bool_]],
     count: int,
 ) -> Estimates:
     r"""Return numbers with inner parameters of terms, whose unknowns were by how much each is to be moved.
@@ -125,7 +125,7 @@ def with_inner(
         Values of inner parameters.
     unknown : mapping of str to ndarray, shape (records,)
         Standard errors of what is known of nothing but its range.
-    earned : mapping of str to ndarray of bool, shape (records,)
+    needed : mapping of str to ndarray of bool, shape (records,)
         Whether the record tells more.
     count : int
         Numbers of a record.
@@ -141,7 +141,7 @@ def with_inner(
         error = unknown[name]
         if name in errors and errors[name].shape[-1]:
             told = (errors[name] * factors.pop(name, 1.0))[..., 0].ravel()
-            error = np.where(np.isfinite(told) & earned[name], told, np.fmax(told, error))
+            error = np.where(np.isfinite(told) & needed[name], told, np.fmax(told, error))
         values[name] = np.broadcast_to(value.reshape(*records, 1), (*records, count))
         errors[name] = np.broadcast_to(error.reshape(*records, 1), (*records, count))
         constants[name] = (alone(value), alone(error))

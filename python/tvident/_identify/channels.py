@@ -150,8 +150,8 @@ def motion_channels(
     fused = _fused(first, beside, period)
     if integrations > 1 and has_spring:
         words = (
-            "the angle is integrated twice from an acceleration, and drifts: believe the inertia, and stiffness where the motion is fast; "
-            "measure a velocity or an angle, too"
+            "the angle is integrated twice from an acceleration, and drifts: trust the inertia, and the stiffness where the motion is "
+            "fast; measure a velocity or an angle, too"
         )
         doubts += [(record, words) for record in range(len(sigmas))]
     if integrations:

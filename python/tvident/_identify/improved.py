@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tvident import _core
-from tvident._advice import NOT_TOLD_APART, Explained
+from tvident._advice import NOT_DISTINGUISHED, Explained
 from tvident._arguments import percent
 from tvident._equation import BUILT_IN, COEFFICIENTS, FRICTION, OFFSET, Unknown
 from tvident._identify.data import Data
@@ -49,7 +49,7 @@ _MENDED_FIRST = {"held", "wrapped"}
 
 
 def is_to_be_tried(data: Data, request: Request, found: Sequence[_core.Identification]) -> bool:
-    """Return whether something speaks against the model of a single record in weak form, and there is something to change."""
+    """Return whether something contradicts the model of a single record in weak form, and there is something to change."""
     if not isinstance(request.form, WeakForm) or data.instruments is not None or data.batch:
         return False
     if any(defect.name in _MENDED_FIRST for defect in found[0].defects):
@@ -74,7 +74,7 @@ def _is_plain(data: Data) -> bool:
 
 
 def is_doubted(flags: int) -> bool:
-    """Return whether something speaks against the model of a record."""
+    """Return whether something contradicts the model of a record."""
     return bool(flags & _DOUBTED)
 
 
@@ -218,8 +218,8 @@ class Improvement(_AskedOfRecord):
         )
         dropped += hidden[-1:]  # that nothing is explained, which it is with what is advised
         rest = [line for line in words.advice if line not in dropped and not line.startswith(starts)]
-        # What is tried differs little from what it is compared with where unknowns cannot be told apart.
-        before = next((place + 1 for place, line in enumerate(rest) if NOT_TOLD_APART in line), 0)
+        # What is tried differs little from what it is compared with where unknowns cannot be distinguished.
+        before = next((place + 1 for place, line in enumerate(rest) if NOT_DISTINGUISHED in line), 0)
         return replace(words, advice=(*rest[:before], *([] if advice is None else [advice]), *rest[before:]))
 
     def _trial(self, result: Identification) -> Trial:

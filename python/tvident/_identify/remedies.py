@@ -38,7 +38,7 @@ _MATTERS = 0.01
 """A share of a parameter by which it must move to be told."""
 
 _AGAINST = 0.1
-"""A share of a weight that a negative stiffness beside it may have: with more the two are told apart by nothing."""
+"""A share of a weight that a negative stiffness beside it may have: with more the two are distinguished by nothing."""
 
 Call = dict[str, Any]
 

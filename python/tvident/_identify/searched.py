@@ -1,4 +1,4 @@
-"""The search for inner parameters of terms: which values explain the torque best, and whether the term earns its place."""
+"""The search for inner parameters of terms: which values explain the torque best, and whether the term is needed."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _END = 1e-3
 """So near to an end of its range, as a part of it, a value is the end."""
 
 BY_CHANCE = 0.01
-"""A term whose significance noise exceeds as often, anywhere in the range, does not earn its place."""
+"""A term whose significance noise exceeds as often, anywhere in the range, is not needed."""
 
 _BUDGET = 40
 """Identifications that a search takes, about: only for showing progress."""
@@ -82,8 +82,8 @@ class Searched:
         By how much each term lowers the criterion, its inner parameters paid for.
     chance : mapping of str to ndarray, shape (records,)
         How likely noise makes a term as significant as it is at any value that was tried; NaN where its factor changes.
-    earned : mapping of str to ndarray of bool, shape (records,)
-        Whether a term earns its place.
+    needed : mapping of str to ndarray of bool, shape (records,)
+        Whether a term is needed.
     tried : int
         Identifications; 0 where an earlier result tells the values.
     """
@@ -92,18 +92,18 @@ class Searched:
     at_end: Mapping[str, npt.NDArray[np.bool_]] = field(default_factory=dict)
     gain: Mapping[str, Array] = field(default_factory=dict)
     chance: Mapping[str, Array] = field(default_factory=dict)
-    earned: Mapping[str, npt.NDArray[np.bool_]] = field(default_factory=dict)
+    needed: Mapping[str, npt.NDArray[np.bool_]] = field(default_factory=dict)
     tried: int = 0
 
     def of(self, one: InnerParameter, record: int) -> dict[str, Any]:
         """Return what is said of an inner parameter of a record."""
         if not self.tried:
-            return {"tried": 0, "earned": bool(self.earned[one.term][record])}
+            return {"tried": 0, "needed": bool(self.needed[one.term][record])}
         return {
             "at_end": bool(self.at_end[one.full_name][record]),
             "gain": float(self.gain[one.term][record]),
             "chance": float(self.chance[one.term][record]),
-            "earned": bool(self.earned[one.term][record]),
+            "needed": bool(self.needed[one.term][record]),
             "tried": self.tried,
         }
 
@@ -175,8 +175,8 @@ class _Search:
         places = {name: ranges[name].place(value) for name, value in values.items()}
         at_end = {name: (place < _END) | (place > 1 - _END) for name, place in places.items()}
         with np.errstate(invalid="ignore"):
-            earned = {term: (gain[term] > 0) & ~(chance[term] > BY_CHANCE) for term in gain}
-        return Searched(values, at_end, gain, chance, earned, self._tried)
+            needed = {term: (gain[term] > 0) & ~(chance[term] > BY_CHANCE) for term in gain}
+        return Searched(values, at_end, gain, chance, needed, self._tried)
 
     def _found(
         self,

@@ -39,7 +39,7 @@ _FORMS: dict[str, type[Form]] = {"weak": WeakForm, "strong": StrongForm}
 
 _BESIDE_FORM = frozenset(
     (
-        *("method", "form", "chosen", "kinds", "known", "terms", "own_terms", "inner", "earned", "expansions"),
+        *("method", "form", "chosen", "kinds", "known", "terms", "own_terms", "inner", "needed", "expansions"),
         *(
             "lag",
             "lag_stderr",
@@ -95,8 +95,8 @@ class Request:
         Of a wrapped angle.
     inner : mapping of str to float or sequence
         Inner parameters of terms that an earlier result found.
-    earned : mapping of str to bool or sequence
-        Whether the terms earned their places there.
+    needed : mapping of str to bool or sequence
+        Whether the terms were needed there.
     chosen : bool
         Nobody asked for this form.
     kept : sequence of str
@@ -117,7 +117,7 @@ class Request:
     quantisation: float | None
     period: float | None
     inner: Mapping[str, Any]
-    earned: Mapping[str, Any]
+    needed: Mapping[str, Any]
     chosen: bool
     kept: Sequence[str] = ()
     lag_stderr: Any = None
@@ -217,7 +217,7 @@ def resolve(
         quantisation=asked["quantisation"],
         period=None if asked["period"] is None else arguments.positive_number("period", asked["period"]),
         inner={} if earlier is None else dict(earlier.get("inner") or {}),
-        earned={} if earlier is None else dict(earlier.get("earned") or {}),
+        needed={} if earlier is None else dict(earlier.get("needed") or {}),
         chosen=earlier is None and name == "auto",
         kept=() if earlier is None else _kept(earlier, given, has_form=not arguments.is_word(method, "auto")),
         lag_stderr=None if earlier is None or "lag" in given else earlier.get("lag_stderr"),

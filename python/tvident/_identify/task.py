@@ -172,8 +172,8 @@ class Task:
                 )
             return values
 
-        earned = {one.term: each(one.term, request.earned.get(one.term, True)).astype(bool) for one in self.inner}
-        return Searched({name: each(name, request.inner[name]).astype(np.float64) for name in names}, earned=earned)
+        needed = {one.term: each(one.term, request.needed.get(one.term, True)).astype(bool) for one in self.inner}
+        return Searched({name: each(name, request.inner[name]).astype(np.float64) for name in names}, needed=needed)
 
     def _slopes(self, inner: Mapping[str, Numbers], factors: Mapping[str, Sequence[Numbers]]) -> list[Numbers]:
         """Return what a unit more of each inner parameter does to the torque; nothing if one of them does nothing anywhere."""
@@ -200,8 +200,8 @@ class Task:
         batch = estimates(data.batch, names, found, known)
         if inner:
             unknown = {name: one.unknown_error for name, one in self.ranges.items()}
-            earned = {one.full_name: searched.earned[one.term] for one in self.inner}
-            batch = with_inner(batch, searched.values, unknown, earned, data.time[:: data.step].size)
+            needed = {one.full_name: searched.needed[one.term] for one in self.inner}
+            batch = with_inner(batch, searched.values, unknown, needed, data.time[:: data.step].size)
         if data.labels is not None:
             batch = replace(batch, labels=data.labels.at(slice(None, None, data.step)))
         constants = {**batch.constants, **constants_of(data.motion, data.batch)}
@@ -442,7 +442,7 @@ class Task:
             "kinds": kinds,
             "terms": [[term.name, kinds[term.name]] for term in self._terms],
             "inner": {name: by_record(value.tolist()) for name, value in searched.values.items()},
-            "earned": {name: by_record(value.tolist()) for name, value in searched.earned.items()},
+            "needed": {name: by_record(value.tolist()) for name, value in searched.needed.items()},
             "own_terms": [term.name for term in self._terms if term.own is not None],
             "known": {name: value if isinstance(value, float) else None for name, value in self._known.items()},
             **data.settings,

@@ -341,7 +341,7 @@ class MergedIdentification(Oscillating, Reported):
 
     @property
     def trusted(self) -> npt.NDArray[np.bool_]:
-        """Where values can be trusted, shape (n,): all that can be known are numbers, and no flag speaks against them.
+        """Where values can be trusted, shape (n,): all that can be known are numbers, and no flag forbids it.
 
         See Also
         --------

@@ -31,7 +31,7 @@ class Chain:
     masses : int
         Number of masses, one for each row of angle and torque.
     springs : sequence of (int or "base", int or "base")
-        What every spring connects: masses count from 0. Two springs between the same masses cannot be told apart.
+        What every spring connects: masses count from 0. Two springs between the same masses cannot be distinguished.
     dampers : sequence of (int or "base", int or "base"), optional
         What every damper connects; by default a damper lies beside each spring.
     base : array_like, shape (n,), optional
@@ -280,8 +280,8 @@ def _links(name: str, links: Sequence[Link], masses: int) -> tuple[Link, ...]:
             )
         if any(set(ends) == set(other) for other in found):
             raise ValueError(
-                f"{name} must connect different pairs, since two between the same cannot be told apart; got {arguments.shown(link)} twice; "
-                "leave one out"
+                f"{name} must connect different pairs, since two between the same cannot be distinguished; got {arguments.shown(link)} "
+                "twice; leave one out"
             )
         found.append((ends[0], ends[1]))
     return tuple(found)

@@ -212,15 +212,15 @@ def rolling_least_squares(
     regressors = arguments.real_array("A", A)
     if regressors.ndim == 1:
         regressors = regressors[:, None]
-    sides = arguments.real_array("b", b)
-    if regressors.ndim != 2 or sides.ndim > 2:  # noqa: PLR2004 - a matrix has two axes
+    rhs = arguments.real_array("b", b)
+    if regressors.ndim != 2 or rhs.ndim > 2:  # noqa: PLR2004 - a matrix has two axes
         raise ValueError(
-            f"A must have shape (n, p) and b shape (n,) or (n, q); got {regressors.shape} and {sides.shape}; reshape them"
+            f"A must have shape (n, p) and b shape (n,) or (n, q); got {regressors.shape} and {rhs.shape}; reshape them"
         )
     rows, count = regressors.shape
-    if sides.shape[0] != rows:
+    if rhs.shape[0] != rows:
         raise ValueError(
-            f"A and b must have as many rows as each other; got {rows} and {sides.shape[0]}; cut one of them"
+            f"A and b must have as many rows as each other; got {rows} and {rhs.shape[0]}; cut one of them"
         )
     if count > MOST_REGRESSORS:
         raise ValueError(f"A must have at most {MOST_REGRESSORS} columns; got {count}; drop or combine some")
@@ -239,7 +239,7 @@ def rolling_least_squares(
     weight = arguments.weights("weights", weights, (rows,))
     largest = 1.0 if weight is None else float(weight.max())
     relative = None if weight is None else weight / largest
-    given: npt.NDArray[np.number] = sides.reshape(rows, -1)
+    given: npt.NDArray[np.number] = rhs.reshape(rows, -1)
     columns = given
     threads = arguments.worker_count(workers)
     if is_robust:
@@ -270,7 +270,7 @@ def rolling_least_squares(
     def some(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Return what is wanted, windows first."""
         wanted = values if stride == every else values[..., ::every].copy()
-        wanted = wanted[..., 0, :] if sides.ndim == 1 and values.ndim > 1 else wanted
+        wanted = wanted[..., 0, :] if rhs.ndim == 1 and values.ndim > 1 else wanted
         return np.moveaxis(wanted, -1, 0)
 
     return RollingRegression(

@@ -41,7 +41,7 @@ def _steps(result: Any) -> Iterator[tuple[str, list[str]]]:
         )
     yield "Does the model hold where it was not fitted?", [in_words_of(result.units, result.held_back().words())]
     yield "How much can be trusted", [_flags(result), verdict(result)]
-    yield "What to do next, most useful first", list(result.advice) or ["nothing: no test speaks against these numbers"]
+    yield "What to do next, most useful first", list(result.advice) or ["nothing: no test contradicts these numbers"]
 
 
 def _scan(result: Any) -> str:

@@ -136,7 +136,7 @@ def settings_of(
         if isinstance(own.get(name), list):
             picked = [own[name][record] for record in records]
             own[name] = picked[0] if alone and name not in _LISTS else picked
-    for name in ("inner", "earned"):
+    for name in ("inner", "needed"):
         parts = {key: [one[record] for record in records] for key, one in own[name].items()}
         own[name] = {key: one[0] if alone else one for key, one in parts.items()}
     own["kinds"] = dict(own["kinds"])

@@ -241,7 +241,7 @@ def _equation(request: Request) -> Equation:
     kinds: set[str] = {value for value in found.values() if isinstance(value, str)}
     asked = all_terms(request.terms, "windowed" if is_strong and kinds == {"windowed"} else "constant")
     for term in asked:
-        if term.own is not None or (term.inner and (is_strong or term.name not in request.earned)):
+        if term.own is not None or (term.inner and (is_strong or term.name not in request.needed)):
             raise ValueError(
                 f"terms of a stream must be built-in, without inner parameters; got {term.name!r}, which needs the whole record; "
                 "use 'offset', 'coulomb', 'cubic', 'gravity' or 'viscous_asymmetric'"

@@ -151,7 +151,7 @@ def _unit_of_pint(unit: Any) -> str:
 
 
 def unit_named(values: Any) -> str:
-    """Return the unit in the name of a series, or that of all columns of a table: ``angle [deg]``; nothing where it is none that is known.
+    """Return the unit in the name of a series, or that of all columns of a table: ``angle [deg]``; empty if it is not known.
 
     What is computed from a series keeps its name, so nobody knows whether the numbers are still in this unit.
     """

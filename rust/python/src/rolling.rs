@@ -135,9 +135,9 @@ pub(crate) fn rolling_least_squares<'py>(
     let equations = Equations { columns, weights, rows: 0..total };
     let (elements, workers) = (Elements { first: 0, step }, threads(workers));
     RollingRegressions::filled(py, (p, q), (elements, total.div_ceil(step)), true, |mut regressions| {
-        for side in 0..q {
-            regressions.parameters.swap(side, constant * q + side);
-            regressions.errors.swap(side, constant * q + side);
+        for rhs_index in 0..q {
+            regressions.parameters.swap(rhs_index, constant * q + rhs_index);
+            regressions.errors.swap(rhs_index, constant * q + rhs_index);
         }
         let mut over = 0;
         watched(py, progress, |watch| {

@@ -85,8 +85,8 @@ impl Widths {
         let fits = stages.map(pieces, || (), |length, (): &mut ()| fits_of(length))?;
         for (scans, (fits, enough)) in self.scans.iter_mut().zip(fits) {
             for (scan, fit) in scans.iter_mut().zip(fits) {
-                // That few blocks do not determine the constants is for want of a longer record, and says nothing against them; that one of
-                // them holds all that is known does.
+                // Too few blocks for the constants mean that the record is short, which says nothing against them; one block that holds all
+                // that is known does.
                 scan.tried += usize::from(enough || !matches!(fit, Err(NoFit::TooFewBlocks)));
                 scan.scales.extend(fit.ok().map(|fit| AtScale::new(one.scale, fit)));
             }

@@ -70,7 +70,7 @@ pub(crate) enum NoiseFrom {
     Equations,
 }
 
-/// The constants of some rows, and their variances; nothing where the rows do not determine them.
+/// The constants of some rows, and their variances; `None` if the rows do not determine them.
 type Estimate = Option<(Vec<f64>, Vec<f64>)>;
 
 impl Test {
@@ -204,7 +204,7 @@ fn within(fit: &Fit, rows: Range<usize>, step: usize, span: usize) -> Range<usiz
     first..end.max(first)
 }
 
-/// How much neighbouring parts scatter about lines through them, over what noise explains; nothing where few of those that are `driven` say
+/// How much neighbouring parts scatter about lines through them, over what noise explains; `None` if few of those that are `driven` say
 /// something.
 fn scatter(parts: &[(f64, f64)], driven: usize) -> Option<f64> {
     let bend = |three: &[(f64, f64)]| {

@@ -179,7 +179,7 @@ fn squared_errors<'a>(
     })
 }
 
-/// What predictions from the windows on both sides of a row leave of it; nothing where there are no such windows.
+/// What predictions from the windows on both sides of a row leave of it; `None` if there are no such windows.
 pub(crate) fn left_of_rows<'a>(
     problem: &'a Problem<'_>,
     scale: Scale,

@@ -28,7 +28,7 @@ pub(crate) trait RowSource {
 /// Where the walk is, and its memory.
 #[derive(Debug)]
 pub(crate) struct OneByOne {
-    /// The block in hand: the window that begins in its first row.
+    /// The current block: the window that begins in its first row.
     base: Option<usize>,
     /// Rows of the next block that the prefix holds, and the segment whose suffixes are held.
     done: usize,
@@ -58,7 +58,7 @@ impl OneByOne {
 }
 
 impl RollingLeastSquares {
-    /// The first row that windows around a row and those after it need here: that of the block in hand.
+    /// The first row that windows around a row and those after it need here: that of the current block.
     pub(crate) fn reads_from(&self, row: usize) -> usize {
         let window = self.first_row(row);
         (window - window % self.window).saturating_sub(self.window)

@@ -202,7 +202,7 @@ impl Triangle {
         Self { factor, projections, residuals, floor, reference, count: held.len() }
     }
 
-    /// The order of the window; nothing where what is there does not determine one.
+    /// The order of the window; `None` if the samples of the window do not determine one.
     fn order(&self, options: &PolynomialOptions) -> Option<usize> {
         match options.order {
             Order::Fixed(order) => (order < self.projections.len()).then_some(order),
@@ -214,7 +214,7 @@ impl Triangle {
         }
     }
 
-    /// What each order's share in the estimate would be, by Akaike's weights; nothing where the order is fixed.
+    /// What each order's share in the estimate would be, by Akaike's weights; empty if the order is fixed.
     fn shares(&self, options: &PolynomialOptions) -> Vec<f64> {
         let Order::Chosen { criterion, .. } = options.order else { return Vec::new() };
         let scores = self.residuals.iter().enumerate().map(|(order, residual)| {

@@ -1,7 +1,7 @@
 //! The discrete Fourier transform of real sequences.
 //!
 //! Two neighbouring samples are one complex number, so a transform of half the length does all the work; the sums of the even and of
-//! the odd samples are told apart afterwards. Lengths are powers of two, so that one small algorithm serves: a planner for every
+//! the odd samples are separated afterwards. Lengths are powers of two, so that one small algorithm serves: a planner for every
 //! length would take a third of the time that this crate takes to compile.
 
 use std::f64::consts::TAU;

@@ -39,7 +39,7 @@ pub(crate) struct Finer<'a> {
 }
 
 impl Finer<'_> {
-    /// What the parts of all blocks say beside given constants. `eliminated` is what is left of each block; nothing where it says nothing.
+    /// What the parts of all blocks say beside given constants. `eliminated` is what is left of each block; `None` if it says nothing.
     pub(crate) fn scores(&self, eliminated: &[Option<Eliminated>], constants: &[f64]) -> BlockParts {
         let mut found = BlockParts { parts: Vec::new(), independent: 0.0, unknowns: 0.0 };
         for (block, eliminated) in self.blocks.iter().zip(eliminated) {

@@ -23,16 +23,16 @@ struct Everything {
 
 struct Problem {
     regressors: Vec<Vec<f64>>,
-    sides: Vec<Vec<f64>>,
+    rhs: Vec<Vec<f64>>,
     window: usize,
 }
 
 fn solve_in_pieces(problem: &Problem, cuts: &[usize], instructions: Instructions) -> Everything {
-    let (p, q, n) = (problem.regressors.len(), problem.sides.len(), problem.sides[0].len());
+    let (p, q, n) = (problem.regressors.len(), problem.rhs.len(), problem.rhs[0].len());
     let pairs: Vec<(usize, usize)> = (1..p).map(|i| (i - 1, i)).collect();
     let plan =
         RollingLeastSquares::new(problem.window, p, q, pairs.clone(), HALF_OF_THE_DIGITS, instructions).expect("valid");
-    let columns: Vec<&[f64]> = problem.regressors.iter().chain(&problem.sides).map(Vec::as_slice).collect();
+    let columns: Vec<&[f64]> = problem.regressors.iter().chain(&problem.rhs).map(Vec::as_slice).collect();
     let columns: Vec<&dyn Samples> = columns.iter().map(|column| column as &dyn Samples).collect();
     let equations = Equations { columns, rows: 0..n, ..Equations::default() };
     let mut all = Everything {
@@ -83,12 +83,12 @@ fn problem(seed: u64, n: usize, p: usize, q: usize, window: usize) -> Problem {
                 .collect()
         })
         .collect();
-    let side = |s: usize| {
+    let one_rhs = |s: usize| {
         let error = noise(seed + 100 + s as u64, n);
         (0..n).map(|i| regressors.iter().map(|column| column[i]).sum::<f64>() + error[i]).collect()
     };
-    let sides = (0..q).map(side).collect();
-    Problem { regressors, sides, window }
+    let rhs = (0..q).map(one_rhs).collect();
+    Problem { regressors, rhs, window }
 }
 
 /// Errors of a solution by orthogonal transformations: condition number times rounding times the square root of the rows, with room.
@@ -115,7 +115,7 @@ proptest! {
                 continue;
             }
             let a = Mat::from_fn(count, p, |r, j| problem.regressors[j][rows.start + r]);
-            let b = Mat::from_fn(count, q, |r, s| problem.sides[s][rows.start + r]);
+            let b = Mat::from_fn(count, q, |r, s| problem.rhs[s][rows.start + r]);
             let expected = a.qr().solve_lstsq(&b);
             let residual = &b - &a * expected.subrows(0, p);
             let norms: Vec<f64> = (0..p).map(|j| a.col(j).norm_l2()).collect();
@@ -169,7 +169,7 @@ proptest! {
 fn a_glitch_leaves_with_its_row() {
     let clean = problem(1, 3000, 3, 1, 100);
     let mut dirty = problem(1, 3000, 3, 1, 100);
-    dirty.sides[0][1500] = 1e12;
+    dirty.rhs[0][1500] = 1e12;
     dirty.regressors[1][1500] = -1e13;
     let (found, expected) = (solve(&dirty), solve(&clean));
     for i in (0..3000_usize).filter(|i| i.abs_diff(1500) > 51) {
@@ -209,7 +209,7 @@ fn windows_longer_than_a_segment_are_the_same_least_squares() {
     let found = solve(&problem);
     for i in [2500, 4000, 6000, 9499] {
         let a = Mat::from_fn(5001, 3, |r, j| problem.regressors[j][i - 2500 + r]);
-        let b = Mat::from_fn(5001, 1, |r, _| problem.sides[0][i - 2500 + r]);
+        let b = Mat::from_fn(5001, 1, |r, _| problem.rhs[0][i - 2500 + r]);
         let expected = a.qr().solve_lstsq(&b);
         for j in 0..3 {
             let error = (found.parameters[j][i] - expected[(j, 0)]).abs() * a.col(j).norm_l2();
