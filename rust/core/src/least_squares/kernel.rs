@@ -22,8 +22,8 @@ use crate::status::Status;
 /// Rows of every lane between two calls of `go_on`: some 10 ms with 16 regressors.
 const ASK: usize = 256;
 
-/// The kernel of a run.
-pub(crate) struct RollingKernel<'a, 'b, 'c, H: Dimensions> {
+/// The kernel of a run. Where rows are `PLAIN`, they have no weights and nothing fades: known to the compiler, factors then stay in registers.
+pub(crate) struct RollingKernel<'a, 'b, 'c, H: Dimensions, const PLAIN: bool> {
     pub(crate) run: RollingRun<'a>,
     pub(crate) shape: H,
     pub(crate) equations: &'a Equations<'a>,
@@ -32,7 +32,7 @@ pub(crate) struct RollingKernel<'a, 'b, 'c, H: Dimensions> {
     pub(crate) go_on: &'b GoOn<'b>,
 }
 
-impl<H: Dimensions> Kernel for RollingKernel<'_, '_, '_, H> {
+impl<H: Dimensions, const PLAIN: bool> Kernel for RollingKernel<'_, '_, '_, H, PLAIN> {
     type Output = ();
 
     #[inline(always)]
@@ -88,7 +88,7 @@ impl<H: Dimensions> Kernel for RollingKernel<'_, '_, '_, H> {
                     suffix.load(simd, self.shape, &self.scratch.suffixes[place..place + size]);
                     let (freedom, own) = (self.freedom(simd, offset, full), offset + self.run.plan.before);
                     let RollingScratch { strips, tile, .. } = &mut *self.scratch;
-                    let place = strips[0].place(own % window, own / window);
+                    let place = if own < window { strips[0].place(own, 0) } else { strips[0].place(own - window, 1) };
                     let at = |column: usize| strips[column].in_place(simd, place);
                     finish(simd, self.shape, self.run.plan, &suffix, freedom, offset, tile, &mut row, at);
                 }
@@ -132,11 +132,12 @@ impl<F> WindowSummary<F> {
     }
 }
 
-impl<H: Dimensions> RollingKernel<'_, '_, '_, H> {
+impl<H: Dimensions, const PLAIN: bool> RollingKernel<'_, '_, '_, H, PLAIN> {
     /// The summary of no rows.
     #[inline(always)]
     fn nothing<S: Lanes>(&self, simd: S) -> WindowSummary<H::Factor<S::f64s>> {
-        let sums = self.run.plan.fading.as_ref().map(|_| self.shape.factor(simd.splat_f64s(0.0)));
+        let fades = !PLAIN && self.run.plan.fading.is_some();
+        let sums = fades.then(|| self.shape.factor(simd.splat_f64s(0.0)));
         WindowSummary { factor: empty(simd, self.shape), sums }
     }
 
@@ -158,7 +159,7 @@ impl<H: Dimensions> RollingKernel<'_, '_, '_, H> {
             row[column] = strips[column].in_place(simd, place);
         }
         let mut weight = simd.splat_f64s(1.0);
-        if plan.is_weighted(self.equations) {
+        if !PLAIN && plan.is_weighted(self.equations) {
             weight = strips[columns].in_place(simd, place);
         }
         if let (Some(fading), Some(sums)) = (&plan.fading, &mut summary.sums) {

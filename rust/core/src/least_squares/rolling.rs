@@ -6,6 +6,7 @@ use std::ops::Range;
 use crate::error::Error;
 use crate::exec::memory;
 use crate::exec::pool::{self, GoOn, Piece, Watch};
+use crate::lanes::output::Outputs;
 use crate::least_squares::givens_factor::{Dimensions, Few, Many};
 use crate::least_squares::kernel::RollingKernel;
 use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares, Slots};
@@ -86,38 +87,35 @@ impl RollingLeastSquares {
             let first = window - window % self.window;
             let next = end.min(first + self.stride());
             let run = RollingRun { plan: self, base: first, windows: window..next, rows: equations.rows.clone() };
+            let scratch = &mut *scratch;
             let outputs = &mut outputs;
             match (self.regressors, self.rhs_count) {
-                (1, 1) => {
-                    dispatch(
-                        self.instructions,
-                        RollingKernel { run, shape: Few::<1>, equations, scratch, outputs, go_on },
-                    );
-                }
-                (2, 1) => {
-                    dispatch(
-                        self.instructions,
-                        RollingKernel { run, shape: Few::<2>, equations, scratch, outputs, go_on },
-                    );
-                }
-                (3, 1) => {
-                    dispatch(
-                        self.instructions,
-                        RollingKernel { run, shape: Few::<3>, equations, scratch, outputs, go_on },
-                    );
-                }
-                (4, 1) => {
-                    dispatch(
-                        self.instructions,
-                        RollingKernel { run, shape: Few::<4>, equations, scratch, outputs, go_on },
-                    );
-                }
+                (1, 1) => self.solve_blocks(Few::<1>, run, equations, scratch, outputs, go_on),
+                (2, 1) => self.solve_blocks(Few::<2>, run, equations, scratch, outputs, go_on),
+                (3, 1) => self.solve_blocks(Few::<3>, run, equations, scratch, outputs, go_on),
+                (4, 1) => self.solve_blocks(Few::<4>, run, equations, scratch, outputs, go_on),
                 (regressors, rhs_count) => {
-                    let shape = Many { regressors, rhs_count };
-                    dispatch(self.instructions, RollingKernel { run, shape, equations, scratch, outputs, go_on });
+                    self.solve_blocks(Many { regressors, rhs_count }, run, equations, scratch, outputs, go_on);
                 }
             }
             window = next;
+        }
+    }
+
+    /// Solves the windows of some blocks side by side.
+    fn solve_blocks<H: Dimensions>(
+        &self,
+        shape: H,
+        run: RollingRun<'_>,
+        equations: &Equations<'_>,
+        scratch: &mut RollingScratch,
+        outputs: &mut Outputs<'_>,
+        go_on: &GoOn<'_>,
+    ) {
+        if self.is_weighted(equations) {
+            dispatch(self.instructions, RollingKernel::<_, false> { run, shape, equations, scratch, outputs, go_on });
+        } else {
+            dispatch(self.instructions, RollingKernel::<_, true> { run, shape, equations, scratch, outputs, go_on });
         }
     }
 }
