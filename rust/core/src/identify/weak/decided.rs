@@ -11,7 +11,6 @@ use crate::inference::jumps::jump::Jump;
 use crate::inference::slowly_varying;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
-use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
 use crate::regression::problem::{Correlated, Problem};
 use crate::regression::row_covariance::RowCovariance;
@@ -63,14 +62,6 @@ impl Decided {
     pub(crate) fn has_shortest_windows(&self) -> bool {
         let scale = self.fit.as_ref().and_then(|fit| fit.scale);
         self.scales.len() > 1 && scale.is_some() && self.scales.first().copied() == scale
-    }
-
-    /// Whether its windows are hardly longer than the shortest, and yet rows are predicted with many times the variance of the noise: what is windowed
-    /// changes faster than they follow.
-    pub(crate) fn lags_behind(&self) -> bool {
-        let (scale, shortest) = (self.fit.as_ref().and_then(|fit| fit.scale), self.scales.first());
-        let is_short = shortest.zip(scale).is_some_and(|(shortest, scale)| scale.span() < 2 * shortest.span());
-        is_short && self.scales.len() > 1 && self.error > NOISE_MODEL_FAILS
     }
 
     /// Whether constants seem to vary and windows are the shortest of those that were tried.

@@ -278,7 +278,6 @@ fn settled(
             noise: [0.0; 2],
             channel_noise,
             scan: Scan::default(),
-            narrowed: false,
             free_offset: FreeOffset::default(),
             best_before: None,
             is_rough: false,

@@ -7,7 +7,6 @@ use crate::identify::scanned::{Scans, wider};
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::session::Session;
 use crate::identify::widths::{MOST_SAMPLES, OfWidth, STRETCHES, Widths};
-use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
 use crate::regression::subsample::{places_of, stretches_of_blocks};
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
@@ -17,15 +16,12 @@ use crate::weak_form::weak_rows::WeakRows;
 /// The exponent where none is given.
 const EXPONENT: usize = 9;
 
-/// By what factor test functions become narrower whose shortest windows do not follow what is windowed.
-const NARROWER: f64 = std::f64::consts::SQRT_2;
-
 /// Half-widths that the spectra of a long record suggest which the widest test functions of a scan are long, at least.
 const WIDER: usize = 8;
 
 impl Session<'_, '_, '_> {
     /// Scans the widths unless that was done, moves to the plateau where the test function that the spectra suggest is off it, and on to wider ones where
-    /// windows follow noise, or narrower ones where they do not follow the motion.
+    /// windows follow noise.
     pub(crate) fn onto_plateau(
         &mut self,
         chosen: Chosen,
@@ -48,16 +44,10 @@ impl Session<'_, '_, '_> {
         self.scan = scans.best.clone();
         let mut chosen = if half_width == before { chosen } else { self.chosen_with(half_width, model)? };
         if !given && self.options.averaging {
-            let fitted = self.fit_first(&chosen, model)?;
-            let lags_behind = fitted.lags_behind();
-            chosen.fitted = Some(fitted);
-            chosen = match lags_behind {
-                true => self.narrower(chosen, model)?,
-                false => self.without_shortest_windows(chosen, model)?,
-            };
+            chosen = self.without_shortest_windows(chosen, model)?;
         }
         let used = chosen.weak.function.half_width();
-        self.scan.moved = used != before && !self.narrowed;
+        self.scan.moved = used != before;
         self.scan.contradicted = scans.contradict(used);
         Ok(chosen)
     }
@@ -80,7 +70,7 @@ impl Session<'_, '_, '_> {
         let widest = self.scan.plateau.map_or(0, |plateau| self.scan.scales[plateau.last].half_width);
         let mut tried = first;
         loop {
-            let fitted = self.take_fitted(&mut tried, model)?;
+            let fitted = self.fit_first(&tried, model)?;
             let shortest = fitted.has_shortest_windows();
             tried.fitted = Some(fitted);
             width *= 2;
@@ -88,36 +78,6 @@ impl Session<'_, '_, '_> {
                 return Ok(tried);
             }
             tried = self.chosen_with(width, model)?;
-        }
-    }
-
-    /// The first of some narrower test functions of the plateau whose windows follow what is windowed; the one at hand where none do.
-    ///
-    /// What changes within two test functions no window follows: a row is predicted by rows that share no samples with it. Rows of a narrower one are
-    /// noisier, and the noise stays the smaller part of what is left of them. What no width explains, as a term that is missing, has no better one.
-    fn narrower(&mut self, at_hand: Chosen, model: &Model) -> Result<Chosen, Error> {
-        let plateau = self.scan.accepted_plateau();
-        let narrowest = plateau.map_or(LEAST_HALF_WIDTH, |plateau| self.scan.scales[plateau.first].half_width);
-        let mut width = at_hand.weak.function.half_width();
-        let mut error = f64::INFINITY;
-        loop {
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "less than a half-width")]
-            let next = (width as f64 / NARROWER).round() as usize;
-            width = next;
-            if width < narrowest {
-                return Ok(at_hand);
-            }
-            let mut tried = self.chosen_with(width, model)?;
-            let fitted = self.fit_first(&tried, model)?;
-            if fitted.error <= NOISE_MODEL_FAILS {
-                tried.fitted = Some(fitted);
-                self.narrowed = true;
-                return Ok(tried);
-            }
-            if fitted.error >= error {
-                return Ok(at_hand);
-            }
-            error = fitted.error;
         }
     }
 

@@ -30,8 +30,6 @@ pub(crate) struct Session<'a, 'b, 'c> {
     pub(crate) channel_noise: [f64; 2],
     /// Estimates by the width of the test function.
     pub(crate) scan: Scan,
-    /// Whether the test function is narrower than the best one for what is constant, since what is windowed changes too fast for that.
-    pub(crate) narrowed: bool,
     /// How much better an offset would predict that is free in every window, where the record contradicts a constant one.
     pub(crate) free_offset: FreeOffset,
     /// Samples of the windows that were best a step before, where little changed since: the best ones are near.

@@ -59,18 +59,16 @@ impl Session<'_, '_, '_> {
         if fails || matters && errors.over_channels > NOISE_MODEL_FAILS {
             errors.status |= Status::NOISE_MODEL;
         }
-        // What changes as fast as windows are long is not followed at its peaks, by the shortest ones either.
-        let is_rough = fails || self.narrowed;
-        if is_rough || raised > RAISED {
+        if fails || raised > RAISED {
             // Coloured noise is stronger where the motion is, of which windows take a part for what they follow: what they leave of rows that
             // they do not hold has all of it.
             let unseen = self.shown_unseen(weak, decided)?.filter(|unseen| unseen.variance() > 0.0);
             let unseen = unseen.unwrap_or_else(|| shown.clone());
-            let least = if is_rough { 0.0 } else { errors.covariance.variance() };
+            let least = if fails { 0.0 } else { errors.covariance.variance() };
             let variance = unseen.variance().max(shown.variance()).max(least);
             errors.covariance = unseen.with_variance(variance);
         }
-        if is_rough {
+        if fails {
             errors.inflation = 1.0;
             errors.expected = Expected::new(&errors.covariance, errors.covariance.variance());
         }
