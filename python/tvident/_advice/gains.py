@@ -110,10 +110,13 @@ class Gains:
         changing = self._changing()
         if not {"inertia", "stiffness"} <= set(changing):
             return []
-        errors = {name: one.stderr * one.factor / abs(np.nanmean(one.values)) for name, one in changing.items()}
+        there = np.logical_and.reduce([np.isfinite(one.values) & np.isfinite(one.stderr) for one in changing.values()])
+        if not there.any():
+            return []
+        errors = {name: one.stderr * one.factor / abs(np.mean(one.values[there])) for name, one in changing.items()}
         # Near the ends little is known, and curves go astray.
-        known = errors["inertia"] <= _AS_KNOWN * np.nanmedian(errors["inertia"])
-        changes = {name: (one.values / np.nanmean(one.values[known]) - 1)[known] for name, one in changing.items()}
+        known = there & (errors["inertia"] <= _AS_KNOWN * np.median(errors["inertia"][there]))
+        changes = {name: one.values[known] / np.mean(one.values[known]) - 1 for name, one in changing.items()}
         error = {name: _root_mean_square(one[known]) for name, one in errors.items()}
         inertia = changes["inertia"]
         change = _root_mean_square(inertia)
@@ -136,6 +139,7 @@ class Gains:
         return [words]
 
 
+@np.errstate(all="ignore")
 def changes_of_gain(found: _core.Identification, names: Sequence[str], period: float, step: int) -> list[str]:
     """Return that the gain of a channel seems to change in one record, and what to do.
 
@@ -147,9 +151,10 @@ def changes_of_gain(found: _core.Identification, names: Sequence[str], period: f
     period, step : float, int
         Seconds from one sample to the next; samples from one number to the next.
     """
-    unknowns = dict(zip(names, found.unknowns, strict=True))
+    # Inner parameters of terms come after what has a name.
+    unknowns = dict(zip(names, found.unknowns, strict=False))
     return Gains(unknowns, jumps_beside_pulses(found), found.window_length // 2, period, step).words()
 
 
 def _root_mean_square(values: npt.NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.nanmean(values**2)))
+    return float(np.sqrt(np.mean(values**2)))

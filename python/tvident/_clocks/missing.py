@@ -55,6 +55,7 @@ class Bridge:
     longest: float
 
 
+@np.errstate(all="ignore")
 def bridge_of(channels: Mapping[str, npt.NDArray[np.number]], order: int | None = None) -> Bridge:
     """Return how short gaps of channels on a uniform grid are bridged; NaN is missing.
 
