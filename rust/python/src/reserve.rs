@@ -56,6 +56,7 @@ pub(crate) fn fill() -> Result<(), usize> {
 /// Makes the calling thread's stack as long as calls need it. The stack of a process's first thread grows as it is used, and the process ends where there
 /// is no memory for that.
 #[inline(never)]
+#[allow(clippy::large_stack_arrays, reason = "the stack is what it is for")]
 pub(crate) fn grow_stack() {
     hint::black_box(&mut [0_u8; STACK]);
 }

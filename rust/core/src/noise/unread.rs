@@ -94,7 +94,7 @@ fn jumped_to(channel: &dyn Samples, jump: f64, watch: &mut Watch<'_>) -> Result<
         before = [last, value];
     })?;
     values.sort_unstable_by(f64::total_cmp);
-    let most = values.chunk_by(|one, other| one == other).max_by_key(|equal| equal.len());
+    let most = values.chunk_by(|one, other| one == other).max_by_key(Samples::len);
     Ok(most.filter(|equal| equal.len() >= FEWEST).map(|equal| equal[0]))
 }
 
