@@ -17,6 +17,14 @@ from parameters import long
 
 Array = npt.NDArray[np.float64]
 
+OF_CARRIAGE: dict[str, Any] = {name: value for name, value in FRICTION.items() if name != "sample_rate"} | {
+    "inertia": "constant",
+    "damping": "constant",
+    "angle_unit": "m",
+    "torque_unit": "N",
+}
+"""How the carriage is identified, whatever its times are."""
+
 LOSSES = [(0.01, 1), (0.1, 1), (0.05, 50), (0.1, 200)]
 """Share of the samples, and how many in a row."""
 
@@ -79,11 +87,9 @@ def test_a_carriage_that_lost_samples_is_the_whole_carriage(
 ) -> None:
     position, force = carriage(folder_of_recordings)
     t = np.arange(position.size) / 1000
-    kinds = {name: value for name, value in FRICTION.items() if name != "sample_rate"}
-    kinds |= {"inertia": "constant", "damping": "constant", "angle_unit": "m", "torque_unit": "N"}
-    whole = tvident.identify(position, force, sample_rate=1000, **kinds)
+    whole = tvident.identify(position, force, sample_rate=1000, **OF_CARRIAGE)
     for call in variants(t, position, force, loss, seed):
-        result = tvident.identify(**call, **kinds)
+        result = tvident.identify(**call, **OF_CARRIAGE)
         for name, (value, stderr) in result.constants.items():
             assert abs(value - whole.constants[name][0]) < 2 * stderr, name
             assert stderr < 2.5 * whole.constants[name][1], name
@@ -95,9 +101,7 @@ def test_a_carriage_whose_times_are_shuffled_or_whose_force_is_slower_is_the_sam
 ) -> None:
     position, force = carriage(folder_of_recordings)
     t = np.arange(position.size) / 1000
-    kinds = {name: value for name, value in FRICTION.items() if name != "sample_rate"}
-    kinds |= {"inertia": "constant", "damping": "constant", "angle_unit": "m", "torque_unit": "N"}
-    whole = tvident.identify(position, force, sample_rate=1000, **kinds)
+    whole = tvident.identify(position, force, sample_rate=1000, **OF_CARRIAGE)
     moved = t + 0.3e-3 * np.random.default_rng(seed).uniform(-1, 1, t.size)
     moved = np.clip(moved, t[0], t[-1])
     calls: list[dict[str, Any]] = [
@@ -110,7 +114,7 @@ def test_a_carriage_whose_times_are_shuffled_or_whose_force_is_slower_is_the_sam
         *({"angle": position, "torque": force[first::3], "t": (t, t[first::3])} for first in range(3)),
     ]
     for call in calls:
-        result = tvident.identify(**call, **kinds)
+        result = tvident.identify(**call, **OF_CARRIAGE)
         for name, (value, stderr) in result.constants.items():
             assert abs(value - whole.constants[name][0]) < 2 * stderr, name
 
