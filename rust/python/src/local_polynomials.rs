@@ -16,7 +16,7 @@ use tvident::local_polynomials::{
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
-use crate::arrays::zeros;
+use crate::arrays::empty;
 use crate::records::{placed, records};
 use crate::watch::watched;
 
@@ -247,11 +247,11 @@ impl LocalPolynomials {
         }
         let noise = options.noise || matches!(options.order, Order::Chosen { .. });
         let diagnostics = if noise { shape.clone() } else { vec![0] };
-        let order = zeros::<u8>(py, &diagnostics)?;
-        let status = zeros::<u16>(py, &diagnostics)?;
-        let sigma = zeros::<f64>(py, &diagnostics)?;
+        let order = empty::<u8>(py, &diagnostics)?;
+        let status = empty::<u16>(py, &diagnostics)?;
+        let sigma = empty::<f64>(py, &diagnostics)?;
         shape.insert(0, options.derivatives.len());
-        let derivatives = zeros::<f64>(py, &shape)?;
+        let derivatives = empty::<f64>(py, &shape)?;
         {
             let (mut derivatives, mut order) = (derivatives.readwrite(), order.readwrite());
             let (mut status, mut sigma) = (status.readwrite(), sigma.readwrite());

@@ -12,7 +12,7 @@ use tvident::least_squares::{Alignment, Equations, Regressions, RollingLeastSqua
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
-use crate::arrays::{rows, zeros};
+use crate::arrays::{empty, rows};
 use crate::records::records;
 use crate::watch::{exception, watched};
 
@@ -70,10 +70,10 @@ impl RollingRegressions {
         fill: impl FnOnce(Regressions<'_>) -> PyResult<usize>,
     ) -> PyResult<Self> {
         let fits = if with_fit { q } else { 0 };
-        let (params, stderr) = (zeros::<f64>(py, &[p, q, count])?, zeros::<f64>(py, &[p, q, count])?);
-        let (rss, condition) = (zeros::<f64>(py, &[q, count])?, zeros::<f64>(py, &[count])?);
-        let (residuals, rsquared) = (zeros::<f64>(py, &[fits, count])?, zeros::<f64>(py, &[fits, count])?);
-        let status = zeros::<u16>(py, &[count])?;
+        let (params, stderr) = (empty::<f64>(py, &[p, q, count])?, empty::<f64>(py, &[p, q, count])?);
+        let (rss, condition) = (empty::<f64>(py, &[q, count])?, empty::<f64>(py, &[count])?);
+        let (residuals, rsquared) = (empty::<f64>(py, &[fits, count])?, empty::<f64>(py, &[fits, count])?);
+        let status = empty::<u16>(py, &[count])?;
         let lags = {
             let (mut params, mut stderr, mut rss) = (params.readwrite(), stderr.readwrite(), rss.readwrite());
             let (mut residuals, mut rsquared) = (residuals.readwrite(), rsquared.readwrite());

@@ -28,17 +28,18 @@ impl Tile {
         self.places
     }
 
+    /// The fields of one window, to put many of them.
+    #[inline(always)]
+    pub(crate) fn fields_of<S: Lanes>(&mut self, window: usize) -> WindowFields<'_> {
+        let apart = self.places * S::F64_LANES;
+        let at = (window & (self.places - 1)) * S::F64_LANES;
+        WindowFields { values: &mut self.values[at..], apart }
+    }
+
     /// Puts one field of one window of every lane into its place.
     #[inline(always)]
     pub(crate) fn put<S: Lanes>(&mut self, simd: S, field: usize, window: usize, value: S::f64s) {
-        let at = self.at(field, window) * S::F64_LANES;
-        simd.store(&mut self.values, at, value);
-    }
-
-    /// Gives one field of one window of every lane.
-    #[inline(always)]
-    pub(crate) fn get<S: Lanes>(&self, simd: S, field: usize, window: usize) -> S::f64s {
-        simd.load(&self.values, self.at(field, window) * S::F64_LANES)
+        self.fields_of::<S>(window).put(simd, field, value);
     }
 
     /// Gives a square of one field: as many consecutive windows from one on as there are lanes, one vector for every lane.
@@ -54,7 +55,7 @@ impl Tile {
             }
         } else {
             for (row, vector) in square[..S::F64_LANES].iter_mut().enumerate() {
-                *vector = self.get(simd, field, window + row);
+                *vector = simd.load(&self.values, self.at(field, window + row) * S::F64_LANES);
             }
         }
         simd.transpose(&mut square[..S::F64_LANES]);
@@ -70,5 +71,26 @@ impl Tile {
     #[inline(always)]
     fn at(&self, field: usize, window: usize) -> usize {
         field * self.places + (window & (self.places - 1))
+    }
+}
+
+/// The fields of one window of every lane.
+pub(crate) struct WindowFields<'a> {
+    values: &'a mut [f64],
+    /// Numbers from one field to the next.
+    apart: usize,
+}
+
+impl WindowFields<'_> {
+    /// Puts one field.
+    #[inline(always)]
+    pub(crate) fn put<S: Lanes>(&mut self, simd: S, field: usize, value: S::f64s) {
+        simd.store(self.values, field * self.apart, value);
+    }
+
+    /// Gives one field.
+    #[inline(always)]
+    pub(crate) fn get<S: Lanes>(&self, simd: S, field: usize) -> S::f64s {
+        simd.load(self.values, field * self.apart)
     }
 }

@@ -9,7 +9,7 @@ use std::ops::Range;
 use crate::exec::pool::GoOn;
 use crate::lanes::output::Outputs;
 use crate::lanes::store::Write;
-use crate::lanes::tile::Tile;
+use crate::lanes::tile::WindowFields;
 use crate::least_squares::fading;
 use crate::least_squares::givens_factor::{
     Dimensions, append, covariance, empty, explained, invert, load, merge, solve, squared_norm, store,
@@ -90,7 +90,8 @@ impl<H: Dimensions, const PLAIN: bool> Kernel for RollingKernel<'_, '_, '_, H, P
                     let RollingScratch { strips, tile, .. } = &mut *self.scratch;
                     let place = if own < window { strips[0].place(own, 0) } else { strips[0].place(own - window, 1) };
                     let at = |column: usize| strips[column].in_place(simd, place);
-                    finish(simd, self.shape, self.run.plan, &suffix, freedom, offset, tile, &mut row, at);
+                    let fields = &mut tile.fields_of::<S>(offset);
+                    finish(simd, self.shape, self.run.plan, &suffix, freedom, fields, &mut row, at);
                 }
                 // The last windows are written together with some that were written before, to fill the vectors.
                 if some.end % places == 0 || some.end == window {
@@ -243,24 +244,23 @@ fn code<S: Lanes>(simd: S, status: Status) -> S::f64s {
     simd.splat_f64s(256.0 * f64::from(status.bits()))
 }
 
-/// Solves each lane's window: what is known of it goes to place `offset` of the tile. `values` is scratch memory; `own` gives columns of the
+/// Solves each lane's window: what is known of it goes to its fields in the tile. `values` is scratch memory; `own` gives columns of the
 /// window's own row, where what is left of that is asked for.
 #[inline(always)]
-#[allow(clippy::too_many_arguments, reason = "a window, its place and where its results go")]
+#[allow(clippy::too_many_arguments, reason = "a window and where its results go")]
 pub(crate) fn finish<S: Lanes, H: Dimensions>(
     simd: S,
     shape: H,
     plan: &RollingLeastSquares,
     summary: &WindowSummary<H::Factor<S::f64s>>,
     mut freedom: S::f64s,
-    offset: usize,
-    tile: &mut Tile,
+    fields: &mut WindowFields<'_>,
     values: &mut H::Factor<S::f64s>,
     own: impl Fn(usize) -> S::f64s,
 ) {
     let factor = &summary.factor;
     let (p, q) = (shape.regressors(), shape.rhs_count());
-    let slots = Slots::of(plan);
+    let slots = Slots::of_shape(plan, p, q);
     // The condition number comes first: where it exceeds the precision, no result has any digits.
     invert(simd, shape, factor, values);
     let mut squares = simd.splat_f64s(0.0);
@@ -275,8 +275,8 @@ pub(crate) fn finish<S: Lanes, H: Dimensions>(
     let flags = simd.select_f64s(ill, code(simd, Status::ILL_CONDITIONED), simd.splat_f64s(0.0));
     let deficient = code(simd, Status::INVALID | Status::RANK_DEFICIENT);
     let condition = simd.select_f64s(determined, condition, simd.splat_f64s(f64::INFINITY));
-    tile.put(simd, slots.condition, offset, condition);
-    tile.put(simd, slots.condition + 1, offset, simd.select_f64s(determined, flags, deficient));
+    fields.put(simd, slots.condition, condition);
+    fields.put(simd, slots.condition + 1, simd.select_f64s(determined, flags, deficient));
 
     let mut faded = None;
     // No closure: a large one is compiled on its own, without the instructions that were chosen.
@@ -288,50 +288,50 @@ pub(crate) fn finish<S: Lanes, H: Dimensions>(
     if plan.normal {
         let pairs = (0..p).flat_map(|i| (i + 1..p).map(move |k| (i, k)));
         for (pair, (i, k)) in pairs.enumerate() {
-            tile.put(simd, slots.normal + pair, offset, covariance(simd, shape, values, i, k));
+            fields.put(simd, slots.normal + pair, covariance(simd, shape, values, i, k));
         }
     }
     for rhs in 0..q {
         let residual = factor[shape.row(p) + rhs];
         let variance = simd.mul_f64s(residual, freedom);
-        tile.put(simd, slots.residuals + rhs, offset, residual);
+        fields.put(simd, slots.residuals + rhs, residual);
         for (pair, &(i, j)) in plan.covariances.iter().enumerate() {
             let one = covariance(simd, shape, values, i.min(j), i.max(j));
-            tile.put(simd, slots.covariances + pair * q + rhs, offset, simd.mul_f64s(one, variance));
+            fields.put(simd, slots.covariances + pair * q + rhs, simd.mul_f64s(one, variance));
         }
         let deviation = simd.sqrt_f64s(variance);
-        tile.put(simd, slots.deviations + rhs, offset, deviation);
+        fields.put(simd, slots.deviations + rhs, deviation);
         for i in 0..p {
             let over = match &faded {
                 Some(variances) => variances[shape.row(i)],
                 None => covariance(simd, shape, values, i, i),
             };
             let error = if plan.normal { over } else { simd.mul_f64s(simd.sqrt_f64s(over), deviation) };
-            tile.put(simd, slots.errors + i * q + rhs, offset, error);
+            fields.put(simd, slots.errors + i * q + rhs, error);
         }
     }
     for rhs in 0..q {
         solve(simd, shape, factor, rhs, values);
         for i in 0..p {
-            tile.put(simd, i * q + rhs, offset, values[i]);
+            fields.put(simd, i * q + rhs, values[i]);
         }
         if plan.fit {
             let mut residual = own(p + rhs);
             for i in 0..p {
                 residual = simd.negate_mul_add_f64s(own(i), values[i], residual);
             }
-            tile.put(simd, slots.own_residuals + rhs, offset, residual);
+            fields.put(simd, slots.own_residuals + rhs, residual);
             let explained = explained(simd, shape, factor, rhs, usize::from(plan.constant_first));
             let all = simd.add_f64s(explained, factor[shape.row(p) + rhs]);
-            tile.put(simd, slots.rsquared + rhs, offset, simd.div_f64s(explained, all));
+            fields.put(simd, slots.rsquared + rhs, simd.div_f64s(explained, all));
         }
     }
     // Few windows are not determined, and they are written twice. Selected, not added: of two that are no number, addition gives either,
     // and which one is the compiler's choice in every path.
     if simd.bits(determined) != (1 << S::F64_LANES) - 1 {
         for slot in 0..slots.condition {
-            let value = tile.get(simd, slot, offset);
-            tile.put(simd, slot, offset, simd.select_f64s(determined, value, simd.splat_f64s(f64::NAN)));
+            let value = fields.get(simd, slot);
+            fields.put(simd, slot, simd.select_f64s(determined, value, simd.splat_f64s(f64::NAN)));
         }
     }
 }

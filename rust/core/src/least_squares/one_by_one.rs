@@ -138,7 +138,8 @@ impl<H: Dimensions> Kernel for OneByOneKernel<'_, '_, '_, H> {
                 let freedom = simd.splat_f64s(1.0 / count.saturating_sub(shape.regressors()) as f64);
                 let summary = WindowSummary { factor, sums: None };
                 let none = |_: usize| simd.splat_f64s(f64::NAN);
-                finish(simd, shape, self.run.plan, &summary, freedom, offset, &mut self.state.tile, &mut row, none);
+                let fields = &mut self.state.tile.fields_of::<S>(offset);
+                finish(simd, shape, self.run.plan, &summary, freedom, fields, &mut row, none);
             }
             if (offset + 1) % places == 0 || offset + 1 == offsets.end {
                 let rows = offset - (offset - offsets.start).min(offset % places)..offset + 1;

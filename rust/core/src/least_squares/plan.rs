@@ -257,13 +257,14 @@ impl RollingLeastSquares {
     }
 }
 
-/// Where the fields of a window are in the tile.
+/// Where the fields of a window are in the tile. Those of every plan come first: in a kernel that is compiled for so many regressors the compiler
+/// knows where they are.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Slots {
     pub(crate) errors: usize,
-    pub(crate) covariances: usize,
     pub(crate) residuals: usize,
     pub(crate) deviations: usize,
+    pub(crate) covariances: usize,
     pub(crate) own_residuals: usize,
     pub(crate) rsquared: usize,
     pub(crate) normal: usize,
@@ -272,17 +273,22 @@ pub(crate) struct Slots {
 
 impl Slots {
     pub(crate) fn of(plan: &RollingLeastSquares) -> Self {
-        let (p, q, pairs) = (plan.regressors, plan.rhs_count, plan.covariances.len());
+        Self::of_shape(plan, plan.regressors, plan.rhs_count)
+    }
+
+    /// The same with the numbers of regressors and right-hand sides, which are those of the plan.
+    #[inline(always)]
+    pub(crate) fn of_shape(plan: &RollingLeastSquares, p: usize, q: usize) -> Self {
         let errors = p * q;
-        let covariances = errors + p * q;
-        let residuals = covariances + pairs * q;
+        let residuals = errors + p * q;
         let deviations = residuals + q;
-        let own_residuals = deviations + q;
+        let covariances = deviations + q;
+        let own_residuals = covariances + plan.covariances.len() * q;
         let fits = if plan.fit { q } else { 0 };
         let rsquared = own_residuals + fits;
         let normal = rsquared + fits;
         let condition = normal + if plan.normal { p * (p - 1) / 2 } else { 0 };
-        Self { errors, covariances, residuals, deviations, own_residuals, rsquared, normal, condition }
+        Self { errors, residuals, deviations, covariances, own_residuals, rsquared, normal, condition }
     }
 
     /// All fields: the last holds flags.
@@ -308,10 +314,10 @@ impl Slots {
         let mut values: Vec<&'a mut [f64]> = Vec::with_capacity(self.fields());
         let groups = [
             (parameters, self.errors),
-            (errors, self.covariances),
-            (covariances, self.residuals),
+            (errors, self.residuals),
             (residuals, self.deviations),
-            (deviations, self.own_residuals),
+            (deviations, self.covariances),
+            (covariances, self.own_residuals),
             (own_residuals, self.rsquared),
             (rsquared, self.normal),
             (normal, self.condition),

@@ -45,18 +45,33 @@ pub(crate) trait Lanes: Simd {
     /// Reads a vector that begins anywhere.
     #[inline(always)]
     fn load(self, from: &[f64], at: usize) -> Self::f64s {
-        let values = &from[at..at + Self::F64_LANES];
-        // SAFETY: the slice holds exactly the bytes of one vector, any of which are valid, and the read asks for no alignment.
-        unsafe { values.as_ptr().cast::<Self::f64s>().read_unaligned() }
+        check_bounds(from, at, Self::F64_LANES);
+        // SAFETY: the slice holds the bytes of one vector from there on, any of which are valid, and the read asks for no alignment.
+        unsafe { from.as_ptr().add(at).cast::<Self::f64s>().read_unaligned() }
     }
 
     /// Writes a vector that begins anywhere.
     #[inline(always)]
     fn store(self, to: &mut [f64], at: usize, value: Self::f64s) {
-        let values = &mut to[at..at + Self::F64_LANES];
-        // SAFETY: the slice holds exactly the bytes of one vector, and the write asks for no alignment.
-        unsafe { values.as_mut_ptr().cast::<Self::f64s>().write_unaligned(value) }
+        check_bounds(to, at, Self::F64_LANES);
+        // SAFETY: the slice holds the bytes of one vector from there on, and the write asks for no alignment.
+        unsafe { to.as_mut_ptr().add(at).cast::<Self::f64s>().write_unaligned(value) }
     }
+}
+
+/// Panics if a slice does not hold so many values from a place on. The last place is the same for all vectors of a slice, so that each costs
+/// one comparison.
+#[inline(always)]
+fn check_bounds(slice: &[f64], at: usize, lanes: usize) {
+    if slice.len().checked_sub(lanes).is_none_or(|last| at > last) {
+        out_of_bounds(slice.len(), at, lanes);
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn out_of_bounds(len: usize, at: usize, lanes: usize) -> ! {
+    panic!("a vector of {lanes} numbers at {at} reaches beyond the {len} that there are");
 }
 
 /// Entries of a table that is looked up in: one for every order.

@@ -333,9 +333,8 @@ impl Kernel for Advance<'_> {
         }
         if let Some(freedom) = self.freedom {
             let (summary, freedom) = (WindowSummary { factor, sums: None }, simd.splat_f64s(freedom));
-            finish(simd, shape, self.plan, &summary, freedom, 0, self.tile, &mut scratch, |_| {
-                simd.splat_f64s(f64::NAN)
-            });
+            let (fields, none) = (&mut self.tile.fields_of::<S>(0), |_: usize| simd.splat_f64s(f64::NAN));
+            finish(simd, shape, self.plan, &summary, freedom, fields, &mut scratch, none);
         }
     }
 }
