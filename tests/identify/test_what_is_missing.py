@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 
 import tvident
+from tvident._identify.improved import Improvement
+from tvident._results import predicted_ahead
+from tvident._results.recorded import Recorded
+from tvident._results.simulated import Simulated
 
 Array = npt.NDArray[np.float64]
 
@@ -107,3 +112,51 @@ def test_a_term_is_averaged_as_it_is_at_the_samples() -> None:
     assert time.shape == recorded.shape == predicted.shape
     error = recorded - predicted
     assert np.nanvar(error) < 1e-4 * np.nanvar(recorded)
+
+
+@pytest.fixture
+def tried(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, object]]:
+    """Give the equations that advice tries."""
+    calls: list[dict[str, object]] = []
+    identify = Improvement._identify  # noqa: SLF001 - what is counted
+
+    def noted(self: Improvement, *some: object, **call: object) -> tvident.Identification:
+        calls.append(call)
+        return identify(self, *some, **call)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Improvement, "_identify", noted)
+    return calls
+
+
+def test_what_constants_explain_down_to_the_noise_needs_no_windows(tried: list[dict[str, object]]) -> None:
+    rig = tvident.simulate_torsional_rig(pattern="constant", seed=300)
+    found = tvident.identify(rig.angle[3:], rig.torque[:-3], sample_rate=RATE)
+    assert "try lag=0.003" in found.advice[0]
+    assert [call["lag"] for call in tried if call["stiffness"] == "windowed"] == [pytest.approx(0.003, abs=1e-4)]
+
+
+def test_the_equation_at_hand_is_not_tried_again(tried: list[dict[str, object]]) -> None:
+    angle, torque = record(0, late=3)
+    assert tvident.identify(angle, torque, sample_rate=RATE).advice
+    windowed = [(call["terms"], call["lag"]) for call in tried if call["stiffness"] == "windowed"]
+    assert (["offset"], 0.0) not in windowed
+    assert (["offset"], "auto") in windowed
+
+
+def test_what_is_held_back_is_identified_once_for_all_distances(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = tvident.simulate_torsional_rig(seed=1)
+    found = tvident.identify(rig.angle, rig.torque, sample_rate=RATE, method="auto")
+    rest_of = Simulated._rest_of  # noqa: SLF001 - what is counted
+    asked = []
+
+    def noted(self: Simulated, parts: list[tuple[int, int, int]], recorded: Recorded) -> object:
+        def again(angles: npt.NDArray[np.number]) -> object:
+            asked.append(parts)
+            return recorded.again(angles)
+
+        return rest_of(self, parts, replace(recorded, again=again))
+
+    monkeypatch.setattr(Simulated, "_rest_of", noted)
+    shares = [predicted_ahead(found, ahead) for ahead in (13, 20, 13)]
+    assert len(asked) == 1
+    assert shares[0] == shares[2] != shares[1]

@@ -236,8 +236,20 @@ class Improvement(_AskedOfRecord):
                 # So little of the part is there that nothing can be identified in it.
                 found = None
             if found is not None:
-                return Trial(identify, found, given, self.asked_terms, self._suspects)
-        return Trial(partial(self._identify, data), result, self.given, self.asked_terms, self._suspects)
+                return Trial(identify, found, given, self.asked_terms, self._suspects, self.request.lag != "auto")
+        again = partial(self._identify, data)
+        return Trial(again, result, self.given, self.asked_terms, self._suspects, self._is_as_asked)
+
+    @property
+    def _is_as_asked(self) -> bool:
+        """Whether the record was identified as a trial with the same equation: all else automatic, nothing from an earlier result."""
+        asked = self.request
+        from_earlier = (asked.lag_samples, asked.angle_zero, asked.shown_noise)
+        is_new = not (asked.by_record or asked.kept or asked.inner) and all(one is None for one in from_earlier)
+        unknown = [kind for kind in self.given.values() if isinstance(kind, str)]
+        # Without a kind a term is windowed where all parameters are.
+        is_usual = any(kind != "windowed" for kind in unknown) and all(one.kind == "constant" for one in self.terms)
+        return is_new and is_usual and self.data.step == 1 and asked.lag != "auto" and asked.form == WeakForm()
 
     def _exchanged(self, result: Identification) -> str | None:
         """Return the question whether channels are swapped, where that explains next to everything with positive parameters.

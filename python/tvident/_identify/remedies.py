@@ -79,10 +79,11 @@ class _Left:
 
 @dataclass(frozen=True)
 class _Remedy:
-    """What to change, in words, and what it leaves unexplained beside the model at hand."""
+    """What to change, in words, what it leaves unexplained beside the model at hand, and whether nothing contradicts it."""
 
     ratio: float
     words: str
+    is_settled: bool = False
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,8 @@ class Trial:
         Terms that were asked for, without kinds.
     suspects : sequence of str
         Terms that may be missing, and ``"lag"``.
+    is_as_asked : bool
+        Whether the result is what ``identify`` gives for what was asked for.
     """
 
     identify: Callable[..., Identification]
@@ -108,6 +111,7 @@ class Trial:
     given: Mapping[str, Any]
     terms: Sequence[Any]
     suspects: Sequence[str]
+    is_as_asked: bool = False
     _now: dict[int | None, Unexplained] = field(default_factory=dict, init=False, repr=False)
 
     def advice(self) -> str | None:
@@ -120,7 +124,9 @@ class Trial:
         # What explains nothing with parameters that change is not explained by one term more either.
         is_changing = "windowed" in self.result.settings["kinds"].values() and not self._explains_nothing
         # Where a parameter changes constants explain too little to tell what is missing: they take what lets them follow the change.
-        beside = self._beside_changes(call) if is_changing else None
+        # What constants explain down to the noise needs nothing that changes.
+        is_settled = of_constants is not None and of_constants.is_settled
+        beside = self._beside_changes(call) if is_changing and not is_settled else None
         if of_constants is None or (beside is not None and of_constants.ratio > _AS_GOOD * beside.ratio):
             return None if beside is None else beside.words
         return of_constants.words
@@ -157,7 +163,7 @@ class Trial:
         if best is None or not left_of[best].ratio <= _BETTER:
             return None
         left, result = left_of[best], found[best]
-        if not _holds(left.least.share, lambda: result):
+        if not _holds(left.least.share, result.record_status):
             return None
         changed = self._with(call, best)
         terms = [term if isinstance(term, str) else term.name for term in changed["terms"]]
@@ -217,7 +223,8 @@ class Trial:
         ahead = max((length for length in lengths if isinstance(length, int)), default=None)
         if ahead not in self._now:
             self._now[ahead] = unexplained(self.result, ahead)
-        return _Left(unexplained(found, ahead), self._now[ahead])
+        now = self._now[ahead]
+        return _Left(now if found is self.result else unexplained(found, ahead), now)
 
     def _compared(self, before: Call, call: Call, chosen: Sequence[str]) -> _Remedy | None:
         """Return the advice in words, if it explains more of what is held back than the model at hand."""
@@ -226,14 +233,18 @@ class Trial:
             call = call | {"lag": float(f"{found.settings['lag']:.4g}")}
         is_none = call["stiffness"] != before["stiffness"]
         kept = {name: call[name] if name == "stiffness" and is_none else kind for name, kind in self.given.items()}
-        free = self.identify(**kept, terms=call["terms"], lag=call["lag"])
+        is_at_hand = self.is_as_asked and not (chosen or is_none)
+        free = self.result if is_at_hand else self.identify(**kept, terms=call["terms"], lag=call["lag"])
         left, left_free = self._left_of(found), self._left_of(free)
         changing = [name for name in COEFFICIENTS if free.settings["kinds"][name] in {"windowed", "varying"}]
         is_simple = bool(changing) and left.ratio <= _AS_GOOD * left_free.ratio
         best, of_best = (left, found) if is_simple else (left_free, free)
         if not (is_simple or chosen or is_none):
             return None
-        if not best.ratio <= _BETTER or not _holds(best.least.share, lambda: self._identified(call, diagnose=True)):
+        if not best.ratio <= _BETTER:
+            return None
+        flags = self._identified(call, diagnose=True).record_status
+        if not _holds(best.least.share, flags):
             return None
         words = []
         if is_none:
@@ -250,7 +261,8 @@ class Trial:
         if "lag" in chosen:
             changes.append(f"lag={call['lag']:.4g}")
         changes += [f"{name}='constant'" for name in changing if is_simple and call[name] == "constant"]
-        return _Remedy(best.ratio, f"{', '.join(words)}: try {', '.join(changes)}; {best}{self._moved(of_best)}")
+        said = f"{', '.join(words)}: try {', '.join(changes)}; {best}{self._moved(of_best)}"
+        return _Remedy(best.ratio, said, is_settled=is_simple and not flags & DOUBTFUL_RECORD)
 
     def _moved(self, found: Identification) -> str:
         """Return which parameters a better equation finds elsewhere, in words."""
@@ -291,9 +303,8 @@ def _is_physical(name: str, value: float, found: Identification) -> bool:
     return value > 0 or not term.dissipates
 
 
-def _holds(share: float, again: Callable[[], Identification]) -> bool:
+def _holds(share: float, flags: int) -> bool:
     """Return whether what is to be advised predicts next to everything, or nothing says that it cannot be trusted either."""
-    flags = again().record_status
     if flags & Status.RANK_DEFICIENT:
         return False
     return share <= NEXT_TO_NOTHING or not flags & DOUBTFUL_RECORD

@@ -47,6 +47,7 @@ class Simulated:
     def __init__(self, recorded: Recorded | None) -> None:
         self._recorded = recorded
         self._held_back: HeldBack | None = None
+        self._rests: dict[tuple[tuple[int, int, int], ...], Model] = {}
 
     def simulate(
         self, torque: npt.ArrayLike, initial: npt.ArrayLike | None = None, *, angle: npt.ArrayLike | None = None
@@ -235,16 +236,26 @@ class Simulated:
         length = ahead or length
         samples = recorded.angles.shape[-1]
         parts = parts_of(samples, length if isinstance(length, int) else 1, PARTS if ahead is None else MORE_PARTS)
-        angles = recorded.angles.astype(np.float64)
-        for _, first, end in parts:
-            angles[..., first:end] = np.nan
         try:
-            rest = recorded.again(angles)
-            model = rest._model(rest._beside_gaps())  # noqa: SLF001 - of this class
+            model = self._rest_of(parts, recorded)
             found = evaluated(model, recorded.angles, recorded.torques, parts, length, simulated=ahead is None)
             return found if found.why_not else replace(found, ahead=length * model.period)
         except ValueError as error:
             return HeldBack(why_not=str(error))
+
+    def _rest_of(self, parts: list[tuple[int, int, int]], recorded: Recorded) -> Model:
+        """Return what is identified without the ends of some parts; once for several distances that are predicted of more parts."""
+        asked = tuple(parts)
+        if asked in self._rests:
+            return self._rests[asked]
+        angles = recorded.angles.astype(np.float64)
+        for _, first, end in parts:
+            angles[..., first:end] = np.nan
+        rest = recorded.again(angles)
+        model: Model = rest._model(rest._beside_gaps())  # noqa: SLF001 - of this class
+        if len(parts) > PARTS:
+            self._rests[asked] = model
+        return model
 
     @np.errstate(all="ignore")
     def _beside_gaps(self) -> npt.NDArray[np.bool_]:
@@ -308,7 +319,7 @@ class Simulated:
 
     def __getstate__(self) -> dict[str, Any]:
         # A record may be long, and functions of terms cannot be stored; what was found of it stays.
-        return self.__dict__ | {"_recorded": None}
+        return self.__dict__ | {"_recorded": None, "_rests": {}}
 
 
 def predicted_ahead(result: Simulated, ahead: int | None) -> tuple[float, float]:
