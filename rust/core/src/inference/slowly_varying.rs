@@ -133,9 +133,14 @@ pub(crate) fn find(
         let current = found.as_ref().map(|found| &found.varying);
         let rhs = found.as_ref().map_or_else(|| rows.rhs.clone(), |found| found.rhs.clone());
         let problem = model.problem(rows, &rhs, noise, None);
-        let Some(fit) = Fit::with_leave_gap_out(&problem, scale, expected, instructions, stages)? else {
-            return Ok(None);
+        // Windows on both sides of a row that are too short to predict it compare nothing: the first bandwidth stands.
+        let compares = scale.predicts(problem.layout);
+        let fit = if compares {
+            Fit::with_leave_gap_out(&problem, scale, expected, instructions, stages)?
+        } else {
+            Fit::new(&problem, Some(scale), expected, instructions, stages)?
         };
+        let Some(fit) = fit else { return Ok(None) };
         let ones = vec![1.0; fit.full.len()];
         let weights = if current.is_some() { &fit.pooled.weights } else { &ones };
         let companions = slow.iter().map(|&one| rows.regressors[one].companion.as_slice()).collect();
@@ -147,6 +152,9 @@ pub(crate) fn find(
         let mut best: Option<(usize, [Varying; 2], f64)> = None;
         let mut least = f64::INFINITY;
         let mut consider = |terms: usize, reach: f64| {
+            if best.is_some() && !compares {
+                return false;
+            }
             let fitted = equations.fit(&triangles, terms, (reach, hole), instructions);
             let Some([leave_gap_out, full]) = fitted else { return false };
             let error = equations.error(&problem, &leave_gap_out, &full, scale, expected.variance);

@@ -10,8 +10,9 @@ use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
 use crate::regression::dyadic_windows::{WindowShape, solve_windows};
+use crate::regression::layout::Layout;
 use crate::regression::problem::Problem;
-use crate::regression::solved::Solved;
+use crate::regression::solved::{Solved, fewest_rows};
 use crate::simd::instructions::Instructions;
 
 /// Cells in a piece of work.
@@ -107,6 +108,11 @@ impl Scale {
     /// Whether a one-sided window is long enough to serve alone.
     pub(crate) fn stands_alone(self) -> bool {
         self.one_sided() >= SHORTEST_ALONE
+    }
+
+    /// Whether the windows on both sides of a row together may hold the rows that determine what they predict it with.
+    pub(crate) fn predicts(self, layout: Layout) -> bool {
+        (2 * self.one_sided()) as f64 >= fewest_rows(layout)
     }
 
     /// The cell that a row belongs to. Its windows need not exist.
@@ -282,7 +288,9 @@ fn of_shape(parts: &[Vec<Solved>], shape: usize) -> Vec<&Solved> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::regression::model::Model;
     use crate::regression::simulated::{model, rows, staged};
+    use crate::regression::solved::is_determined;
 
     #[test]
     fn windows_keep_a_test_functions_reach_away_from_the_row_that_they_predict() {
@@ -307,6 +315,23 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn windows_too_short_to_predict_a_row_determine_nothing_on_both_sides_of_one() {
+        let rows = rows(120, |time| [time.sin(), time.cos()], 0.1);
+        let model = Model { windowed: vec![0, 1], constant: vec![2], linear: true };
+        let problem = model.problem(&rows, &rows.rhs, 0.0, None);
+        let scales = Scale::all(120, 2);
+        let (mut short, mut long) = (0, 0);
+        for scale in scales {
+            let solved = staged(|stages| Scale::solve_leave_gap_out(&[scale], &problem, Instructions::Scalar, stages));
+            let [leave_gap_out, _] = &solved[0];
+            let any = (0..leave_gap_out.len()).any(|window| is_determined(leave_gap_out, window));
+            assert_eq!(any, scale.predicts(problem.layout), "{scale:?}");
+            *(if any { &mut long } else { &mut short }) += 1;
+        }
+        assert!(short > 0 && long > 0);
     }
 
     #[test]

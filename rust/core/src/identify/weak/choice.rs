@@ -33,6 +33,8 @@ pub(crate) struct Chosen {
     pub(crate) at_end: bool,
     /// The fit that everything unknown but the windowed is constant in, once it was made.
     pub(crate) fitted: Option<Decided>,
+    /// The same with the noise of the channels, while more is tried.
+    pub(crate) fitted_before: Option<Decided>,
 }
 
 impl Chosen {
@@ -92,7 +94,7 @@ impl Session<'_, '_, '_> {
         if let (Some(width), Some(exponent)) = (width, exponent) {
             let weak = self.rows(TestFunction::new(width, exponent, delta)?)?;
             let parameters = self.pilot(&weak, model)?;
-            return Ok(Chosen { weak, parameters, at_end: false, fitted: None });
+            return Ok(Chosen { weak, parameters, at_end: false, fitted: None, fitted_before: None });
         }
         // So many rows are left that windows of several test functions fit in.
         let widest = samples / if model.windowed.is_empty() { 8 } else { 16 };
@@ -128,7 +130,13 @@ impl Session<'_, '_, '_> {
                     } else {
                         weak
                     };
-                    return Ok(Chosen { weak, parameters, at_end: width.is_none() && end, fitted: None });
+                    return Ok(Chosen {
+                        weak,
+                        parameters,
+                        at_end: width.is_none() && end,
+                        fitted: None,
+                        fitted_before: None,
+                    });
                 }
             }
         }

@@ -58,14 +58,14 @@ impl Session<'_, '_, '_> {
         }
     }
 
-    /// Fits again what was fitted before something moved that changes the best length of windows by little, if at all.
-    pub(crate) fn fit_near(&mut self, chosen: &mut Chosen, model: &Model) -> Result<(), Error> {
+    /// Fits again what was fitted before something moved that changes the best length of windows by little, if at all. Returns the fit before.
+    pub(crate) fn fit_near(&mut self, chosen: &mut Chosen, model: &Model) -> Result<Option<Decided>, Error> {
         self.best_before = chosen.best_windows();
-        chosen.fitted = None;
+        let before = chosen.fitted.take();
         let fitted = self.fit_first(chosen, model);
         self.best_before = None;
         chosen.fitted = Some(fitted?);
-        Ok(())
+        Ok(before)
     }
 
     /// Fits everything that is not windowed as constant, in windows of the length that predicts best where it is not given.

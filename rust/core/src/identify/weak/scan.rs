@@ -21,12 +21,13 @@ const WIDER: usize = 8;
 
 impl Session<'_, '_, '_> {
     /// Scans the widths unless that was done, moves to the plateau where the test function that the spectra suggest is off it, and on to wider ones where
-    /// windows follow noise.
+    /// windows follow noise. What was chosen and fitted before with the same noise tells what its test function is.
     pub(crate) fn onto_plateau(
         &mut self,
         chosen: Chosen,
         model: &Model,
         scans: &mut Option<Scans>,
+        fitted_before: Option<&Chosen>,
     ) -> Result<Chosen, Error> {
         let given = self.options.half_width.is_some();
         // Without a coefficient of the motion among the unknowns there is nothing that widths could tell apart.
@@ -44,7 +45,7 @@ impl Session<'_, '_, '_> {
         self.scan = scans.best.clone();
         let mut chosen = if half_width == before { chosen } else { self.chosen_with(half_width, model)? };
         if !given && self.options.averaging {
-            chosen = self.without_shortest_windows(chosen, model)?;
+            chosen = self.without_shortest_windows(chosen, model, fitted_before)?;
         }
         let used = chosen.weak.function.half_width();
         self.scan.moved = used != before;
@@ -57,7 +58,7 @@ impl Session<'_, '_, '_> {
         let exponent = self.options.exponent.unwrap_or(EXPONENT);
         let weak = self.rows(TestFunction::new(half_width, exponent, self.options.delta)?)?;
         let parameters = self.pilot(&weak, model)?;
-        Ok(Chosen { weak, parameters, at_end: false, fitted: None })
+        Ok(Chosen { weak, parameters, at_end: false, fitted: None, fitted_before: None })
     }
 
     /// The first test function, of one and wider ones of the plateau, whose best windows are not the shortest there are; the widest where all
@@ -65,14 +66,25 @@ impl Session<'_, '_, '_> {
     ///
     /// Noise that was low-passed, held or rounded is correlated over many samples: in narrow test functions short windows follow it as if it
     /// were motion. In wider ones, whose band ends below the noise's corner, it is as good as white.
-    fn without_shortest_windows(&mut self, first: Chosen, model: &Model) -> Result<Chosen, Error> {
+    fn without_shortest_windows(
+        &mut self,
+        first: Chosen,
+        model: &Model,
+        before: Option<&Chosen>,
+    ) -> Result<Chosen, Error> {
         let mut width = first.weak.function.half_width();
         let widest = self.scan.plateau.map_or(0, |plateau| self.scan.scales[plateau.last].half_width);
         let mut tried = first;
         loop {
-            let fitted = self.fit_first(&tried, model)?;
-            let shortest = fitted.has_shortest_windows();
-            tried.fitted = Some(fitted);
+            let before = before.filter(|before| before.weak.function == tried.weak.function);
+            let shortest = if let Some(fitted) = before.and_then(|before| before.fitted.as_ref()) {
+                fitted.has_shortest_windows()
+            } else {
+                let fitted = self.fit_first(&tried, model)?;
+                let shortest = fitted.has_shortest_windows();
+                tried.fitted = Some(fitted);
+                shortest
+            };
             width *= 2;
             if !shortest || self.scan.has_no_plateau() || width > widest {
                 return Ok(tried);

@@ -50,7 +50,7 @@ impl Session<'_, '_, '_> {
         for _ in 0..ROUNDS {
             let before = (self.noise, self.scan.clone());
             self.best_before = chosen.best_windows();
-            let mut again = self.choose_once(model, &mut scans)?;
+            let mut again = self.choose_once(model, &mut scans, Some(&chosen))?;
             self.best_before = None;
             if again.weak.function == chosen.weak.function {
                 break;
@@ -63,20 +63,26 @@ impl Session<'_, '_, '_> {
             chosen = again;
         }
         if self.is_no_noise(&mut chosen, model)? {
-            (self.noise, chosen.fitted) = (self.channel_noise, None);
+            (self.noise, chosen.fitted) = (self.channel_noise, chosen.fitted_before.take());
         }
+        chosen.fitted_before = None;
         Ok(chosen)
     }
 
     /// Chooses it with the noise of the channels, or with what was told of what the equations show.
     pub(crate) fn choose_first(&mut self, model: &Model, scans: &mut Option<Scans>) -> Result<Chosen, Error> {
         self.noise = [self.channel_noise[0], self.options.shown_noise.unwrap_or(self.channel_noise[1])];
-        self.choose_once(model, scans)
+        self.choose_once(model, scans, None)
     }
 
-    fn choose_once(&mut self, model: &Model, scans: &mut Option<Scans>) -> Result<Chosen, Error> {
+    fn choose_once(
+        &mut self,
+        model: &Model,
+        scans: &mut Option<Scans>,
+        before: Option<&Chosen>,
+    ) -> Result<Chosen, Error> {
         let chosen = self.choose_test_function(model)?;
-        self.onto_plateau(chosen, model, scans)
+        self.onto_plateau(chosen, model, scans, before)
     }
 
     /// Takes what the equations leave for noise of the torque, if that is more than the noise of the channels. Returns whether it is.
@@ -98,7 +104,10 @@ impl Session<'_, '_, '_> {
             }
             let shown = self.noise[1] + (left - 1.0) * expected / gain.variance();
             self.noise[1] = shown.max(self.channel_noise[1]);
-            self.fit_near(chosen, model)?;
+            let before = self.fit_near(chosen, model)?;
+            if !raised && step == 0 {
+                chosen.fitted_before = before;
+            }
             if alone {
                 // Constants leave the same whatever noise they are told of.
                 break;
