@@ -45,6 +45,7 @@ from tvident._core_stubs.noise import (
     parts_of_quantisation,
     quantisation_step,
     spike_counts,
+    unread_counts,
 )
 from tvident._core_stubs.regression import RollingRegressions, rolling_least_squares
 from tvident._core_stubs.response import Modes, Responses, modes, respond
@@ -125,6 +126,7 @@ __all__ = [
     "sliding_velocity",
     "spike_counts",
     "status_flags",
+    "unread_counts",
 ]
 
 CORRELATED_NOISE: float

@@ -86,7 +86,7 @@ def test_where_nothing_takes_them_out_the_summary_says_so() -> None:
     assert result.advice[0].startswith("3 samples of the angle stand far out of the neighbours on both sides")
     assert "method='auto'" in result.advice[0]
     clean = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, method="paper")
-    assert not any("neighbours" in line for line in clean.advice)
+    assert not any("neighbours" in line or "hold one and the same value" in line for line in clean.advice)
 
 
 @pytest.mark.parametrize("channel", ["angle", "torque"])
@@ -109,6 +109,10 @@ def test_readings_that_failed_count_as_missing(channel: str, value: float, lengt
     (said,) = [reason for reason in result.reasons if "hold one and the same value" in reason]
     assert said.startswith(f"{np.sum(failed == value)} samples of the {channel} hold")
     assert "do not trust" not in result.summary()
+    paper = tvident.identify(channels["angle"], channels["torque"], sample_rate=1000, method="paper")
+    (kept,) = [line for line in paper.advice if "hold one and the same value" in line]
+    assert kept.startswith(said.partition(":")[0])
+    assert "make them NaN, or use method='auto'" in kept
 
 
 def test_a_torque_that_is_switched_off_is_a_torque() -> None:

@@ -1,7 +1,7 @@
 """Puts into words what was chosen, why, and what to do next."""
 
 from tvident._advice.collinear import NOT_DISTINGUISHED
-from tvident._advice.events import spikes_that_stay, without_numbers
+from tvident._advice.events import events_that_stay, without_numbers
 from tvident._advice.expansion import FoundExpansion, words_of_expansions
 from tvident._advice.gains import changes_of_gain
 from tvident._advice.instrument import fed_back_in_records, words_with_instrument
@@ -18,8 +18,8 @@ __all__ = [
     "FoundExpansion",
     "Plausible",
     "changes_of_gain",
+    "events_that_stay",
     "fed_back_in_records",
-    "spikes_that_stay",
     "without_numbers",
     "words_of_expansions",
     "words_of_search",

@@ -45,8 +45,7 @@ def spikes(found: _core.Identification) -> list[str]:
 def unread(found: _core.Identification) -> list[str]:
     """Return how many samples of each channel hold one value in place of a reading."""
     return [
-        f"{len(places)} samples of the {name} hold one and the same value, to which it jumps and from which it comes back, as where a "
-        "reading fails: they count as missing"
+        f"{_not_read(len(places), name)}: they count as missing"
         for (name, _), places in zip(_TREATED, found.unread, strict=True)
         if places
     ]
@@ -74,14 +73,22 @@ def without_numbers(
     return found
 
 
-def spikes_that_stay(angles: npt.NDArray[np.number], torques: npt.NDArray[np.number]) -> list[tuple[int, str]]:
-    """Return what to do about spikes, by record, where nothing took them out."""
+def events_that_stay(angles: npt.NDArray[np.number], torques: npt.NDArray[np.number]) -> list[tuple[int, str]]:
+    """Return what to do about readings that failed and about spikes, by record, where nothing took them out."""
     return [
-        (record, f"{_out_of_neighbours(count, name)}: make them NaN, or use method='auto', which takes them out")
-        for record, counts in enumerate(_core.spike_counts(angles, torques))
+        (record, f"{words(count, name)}: make them NaN, or use method='auto', which takes them out")
+        for words, counted in ((_not_read, _core.unread_counts), (_out_of_neighbours, _core.spike_counts))
+        for record, counts in enumerate(counted(angles, torques))
         for (name, _), count in zip(_TREATED, counts, strict=True)
         if count
     ]
+
+
+def _not_read(count: int, name: str) -> str:
+    return (
+        f"{count} samples of the {name} hold one and the same value, to which it jumps and from which it comes back, as where a "
+        "reading fails"
+    )
 
 
 def _out_of_neighbours(count: int, name: str) -> str:

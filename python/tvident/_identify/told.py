@@ -15,8 +15,8 @@ from tvident._advice import (
     FoundBySearch,
     Plausible,
     changes_of_gain,
+    events_that_stay,
     fed_back_in_records,
-    spikes_that_stay,
     without_numbers,
     words_of_search,
     words_with_instrument,
@@ -78,7 +78,7 @@ class Told:
             words = self._of_strong_form(settings).words()
             words = replace(words + (of_batch(more) if several else more[0]), each=words.each)
             words = plausible.before(words, data.angles, self.batch)
-            doubts = spikes_that_stay(data.angles, data.torques)
+            doubts = events_that_stay(data.angles, data.torques)
             if not data.motion.recorded:
                 # What was made of several channels, or integrated, has no noise above the motion that would be the angle's alone.
                 doubts = [*doubts, *fed_back_in_records(data.angles, data.torques)]

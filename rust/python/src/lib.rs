@@ -57,7 +57,9 @@ mod _core {
     #[pymodule_export]
     use crate::motions::Motions;
     #[pymodule_export]
-    use crate::noise::{Noise, fuse, noise, noise_coherence, parts_of_quantisation, quantisation_step, spike_counts};
+    use crate::noise::{
+        Noise, fuse, noise, noise_coherence, parts_of_quantisation, quantisation_step, spike_counts, unread_counts,
+    };
     #[pymodule_export]
     use crate::respond::{Responses, respond};
     #[pymodule_export]

@@ -4,9 +4,10 @@ use numpy::{PyArray1, PyUntypedArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tvident::Error;
+use tvident::exec::Watch;
 use tvident::noise::{
     Beside, fuse as core_fuse, noise as core_noise, noise_coherence as core_coherence, quantisation_step as core_step,
-    searched, spike_counts as core_spike_counts, variance_after,
+    searched, spike_counts as core_spike_counts, unread_counts as core_unread_counts, variance_after,
 };
 use tvident::record::Samples;
 use tvident::simd::Instructions;
@@ -142,10 +143,27 @@ pub(crate) fn spike_counts(
     angle: &Bound<'_, PyUntypedArray>,
     torque: &Bound<'_, PyUntypedArray>,
 ) -> PyResult<Vec<[usize; 2]>> {
+    counted(angle, torque, core_spike_counts)
+}
+
+/// How many samples of the angle and of the torque of every record hold one value in place of a reading that failed.
+#[pyfunction]
+pub(crate) fn unread_counts(
+    angle: &Bound<'_, PyUntypedArray>,
+    torque: &Bound<'_, PyUntypedArray>,
+) -> PyResult<Vec<[usize; 2]>> {
+    counted(angle, torque, core_unread_counts)
+}
+
+fn counted(
+    angle: &Bound<'_, PyUntypedArray>,
+    torque: &Bound<'_, PyUntypedArray>,
+    count: impl Fn(&dyn Samples, &dyn Samples, &mut Watch<'_>) -> Result<[usize; 2], Error> + Sync,
+) -> PyResult<Vec<[usize; 2]>> {
     let (angles, torques, mut counts) = (records(angle)?, records(torque)?, Vec::new());
     watched(angle.py(), None, |watch| {
         for (angle, torque) in angles.iter().zip(&torques) {
-            counts.push(core_spike_counts(angle, torque, watch)?);
+            counts.push(count(angle, torque, watch)?);
         }
         Ok::<(), Error>(())
     })?;

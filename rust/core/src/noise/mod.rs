@@ -15,6 +15,7 @@ pub(crate) mod spectrum;
 pub(crate) mod spikes;
 pub(crate) mod transform;
 pub(crate) mod unread;
+pub(crate) mod walk;
 
 pub use channel::{FEWEST_SAMPLES, noise, variance_after};
 pub use coherence::{CORRELATED_NOISE, noise_coherence};
@@ -25,3 +26,4 @@ pub use fused::{AngleNoise, Beside, fuse};
 pub use passed::PassedNoise;
 pub use quantisation::{quantisation_step, searched};
 pub use spikes::spike_counts;
+pub use unread::unread_counts;

@@ -7,7 +7,8 @@ use crate::error::Error;
 use crate::exec::pool::Watch;
 use crate::noise::breaks::windows::{Size, deviation, orthonormal, product};
 use crate::noise::quantisation::quantisation_step;
-use crate::record::samples::{Samples, all_usable, read_around};
+use crate::noise::walk::each_part;
+use crate::record::samples::{Samples, all_usable};
 
 /// Neighbours on either side, and the degree of the polynomial through all of them.
 const NEIGHBOURS: usize = 3;
@@ -32,10 +33,6 @@ const FEWEST_NEARBY: usize = 8;
 
 /// A second difference from which on a spike may begin, in units of what is usual: less than what any spike has.
 const BEGINS: f64 = 4.0;
-
-/// Samples that are looked at together, and how many such parts between two looks at the watch.
-const TOGETHER: usize = 1 << 12;
-const PARTS: usize = 64;
 
 /// Samples around those that are looked at together.
 const AROUND: usize = NEARBY + 2 * NEIGHBOURS + LONGEST[0];
@@ -90,14 +87,9 @@ pub(crate) fn spikes(channel: &dyn Samples, longest: usize, watch: &mut Watch<'_
     let (Some(widths), mut found) = (widths, Vec::new()) else {
         return Ok(Vec::new());
     };
-    let mut values = vec![0.0; TOGETHER + 2 * AROUND];
     let mut others = Others::default();
-    for (part, first) in (0..samples).step_by(TOGETHER).enumerate() {
-        if part > 0 && part % PARTS == 0 && !watch(0, samples) {
-            return Err(Error::Cancelled);
-        }
-        read_around(channel, first.cast_signed() - AROUND.cast_signed(), &mut values);
-        for place in 0..TOGETHER.min(samples - first) {
+    each_part(channel, AROUND, watch, |first, values| {
+        for place in 0..values.len() - 2 * AROUND {
             let (at, sample) = (place + AROUND, first + place);
             let bend = values[at - 2] - 2.0 * values[at - 1] + values[at];
             if bend.abs() <= begins || found.last().is_some_and(|last: &Alone| last.end() > sample) {
@@ -106,10 +98,10 @@ pub(crate) fn spikes(channel: &dyn Samples, longest: usize, watch: &mut Watch<'_
             // The largest distance so far, NaN before any.
             let mut furthest = f64::NAN;
             let alone = widths.iter().find_map(|width| {
-                let distance = width.distance_at(&values, at);
+                let distance = width.distance_at(values, at);
                 furthest = furthest.max(distance);
-                let alone = || Alone { first: sample, distance, instead: width.instead(&values, at) };
-                width.is_alone(&values, at, distance).then(alone)
+                let alone = || Alone { first: sample, distance, instead: width.instead(values, at) };
+                width.is_alone(values, at, distance).then(alone)
             });
             if let Some(alone) = alone {
                 others.forget(sample);
@@ -118,7 +110,7 @@ pub(crate) fn spikes(channel: &dyn Samples, longest: usize, watch: &mut Watch<'_
                 others.add(sample, furthest, found.last());
             }
         }
-    }
+    })?;
     Ok(seldom(found, &others.counted(), samples))
 }
 

@@ -9,6 +9,7 @@ use crate::error::Error;
 use crate::exec::pool::Watch;
 use crate::noise::median::median;
 use crate::noise::quantisation::quantisation_step;
+use crate::noise::walk::each_part;
 use crate::record::samples::{Samples, is_usable};
 use crate::record::subsample::stretches;
 
@@ -31,15 +32,19 @@ const SELDOM: usize = 10;
 /// Values that a channel jumps to which are looked at.
 const MOST_JUMPS: usize = 1 << 16;
 
-/// Samples that are read together, and how many such parts between two looks at the watch.
-const TOGETHER: usize = 1 << 12;
-const PARTS: usize = 64;
-
 /// A stretch of one value between others.
 struct Pause {
     places: Range<usize>,
     /// What stands before and after it.
     sides: [f64; 2],
+}
+
+/// How many samples of the angle and of the torque hold one value in place of a reading. Costs two walks over the record.
+///
+/// # Errors
+/// If the watch cancels.
+pub fn unread_counts(angle: &dyn Samples, torque: &dyn Samples, watch: &mut Watch<'_>) -> Result<[usize; 2], Error> {
+    Ok([unread(angle, watch)?.len(), unread(torque, watch)?.len()])
 }
 
 /// The samples at which a channel was not read, in order. Costs two walks over the record.
@@ -117,20 +122,10 @@ fn pauses(channel: &dyn Samples, value: f64, watch: &mut Watch<'_>) -> Result<Ve
 
 /// Does something with every usable sample, in order.
 fn each_usable(channel: &dyn Samples, watch: &mut Watch<'_>, mut work: impl FnMut(usize, f64)) -> Result<(), Error> {
-    let mut samples = vec![0.0; TOGETHER.min(channel.len())];
-    for (part, first) in (0..channel.len()).step_by(TOGETHER).enumerate() {
-        if part > 0 && part % PARTS == 0 && !watch(0, channel.len()) {
-            return Err(Error::Cancelled);
-        }
-        let samples = &mut samples[..TOGETHER.min(channel.len() - first)];
-        channel.read(first, samples);
-        samples
-            .iter()
-            .enumerate()
-            .filter(|(_, value)| is_usable(**value))
-            .for_each(|(k, &value)| work(first + k, value));
-    }
-    Ok(())
+    each_part(channel, 0, watch, |first, samples| {
+        let usable = samples.iter().enumerate().filter(|(_, value)| is_usable(**value));
+        usable.for_each(|(k, &value)| work(first + k, value));
+    })
 }
 
 #[cfg(test)]
