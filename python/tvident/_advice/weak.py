@@ -21,7 +21,6 @@ from tvident._advice.events import (
     unread,
     untold_here,
 )
-from tvident._advice.gains import changes_of_gain
 from tvident._advice.instrument import fed_back
 from tvident._advice.lists import listed
 from tvident._advice.scales import disagreement, scales_compared
@@ -72,6 +71,8 @@ class Explained:
         Of the noise of both channels, above the motion.
     lag : float, optional
         Samples by which the torque was taken to be late.
+    gains : sequence of str
+        That the gain of a channel seems to change, in words.
     units : mapping of str to str, optional
         Of parameters and terms.
     """
@@ -84,6 +85,7 @@ class Explained:
     step: int
     coherence: float | None = None
     lag: float = 0.0
+    gains: Sequence[str] = ()
     units: Mapping[str, str] = field(default_factory=lambda: UNITS)
 
     def words(self) -> Words:
@@ -123,7 +125,7 @@ class Explained:
             *self._misfit(flags),
             *unexplained_here(self.found, self.period, self.step),
             *untold_here(self.found, self._windowed(), self.period, self.step),
-            *changes_of_gain(self.found, self.names, self.period, self.step),
+            *self.gains,
             *self._outside(),
             *self._contradictions(),
             *self._free_offset(),

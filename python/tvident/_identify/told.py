@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -134,7 +135,7 @@ class Told:
         data = self.data
         flags = np.zeros(data.records, np.uint16)
         flags[[record for record, _ in data.doubts]] = Status.CHANNEL_SUSPECTED
-        flags[self._of_other_gains()] = Status.CHANNEL_SUSPECTED
+        flags[[record for record, words in enumerate(self._of_gains) if words]] = Status.CHANNEL_SUSPECTED
         lacking = [record for record, term in enumerate(self.lacking) if term is not None]
         flags[lacking] |= np.uint16(Status.TERM_SUSPECTED)
         if not flags.any():
@@ -142,13 +143,13 @@ class Told:
         more: Any = flags.reshape(data.batch) if data.batch else Status(int(flags[0]))
         return replace(self.batch, record_status=self.batch.record_status | more)
 
-    def _of_other_gains(self) -> list[int]:
-        """Return the records in which the gain of a channel seems to change."""
+    @cached_property
+    def _of_gains(self) -> list[list[str]]:
+        """That the gain of a channel seems to change, in words, by record."""
         if isinstance(self.request.form, StrongForm) or self.data.instruments is not None:
-            return []
+            return [[] for _ in self.found]
         names = [one.name for one in self.unknowns]
-        each = enumerate(self.found)
-        return [record for record, one in each if changes_of_gain(one, names, self.data.period, self.data.step)]
+        return [changes_of_gain(one, names, self.data.period, self.data.step) for one in self.found]
 
     def _of_records(self, names: Sequence[str], settings: Mapping[str, Any]) -> list[Words]:
         """Return what there is to say of each record in weak form, or with an instrument."""
@@ -166,8 +167,8 @@ class Told:
         lags = np.broadcast_to(np.divide(settings["lag"], data.period), data.records)
         chosen = [name for name in settings["chosen"] if not self.request.is_kept(name)]
         return [
-            Explained(one, names, chosen, tested, data.period, data.step, coherence, late, data.units).words()
-            for one, coherence, late in zip(self.found, coherences, lags.tolist(), strict=True)
+            Explained(one, names, chosen, tested, data.period, data.step, coherence, late, gains, data.units).words()
+            for one, coherence, late, gains in zip(self.found, coherences, lags.tolist(), self._of_gains, strict=True)
         ]
 
     def _of_strong_form(self, settings: Mapping[str, Any]) -> ExplainedStrong:
