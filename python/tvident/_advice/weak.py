@@ -24,6 +24,7 @@ from tvident._advice.events import (
 from tvident._advice.instrument import fed_back
 from tvident._advice.lists import listed
 from tvident._advice.scales import disagreement, scales_compared
+from tvident._advice.torque import OF_TORQUE, told_by_torque
 from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, UNITS
 from tvident._results import Words
 from tvident._status import Status
@@ -133,7 +134,10 @@ class Explained:
             *self._limits(flags),
         )
         # Where unknowns are collinear the rest may follow from it. Else what can be typed comes before what is to be looked for.
-        return Words(reasons, (*self._defects(), *collinear(self.found, self.names), *self.suspicions(), *advice))
+        return Words(
+            reasons,
+            (*self._defects(), *collinear(self.found, self.names), *self._of_torque(), *self.suspicions(), *advice),
+        )
 
     def _constants(self) -> list[tuple[str, _core.Unknown]]:
         """Return the constants by name."""
@@ -336,11 +340,19 @@ class Explained:
     @property
     def suspects(self) -> list[Any]:
         """What seems to be missing, the surest first; friction that drives the motion is no friction."""
-        suspects = [one for one in self.found.suspects if one.conspicuous]
-        found = [one for one in suspects if one.value > 0 or one.name == "lag" or not BUILT_IN[one.name].dissipates]
+        found = [one for one in self._conspicuous() if one.name not in OF_TORQUE]
+        return [one for one in found if one.value > 0 or one.name == "lag" or not BUILT_IN[one.name].dissipates]
+
+    def _conspicuous(self) -> list[Any]:
+        """Return what is beyond chance, the surest first."""
         return sorted(
-            found, key=lambda suspect: -abs(suspect.value) / suspect.stderr if suspect.stderr > 0 else -math.inf
+            (one for one in self.found.suspects if one.conspicuous),
+            key=lambda suspect: -abs(suspect.value) / suspect.stderr if suspect.stderr > 0 else -math.inf,
         )
+
+    def _of_torque(self) -> list[str]:
+        """Return what the torque tells of its sensor and of the machine, in words."""
+        return told_by_torque(self.found, self._conspicuous(), self.units[OFFSET])
 
     def suspicions(self, names: Collection[str] | None = None) -> list[str]:
         """Return what seems to be missing, in words: everything, or some of it by name."""

@@ -1,7 +1,8 @@
 //! Tests for terms that are missing from the equation of motion: friction, an offset, a hardening spring, a lag of the
-//! torque.
+//! torque; and for what the torque itself tells: a sensor that is not linear, a resonance.
 //!
-//! Each term is added to the constants on its own and judged by its standard error (similar to a score test).
+//! Each term is added to the constants on its own and judged by its standard error (similar to a score test). What the torque tells is judged beside all
+//! of them: anything that is missing bends the relation of torque and motion a little.
 
 use std::sync::Arc;
 
@@ -29,6 +30,12 @@ pub enum Missing {
     Term(&'static BuiltInTerm),
     /// The torque lags behind.
     Lag,
+    /// The torque has a part of its own second derivative: something between its sensor and that of the angle bends.
+    Resonance,
+    /// It has a part of its own square: what its sensor shows is not symmetric.
+    TorqueSquare,
+    /// It has a part of its own cube: what its sensor shows is not linear.
+    TorqueCube,
 }
 
 /// A missing term and its coefficient.
@@ -49,16 +56,40 @@ impl Missing {
         match self {
             Self::Term(term) => term.name,
             Self::Lag => "lag",
+            Self::Resonance => "resonance",
+            Self::TorqueSquare => "torque_square",
+            Self::TorqueCube => "torque_cube",
         }
     }
 
-    /// The samples of a term, `None` if they are one everywhere or it is none.
-    pub(crate) fn samples<'a>(self, angle: &'a dyn Samples, velocity: &'a dyn Samples) -> Option<Mapped<'a>> {
+    /// Whether it is told by the torque itself, beside everything else.
+    #[must_use]
+    pub fn is_of_torque(self) -> bool {
+        matches!(self, Self::Resonance | Self::TorqueSquare | Self::TorqueCube)
+    }
+
+    /// The samples of a term or of a power of the torque, `None` if they are one everywhere or it is none.
+    pub(crate) fn samples<'a>(
+        self,
+        angle: &'a dyn Samples,
+        velocity: &'a dyn Samples,
+        torque: &'a dyn Samples,
+    ) -> Option<Mapped<'a>> {
         match self {
             Self::Term(term) => term.function.samples(angle, velocity),
-            Self::Lag => None,
+            Self::TorqueSquare => Some(Mapped { channel: torque, function: squares }),
+            Self::TorqueCube => Some(Mapped { channel: torque, function: cubes }),
+            Self::Lag | Self::Resonance => None,
         }
     }
+}
+
+fn squares(values: &mut [f64]) {
+    values.iter_mut().for_each(|value| *value = value.powi(2));
+}
+
+fn cubes(values: &mut [f64]) {
+    values.iter_mut().for_each(|value| *value = value.powi(3));
 }
 
 impl Suspect {

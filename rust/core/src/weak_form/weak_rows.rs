@@ -34,6 +34,8 @@ pub(crate) enum TermSamples<'a> {
     One,
     /// Given at every sample.
     Given(&'a dyn Samples),
+    /// A function of the torque, as late as it is.
+    OfTorque(&'a dyn Samples),
     /// The rate of the torque, which is the regressor of its lag.
     TorqueRate,
     /// Its second derivative, which is a constant's.
@@ -180,7 +182,7 @@ impl WeakRows {
                 ),
                 _ if record.constant_terms => (next(), Vec::new()),
                 TermSamples::TorqueCurvature | TermSamples::TorqueJerk => (next(), vec![0.0; self.rows.usable.len()]),
-                TermSamples::Given(_) | TermSamples::TorqueRate => (next(), next()),
+                TermSamples::Given(_) | TermSamples::OfTorque(_) | TermSamples::TorqueRate => (next(), next()),
             };
             self.rows.regressors.push(Regressor { value, companion, noise: Default::default() });
         }
@@ -278,7 +280,8 @@ fn tasks<'a>(
     let slopes = kernels.slopes.iter().zip(record.constant).filter(|(_, constant)| !constant).map(|(slope, _)| slope);
     let all: Vec<&[f64]> = kernels.values.iter().chain(slopes).map(Vec::as_slice).collect();
     #[allow(clippy::cast_possible_truncation, reason = "a lag of a few samples")]
-    let torque = || Box::new(Late { channel: record.torque, samples: whole as isize });
+    let delayed = |channel: &'a dyn Samples| Box::new(Late { channel, samples: whole as isize });
+    let torque = || delayed(record.torque);
     tasks.add(Box::new(Whole(record.angle)), &all, stride);
     tasks.add(torque(), &[&late.values[2]], stride);
     let jerk = rate_of(&late.values[0], delta);
@@ -290,6 +293,9 @@ fn tasks<'a>(
             TermSamples::One => {}
             TermSamples::Given(samples) => {
                 tasks.add(Box::new(Whole(samples)), &[value.as_slice(), slope][..of_a_term], stride);
+            }
+            TermSamples::OfTorque(samples) => {
+                tasks.add(delayed(samples), &[late.values[2].as_slice(), &late.slopes[2]][..of_a_term], stride);
             }
             TermSamples::TorqueRate => {
                 tasks.add(torque(), &[late.values[1].as_slice(), &late.slopes[1]][..of_a_term], stride);

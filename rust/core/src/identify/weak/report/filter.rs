@@ -31,7 +31,7 @@ const DERIVATIVES: [TermSamples<'static>; 3] =
     [TermSamples::TorqueRate, TermSamples::TorqueCurvature, TermSamples::TorqueJerk];
 const CURVATURE: usize = 1;
 /// By what part the noise of the torque may be another one than that which derivatives are corrected for.
-const UNSURE: f64 = 0.1;
+pub(crate) const UNSURE: f64 = 0.1;
 
 /// A filter without a lag that changes no parameter by more than this part of it is not worth a word.
 pub(crate) const LEAST_CHANGE: f64 = 1e-3;
@@ -144,7 +144,7 @@ fn add_noise_of_torque(rows: &mut Rows, weak: &WeakRows, first: usize, noise: [f
 }
 
 /// The covariance of the noise of a row with that of the torque's second derivative, whose size it has: of the rate and the third derivative it is none.
-fn shared_noise(weak: &WeakRows, torque: f64) -> f64 {
+pub(crate) fn shared_noise(weak: &WeakRows, torque: f64) -> f64 {
     let square = |kernel: &[f64]| kernel.iter().map(|value| value * value).sum::<f64>();
     let [_, rate, value] = &weak.kernels.values;
     torque * square(rate) / square(value)

@@ -12,7 +12,7 @@ use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::{JudgedTerm, Missing, Suspect};
 use crate::record::derived::Interpolated;
 use crate::regression::fit::Fit;
-use crate::regression::limits::NEGLIGIBLE;
+use crate::regression::limits::{NEGLIGIBLE, NOISE_MODEL_FAILS};
 use crate::regression::problem::Correlated;
 use crate::regression::subsample::{holds, more_stretches_of_rows, stretches_of_rows, thinned_column, thinned_rows};
 use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows};
@@ -39,6 +39,12 @@ impl Session<'_, '_, '_> {
         let first = weak.rows.regressors.len();
         weak.rows.regressors.extend(more);
         weak.rows.clear_unusable();
+        // Equations that leave too much lack something else.
+        let mut suspects = if errors.error > NOISE_MODEL_FAILS {
+            Vec::new()
+        } else {
+            self.of_torque(weak, decided, fit, &rhs, first..weak.rows.regressors.len(), &candidates)?
+        };
         if decided.white.is_some() {
             weak.rows = decided.as_white(std::mem::take(&mut weak.rows), &mut self.stages)?;
             rhs.clone_from(&weak.rows.rhs);
@@ -48,8 +54,7 @@ impl Session<'_, '_, '_> {
         } else {
             decided.model.correlated(&weak.rows, &errors.covariance, &mut self.stages)?
         };
-        let mut suspects = Vec::new();
-        for (place, missing) in candidates.iter().enumerate() {
+        for (place, missing) in candidates.iter().enumerate().filter(|(_, missing)| !missing.is_of_torque()) {
             let judged = JudgedTerm {
                 rows: &weak.rows,
                 model: &decided.model,
@@ -85,11 +90,14 @@ impl Session<'_, '_, '_> {
     ) -> Result<Vec<Regressor>, Error> {
         let (velocity, samples) = (weak.plain_column(1), self.record.angle.len());
         let velocity = Interpolated { values: &velocity, first: weak.first, stride: weak.stride, samples };
-        let mapped: Vec<_> = candidates.iter().map(|missing| missing.samples(self.record.angle, &velocity)).collect();
+        let Record { angle, torque, .. } = self.record;
+        let mapped: Vec<_> = candidates.iter().map(|missing| missing.samples(angle, &velocity, torque)).collect();
         let terms = candidates.iter().zip(&mapped).map(|(missing, mapped)| match (missing, mapped) {
             (Missing::Lag, _) => TermSamples::TorqueRate,
+            (Missing::Resonance, _) => TermSamples::TorqueCurvature,
             (Missing::Term(_), Some(mapped)) => TermSamples::Given(mapped),
-            (Missing::Term(_), None) => TermSamples::One,
+            (_, Some(mapped)) => TermSamples::OfTorque(mapped),
+            (_, None) => TermSamples::One,
         });
         // Each is added to the constants.
         let (terms, constant) = (terms.collect(), [true; 3]);
@@ -102,7 +110,12 @@ impl Session<'_, '_, '_> {
     /// What may be missing: what the equation does not hold already.
     fn candidates(&self) -> Vec<Missing> {
         let terms = BUILT_IN_TERMS.iter().filter(|term| term.looked_for).map(Missing::Term);
-        let all = terms.chain(std::iter::once(Missing::Lag));
+        // Rows of derivatives reach out of a mask, beside which other equations hold; behind a lag a filter is looked for. Noise of an angle that was fused
+        // or integrated falls of itself, as behind a filter.
+        let resonance = self.record.mask.is_none() && self.record.lag == 0.0 && self.record.noise.is_none();
+        let of_torque =
+            resonance.then_some(Missing::Resonance).into_iter().chain([Missing::TorqueSquare, Missing::TorqueCube]);
+        let all = terms.chain(std::iter::once(Missing::Lag)).chain(of_torque);
         all.filter(|missing| !self.options.not_missing.contains(missing)).collect()
     }
 }

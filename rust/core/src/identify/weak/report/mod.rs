@@ -5,6 +5,7 @@ pub(crate) mod errors;
 pub(crate) mod explained;
 pub(crate) mod filter;
 pub(crate) mod missing_terms;
+pub(crate) mod of_torque;
 pub(crate) mod record;
 pub(crate) mod tracks;
 pub(crate) mod window_sums;

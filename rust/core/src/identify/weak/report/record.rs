@@ -17,7 +17,7 @@ use crate::identify::weak::report::filter::{LEAST_CHANGE, LeftOfFilter};
 use crate::identify::weak::session::Session;
 use crate::inference::constancy::NO_CHANCE;
 use crate::inference::identifiability::is_mostly_noise;
-use crate::inference::missing_terms::Missing;
+use crate::inference::missing_terms::{Missing, Suspect};
 use crate::regression::constants::weakest;
 use crate::regression::fit::Fit;
 use crate::regression::limits::{HARDLY_TOLD_APART, NEGLIGIBLE, UNEXPLAINED};
@@ -108,8 +108,12 @@ impl Session<'_, '_, '_> {
         if errors.left > NEGLIGIBLE * weak.rows.mean_square() {
             found.suspects = self.suspects(&mut weak, decided, fit, (rhs, correlated), &errors)?;
         }
+        let contradicted = self.is_contradicted(&weak, &found.constants);
+        // What a filter does is said already, and the torque tells of anything that changes and should not.
+        let is_said = |one: &Suspect| one.missing == Missing::Resonance && found.filtered.is_some();
+        found.suspects.retain(|one| !(is_said(one) || contradicted && one.missing.is_of_torque()));
         found.record_status = errors.status | record_status(&found, decided, at_end);
-        if self.is_contradicted(&weak, &found.constants) {
+        if contradicted {
             found.record_status |= Status::KIND_CONTRADICTED;
         }
         Ok((found, Some(results)))
@@ -262,7 +266,11 @@ fn record_status(found: &WeakIdentified, decided: &Decided, at_end: bool) -> Sta
         status |= Status::ILL_CONDITIONED;
     }
     for suspect in found.suspects.iter().filter(|suspect| suspect.is_conspicuous()) {
-        status |= if suspect.missing == Missing::Lag { Status::LAG_SUSPECTED } else { Status::TERM_SUSPECTED };
+        status |= match suspect.missing {
+            Missing::Lag => Status::LAG_SUSPECTED,
+            Missing::Term(_) | Missing::Resonance => Status::TERM_SUSPECTED,
+            Missing::TorqueSquare | Missing::TorqueCube => Status::CHANNEL_SUSPECTED,
+        };
     }
     status
 }

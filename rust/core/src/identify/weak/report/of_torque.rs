@@ -1,0 +1,97 @@
+//! Tests of what the torque itself tells: is its sensor linear, and is the machine between both sensors rigid?
+//!
+//! A sensor that shows `T + aT² + bT³`, and a coupling that bends, whose resonance `ω₀` is above the motion and leaves `T + T″/ω₀²` at most, change
+//! parameters by what they add to the torque, which windows and residuals hardly show. Their factors are asked beside everything else that may be missing,
+//! all at once.
+
+use std::ops::Range;
+
+use crate::equation::rows::Rows;
+use crate::error::Error;
+use crate::identify::weak::decided::Decided;
+use crate::identify::weak::report::filter::{UNSURE, shared_noise};
+use crate::identify::weak::session::Session;
+use crate::inference::missing_terms::{Missing, Suspect};
+use crate::regression::fit::Fit;
+use crate::regression::limits::NEGLIGIBLE;
+use crate::regression::model::Model;
+use crate::regression::problem::Problem;
+use crate::regression::residuals::residuals;
+use crate::regression::row_covariance::RowCovariance;
+use crate::weak_form::weak_rows::WeakRows;
+
+impl Session<'_, '_, '_> {
+    /// What the torque tells beside all that may be missing, whose regressors are some of the rows'.
+    pub(crate) fn of_torque(
+        &mut self,
+        weak: &WeakRows,
+        decided: &Decided,
+        fit: &Fit,
+        rhs: &[f64],
+        regressors: Range<usize>,
+        candidates: &[Missing],
+    ) -> Result<Vec<Suspect>, Error> {
+        let rows = &weak.rows;
+        let (known, expected) = self.covariance(weak, self.parameters(&decided.model, fit));
+        let model = decided.ordered();
+        let count = model.constant.len();
+        let model = Model { constant: model.constant.iter().copied().chain(regressors.clone()).collect(), ..model };
+        let problem = model.problem(rows, rhs, self.noise[0], None);
+        let Some(beside) = fit.again(&problem, expected, self.options.instructions, &mut self.stages)? else {
+            return Ok(Vec::new());
+        };
+        let (left, usable) = residuals(&problem, &beside, &mut self.stages)?;
+        let shown = RowCovariance::of_residuals(&left, &usable, 4 * weak.reach());
+        let covariance = if shown.variance() > known.variance() { shown } else { known };
+        let problem = Problem { correlated: Some(model.correlated(rows, &covariance, &mut self.stages)?), ..problem };
+        let shared = shared(weak, &regressors, candidates, expected.torque.min(covariance.variance()));
+        let lag = candidates.iter().position(|&one| one == Missing::Lag);
+        let mut suspects = Vec::new();
+        for (place, &missing) in candidates.iter().enumerate().filter(|(_, missing)| missing.is_of_torque()) {
+            let value = beside.pooled.values[count + place];
+            // What changes nothing by a thousandth need not be said.
+            if value * value * mean_square(rows, regressors.start + place) < NEGLIGIBLE * rows.mean_square() {
+                continue;
+            }
+            let variance = beside.variance_of(&problem, count + place, &covariance, &mut self.stages)?;
+            let mut suspect = Suspect { missing, value, error: variance.sqrt() };
+            if suspect.is_conspicuous() {
+                // The torque's noise is in both sides.
+                let white = beside.covariance(&problem, &RowCovariance::white(), &mut self.stages)?;
+                let row = &white[(count + place) * problem.layout.constant + count..][..candidates.len()];
+                let by_noise = rows.len() as f64 * row.iter().zip(&shared).map(|(one, other)| one * other).sum::<f64>();
+                suspect.value -= by_noise;
+                suspect.error += UNSURE * by_noise.abs();
+                if let (Missing::Resonance, Some(lag)) = (missing, lag) {
+                    // A torque that is late has half its lag's square of the second derivative.
+                    let variance = beside.variance_of(&problem, count + lag, &covariance, &mut self.stages)?;
+                    let lag = beside.pooled.values[count + lag];
+                    suspect.value += lag * lag / 2.0;
+                    suspect.error += lag.abs() * variance.sqrt();
+                }
+            }
+            suspects.push(suspect);
+        }
+        Ok(suspects)
+    }
+}
+
+/// The covariance of a row's noise with that of each regressor.
+fn shared(weak: &WeakRows, regressors: &Range<usize>, candidates: &[Missing], torque: f64) -> Vec<f64> {
+    let scale: f64 = weak.torque.iter().sum();
+    let mean = |column: &[f64]| column.iter().sum::<f64>() / (scale * weak.rows.len() as f64);
+    let square = candidates.iter().position(|&one| one == Missing::TorqueSquare);
+    let squares = square.map_or(0.0, |place| mean(&weak.rows.regressors[regressors.start + place].value));
+    let of = |missing: &Missing| match missing {
+        Missing::Resonance => -shared_noise(weak, torque),
+        // The slopes of both powers, in the mean.
+        Missing::TorqueSquare => 2.0 * mean(&weak.rows.rhs) * torque,
+        Missing::TorqueCube => 3.0 * squares * torque,
+        Missing::Term(_) | Missing::Lag => 0.0,
+    };
+    candidates.iter().map(of).collect()
+}
+
+fn mean_square(rows: &Rows, regressor: usize) -> f64 {
+    rows.regressors[regressor].value.iter().map(|value| value * value).sum::<f64>() / rows.len() as f64
+}
