@@ -114,3 +114,14 @@ def test_a_jump_of_the_inertia_is_one_of_the_inertia(pattern: Any, part: float) 
         inside = slice(500, -500)
         assert np.sqrt(np.mean((result.inertia / recording.inertia - 1)[inside] ** 2)) < 0.01
         assert not result.record_status & Status.KIND_CONTRADICTED
+
+
+@pytest.mark.parametrize("seed", [20_000, 20_027])
+def test_windows_hardly_longer_than_a_narrow_test_function_hide_no_jump(seed: int) -> None:
+    # Of 36 such records these two were lost: K was 60 and 108 % off.
+    recording = tvident.simulate_torsional_rig(40.0, 1000.0, seed, "square", torque_snr_db=20.0, angle_noise=1e-3)
+    found = identify(recording)
+    off = (found.stiffness - recording.stiffness)[INTERIOR]
+    assert np.sqrt(np.mean(off**2)) < ERROR * recording.stiffness.mean()
+    inertia, error = found.constants["inertia"]
+    assert abs(inertia - recording.inertia[0]) < 4 * error

@@ -18,8 +18,8 @@ use crate::regression::window_length::Scale;
 
 /// The mean squared error of predicting rows, over the noise's, from which on more is tried, and the part of it that must be left to be
 /// worth it.
-const BADLY: f64 = 1.5;
-const BETTER: f64 = 0.8;
+pub(crate) const BADLY: f64 = 1.5;
+pub(crate) const BETTER: f64 = 0.8;
 
 /// Where constants jump, those that do not change in between stand unless others predict so much better.
 const SIMPLER: f64 = 0.98;

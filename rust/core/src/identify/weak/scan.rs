@@ -5,6 +5,8 @@ use std::ops::Range;
 use crate::error::Error;
 use crate::identify::scanned::{Scans, wider};
 use crate::identify::weak::choice::Chosen;
+use crate::identify::weak::decide::{BADLY, BETTER};
+use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
 use crate::identify::widths::{MOST_SAMPLES, OfWidth, STRETCHES, Widths};
 use crate::regression::model::Model;
@@ -87,10 +89,33 @@ impl Session<'_, '_, '_> {
             };
             width *= 2;
             if !shortest || self.scan.has_no_plateau() || width > widest {
-                return Ok(tried);
+                return self.without_hidden_jumps(tried, widest, model);
             }
             tried = self.chosen_with(width, model)?;
         }
+    }
+
+    /// The same test function, or the first wider one of the plateau that predicts much better, where windows are hardly longer than it and predict
+    /// badly: while nothing is known of jumps yet, such windows may lose least of all at them, and hide them.
+    fn without_hidden_jumps(&mut self, tried: Chosen, widest: usize, model: &Model) -> Result<Chosen, Error> {
+        let hides = |fitted: &Decided| {
+            let follows = fitted.fit.as_ref().is_some_and(|fit| tried.weak.follow_anything(fit.span));
+            follows && fitted.error > BADLY
+        };
+        let Some(error) = tried.fitted.as_ref().filter(|fitted| hides(fitted)).map(|fitted| fitted.error) else {
+            return Ok(tried);
+        };
+        let mut width = 2 * tried.weak.function.half_width();
+        while !self.scan.has_no_plateau() && width <= widest {
+            let mut wider = self.chosen_with(width, model)?;
+            let fitted = self.fit_first(&wider, model)?;
+            if fitted.error < BETTER * error {
+                wider.fitted = Some(fitted);
+                return Ok(wider);
+            }
+            width *= 2;
+        }
+        Ok(tried)
     }
 
     /// Estimates what is constant with test functions of all widths, and looks for widths that agree. Of a long record those are tried that the samples
