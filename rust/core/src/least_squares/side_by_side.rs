@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::lanes::interleaved::Strips;
 use crate::lanes::output::Outputs;
-use crate::lanes::tile::Tile;
+use crate::lanes::tile::{TILE, Tile};
 use crate::least_squares::givens_factor::{Dimensions, Many};
 use crate::least_squares::plan::{Equations, RollingLeastSquares, Slots};
 use crate::record::samples::{Samples, all_usable, is_usable};
@@ -14,6 +14,10 @@ use crate::status::Status;
 
 /// Suffix factors that are kept at a time. Longer windows keep one of so many and recompute the others.
 pub(crate) const SEGMENT: usize = 2048;
+
+/// With so many fields a full tile takes 32 KB of the first-level cache: what is written of a lane then lies in a few whole cache lines. With
+/// more of them a tile has room for fewer windows.
+const MOST_FIELDS: usize = 16;
 
 /// Memory of one thread.
 #[derive(Debug)]
@@ -40,6 +44,8 @@ impl RollingScratch {
         let strips = Strips::new(plan.window, plan.window, lanes);
         let factor = Many { regressors: plan.regressors, rhs_count: plan.rhs_count }.size() * lanes;
         let factor = plan.summary(factor);
+        let fields = Slots::of(plan).fields();
+        let places = if fields <= MOST_FIELDS { TILE } else { lanes.next_multiple_of(8) };
         Self {
             column: vec![0.0; strips.samples()],
             unusable: Vec::new(),
@@ -49,7 +55,7 @@ impl RollingScratch {
             strips: vec![strips; columns + 1],
             suffixes: Aligned::zeros(plan.window.min(SEGMENT) * factor),
             checkpoints: Aligned::zeros((plan.window.div_ceil(SEGMENT) - 1) * factor),
-            tile: Tile::new(Slots::of(plan).fields(), lanes.next_multiple_of(8), lanes),
+            tile: Tile::new(fields, places, lanes),
         }
     }
 }
