@@ -85,11 +85,15 @@ impl Missing {
 }
 
 fn squares(values: &mut [f64]) {
-    values.iter_mut().for_each(|value| *value = value.powi(2));
+    for value in values {
+        *value = value.powi(2);
+    }
 }
 
 fn cubes(values: &mut [f64]) {
-    values.iter_mut().for_each(|value| *value = value.powi(3));
+    for value in values {
+        *value = value.powi(3);
+    }
 }
 
 impl Suspect {

@@ -20,6 +20,10 @@ use crate::regression::residuals::residuals;
 use crate::regression::row_covariance::RowCovariance;
 use crate::weak_form::weak_rows::WeakRows;
 
+/// The least part of the torque's mean square that powers of it must have to be said: half a percent of the torque. Rounding of an angle beside a
+/// torque without noise is seen as a quarter of a percent.
+const LEAST_OF_POWERS: f64 = 2.5e-5;
+
 impl Session<'_, '_, '_> {
     /// What the torque tells beside all that may be missing, whose regressors are some of the rows'.
     pub(crate) fn of_torque(
@@ -49,8 +53,8 @@ impl Session<'_, '_, '_> {
         let mut suspects = Vec::new();
         for (place, &missing) in candidates.iter().enumerate().filter(|(_, missing)| missing.is_of_torque()) {
             let value = beside.pooled.values[count + place];
-            // What changes nothing by a thousandth need not be said.
-            if value * value * mean_square(rows, regressors.start + place) < NEGLIGIBLE * rows.mean_square() {
+            let least = if missing == Missing::Resonance { NEGLIGIBLE } else { LEAST_OF_POWERS };
+            if value * value * mean_square(rows, regressors.start + place) < least * rows.mean_square() {
                 continue;
             }
             let variance = beside.variance_of(&problem, count + place, &covariance, &mut self.stages)?;

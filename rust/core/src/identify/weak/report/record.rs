@@ -71,8 +71,7 @@ impl Session<'_, '_, '_> {
             return Ok((self.undetermined(nothing, decided)?, None));
         }
         found.constant_pairs = pairs_of(&ordered.constant, slow, &found.covariance);
-        let weakest = &found.weakest;
-        let noise = self.noise[0];
+        let (weakest, noise) = (&found.weakest, self.noise[0]);
         found.mostly_noise = is_mostly_noise(&problem, rows, &ordered, all, weakest, noise, &mut self.stages)?;
         let mut tracks = self.tracks(&problem, &weak, decided, (fit, all), &values, errors.expected)?;
         let variances: Vec<f64> = (slow..count).map(|place| found.covariance[place * (count + 1)]).collect();
@@ -109,9 +108,7 @@ impl Session<'_, '_, '_> {
             found.suspects = self.suspects(&mut weak, decided, fit, (rhs, correlated), &errors)?;
         }
         let contradicted = self.is_contradicted(&weak, &found.constants);
-        // What a filter does is said already, and the torque tells of anything that changes and should not.
-        let is_said = |one: &Suspect| one.missing == Missing::Resonance && found.filtered.is_some();
-        found.suspects.retain(|one| !(is_said(one) || contradicted && one.missing.is_of_torque()));
+        forget_what_is_said(&mut found, contradicted);
         found.record_status = errors.status | record_status(&found, decided, at_end);
         if contradicted {
             found.record_status |= Status::KIND_CONTRADICTED;
@@ -254,6 +251,13 @@ fn constants(decided: &Decided, values: &[f64], covariance: &[f64]) -> Vec<Const
         Constant { unknown, value: values[place + slow], error: variance.sqrt(), test }
     };
     decided.model.constant.iter().enumerate().map(constant).collect()
+}
+
+/// Forgets suspects that only repeat what is said already: what a filter does, and, where something changes that should not, what the torque tells of it.
+fn forget_what_is_said(found: &mut WeakIdentified, contradicted: bool) {
+    let is_filtered = found.filtered.is_some();
+    let is_said = |one: &Suspect| one.missing == Missing::Resonance && is_filtered;
+    found.suspects.retain(|one| !(is_said(one) || contradicted && one.missing.is_of_torque()));
 }
 
 /// Flags of the whole record, beside those of its noise.
