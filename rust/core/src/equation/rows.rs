@@ -70,6 +70,11 @@ impl Rows {
         sum / count.max(1.0)
     }
 
+    /// The mean square of a regressor over all rows.
+    pub(crate) fn mean_square_of(&self, regressor: usize) -> f64 {
+        self.regressors[regressor].value.iter().map(|value| value * value).sum::<f64>() / self.len() as f64
+    }
+
     /// Puts rows of the same unknowns behind these. Windows do not reach from one part to the next.
     pub(crate) fn append(&mut self, mut other: Self) {
         if self.regressors.is_empty() {

@@ -32,7 +32,7 @@ impl Tile {
     #[inline(always)]
     pub(crate) fn fields_of<S: Lanes>(&mut self, window: usize) -> WindowFields<'_> {
         let apart = self.places * S::F64_LANES;
-        let at = (window & (self.places - 1)) * S::F64_LANES;
+        let at = self.at(0, window) * S::F64_LANES;
         WindowFields { values: &mut self.values[at..], apart }
     }
 

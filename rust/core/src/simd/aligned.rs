@@ -37,8 +37,8 @@ impl Deref for Aligned {
     #[inline(always)]
     fn deref(&self) -> &[f64] {
         debug_assert!(self.first + self.len <= self.values.len());
-        // SAFETY: the range lies within the values since they were made. Kernels come here for every vector: checked, it is a third of what
-        // they do beside arithmetic.
+        // SAFETY: the range lies within the values since they were made. Kernels come here for every vector: checked, a window of
+        // least squares takes 17 % more instructions.
         unsafe { self.values.get_unchecked(self.first..self.first + self.len) }
     }
 }

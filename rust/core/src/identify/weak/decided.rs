@@ -16,6 +16,7 @@ use crate::regression::problem::{Correlated, Problem};
 use crate::regression::row_covariance::RowCovariance;
 use crate::regression::whitening::Whitening;
 use crate::regression::window_length::Scale;
+use crate::weak_form::weak_rows::WeakRows;
 
 /// What was decided, and the fit it rests on.
 #[derive(Clone)]
@@ -62,6 +63,11 @@ impl Decided {
     pub(crate) fn has_shortest_windows(&self) -> bool {
         let scale = self.fit.as_ref().and_then(|fit| fit.scale);
         self.scales.len() > 1 && scale.is_some() && self.scales.first().copied() == scale
+    }
+
+    /// Whether its windows are hardly longer than the test function of the rows: they follow anything as if it were motion.
+    pub(crate) fn has_windows_of_a_function(&self, weak: &WeakRows) -> bool {
+        self.fit.as_ref().is_some_and(|fit| fit.scale.is_some() && weak.follow_anything(fit.span))
     }
 
     /// Whether constants seem to vary and windows are the shortest of those that were tried.

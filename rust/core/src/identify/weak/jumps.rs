@@ -80,7 +80,10 @@ pub(crate) fn signals<'a>(record: &Record<'a>, model: &Model) -> Option<Vec<Box<
             term => match record.terms[term - 1] {
                 TermSamples::One => Some(Box::new(Ones(record.angle.len()))),
                 TermSamples::Given(samples) => Some(Box::new(Whole(samples))),
-                _ => None,
+                TermSamples::OfTorque(_)
+                | TermSamples::TorqueRate
+                | TermSamples::TorqueCurvature
+                | TermSamples::TorqueJerk => None,
             },
         }
     };

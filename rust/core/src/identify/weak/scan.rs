@@ -23,13 +23,13 @@ const WIDER: usize = 8;
 
 impl Session<'_, '_, '_> {
     /// Scans the widths unless that was done, moves to the plateau where the test function that the spectra suggest is off it, and on to wider ones where
-    /// windows follow noise. What was chosen and fitted before with the same noise tells what its test function is.
+    /// windows follow noise. What was chosen and fitted `last`, with the same noise, tells what its test function is.
     pub(crate) fn onto_plateau(
         &mut self,
         chosen: Chosen,
         model: &Model,
         scans: &mut Option<Scans>,
-        fitted_before: Option<&Chosen>,
+        last: Option<&Chosen>,
     ) -> Result<Chosen, Error> {
         let given = self.options.half_width.is_some();
         // Without a coefficient of the motion among the unknowns there is nothing that widths could tell apart.
@@ -47,7 +47,7 @@ impl Session<'_, '_, '_> {
         self.scan = scans.best.clone();
         let mut chosen = if half_width == before { chosen } else { self.chosen_with(half_width, model)? };
         if !given && self.options.averaging {
-            chosen = self.without_shortest_windows(chosen, model, fitted_before)?;
+            chosen = self.without_shortest_windows(chosen, model, last)?;
         }
         let used = chosen.weak.function.half_width();
         self.scan.moved = used != before;
@@ -98,13 +98,8 @@ impl Session<'_, '_, '_> {
     /// The same test function, or the first wider one of the plateau that predicts much better, where windows are hardly longer than it and predict
     /// badly: while nothing is known of jumps yet, such windows may lose least of all at them, and hide them.
     fn without_hidden_jumps(&mut self, tried: Chosen, widest: usize, model: &Model) -> Result<Chosen, Error> {
-        let hides = |fitted: &Decided| {
-            let follows = fitted.fit.as_ref().is_some_and(|fit| tried.weak.follow_anything(fit.span));
-            follows && fitted.error > BADLY
-        };
-        let Some(error) = tried.fitted.as_ref().filter(|fitted| hides(fitted)).map(|fitted| fitted.error) else {
-            return Ok(tried);
-        };
+        let hides = |fitted: &&Decided| fitted.has_windows_of_a_function(&tried.weak) && fitted.error > BADLY;
+        let Some(error) = tried.fitted.as_ref().filter(hides).map(|fitted| fitted.error) else { return Ok(tried) };
         let mut width = 2 * tried.weak.function.half_width();
         while !self.scan.has_no_plateau() && width <= widest {
             let mut wider = self.chosen_with(width, model)?;

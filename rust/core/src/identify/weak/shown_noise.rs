@@ -121,8 +121,7 @@ impl Session<'_, '_, '_> {
     /// above the motion is noise, however much it is.
     fn is_no_noise(&mut self, chosen: &mut Chosen, model: &Model) -> Result<bool, Error> {
         let fitted = self.take_fitted(chosen, model)?;
-        let follows = |fit: &Fit| fit.scale.is_some() && chosen.weak.follow_anything(fit.span);
-        let most = if fitted.fit.as_ref().is_some_and(follows) { LEFT_BY_SHORT } else { UNEXPLAINED };
+        let most = if fitted.has_windows_of_a_function(&chosen.weak) { LEFT_BY_SHORT } else { UNEXPLAINED };
         let is_more = fitted.expected.torque > most * chosen.weak.rows.mean_square();
         chosen.fitted = Some(fitted);
         Ok(is_more && self.noise[1] > MORE * self.density_above_motion())

@@ -69,8 +69,7 @@ impl Session<'_, '_, '_> {
             };
             if let Some((value, error)) = judged.factor(first + place, &mut self.stages)? {
                 // A term that is next to nothing of the torque need not be there; a lag is little of it, and much of the damping.
-                let squares = weak.rows.regressors[first + place].value.iter().map(|sample| (value * sample).powi(2));
-                let share = squares.sum::<f64>() / weak.rows.len() as f64;
+                let share = value * value * weak.rows.mean_square_of(first + place);
                 if *missing != Missing::Lag && share < NEGLIGIBLE * weak.rows.mean_square() {
                     continue;
                 }

@@ -6,7 +6,6 @@
 
 use std::ops::Range;
 
-use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::report::filter::{UNSURE, shared_noise};
@@ -54,7 +53,7 @@ impl Session<'_, '_, '_> {
         for (place, &missing) in candidates.iter().enumerate().filter(|(_, missing)| missing.is_of_torque()) {
             let value = beside.pooled.values[count + place];
             let least = if missing == Missing::Resonance { NEGLIGIBLE } else { LEAST_OF_POWERS };
-            if value * value * mean_square(rows, regressors.start + place) < least * rows.mean_square() {
+            if value * value * rows.mean_square_of(regressors.start + place) < least * rows.mean_square() {
                 continue;
             }
             let variance = beside.variance_of(&problem, count + place, &covariance, &mut self.stages)?;
@@ -94,8 +93,4 @@ fn shared(weak: &WeakRows, regressors: &Range<usize>, candidates: &[Missing], to
         Missing::Term(_) | Missing::Lag => 0.0,
     };
     candidates.iter().map(of).collect()
-}
-
-fn mean_square(rows: &Rows, regressor: usize) -> f64 {
-    rows.regressors[regressor].value.iter().map(|value| value * value).sum::<f64>() / rows.len() as f64
 }
