@@ -70,6 +70,11 @@ impl Scan {
         self.plateau.map(|plateau| &self.scales[plateau.first])
     }
 
+    /// The half-width of the widest test function of the plateau.
+    pub(crate) fn widest(&self) -> Option<usize> {
+        self.plateau.map(|plateau| self.scales[plateau.last].half_width)
+    }
+
     /// Whether there were widths enough to show a plateau, and they do not.
     pub(crate) fn has_no_plateau(&self) -> bool {
         self.tried >= ENOUGH_WIDTHS && self.factor() < LEAST_PLATEAU

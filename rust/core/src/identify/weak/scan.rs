@@ -56,7 +56,7 @@ impl Session<'_, '_, '_> {
     }
 
     /// Rows of a half-width.
-    fn chosen_with(&mut self, half_width: usize, model: &Model) -> Result<Chosen, Error> {
+    pub(crate) fn chosen_with(&mut self, half_width: usize, model: &Model) -> Result<Chosen, Error> {
         let exponent = self.options.exponent.unwrap_or(EXPONENT);
         let weak = self.rows(TestFunction::new(half_width, exponent, self.options.delta)?)?;
         let parameters = self.pilot(&weak, model)?;
@@ -75,7 +75,7 @@ impl Session<'_, '_, '_> {
         before: Option<&Chosen>,
     ) -> Result<Chosen, Error> {
         let mut width = first.weak.function.half_width();
-        let widest = self.scan.plateau.map_or(0, |plateau| self.scan.scales[plateau.last].half_width);
+        let widest = self.scan.widest().unwrap_or(0);
         let mut tried = first;
         loop {
             let before = before.filter(|before| before.weak.function == tried.weak.function);

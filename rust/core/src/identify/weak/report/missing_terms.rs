@@ -12,7 +12,7 @@ use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::{JudgedTerm, Missing, Suspect};
 use crate::record::derived::Interpolated;
 use crate::regression::fit::Fit;
-use crate::regression::limits::{NEGLIGIBLE, NOISE_MODEL_FAILS};
+use crate::regression::limits::NEGLIGIBLE;
 use crate::regression::problem::Correlated;
 use crate::regression::subsample::{holds, more_stretches_of_rows, stretches_of_rows, thinned_column, thinned_rows};
 use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows};
@@ -39,12 +39,8 @@ impl Session<'_, '_, '_> {
         let first = weak.rows.regressors.len();
         weak.rows.regressors.extend(more);
         weak.rows.clear_unusable();
-        // Equations that leave too much lack something else.
-        let mut suspects = if errors.error > NOISE_MODEL_FAILS {
-            Vec::new()
-        } else {
-            self.of_torque(weak, decided, fit, &rhs, first..weak.rows.regressors.len(), &candidates)?
-        };
+        let regressors = first..weak.rows.regressors.len();
+        let mut suspects = self.of_torque(weak, decided, fit, &rhs, regressors, &candidates)?;
         if decided.white.is_some() {
             weak.rows = decided.as_white(std::mem::take(&mut weak.rows), &mut self.stages)?;
             rhs.clone_from(&weak.rows.rhs);
@@ -81,7 +77,7 @@ impl Session<'_, '_, '_> {
     }
 
     /// The regressors of what may be missing, in all rows or in those of some stretches.
-    fn regressors_of(
+    pub(crate) fn regressors_of(
         &mut self,
         candidates: &[Missing],
         weak: &WeakRows,

@@ -12,7 +12,7 @@ use crate::identify::weak::report::filter::{UNSURE, shared_noise};
 use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::{Missing, Suspect};
 use crate::regression::fit::Fit;
-use crate::regression::limits::NEGLIGIBLE;
+use crate::regression::limits::{NEGLIGIBLE, NOISE_MODEL_FAILS};
 use crate::regression::model::Model;
 use crate::regression::problem::Problem;
 use crate::regression::residuals::residuals;
@@ -23,9 +23,42 @@ use crate::weak_form::weak_rows::WeakRows;
 /// torque without noise is seen as a quarter of a percent.
 const LEAST_OF_POWERS: f64 = 2.5e-5;
 
+/// From how many times the half-width on another test function has the last word.
+const WIDER: usize = 2;
+
 impl Session<'_, '_, '_> {
-    /// What the torque tells beside all that may be missing, whose regressors are some of the rows'.
+    /// What the torque tells beside all that may be missing, whose regressors are some of the rows'. Where the test function was made narrower than those
+    /// that agree with it, the widest of these has the last word: noise is less there, and windows are longer.
     pub(crate) fn of_torque(
+        &mut self,
+        weak: &WeakRows,
+        decided: &Decided,
+        fit: &Fit,
+        rhs: &[f64],
+        regressors: Range<usize>,
+        candidates: &[Missing],
+    ) -> Result<Vec<Suspect>, Error> {
+        let suspects = self.of_torque_in(weak, decided, fit, rhs, regressors, candidates)?;
+        let widest = self.scan.widest().unwrap_or(0);
+        let is_wider = self.scan.moved && widest >= WIDER * weak.function.half_width() && decided.jumps.is_empty();
+        if !is_wider || !suspects.iter().any(Suspect::is_conspicuous) {
+            return Ok(suspects);
+        }
+        let model = decided.ordered();
+        let mut wide = self.chosen_with(widest, &model)?;
+        let fitted = self.fit_first(&wide, &model)?;
+        let Some(fit) = &fitted.fit else { return Ok(Vec::new()) };
+        let more = self.regressors_of(candidates, &wide.weak, None)?;
+        let rows = &mut wide.weak.rows;
+        let first = rows.regressors.len();
+        rows.regressors.extend(more);
+        rows.clear_unusable();
+        let (rhs, regressors) = (rows.rhs.clone(), first..rows.regressors.len());
+        self.of_torque_in(&wide.weak, &fitted, fit, &rhs, regressors, candidates)
+    }
+
+    /// The same with the test function of these rows.
+    fn of_torque_in(
         &mut self,
         weak: &WeakRows,
         decided: &Decided,
@@ -45,6 +78,10 @@ impl Session<'_, '_, '_> {
         };
         let (left, usable) = residuals(&problem, &beside, &mut self.stages)?;
         let shown = RowCovariance::of_residuals(&left, &usable, 4 * weak.reach());
+        if shown.variance() > NOISE_MODEL_FAILS * known.variance() {
+            // Equations that leave too much beside all of these lack something else.
+            return Ok(Vec::new());
+        }
         let covariance = if shown.variance() > known.variance() { shown } else { known };
         let problem = Problem { correlated: Some(model.correlated(rows, &covariance, &mut self.stages)?), ..problem };
         let shared = shared(weak, &regressors, candidates, expected.torque.min(covariance.variance()));
