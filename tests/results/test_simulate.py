@@ -237,6 +237,42 @@ def test_a_part_that_was_held_back_tells_a_good_model_from_a_bad_one(
     assert paper.simulated > 90
 
 
+ALIKE = 1.0
+"""Percent of the variance that the same samples may be explained by differently: constants are those of 59 s or of 590 s."""
+
+
+@pytest.mark.parametrize("stiffness", ["windowed", "constant"])
+def test_a_long_record_is_told_by_stretches_of_it(stiffness: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    long = tvident.simulate_torsional_rig(660.0, pattern="ramp" if stiffness == "windowed" else "constant", seed=5)
+    result = tvident.identify(long.angle, long.torque, sample_rate=1000, stiffness=stiffness)
+    found = result.held_back()
+    assert found.stretch == 32.768
+    assert "in a tenth of the last 32.8 s of every tenth, held back from the fit" in found.words()
+    assert (found.parts, found.ahead) == (10, result.settings["window_length"] / 1000)
+    # The same samples, held back from a fit to all the others.
+    tenth = round(32_768 / 10)
+    parts = [(end - 66_000, end - 2 * tenth, end - tenth) for end in range(66_000, 660_001, 66_000)]
+    monkeypatch.setattr("tvident._results.simulated.stretches_of", lambda *_: [])
+    monkeypatch.setattr("tvident._results.simulated.parts_of", lambda *_: parts)
+    result._held_back = None  # noqa: SLF001 - what is tested
+    whole = result.held_back()
+    assert not np.isfinite(whole.stretch)
+    for name in ("simulated", "predicted", "steady"):
+        assert getattr(found, name) == pytest.approx(getattr(whole, name), abs=ALIKE)
+
+
+def test_a_long_record_whose_stretches_are_lost_is_told_by_all_of_it() -> None:
+    long = tvident.simulate_torsional_rig(660.0, pattern="constant", seed=5)
+    angle = long.angle.copy()
+    angle[66_000 - 32_768 : 66_000 - 6_600] = np.nan
+    found = tvident.identify(angle, long.torque, sample_rate=1000, stiffness="constant").held_back()
+    assert found.predicted > 99
+    angle[:] = np.nan
+    angle[:20_000] = long.angle[:20_000]
+    lost = tvident.identify(angle, long.torque, sample_rate=1000, stiffness="constant").held_back()
+    assert "no sample that was held back has an angle" in lost.why_not
+
+
 def test_noise_that_no_model_explains_is_not_explained() -> None:
     generator = np.random.default_rng(3)
     angle, torque = generator.standard_normal((2, 4000))

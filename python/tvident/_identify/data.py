@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -115,6 +115,39 @@ class Data:
         return math.prod(self.batch)
 
     @property
+    def is_plain(self) -> bool:
+        """Whether a record has nothing beside an angle and a torque, of which any stretch can be taken."""
+        return not (self.motion.recorded or self.batch or self.weights or self.clock) and self.instruments is None
+
+    def of(self, place: Any) -> Data:
+        """Return some of several records, as NumPy's indexing takes them."""
+        return replace(
+            self,
+            angles=self.angles[place],
+            torques=self.torques[place],
+            motion=self.motion.part(place, self.batch),
+            instruments=None if self.instruments is None else self.instruments[place],
+            mask=None if self.mask is None else self.mask[place],
+            weights=None if self.weights is None else self.weights.part(place),
+            doubts=(),
+            labels=None,
+        )
+
+    def stretch(self, some: slice) -> Data:
+        """Return a stretch of a plain record."""
+        return replace(
+            self,
+            angles=self.angles[..., some],
+            torques=self.torques[..., some],
+            time=self.time[some],
+            mask=None if self.mask is None else self.mask[..., some],
+            step=1,
+            labels=None,
+            doubts=(),
+            moved=(),
+        )
+
+    @property
     def settings(self) -> dict[str, Any]:
         """What settings keep of records and their times."""
         channels = {"instrument": self.instruments is not None, "weights": self.weights is not None}
@@ -130,3 +163,8 @@ class Data:
     def units(self) -> Mapping[str, str]:
         """Units of results."""
         return UNITS if self.axis.system is ROTARY else LINEAR_UNITS
+
+
+def cut(value: Any, some: Any) -> Any:
+    """Return some of a known parameter, which may be one number."""
+    return value if isinstance(value, float) else value[..., some]

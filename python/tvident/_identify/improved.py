@@ -13,7 +13,7 @@ from tvident import _core
 from tvident._advice import NOT_DISTINGUISHED, Explained
 from tvident._arguments import percent
 from tvident._equation import BUILT_IN, COEFFICIENTS, FRICTION, OFFSET, Unknown
-from tvident._identify.data import Data
+from tvident._identify.data import Data, cut
 from tvident._identify.methods import StrongForm, WeakForm
 from tvident._identify.remedies import BEYOND_CHANCE, NEXT_TO_NOTHING, Trial, unexplained
 from tvident._identify.settings import Request, resolve
@@ -65,12 +65,7 @@ def is_to_be_tried(data: Data, request: Request, found: Sequence[_core.Identific
 
 def is_told_by_weak_form(data: Data, request: Request) -> bool:
     """Return whether a record is a single one in strong form, of which the weak form takes any part as well."""
-    return isinstance(request.form, StrongForm) and _is_plain(data) and data.time.size > 0
-
-
-def _is_plain(data: Data) -> bool:
-    """Return whether a record has nothing beside an angle and a torque, of which any part can be taken."""
-    return not (data.motion.recorded or data.batch or data.weights or data.clock) and data.instruments is None
+    return isinstance(request.form, StrongForm) and data.is_plain and data.time.size > 0
 
 
 def is_doubted(flags: int) -> bool:
@@ -152,27 +147,12 @@ class TriedInWeakForm(_AskedOfRecord):
     def _in_weak_form(self, some: slice) -> Identification:
         data = self.data
         kinds = {
-            name: ("constant" if kind == "constant" else _TESTED[name]) if isinstance(kind, str) else _some(kind, some)
+            name: ("constant" if kind == "constant" else _TESTED[name]) if isinstance(kind, str) else cut(kind, some)
             for name, kind in self.given.items()
         }
         asked = {**kinds, "terms": self.asked_terms, "lag": self.request.lag}
         request = resolve(WeakForm(), asked, None, 1 / data.period)
-        return self.run(replace(request, period=self.request.period), _part_of(data, some), diagnose=True)
-
-
-def _part_of(data: Data, some: slice) -> Data:
-    """Return a part of a plain record."""
-    return replace(
-        data,
-        angles=data.angles[..., some],
-        torques=data.torques[..., some],
-        time=data.time[some],
-        mask=None if data.mask is None else data.mask[..., some],
-        step=1,
-        labels=None,
-        doubts=(),
-        moved=(),
-    )
+        return self.run(replace(request, period=self.request.period), data.stretch(some), diagnose=True)
 
 
 def _busiest(torque: Any, length: int) -> slice:
@@ -185,11 +165,6 @@ def _busiest(torque: Any, length: int) -> slice:
         return float(np.subtract(*np.percentile(there, [75, 25]))) * there.size if there.size else 0.0
 
     return max(parts, key=spread)
-
-
-def _some(value: Any, some: slice) -> Any:
-    """Return a part of a known parameter, which may be one number."""
-    return value if isinstance(value, float) else value[..., some]
 
 
 @dataclass(frozen=True)
@@ -226,10 +201,10 @@ class Improvement(_AskedOfRecord):
         """Return the trial of the record, or of its busiest part where that tells as much."""
         data, length = self.data, result.settings["window_length"]
         part = max(_PART, _FUNCTIONS * length) if isinstance(length, int) else _PART
-        if _is_plain(data) and data.time.size >= 2 * part:
+        if data.is_plain and data.time.size >= 2 * part:
             some = _busiest(data.torques, part)
-            given = {name: kind if isinstance(kind, str) else _some(kind, some) for name, kind in self.given.items()}
-            identify = partial(self._identify, _part_of(data, some))
+            given = {name: kind if isinstance(kind, str) else cut(kind, some) for name, kind in self.given.items()}
+            identify = partial(self._identify, data.stretch(some))
             try:
                 found = identify(**given, terms=self.asked_terms, lag=self.request.lag, diagnose=True)
             except ValueError:

@@ -14,7 +14,7 @@ from tvident import _core
 from tvident._arguments import with_error
 from tvident._equation import BUILT_IN, COEFFICIENTS, Unknown
 from tvident._identify.columns import Columns
-from tvident._identify.data import Data
+from tvident._identify.data import Data, cut
 from tvident._identify.methods import StrongForm
 from tvident._identify.settings import Request
 from tvident._units import ROTARY
@@ -109,7 +109,7 @@ def lacking_terms(
     evaluated = Columns(terms, data.angles[..., some], data.time[some], data.period, plan, weak=False).all_samples({})
     rhs = data.torques[..., some].astype(np.float64)
     for name, value in known.items():
-        rhs = rhs - (value if isinstance(value, float) else value[..., some]) * columns[name]
+        rhs = rhs - cut(value, some) * columns[name]
     names = [name for name, term in BUILT_IN.items() if term.is_sought and name not in evaluated]
     if not any(one.name == "stiffness" for one in unknowns):
         names = [name for name in names if BUILT_IN[name].spring != "beside"]

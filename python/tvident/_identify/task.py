@@ -19,7 +19,7 @@ from tvident._identify.batch import estimates, of_windows, with_inner
 from tvident._identify.channels import constants_of
 from tvident._identify.columns import Columns, Range, fixed, secant
 from tvident._identify.criterion import criterion_of
-from tvident._identify.data import Data
+from tvident._identify.data import Data, cut
 from tvident._identify.improved import Improvement, TriedInWeakForm, is_to_be_tried, is_told_by_weak_form, of_one
 from tvident._identify.lacking import lacking_terms
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, StrongForm, exponent_of
@@ -192,9 +192,7 @@ class Task:
     def _numbers(self, found: Sequence[_core.Identification], searched: Searched) -> tuple[list[str], Told]:
         """Return the names of what the core found in every record, and the numbers by name with what is to be told of them."""
         data = self._data
-        known = {
-            name: value if isinstance(value, float) else value[..., :: data.step] for name, value in self._known.items()
-        }
+        known = {name: cut(value, slice(None, None, data.step)) for name, value in self._known.items()}
         inner = [one.full_name for one in self.inner]
         names = [*self._names, *(inner if found and len(found[0].unknowns) > len(self._names) else [])]
         batch = estimates(data.batch, names, found, known)
@@ -252,20 +250,7 @@ class Task:
         data = self._data
 
         def part(place: Any) -> Recorded:
-            def some(array: Any) -> Any:
-                return None if array is None else array[place]
-
-            some_data = replace(
-                data,
-                angles=data.angles[place],
-                torques=data.torques[place],
-                motion=data.motion.part(place, data.batch),
-                instruments=some(data.instruments),
-                mask=some(data.mask),
-                weights=None if data.weights is None else data.weights.part(place),
-                doubts=(),
-                labels=None,
-            )
+            some_data = data.of(place)
             some_used = replace(some_data, angles=used.angles[place], torques=used.torques[place])
             kinds = {name: np.asarray(kind)[place] for name, kind in found.kinds.items()}
             alone = some_data.angles.ndim == 1
@@ -285,6 +270,7 @@ class Task:
             own={term.name: fixed(term.own, term, inner) for term in self._terms if term.own is not None},
             again=partial(self._again, settings),
             scans=partial(self._scans, settings) if is_strong and data.instruments is None else None,
+            again_in=partial(self._again, settings) if data.is_plain else None,
             part=part if data.batch else None,
         )
 
@@ -302,14 +288,19 @@ class Task:
         found = form.scan(motions, kinds, lag=lags, masks=data.masks, weights=weights, workers=data.workers)
         return tuple(scan_of(one, self._names) for one in found)
 
-    def _again(self, settings: dict[str, Any], angles: npt.NDArray[np.number]) -> Identification:
-        """Identify another angle with what was chosen; its missing values are left out."""
-        data = replace(self._data, angles=angles, propagate=False, step=1)
-        return self._replayed(settings, data).run(progress=None, diagnose=False)
+    def _again(self, settings: dict[str, Any], angles: npt.NDArray[np.number], *stretch: Any) -> Identification:
+        """Identify another angle with what was chosen, or that of a stretch with what else is known; its missing values are left out."""
+        data, given = self._data, None
+        if stretch:
+            some, known = stretch
+            data = data.stretch(some)
+            given = {name: cut(value, some) for name, value in {**self._known, **known}.items()}
+        task = self._replayed(settings, replace(data, angles=angles, propagate=False, step=1), given)
+        return task.run(progress=None, diagnose=False)
 
-    def _replayed(self, settings: dict[str, Any], data: Data) -> Task:
-        """Return the task of other data with what was chosen."""
-        given: dict[str, Any] = {name: value for name, value in self._known.items() if not isinstance(value, float)}
+    def _replayed(self, settings: dict[str, Any], data: Data, known: Mapping[str, Any] | None = None) -> Task:
+        """Return the task of other data with what was chosen, and what is known of them."""
+        given = dict(known or {name: value for name, value in self._known.items() if not isinstance(value, float)})
         if settings["own_terms"]:
             given["terms"] = [(term.own or term.name, settings["kinds"][term.name]) for term in self._terms]
         has_instrument = self._data.instruments is not None

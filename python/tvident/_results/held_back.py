@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -17,6 +18,9 @@ PARTS = 10
 """The last tenth of each is held back."""
 
 _SHARE = 0.1
+
+_STRETCH, _OF_STRETCH = 1 << 15, 100
+"""Samples, and test functions, of a stretch at the end of each part: a record that is twice as long as ten of them is told by these."""
 
 _SUDDEN = 0.1
 """The share of the parts that may hold a sudden change, which no model that was fitted beside it can foresee."""
@@ -46,6 +50,9 @@ class HeldBack:
         Seconds that a test function is long: what was predicted with a longer one cannot be compared with what was with a shorter one.
     steady : float
         As `predicted`, without the tenth of the parts that are predicted worst; of a single record.
+    stretch : float
+        Seconds of each stretch at the end of a part of a long record, of which a tenth was held back in place of that of the whole part;
+        NaN of a shorter one.
     """
 
     simulated: Any = np.nan
@@ -54,6 +61,7 @@ class HeldBack:
     why_not: str = ""
     ahead: float = np.nan
     steady: float = np.nan
+    stretch: float = np.nan
 
     def words(self) -> str:
         """Return it as a line."""
@@ -66,7 +74,7 @@ class HeldBack:
         whose = " (median of all records)" if several else ""
         return (
             f"explains {simulated} of the angle simulated and {predicted} predicted one test function ahead{self._seconds()} in "
-            f"{where_held_back(self.parts)}, "
+            f"{where_held_back(self.parts, self.stretch)}, "
             f"held back from the fit{whose}"
         )
 
@@ -77,8 +85,10 @@ class HeldBack:
         return f" ({self.ahead:.3g} s)" if self.ahead >= 1 else f" ({1e3 * self.ahead:.3g} ms)"
 
 
-def where_held_back(parts: int) -> str:
-    """Return what was held back of so many parts."""
+def where_held_back(parts: int, stretch: float = np.nan) -> str:
+    """Return what was held back of so many parts, or of a stretch of so many seconds at the end of each."""
+    if np.isfinite(stretch):
+        return f"a tenth of the last {stretch:.3g} s of every tenth"
     few = {PARTS: "the last tenth of every tenth", 1: "the last tenth"}
     return few.get(parts, f"the last tenth of each of {parts} parts")
 
@@ -88,6 +98,19 @@ def parts_of(samples: int, window_length: int, most: int = PARTS) -> list[tuple[
     count = min(most, max(1, samples // (_FUNCTIONS * window_length)))
     ends = [round(samples * part / count) for part in range(count + 1)]
     return [(begin, end - max(1, round(_SHARE * (end - begin))), end) for begin, end in pairwise(ends)]
+
+
+def stretches_of(samples: int, window_length: int) -> list[slice]:
+    """Return the stretches that tell of a long record: the end of each part; none where a record is short."""
+    length = max(_STRETCH, _OF_STRETCH * window_length)
+    if samples < 2 * PARTS * length:
+        return []
+    return [slice(end - length, end) for end in (round(samples * part / PARTS) for part in range(1, PARTS + 1))]
+
+
+def part_of_stretch(length: int) -> tuple[int, int, int]:
+    """Return the part of a stretch as :func:`parts_of` does: the last but one tenth, so that both sides are known."""
+    return 0, length - 2 * round(_SHARE * length), length - round(_SHARE * length)
 
 
 def evaluated(
@@ -100,12 +123,24 @@ def evaluated(
     simulated: bool = True,
 ) -> HeldBack:
     """Return what a model that was fitted to the rest explains of the ends of the parts; if asked for, simulated as well."""
-    held = np.zeros(angle.shape[-1], bool)
+    responses = responses_of(model, angle, torque, parts, window_length, simulated=simulated)
+    return judged(angle, responses, parts, simulated=simulated)
+
+
+def responses_of(
+    model: Model,
+    angle: npt.NDArray[np.number],
+    torque: npt.NDArray[np.number],
+    parts: list[tuple[int, int, int]],
+    window_length: int,
+    *,
+    simulated: bool = True,
+) -> Iterator[npt.NDArray[np.float64]]:
+    """Return the angle that was simulated, if asked for, and the one that was predicted, at the ends of the parts."""
     pieces, whole = [], []
     # Where a term is not linear the state takes many simulations; the last ten test functions tell it.
     is_linear = set(model.values) <= {*COEFFICIENTS, OFFSET}
     for begin, first, end in parts:
-        held[first:end] = True
         before = min(window_length, first - begin)
         whole.append((begin if is_linear else max(begin, first - _FUNCTIONS * window_length), first, end))
         pieces += [(start - before, start, min(start + before, end)) for start in range(first, end, max(1, before))]
@@ -113,9 +148,23 @@ def evaluated(
     values = {name: without_gaps(value) if value.shape[-1] > 1 else value for name, value in model.values.items()}
     model = replace(model, values=values)
     # What a piece tells of its first half is no prediction: the piece before overwrites it.
-    shares, response = [], np.empty(0)
     for spans in (whole, pieces[::-1]) if simulated else (pieces[::-1],):
-        response, _ = model.respond(torque, angle=angle, spans=spans)
+        yield model.respond(torque, angle=angle, spans=spans)[0]
+
+
+def judged(
+    angle: npt.NDArray[np.number],
+    responses: Iterable[npt.NDArray[np.float64]],
+    parts: list[tuple[int, int, int]],
+    *,
+    simulated: bool = True,
+) -> HeldBack:
+    """Return what responses explain of the ends of the parts: the angle that was simulated, if it was, and the one that was predicted."""
+    held = np.zeros(angle.shape[-1], bool)
+    for _, first, end in parts:
+        held[first:end] = True
+    shares, response = [], np.empty(0)
+    for response in responses:
         share = accounted_for(angle[..., held], response[..., held])
         shares.append(share if share.ndim else float(share))
     if not np.isfinite(shares[0]).any():

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,9 @@ from tvident._equation import COEFFICIENTS
 from tvident._results.estimates import Estimates
 
 Array = npt.NDArray[np.float64]
+
+_BLOCK = 1 << 14
+"""Samples whose intermediate values stay in the cache."""
 
 
 class Oscillator:
@@ -42,26 +46,37 @@ class Oscillator:
             return np.asarray(self._damping / (2 * np.sqrt(self._stiffness * self._inertia)))
 
     def natural_frequency_error(self) -> Array:
-        with np.errstate(all="ignore"):
-            f = self.natural_frequency
-            return self._propagate({"inertia": -f / (2 * self._inertia), "stiffness": f / (2 * self._stiffness)})
+        f, inertia, stiffness = self.natural_frequency, self._inertia, self._stiffness
+        return self._propagate(
+            {
+                "inertia": lambda some: -f[some] / (2 * inertia[some]),
+                "stiffness": lambda some: f[some] / (2 * stiffness[some]),
+            }
+        )
 
     def damping_ratio_error(self) -> Array:
-        with np.errstate(all="ignore"):
-            ratio = self.damping_ratio
-            gradient = {
-                "inertia": -ratio / (2 * self._inertia),
-                "damping": 1 / (2 * np.sqrt(self._stiffness * self._inertia)),
-                "stiffness": -ratio / (2 * self._stiffness),
+        ratio, inertia, stiffness = self.damping_ratio, self._inertia, self._stiffness
+        return self._propagate(
+            {
+                "inertia": lambda some: -ratio[some] / (2 * inertia[some]),
+                "damping": lambda some: 1 / (2 * np.sqrt(stiffness[some] * inertia[some])),
+                "stiffness": lambda some: -ratio[some] / (2 * stiffness[some]),
             }
-            return self._propagate(gradient)
+        )
 
-    def _propagate(self, gradient: dict[str, Array]) -> Array:
-        """Return the standard error of a function with the given gradient: the delta method."""
-        variance = sum((slope * self._errors[name]) ** 2 for name, slope in gradient.items())
-        for pair, covariance in self._covariances.items():
-            if pair <= gradient.keys():
+    @np.errstate(all="ignore")
+    def _propagate(self, gradient: dict[str, Callable[[Any], Array]]) -> Array:
+        """Return the standard error of a function with the given gradient: the delta method, a block of samples at a time."""
+        errors = {name: self._errors[name] for name in gradient}
+        pairs = {pair: covariance for pair, covariance in self._covariances.items() if pair <= gradient.keys()}
+        result = np.empty(self._inertia.shape)
+        for first in range(0, self._inertia.shape[-1], _BLOCK):
+            some: Any = (..., slice(first, first + _BLOCK))
+            slopes = {name: slope(some) for name, slope in gradient.items()}
+            variance = sum((slope * errors[name][some]) ** 2 for name, slope in slopes.items())
+            for pair, covariance in pairs.items():
                 one, other = pair
                 factor = self._factors.get(one, 1.0) * self._factors.get(other, 1.0)
-                variance = variance + 2 * gradient[one] * gradient[other] * factor * covariance
-        return np.asarray(np.sqrt(variance))
+                variance = variance + 2 * slopes[one] * slopes[other] * factor * covariance[some]
+            result[some] = np.sqrt(variance)
+        return result

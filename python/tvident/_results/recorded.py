@@ -50,6 +50,9 @@ class Recorded:
         Tries what a result advises, and returns words that begin with what leads to the answer.
     scans : callable, optional
         Compares windows of other lengths with those that were used, in strong form.
+    again_in : callable, optional
+        Identifies a stretch once more, with the same settings, its angle, which one it is, and parameters that are known; None where a
+        stretch is no record of its own.
     """
 
     angles: Numbers
@@ -60,6 +63,7 @@ class Recorded:
     part: Callable[[Any], Recorded] | None = None
     improve: Callable[[Any, Words], Words] | None = None
     scans: Callable[[], tuple[Scan, ...]] | None = None
+    again_in: Callable[[Numbers, slice, Mapping[str, Any]], Any] | None = None
     _mark: bytes = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

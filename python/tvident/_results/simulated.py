@@ -10,8 +10,18 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._equation import OFFSET
-from tvident._results.held_back import MORE_PARTS, PARTS, HeldBack, evaluated, parts_of
+from tvident._equation import COEFFICIENTS, OFFSET
+from tvident._results.held_back import (
+    MORE_PARTS,
+    PARTS,
+    HeldBack,
+    evaluated,
+    judged,
+    part_of_stretch,
+    parts_of,
+    responses_of,
+    stretches_of,
+)
 from tvident._results.recorded import Recorded, begins_once, both_or_none, still_there
 from tvident._results.response import Model, accounted_for, every_sample
 from tvident._results.torque import POLYNOMIALS, SHORTEST, compared
@@ -191,6 +201,8 @@ class Simulated:
         """Return how much the model explains of a part of the record that it is not fitted to: the last tenth of every tenth.
 
         Parameters are identified once more without these samples, with the settings of this result, and interpolated between the others.
+        Of a long record (at 1 kHz from 11 minutes on) the same is done in a stretch at the end of every tenth, of 33 s or a hundred test
+        functions; what is not windowed can hardly follow so few of its samples, and is not identified once more.
         It is done when it is asked for first, by :meth:`summary` too, and takes about as long as to identify with ``settings=``.
 
         Returns
@@ -235,6 +247,11 @@ class Simulated:
         length = int(np.max(length)) if isinstance(length, list) and length else length
         length = ahead or length
         samples = recorded.angles.shape[-1]
+        some = stretches_of(samples, length) if ahead is None and isinstance(length, int) else []
+        if some and self._is_told_by_stretches:
+            found = self._hold_back_of(some, length)
+            if not found.why_not:
+                return found
         parts = parts_of(samples, length if isinstance(length, int) else 1, PARTS if ahead is None else MORE_PARTS)
         try:
             model = self._rest_of(parts, recorded)
@@ -242,6 +259,54 @@ class Simulated:
             return found if found.why_not else replace(found, ahead=length * model.period)
         except ValueError as error:
             return HeldBack(why_not=str(error))
+
+    @property
+    def _is_told_by_stretches(self) -> bool:
+        """Whether stretches of the record are records of their own, in which what is not windowed can be taken as known."""
+        recorded = self._recorded
+        return (
+            recorded is not None
+            and recorded.again_in is not None
+            and not self.settings["own_terms"]
+            and "angle_zero" not in self.constants
+        )
+
+    def _hold_back_of(self, stretches: list[slice], length: int) -> HeldBack:
+        """Return the same of stretches of a long record. What is not windowed can hardly follow so few samples, and is known."""
+        recorded, model = self._recorded, self._model()
+        assert recorded is not None  # noqa: S101 - asked before
+        responses, places = [], []
+        for some in stretches:
+            begin, first, end = part_of_stretch(some.stop - some.start)
+            angle = recorded.angles[some]
+            try:
+                rest = self._rest_of_stretch(some, (first, end), model)
+                found = responses_of(rest, angle, recorded.torques[some], [(begin, first, end)], length)
+                responses.append([response[first:end] for response in found])
+            except ValueError as error:
+                # So little of it is there that nothing can be identified, while the whole record tells something.
+                return HeldBack(why_not=str(error))
+            places.append(np.arange(some.start + first, some.start + end))
+        held = places[0].size
+        parts = [(start, start, start + held) for start in range(0, held * len(places), held)]
+        simulated_and_predicted = map(np.concatenate, zip(*responses, strict=True))
+        told = judged(recorded.angles[np.concatenate(places)], simulated_and_predicted, parts)
+        stretch = (stretches[0].stop - stretches[0].start) * model.period
+        return told if told.why_not else replace(told, ahead=length * model.period, stretch=stretch)
+
+    def _rest_of_stretch(self, some: slice, held: tuple[int, int], model: Model) -> Model:
+        """Return what is identified of a stretch without what is held back of it: what is windowed, and terms."""
+        recorded, kinds = self._recorded, self.settings["kinds"]
+        assert recorded is not None and recorded.again_in is not None  # noqa: S101, PT018 - asked before
+        if "windowed" not in kinds.values():
+            return replace(model, values={name: _within(value, some) for name, value in model.values.items()})
+        angle = recorded.angles[some].astype(np.float64)
+        angle[slice(*held)] = np.nan
+        values = {name: model.values[name] for name in COEFFICIENTS if kinds.get(name) != "windowed"}
+        known = {name: value if value.size > 1 else float(value[0]) for name, value in values.items()}
+        rest = recorded.again_in(angle, some, known)
+        found: Model = rest._model(rest._beside_gaps())  # noqa: SLF001 - of this class
+        return found
 
     def _rest_of(self, parts: list[tuple[int, int, int]], recorded: Recorded) -> Model:
         """Return what is identified without the ends of some parts; once for several distances that are predicted of more parts."""
@@ -320,6 +385,11 @@ class Simulated:
     def __getstate__(self) -> dict[str, Any]:
         # A record may be long, and functions of terms cannot be stored; what was found of it stays.
         return self.__dict__ | {"_recorded": None, "_rests": {}}
+
+
+def _within(value: Array, some: slice) -> Array:
+    """Return a stretch of what changes, or what is constant."""
+    return value[..., some] if value.shape[-1] > 1 else value
 
 
 def predicted_ahead(result: Simulated, ahead: int | None) -> tuple[float, float]:
