@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from typing import Literal
 
 from tvident._files.cells import Separator, is_present, number, split, without_comment
@@ -75,7 +76,8 @@ def dialect_of(lines: Sequence[str], say: Say) -> Dialect | None:
     starts = _starts(lines)
     # Single numbers are lines of numbers only where nothing separates any; of equals the first.
     several = [one for one in starts if len(one.cells) > 1]
-    start = max(several or starts, key=lambda one: one.agree, default=None) or _with_words(lines)
+    start = max(several or starts, key=lambda one: one.agree, default=None)
+    start = _with_words(lines) if start is None else replace(start, first=_back(lines, start.first, start.separator))
     if start is None:
         return None
     above = [Line(index, lines[index], start.separator) for index in range(start.first)]
@@ -110,6 +112,8 @@ def _starts(lines: Sequence[str]) -> list[_Start]:
 
     A line that none below agrees with may be a date or a number above the table: the search goes on.
     """
+    # A line is looked at from all lines above that none agrees with.
+    numbers = cache(_numbers)
     found: dict[Separator, _Start] = {}
     last = len(lines)
     for index, line in enumerate(lines):
@@ -118,23 +122,25 @@ def _starts(lines: Sequence[str]) -> list[_Start]:
         for separator in _SEPARATORS:
             if separator in found and found[separator].agree > 1:
                 continue
-            cells = _numbers(line, separator)
+            cells = numbers(line, separator)
             if not cells or _counts(cells):
                 continue
-            start = _start(lines, index, cells, separator)
-            if separator not in found or start.agree > found[separator].agree:
-                found[separator] = start
-            if start.agree > 1:
+            following = [one for one in lines[index : index + 2 * _COMPARED] if without_comment(one).strip()]
+            agree = _agreeing(cells, [numbers(one, separator) for one in following[:_COMPARED]])
+            if separator not in found or agree > found[separator].agree:
+                found[separator] = _Start(separator, index, cells, agree)
+            if agree > 1:
                 last = min(last, index + _COMPARED)
     return [found[separator] for separator in _SEPARATORS if separator in found]
 
 
-def _start(lines: Sequence[str], index: int, cells: list[str], separator: Separator) -> _Start:
-    following = [one for one in lines[index : index + 2 * _COMPARED] if without_comment(one).strip()]
+def _agreeing(cells: Sequence[str], rows: Sequence[Sequence[str]]) -> int:
+    """Return how many rows have as many cells, and times where these have times; the row itself is one of them."""
+    as_long = [row for row in rows if len(row) == len(cells)]
+    if len(as_long) == 1:
+        return 1
     here = [instant(cell) is not None for cell in cells]
-    rows = [_numbers(one, separator) for one in following[:_COMPARED]]
-    agree = sum(len(row) == len(cells) and _are_alike(here, cells, row) for row in rows)
-    return _Start(separator, _back(lines, index, separator), cells, agree)
+    return sum(_are_alike(here, cells, row) for row in as_long)
 
 
 def _are_alike(are_times: Sequence[bool], cells: Sequence[str], row: Sequence[str]) -> bool:

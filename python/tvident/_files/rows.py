@@ -146,8 +146,9 @@ class Rows:
             return None
         for sign, is_clear in ((".", _CLEARLY_POINTS), (",", _CLEARLY_DECIMAL)):
             if has[sign] and d.comma:
-                known = self._signs if is_clear.search(bare) else self._doubtful
-                known[sign] = known[sign] or self._line + 1
+                clear = is_clear.search(bare)
+                known, place = (self._doubtful, bare.index(sign)) if clear is None else (self._signs, clear.start())
+                known[sign] = known[sign] or self._line + 1 + bare.count("\n", 0, place)
         for column, kind in enumerate(d.kinds):
             if kind == "nothing" and np.isfinite(found[:, column]).any():
                 if column in self._remarks:
