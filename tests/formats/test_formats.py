@@ -16,7 +16,7 @@ from scipy.io import savemat
 import recorded_files as examples
 import tvident
 from tvident import recordings
-from tvident._files import read
+from tvident._files import printable, read, write_table
 from tvident._formats import FORMATS, matlab
 
 JOINTS = {".mcap", ".bag"}
@@ -157,6 +157,14 @@ def test_results_go_to_files_of_every_kind(tmp_path: Path) -> None:
         result.save(tmp_path / "x.ods")
     with pytest.raises(ValueError, match="at most 1048575 rows of numbers; there are 1048576"):
         tvident.FileRecording({"a": np.zeros(1 << 20)}).write(tmp_path / "long.xlsx")
+
+
+@pytest.mark.parametrize("name", ["=1+1", "=HYPERLINK(1)", "a,b", "\x1b[31mred", "two\nlines", "+x", "1"])
+def test_words_of_sheets_are_no_formulas_and_hold_nothing_that_sheets_refuse(tmp_path: Path, name: str) -> None:
+    write_table(tmp_path / "x.xlsx", {"model": np.array([name, "plain"]), name: np.ones(2)}, {})
+    rows = list(import_module("openpyxl").load_workbook(tmp_path / "x.xlsx").active)
+    assert [[cell.data_type for cell in row] for row in rows] == [["s", "s"], ["s", "n"], ["s", "n"]]
+    assert rows[0][1].value == rows[1][0].value == printable(name)
 
 
 @pytest.mark.filterwarnings("ignore")  # of libraries about each other

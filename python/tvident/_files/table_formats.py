@@ -115,12 +115,20 @@ def _variables(names: list[str]) -> dict[str, str]:
 def write_xlsx(file: IO[bytes], columns: Columns, units: Mapping[str, str]) -> None:
     """Write a sheet: names, units, then a row for every sample; a cell without a number is empty."""
     from openpyxl import Workbook  # noqa: PLC0415 - an extra
+    from openpyxl.cell import WriteOnlyCell  # noqa: PLC0415 - likewise
 
     book = Workbook(write_only=True)
     sheet = book.create_sheet("tvident")
-    sheet.append([f"{name} [{units[name]}]" if units.get(name) else name for name in columns])
+
+    def words(text: str) -> Any:
+        """Return a cell that is never computed, without characters that a sheet must not hold."""
+        cell = WriteOnlyCell(sheet, printable(text, len(text)))
+        cell.data_type = "s"
+        return cell
+
+    sheet.append([words(f"{name} [{units[name]}]" if units.get(name) else name) for name in columns])
     lists = [
-        [one if isinstance(one, str) or math.isfinite(one) else None for one in values.tolist()]
+        [words(one) if isinstance(one, str) else one if math.isfinite(one) else None for one in values.tolist()]
         for values in columns.values()
     ]
     for row in zip(*lists, strict=True):
