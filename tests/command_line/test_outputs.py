@@ -360,18 +360,23 @@ def test_names_of_channels_are_no_names_of_files_and_no_formulas(folder: Path) -
             '{"kinds": {}, "known": {}, "terms": [], "lag": 0, "quantisation": 0, "form": "weak"}',
             "of an earlier result",
         ),
-        (None, "settings must be a file"),
     ],
 )
-def test_settings_that_are_none(folder: Path, content: str | None, message: str) -> None:
-    if content is None:
-        os.mkfifo(folder / "s.json")
-    else:
-        (folder / "s.json").write_text(content)
+def test_settings_that_are_none(folder: Path, content: str, message: str) -> None:
+    (folder / "s.json").write_text(content)
     done = run(*IDENTIFY, "--settings", "s.json", cwd=folder)
     assert done.returncode in {1, 2}
     assert message in " ".join(done.stderr.split())
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("ending", [".json", ".toml", ".csv", ".npz"])
+def test_settings_are_not_waited_for_at_a_pipe(folder: Path, ending: str) -> None:
+    pipe = folder / f"pipe_of_settings{ending}"
+    os.mkfifo(pipe)
+    done = run_program(*IDENTIFY, "--settings", pipe.name, cwd=folder)
+    assert done.returncode == 1
+    assert "must be a file" in " ".join(done.stderr.split())
 
 
 def test_any_encoding_of_the_terminal_will_do(folder: Path) -> None:

@@ -27,9 +27,11 @@ def read_settings(path: str) -> dict[str, Any]:
         found: dict[str, Any] = tvident.load(path).settings
         return found
     kind = Path(path).stat()
-    if ending in TABLE_ENDINGS and not _begins_as_json(path):
+    # A pipe is not opened: that waits for who writes into it.
+    is_file = stat.S_ISREG(kind.st_mode)
+    if is_file and ending in TABLE_ENDINGS and not _begins_as_json(path):
         return settings_beside(Path(path))
-    if not stat.S_ISREG(kind.st_mode) or kind.st_size > _MOST_BYTES:
+    if not is_file or kind.st_size > _MOST_BYTES:
         raise recordings.FileError(f"{place}: settings must be a file of at most {_MOST_BYTES} bytes; {cure}")
     try:
         text = Path(path).read_text(encoding="utf-8")

@@ -70,8 +70,10 @@ def read_result(path: Path) -> tuple[dict[str, npt.NDArray[Any]], str]:
             f"{place}: a result comes back from {' or '.join(ENDINGS)}; got '{printable(path.suffix)}'; other files keep columns only, "
             "and their settings beside them: read them with tvident.read_recording"
         )
-    if not path.is_file():
+    if not path.exists():
         raise FileError(f"{place}: there is no such file; check the name and the folder")
+    if not path.is_file():
+        raise FileError(f"{place}: must be a file; it is a folder, a pipe or a device; name the file")
     try:
         named, facts = _from_npz(path) if path.suffix == ".npz" else _from_parquet(path)
     except (FileError, MemoryError, ImportError):

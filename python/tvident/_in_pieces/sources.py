@@ -236,11 +236,11 @@ def opened(path: Path) -> Source:
     place, ending = printable(path), path.suffix.lower()
     if not path.exists():
         raise FileError(f"{place}: there is no such file; check the name and the folder")
+    if ending != ".zarr" and not path.is_file():
+        raise FileError(f"{place}: must be a file; it is a folder, a pipe or a device; name the file")
     if ending not in READERS:
         known = ", ".join([*READERS, *TEXT])
         raise FileError(f"{place}: files that end in {known} are read piece by piece; got '{ending}'; convert it first")
-    if ending != ".zarr" and not path.is_file():
-        raise FileError(f"{place}: must be a file; it is a folder or a device; name the file")
     try:
         source = READERS[ending](path)
     except (FileError, ImportError):
