@@ -163,6 +163,24 @@ def test_a_link_stays_a_link_and_its_target_is_written(folder: Path) -> None:
     assert "these links lead in a circle" in refused.stderr
 
 
+@pytest.mark.parametrize("content", ['{"mine": 1}', "[1, 2]", "notes", None])
+def test_settings_beside_results_replace_settings_alone(folder: Path, content: str | None) -> None:
+    beside = folder / "x.csv.settings.json"
+    if content is None:
+        beside.mkdir()
+    else:
+        beside.write_text(content)
+    done = run(*IDENTIFY, "-o", "x.csv", cwd=folder)
+    assert done.returncode == 1
+    assert "x.csv.settings.json: settings of x.csv stand in a file of this name, and this one holds none" in done.stderr
+    rig = tvident.simulate_torsional_rig(duration=1.0, pattern="constant")
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=1000, stiffness="constant")
+    with pytest.raises(recordings.FileError, match="this one holds none; move it away"):
+        result.save(folder / "x.csv")
+    assert not (folder / "x.csv").exists()
+    assert content is None or beside.read_text() == content
+
+
 def test_a_pipe_is_written_to_and_stays_a_pipe(folder: Path) -> None:
     os.mkfifo(folder / "pipe.csv")
     refused = run(*IDENTIFY, "-o", "pipe.csv", cwd=folder)

@@ -1,6 +1,6 @@
 """Reads recordings from files and writes tables to them."""
 
-from tvident._files.beside import place_beside, settings_beside, write_settings
+from tvident._files.beside import check_beside, place_beside, settings_beside, write_settings
 from tvident._files.channels import Channels, FileError, FileWarning, channel, full_name
 from tvident._files.names import listed, printable
 from tvident._files.places import ENDINGS as TABLE_ENDINGS
@@ -23,6 +23,7 @@ __all__ = [
     "aligned",
     "channel",
     "check_apart",
+    "check_beside",
     "check_folder",
     "check_place",
     "copy_text",

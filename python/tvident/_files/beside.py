@@ -16,6 +16,9 @@ from tvident._files.replacement import replaced
 _ENDING, _LONGEST_NAME = ".settings.json", 255
 """What stands behind the name of the table, and the bytes that a name may have."""
 
+_DAMAGES = (ValueError, TypeError, KeyError, RecursionError)
+"""What is raised where a file holds something else than settings."""
+
 
 def place_beside(path: Path) -> Path | None:
     """Return where settings of a table stand; nowhere beside pipes and devices."""
@@ -23,6 +26,28 @@ def place_beside(path: Path) -> Path | None:
     if path.name == "-" or writes_through(path) or len(name.encode(errors="surrogateescape")) > _LONGEST_NAME:
         return None
     return path.with_name(name)
+
+
+def check_beside(path: Path) -> None:
+    """Check, before a table is written, that its settings replace nothing but settings.
+
+    Raises
+    ------
+    FileError
+        If what has their name is something else.
+    """
+    place = place_beside(path)
+    if place is None or not place.exists():
+        return
+    try:
+        holds_settings = place.is_file() and bool(_content(place))
+    except _DAMAGES:
+        holds_settings = False
+    if not holds_settings:
+        raise FileError(
+            f"{printable(place)}: settings of {printable(path.name)} stand in a file of this name, and this one holds none; move it away, "
+            "or write elsewhere"
+        )
 
 
 def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
@@ -55,9 +80,9 @@ def settings_beside(path: Path) -> dict[str, Any]:
             "or give a result in .npz or .parquet, which holds its own"
         )
     try:
-        content = json.loads(place.read_text(encoding="utf-8"))
-        table, digest, settings = path.with_name(content["table"]), content["sha256"], dict(content["settings"])
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        name, digest, settings = _content(place)
+        table = path.with_name(name)
+    except _DAMAGES as error:
         raise FileError(
             f"{printable(place)}: must hold settings as they stand beside results; it does not ({printable(error, 80)}); copy it again"
         ) from None
@@ -69,6 +94,12 @@ def settings_beside(path: Path) -> dict[str, Any]:
             stacklevel=3,
         )
     return settings
+
+
+def _content(place: Path) -> tuple[str, str, dict[str, Any]]:
+    """Return the name of a table, what it held, and its settings; raise one of ``_DAMAGES`` where a file does not hold these."""
+    content = json.loads(place.read_text(encoding="utf-8"))
+    return content["table"], content["sha256"], dict(content["settings"])
 
 
 def _digest(path: Path) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._files import RESULT_ENDINGS, write_settings, write_table
+from tvident._files import RESULT_ENDINGS, check_beside, write_settings, write_table
 from tvident._merged.drawn import drawn
 from tvident._merged.held_back import HeldBackTorque, held_back
 from tvident._merged.merging import Identifiable, Merging
@@ -363,5 +363,6 @@ class Reported(MergedSimulated, Telling, Tabular):
         if Path(path).suffix in RESULT_ENDINGS:
             store(Path(path), self)
         else:
+            check_beside(Path(path))
             write_table(path, self.columns(), self.units)
             write_settings(Path(path), self.settings)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._files import RESULT_ENDINGS, write_settings, write_table
+from tvident._files import RESULT_ENDINGS, check_beside, write_settings, write_table
 from tvident._results.scan import Scan
 from tvident._results.short import as_html, short
 from tvident._results.simulated import Simulated
@@ -124,6 +124,7 @@ class Shown(Simulated, Telling, Valued):
             rest = {"terms": list(self.terms), "jumps": self.jumps, "words": plain_words(self._told)}
             store(Path(path), self._table(), self._found, rest)
         else:
+            check_beside(Path(path))
             write_table(path, self.columns(), self.units)
             write_settings(Path(path), self.settings)
 
