@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 import tvident
 from commands import TVIDENT
@@ -100,6 +101,36 @@ def test_an_interrupt_where_nothing_can_be_raised_is_heard(tmp_path: Path) -> No
     (tmp_path / "a.csv").write_text("a\n1\n")
     command = [sys.executable, "-c", textwrap.dedent(script)]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=19)
+    assert (done.returncode, done.stdout, done.stderr.strip()) == (1, "", "Aborted!")
+
+
+@pytest.mark.parametrize(
+    "module",
+    [
+        "try:\n    signal.raise_signal(signal.SIGINT)\n    time.sleep(0.1)\nexcept BaseException:\n    pass",
+        "signal.raise_signal(signal.SIGINT)\ntime.sleep(20)",
+    ],
+    ids=["taken back", "long"],
+)
+def test_an_interrupt_within_an_import_is_heard_after_it_or_soon(tmp_path: Path, module: str) -> None:
+    # Modules made by Cython, as lxml's, take back what is raised while they begin.
+    (tmp_path / "imported.py").write_text(f"import signal\nimport time\n{module}\n")
+    script = """
+        import time
+        from tvident._command_line import group
+
+        class Commands:
+            def info(self, *_, **__):
+                import imported
+                time.sleep(20)
+                print("went on")
+
+        group.commands = Commands
+        group.main(["info", "a.csv"])
+    """
+    (tmp_path / "a.csv").write_text("a\n1\n")
+    command = [sys.executable, "-c", textwrap.dedent(script)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=15)
     assert (done.returncode, done.stdout, done.stderr.strip()) == (1, "", "Aborted!")
 
 
