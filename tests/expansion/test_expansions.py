@@ -248,6 +248,32 @@ def test_what_cannot_be_meant_is_refused(short: tvident.Recording, given: dict[s
 
 
 @pytest.mark.parametrize(
+    "others",
+    [{}, {"inertia": "constant", "damping": "constant"}, {"method": tvident.WeakForm(regression_window=200)}],
+    ids=["auto", "constant", "given"],
+)
+@pytest.mark.parametrize("what", ["zero", "at rest", "none", "no torque", "noise"])
+def test_nothing_is_determined_where_windows_determine_nothing(
+    short: tvident.Recording, what: str, others: dict[str, Any]
+) -> None:
+    nothing, noise = np.zeros(2000), np.random.default_rng(0).standard_normal((2, 2000))
+    angle, torque = {
+        "zero": (nothing, nothing),
+        "at rest": (nothing + 1, nothing + 2),
+        "none": (nothing * np.nan, nothing),
+        "no torque": (short.angle[:2000], nothing),
+        "noise": (1e-5 * noise[0], noise[1]),
+    }[what]
+    for expansion in (Expansion("bspline", size=4), Expansion("bspline", of=short.slider_position[:2000])):
+        result = tvident.identify(angle, torque, sample_rate=1000, stiffness=expansion, **others)
+        again = tvident.identify(angle, torque, sample_rate=1000, stiffness=expansion, settings=result.settings)
+        for one in (result, again):
+            assert np.isnan(one.stiffness).all()
+            assert not one.trusted.any()
+            assert one.summary().startswith("do not trust")
+
+
+@pytest.mark.parametrize(
     ("given", "words"), [({"size": 4}, "take 5"), ({"limits": (3, 1)}, "exchange"), ({"degree": 9}, "take 3")]
 )
 def test_an_expansion_that_cannot_be(given: dict[str, Any], words: str) -> None:

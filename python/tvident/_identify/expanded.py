@@ -56,8 +56,9 @@ class ExpandedTask:
         task = Task(whole, self._pilot_request())
         # Errors of inner parameters come with what may be missing.
         pilot = task.run(progress, diagnose=bool(task.inner))
-        if not isinstance(pilot.settings["window_length"], int) or not isinstance(pilot.settings["exponent"], int):
-            return pilot  # nothing could be determined, and its status says so
+        chosen = all(isinstance(pilot.settings[name], int) for name in ("window_length", "exponent"))
+        if not chosen or _determines_nothing(pilot):
+            return pilot  # its status says so
         given = ExpandedInputs(self._data, self._request, self._expansions, task, pilot)
         search = SizeSearch(given.record, given.parts, given.noise, given.known)
         unknowns, fitted, around = search.run(given.start, given.start_of_terms)
@@ -197,3 +198,9 @@ def with_expansions(request: Request, expansions: Mapping[str, Expansion]) -> Re
         name = getattr(term[0], "name", term[0]) if pair else term
         terms.append((term[0], expansions[name]) if pair and name in expansions else term)
     return replace(request, parameters=parameters, terms=terms)
+
+
+def _determines_nothing(pilot: Identification) -> bool:
+    """Return whether a record says nothing of any parameter: windows have no numbers, and that is the whole record's."""
+    is_deficient = Status.RANK_DEFICIENT in Status(int(np.asarray(pilot.record_status)))
+    return is_deficient and bool(np.all(np.asarray(pilot.status) & int(Status.INVALID)))
