@@ -193,6 +193,8 @@ CORNERS = [
             ("correlated", 'covariance="hac"', _regression(covariance="hac")),
             ("half-life-5", "half_life=50, five regressors", _regression(5, alignment="trailing", half_life=50)),
             ("correlated-5", 'covariance="hac", five regressors', _regression(5, covariance="hac")),
+            ("half-life-8", "half_life=50, eight regressors", _regression(8, alignment="trailing", half_life=50)),
+            ("correlated-8", 'covariance="hac", eight regressors', _regression(8, covariance="hac")),
         )
     ),
     Row("irregular", "`identify(t=)`, steps that scatter by 0.3 of a step", "uniform times", _irregular, most=6),

@@ -9,21 +9,20 @@ use std::num::NonZeroUsize;
 use std::ops::Range;
 
 use crate::error::Error;
-use crate::exec::huge_pages::zeros;
 use crate::exec::pool::{Piece, Watch};
 use crate::exec::stages::Stages;
+use crate::lanes::output::split_off;
 use crate::least_squares::bandwidth::{Bandwidth, Neighbours};
 use crate::least_squares::error_scale::ErrorScale;
-use crate::least_squares::givens_factor::MOST_REGRESSORS;
+use crate::least_squares::givens_factor::{MOST_PAIRS, MOST_REGRESSORS};
 use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares};
+use crate::least_squares::rounds::{Lender, Lent, Rounds, SomeWindows};
 use crate::least_squares::row_products::{RowProducts, multiply, pairs, side_by_side};
 use crate::least_squares::sliding_sums::{begin, slide, sliding_sums};
 use crate::record::subsample::stretches;
+use crate::simd::aligned::Aligned;
 use crate::simd::vectors::{Kernel, Lanes, MOST_LANES, dispatch};
 use crate::status::Status;
-
-/// Rows in a piece of work, about: what is kept of them stays in the second nearest cache.
-const PIECE: usize = 3 << 11;
 
 /// Rows of which the correlation of the residuals is learnt: it is known to a few thousandths then.
 const LEARNT_OF: usize = 1 << 17;
@@ -37,42 +36,52 @@ impl RollingLeastSquares {
     pub fn run_correlated(
         mut self,
         equations: &Equations<'_>,
-        mut regressions: Regressions<'_>,
+        regressions: Regressions<'_>,
         lags: Option<usize>,
         workers: NonZeroUsize,
         watch: &mut Watch<'_>,
     ) -> Result<usize, Error> {
-        let rows = equations.columns.first().map_or(0, |column| column.len());
-        let pairs = self.regressors * (self.regressors - 1) / 2;
-        // One array: every one of its own has small pages at its ends, which cost as much as a tenth of the work.
-        let mut normal = zeros(pairs.saturating_mul(rows))?;
+        let total = equations.columns.first().map_or(0, |column| column.len());
         self.normal = true;
-        let mut stages = Stages::new(workers, rows, 2, watch);
-        let mut inner = regressions.reborrow();
-        inner.normal = normal.chunks_exact_mut(rows.max(1)).collect();
-        stages.stage(|watch| self.run(equations, inner, workers, watch))?;
-        let normal: Vec<&[f64]> = normal.chunks_exact(rows.max(1)).collect();
-        let Regressions { parameters, errors, status, .. } = &mut regressions;
-        let (q, mut most) = (self.rhs_count, 0);
-        for rhs in 0..q {
-            let fits = Fits {
-                plan: &self,
-                equations,
-                rhs,
-                parameters: parameters.iter().skip(rhs).step_by(q).map(|values| &**values).collect(),
-                normal: &normal,
-                status,
-            };
-            let bandwidth = match lags {
-                Some(lags) => Bandwidth::given(lags + 1, self.regressors),
-                None => fits.bandwidth(&mut stages)?,
-            };
-            most = most.max(bandwidth.rows - 1);
-            let errors = errors.iter_mut().skip(rhs).step_by(q).map(|values| &mut **values).collect();
-            fits.run(&bandwidth, errors, &mut stages)?;
+        let mut rounds = Rounds::new(&self, equations, regressions, workers)?;
+        let all = rounds.all(workers);
+        let mut stages = Stages::new(workers, total, all.len() * (1 + self.rhs_count), watch);
+        let bandwidths = match lags {
+            Some(lags) => vec![Bandwidth::given(lags + 1, self.regressors); self.rhs_count],
+            None => self.bandwidths(equations, &mut rounds, total, &mut stages)?,
+        };
+        let scratch = Lender::new();
+        for round in all {
+            rounds.solve(&self.needed_by(&rounds.rows_of(&round)), &mut stages)?;
+            for (rhs, bandwidth) in bandwidths.iter().enumerate() {
+                let (fits, errors) = Fits::of(&self, equations, rhs, &mut rounds.regressions);
+                fits.run(bandwidth, &rounds.pieces[round.clone()], errors, &scratch, &mut stages)?;
+            }
+            rounds.forget(round);
         }
         stages.finish()?;
-        Ok(most)
+        Ok(bandwidths.iter().map(|bandwidth| bandwidth.rows - 1).max().unwrap_or(0))
+    }
+
+    /// Over how many rows the residuals of every right-hand side are correlated, as stretches of the record show.
+    fn bandwidths(
+        &self,
+        equations: &Equations<'_>,
+        rounds: &mut Rounds<'_, '_>,
+        total: usize,
+        stages: &mut Stages<'_, '_>,
+    ) -> Result<Vec<Bandwidth>, Error> {
+        let some: Vec<Range<usize>> = stretches(total, LEARNT_OF.max(8 * self.window), 8).collect();
+        for rows in &some {
+            rounds.solve(&self.needed_by(rows), stages)?;
+        }
+        let of_rhs = |rhs| Fits::of(self, equations, rhs, &mut rounds.regressions).0.bandwidth(&some, stages);
+        (0..self.rhs_count).map(of_rhs).collect()
+    }
+
+    /// The windows around these rows are needed for the errors of windows around some rows, beside those before.
+    fn needed_by(&self, rows: &Range<usize>) -> Range<usize> {
+        rows.start.saturating_sub(2 * self.window)..rows.end + 2 * self.window
     }
 }
 
@@ -82,8 +91,6 @@ struct Fits<'a> {
     equations: &'a Equations<'a>,
     rhs: usize,
     parameters: Vec<&'a [f64]>,
-    /// What is above the diagonal of the inverse of every window's normal matrix, row by row; the diagonal is where errors are to be.
-    normal: &'a [&'a [f64]],
     status: &'a [u16],
 }
 
@@ -92,9 +99,24 @@ struct Fits<'a> {
 struct Scratch {
     products: RowProducts,
     /// Sums of neighbouring rows, then of the products of each pair of these: the sums of one block, and the suffixes of the next.
-    neighbours: Vec<f64>,
-    here: Vec<f64>,
-    next: Vec<f64>,
+    neighbours: Aligned,
+    here: Aligned,
+    next: Aligned,
+}
+
+impl<'a> Fits<'a> {
+    /// These of one right-hand side, and where their errors are to be: now the diagonals of the inverses of normal matrices are there.
+    fn of(
+        plan: &'a RollingLeastSquares,
+        equations: &'a Equations<'a>,
+        rhs: usize,
+        regressions: &'a mut Regressions<'_>,
+    ) -> (Self, Vec<&'a mut [f64]>) {
+        let Regressions { parameters, errors, status, .. } = regressions;
+        let parameters = parameters.iter().skip(rhs).step_by(plan.rhs_count).map(|values| &**values).collect();
+        let errors = errors.iter_mut().skip(rhs).step_by(plan.rhs_count).map(|values| &mut **values).collect();
+        (Self { plan, equations, rhs, parameters, status }, errors)
+    }
 }
 
 impl Fits<'_> {
@@ -146,16 +168,17 @@ impl Fits<'_> {
         rows.map(nearest).collect()
     }
 
-    /// The products of some rows; those outside of the record are zero.
+    /// The products of some rows; those outside of the record, and those that are not before an end, are zero.
     #[inline(always)]
     fn products<S: Lanes, const N: usize, const R: usize>(
         &self,
         simd: S,
         range: Range<isize>,
+        end: usize,
         products: &mut RowProducts,
     ) {
-        let (p, total) = (if R == 0 { self.plan.regressors } else { R }, self.rows());
-        let clamp = |row: isize| row.clamp(0, total.cast_signed()).unsigned_abs();
+        let p = if R == 0 { self.plan.regressors } else { R };
+        let clamp = |row: isize| row.clamp(0, end.min(self.rows()).cast_signed()).unsigned_abs();
         let rows = clamp(range.start)..clamp(range.end);
         let (length, count) = ((range.end - range.start).max(0).unsigned_abs(), rows.len());
         let RowProducts { first, values, counts, columns } = products;
@@ -200,11 +223,9 @@ impl Fits<'_> {
         counts[places.end + 1..].fill(all);
     }
 
-    /// Over how many rows residuals are correlated, as stretches of the record show.
-    fn bandwidth(&self, stages: &mut Stages<'_, '_>) -> Result<Bandwidth, Error> {
-        let pieces = stretches(self.rows(), LEARNT_OF.max(8 * self.plan.window), 8)
-            .map(|rows| Piece { size: rows.len(), content: rows })
-            .collect();
+    /// Over how many rows residuals are correlated, as some rows show.
+    fn bandwidth(&self, some: &[Range<usize>], stages: &mut Stages<'_, '_>) -> Result<Bandwidth, Error> {
+        let pieces = some.iter().map(|rows| Piece { size: rows.len(), content: rows.clone() }).collect();
         let p = self.plan.regressors;
         let of_rows = |rows: Range<usize>, products: &mut RowProducts| {
             dispatch(self.plan.instructions, Correlations { fits: self, rows, products })
@@ -217,21 +238,33 @@ impl Fits<'_> {
         Ok(Bandwidth::of(&all, self.plan.window))
     }
 
-    /// Writes the standard errors of every regressor.
-    fn run(&self, bandwidth: &Bandwidth, errors: Vec<&mut [f64]>, stages: &mut Stages<'_, '_>) -> Result<(), Error> {
-        let block = self.plan.window - bandwidth.rows + 1;
-        let size = PIECE.max(8 * block);
-        let (mut pieces, mut rest) = (Vec::new(), errors);
-        for first in (0..self.rows()).step_by(size) {
-            let rows = first..self.rows().min(first + size);
-            let part: Vec<&mut [f64]> =
-                rest.iter_mut().filter_map(|values| values.split_off_mut(..rows.len())).collect();
-            pieces.push(Piece { size: rows.len(), content: (rows, part) });
+    /// Writes the standard errors of every regressor, for the windows of some pieces.
+    fn run(
+        &self,
+        bandwidth: &Bandwidth,
+        windows: &[SomeWindows],
+        mut errors: Vec<&mut [f64]>,
+        scratch: &Lender<Scratch>,
+        stages: &mut Stages<'_, '_>,
+    ) -> Result<(), Error> {
+        let (mut pieces, mut done) = (Vec::new(), 0);
+        for some in windows {
+            let rows = some.rows.clone();
+            let part = errors.iter_mut().map(|values| {
+                split_off(values, rows.start - done);
+                split_off(values, rows.len())
+            });
+            let part = part.collect();
+            done = rows.end;
+            pieces.push(Piece { size: rows.len(), content: (some, part) });
         }
-        let work = |(rows, part): (Range<usize>, Vec<&mut [f64]>), scratch: &mut Scratch| {
-            dispatch(self.plan.instructions, Sandwich { fits: self, bandwidth, rows, errors: part, scratch });
+        let work = |(some, errors): (&SomeWindows, Vec<&mut [f64]>), lent: &mut Lent<'_, Scratch>| {
+            let scratch = lent.get();
+            let normal = some.normal();
+            let rows = some.rows.clone();
+            dispatch(self.plan.instructions, Sandwich { fits: self, bandwidth, rows, normal, errors, scratch });
         };
-        stages.map(pieces, Scratch::default, work)?;
+        stages.map(pieces, || scratch.lend(Scratch::default), work)?;
         Ok(())
     }
 }
@@ -263,7 +296,7 @@ impl Correlations<'_, '_, '_> {
     #[inline(always)]
     fn run_with<S: Lanes, const N: usize, const R: usize>(self, simd: S) -> Vec<Neighbours> {
         let Self { fits, rows, products } = self;
-        fits.products::<S, N, R>(simd, rows.start.cast_signed()..rows.end.cast_signed(), products);
+        fits.products::<S, N, R>(simd, rows.start.cast_signed()..rows.end.cast_signed(), rows.end, products);
         let mut sums: [Neighbours; N] = std::array::from_fn(|_| Neighbours::default());
         for rows in products.values.as_chunks::<N>().0[..rows.len()].windows(2) {
             for (regressor, sums) in sums.iter_mut().enumerate() {
@@ -279,6 +312,8 @@ struct Sandwich<'a, 'b, 'c> {
     fits: &'a Fits<'b>,
     bandwidth: &'a Bandwidth,
     rows: Range<usize>,
+    /// What is above the diagonals of the inverses of their normal matrices.
+    normal: Vec<&'c [f64]>,
     errors: Vec<&'c mut [f64]>,
     scratch: &'c mut Scratch,
 }
@@ -296,7 +331,8 @@ impl Kernel for Sandwich<'_, '_, '_> {
             4 => self.run_with::<S, 4, 12, 4>(simd),
             5 => self.run_with::<S, 8, 16, 5>(simd),
             6 => self.run_with::<S, 8, 24, 6>(simd),
-            ..=8 => self.run_with::<S, 8, 40, 0>(simd),
+            7 => self.run_with::<S, 8, 32, 7>(simd),
+            8 => self.run_with::<S, 8, 40, 8>(simd),
             _ => self.run_with::<S, 16, 136, 0>(simd),
         }
     }
@@ -305,7 +341,7 @@ impl Kernel for Sandwich<'_, '_, '_> {
 impl Sandwich<'_, '_, '_> {
     #[inline(always)]
     fn run_with<S: Lanes, const N: usize, const P: usize, const R: usize>(self, simd: S) {
-        let Self { fits, bandwidth, rows, mut errors, scratch } = self;
+        let Self { fits, bandwidth, rows, normal, mut errors, scratch } = self;
         let p = if R == 0 { fits.plan.regressors } else { R };
         let Scratch { products, neighbours, here, next } = scratch;
         let (correlated, length) = (bandwidth.rows, fits.plan.window - bandwidth.rows + 1);
@@ -317,7 +353,9 @@ impl Sandwich<'_, '_, '_> {
         let end = of_block(first + rows.len().cast_signed(), length) + 2 * length.cast_signed();
         let count = (end - from_neighbours).unsigned_abs().next_multiple_of(correlated);
         let until = from_neighbours + (count + correlated).cast_signed();
-        fits.products::<S, N, R>(simd, from_neighbours..until, products);
+        // Of rows after the last window nothing is asked, and nothing may be known.
+        let known = rows.end - 1 + fits.plan.window - fits.plan.before;
+        fits.products::<S, N, R>(simd, from_neighbours..until, known, products);
         let of_rows = products.values.as_chunks::<N>().0;
         let neighbours = if correlated == 1 {
             &of_rows[..count]
@@ -330,7 +368,7 @@ impl Sandwich<'_, '_, '_> {
         let [mut here, mut next] = [here, next].map(|vectors| side_by_side::<P>(vectors, length));
         let of_pairs = |row: &[f64; N]| pairs::<N, P>(p, row);
         begin(&neighbours[..length], of_pairs, next);
-        let scale = ErrorScale::new(fits.plan, fits.normal, fits.rows(), bandwidth);
+        let scale = ErrorScale::new(fits.plan, fits.rows(), bandwidth);
         let counts = (products.first, &*products.counts);
         let skipped = (first - from).unsigned_abs();
         for (block, after) in neighbours[length..].chunks_exact(length).enumerate() {
@@ -346,7 +384,9 @@ impl Sandwich<'_, '_, '_> {
             let sums = &here[wanted.start - block * length..wanted.end - block * length];
             let mut into: [&mut [f64]; MOST_REGRESSORS] = Default::default();
             into.iter_mut().zip(&mut errors).for_each(|(into, errors)| *into = &mut errors[done.clone()]);
-            scale.write::<S, P, R>(simd, some_rows, sums, counts, &mut into[..p]);
+            let mut between: [&[f64]; MOST_PAIRS] = [&[]; MOST_PAIRS];
+            between.iter_mut().zip(&normal).for_each(|(between, normal)| *between = &normal[done.clone()]);
+            scale.write::<S, N, P, R>(simd, some_rows, sums, counts, &between, &mut into[..p]);
         }
     }
 }

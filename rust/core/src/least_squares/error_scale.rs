@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::least_squares::bandwidth::Bandwidth;
 use crate::least_squares::plan::RollingLeastSquares;
+use crate::simd::aligned::OnLines;
 use crate::simd::vectors::{Lanes, MOST_LANES};
 
 /// Windows that are finished together.
@@ -15,8 +16,6 @@ const LEAST_LEFT: f64 = 0.05;
 /// Makes standard errors of the sums over windows.
 pub(crate) struct ErrorScale<'a> {
     plan: &'a RollingLeastSquares,
-    /// What is above the diagonal of the inverse of every window's normal matrix, row by row; the diagonal is where errors are to be.
-    normal: &'a [&'a [f64]],
     /// Rows of the record.
     total: usize,
     correlated: f64,
@@ -29,31 +28,27 @@ pub(crate) struct ErrorScale<'a> {
 
 impl<'a> ErrorScale<'a> {
     #[inline(always)]
-    pub(crate) fn new(
-        plan: &'a RollingLeastSquares,
-        normal: &'a [&'a [f64]],
-        total: usize,
-        bandwidth: &Bandwidth,
-    ) -> Self {
+    pub(crate) fn new(plan: &'a RollingLeastSquares, total: usize, bandwidth: &Bandwidth) -> Self {
         let kept: Vec<f64> = bandwidth.kept.iter().map(|kept| kept.sqrt().recip()).collect();
         let of_pair = |i: usize, k: usize| kept[i] * kept[k] * if i == k { 1.0 } else { 2.0 };
         let factors =
             (0..kept.len()).flat_map(|i| (i..kept.len()).map(move |k| (i, k))).map(|(i, k)| of_pair(i, k)).collect();
-        let scale = Self { plan, normal, total, correlated: bandwidth.rows as f64, factors, whole: 0.0 };
+        let scale = Self { plan, total, correlated: bandwidth.rows as f64, factors, whole: 0.0 };
         let rows = plan.window as f64;
         Self { whole: scale.of(rows, 0.0, rows), ..scale }
     }
 
     /// Writes the errors of some windows, where the diagonals of their normal matrices are, from the sums of the products of each pair, of
-    /// which `P` stand side by side. `counts` are the rows that count before each row from a first one on. There are `R` regressors, or zero
-    /// where the compiler does not know how many.
+    /// which `P` stand side by side. `normal` is above the diagonals of the normal matrices, row by row, and `counts` are the rows that count before each row from a first one on. There are `R` regressors, or up
+    /// to `N` where that is zero: then the compiler does not know how many.
     #[inline(always)]
-    pub(crate) fn write<S: Lanes, const P: usize, const R: usize>(
+    pub(crate) fn write<S: Lanes, const N: usize, const P: usize, const R: usize>(
         &self,
         simd: S,
         rows: Range<usize>,
         sums: &[[f64; P]],
         counts: (isize, &[u32]),
+        normal: &[&[f64]],
         errors: &mut [&mut [f64]],
     ) {
         let mut scales = [0.0; TILE];
@@ -61,12 +56,12 @@ impl<'a> ErrorScale<'a> {
             let scales = &mut scales[..sums.len()];
             self.of_windows(first, counts, scales);
             for (place, sums) in (0..).step_by(S::F64_LANES).zip(sums.chunks(S::F64_LANES)) {
-                let (row, scales) = (first + place, &scales[place..]);
-                let into = (row - rows.start, &mut *errors);
+                let scales = &scales[place..];
+                let into = (first + place - rows.start, normal, &mut *errors);
                 if sums.len() == S::F64_LANES {
-                    self.write_some::<S, P, R, true>(simd, row, sums, scales, into);
+                    self.write_some::<S, N, P, R, true>(simd, sums, scales, into);
                 } else {
-                    self.write_some::<S, P, R, false>(simd, row, sums, scales, into);
+                    self.write_some::<S, N, P, R, false>(simd, sums, scales, into);
                 }
             }
         }
@@ -74,50 +69,49 @@ impl<'a> ErrorScale<'a> {
 
     /// The same for as many windows as a vector holds, or fewer.
     #[inline(always)]
-    fn write_some<S: Lanes, const P: usize, const R: usize, const FULL: bool>(
+    fn write_some<S: Lanes, const N: usize, const P: usize, const R: usize, const FULL: bool>(
         &self,
         simd: S,
-        row: usize,
         sums: &[[f64; P]],
         scales: &[f64],
-        (place, errors): (usize, &mut [&mut [f64]]),
+        (place, normal, errors): (usize, &[&[f64]], &mut [&mut [f64]]),
     ) {
         let (p, count) = (if R == 0 { self.plan.regressors } else { R }, sums.len());
         let some = |numbers: &[f64]| {
             if FULL { simd.load(numbers, 0) } else { simd.partial_load_f64s(&numbers[..count]) }
         };
-        let mut of_pairs = [simd.splat_f64s(0.0); P];
-        turn(simd, sums, &mut of_pairs);
-        for (sum, &factor) in of_pairs.iter_mut().zip(&self.factors) {
+        let mut of_pairs = OnLines([simd.splat_f64s(0.0); P]);
+        turn(simd, sums, &mut of_pairs.0);
+        for (sum, &factor) in of_pairs.0.iter_mut().zip(&self.factors) {
             *sum = simd.mul_f64s(*sum, simd.splat_f64s(factor));
         }
-        // By pair of regressors, as the sums are.
-        let (mut of_normal, mut above, mut place_of) = ([simd.splat_f64s(0.0); P], 0, 0);
-        for (i, errors) in errors[..p].iter().enumerate() {
-            for k in i..p {
-                of_normal[place_of] = if i == k {
-                    some(&errors[place..])
-                } else {
-                    above += 1;
-                    some(&self.normal[above - 1][row..])
-                };
-                place_of += 1;
+        let mut of_normal = OnLines([[simd.splat_f64s(0.0); N]; N]);
+        let mut above = normal.iter();
+        for i in 0..p {
+            of_normal[i][i] = some(&errors[i][place..]);
+            for (k, column) in (i + 1..p).zip(&mut above) {
+                let one = some(&column[place..]);
+                (of_normal[i][k], of_normal[k][i]) = (one, one);
             }
         }
-        let pair = |i: usize, k: usize| i.min(k) * (2 * p - i.min(k) - 1) / 2 + i.max(k);
-        let scale = some(scales);
-        for a in 0..p {
-            let mut variance = simd.splat_f64s(0.0);
-            for b in 0..p {
-                let mut inner = simd.splat_f64s(0.0);
-                for c in b..p {
-                    inner = simd.mul_add_f64s(of_pairs[pair(b, c)], of_normal[pair(a, c)], inner);
+        // The innermost loops run over the parameters, which do not wait for each other.
+        let (mut variances, mut of_pair) = (OnLines([simd.splat_f64s(0.0); N]), of_pairs.0.iter());
+        for b in 0..p {
+            let mut inner = OnLines([simd.splat_f64s(0.0); N]);
+            for (c, &sum) in (b..p).zip(&mut of_pair) {
+                for a in 0..p {
+                    inner[a] = simd.mul_add_f64s(sum, of_normal[c][a], inner[a]);
                 }
-                variance = simd.mul_add_f64s(inner, of_normal[pair(a, b)], variance);
             }
+            for a in 0..p {
+                variances[a] = simd.mul_add_f64s(inner[a], of_normal[b][a], variances[a]);
+            }
+        }
+        let scale = some(scales);
+        for (errors, &variance) in errors[..p].iter_mut().zip(&variances.0) {
             // Where there are no parameters the diagonal is NaN, and so is the error.
             let error = simd.sqrt_f64s(simd.mul_f64s(scale, variance));
-            let into = &mut errors[a][place..];
+            let into = &mut errors[place..];
             if FULL {
                 simd.store(into, 0, error);
             } else {

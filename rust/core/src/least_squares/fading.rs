@@ -98,40 +98,44 @@ pub(crate) fn merge<S: Lanes, H: Dimensions>(
 }
 
 /// What the squared residuals are divided by for the variance of the noise. The variances of the parameters over it are left in the places
-/// of the weights of `normal`, which is scratch memory.
+/// of the weights of `variances`.
 #[inline(always)]
 pub(crate) fn freedom<S: Lanes, H: Dimensions>(
     simd: S,
     shape: H,
     inverse: &H::Factor<S::f64s>,
     sums: &H::Factor<S::f64s>,
-    normal: &mut H::Factor<S::f64s>,
+    variances: &mut H::Factor<S::f64s>,
 ) -> S::f64s {
     let p = shape.regressors();
+    let mut normal = shape.square(simd.splat_f64s(0.0));
     let mut trace = simd.splat_f64s(0.0);
     for i in 0..p {
         for k in i..p {
-            let entry = shape.entry(i, k);
-            normal[entry] = covariance(simd, shape, inverse, i, k);
+            let one = covariance(simd, shape, inverse, i, k);
+            (normal[i * p + k], normal[k * p + i]) = (one, one);
             let twice = simd.splat_f64s(if i == k { 1.0 } else { 2.0 });
-            trace = simd.mul_add_f64s(simd.mul_f64s(normal[entry], twice), sums[entry], trace);
+            trace = simd.mul_add_f64s(simd.mul_f64s(one, twice), sums[shape.entry(i, k)], trace);
         }
     }
-    let at = |i: usize, k: usize| shape.entry(i.min(k), i.max(k));
-    let mut variances = [simd.splat_f64s(0.0); MOST_REGRESSORS];
-    for (i, variance) in variances[..p].iter_mut().enumerate() {
-        for a in 0..p {
-            // What is off the diagonal counts twice.
-            let mut sum = simd.splat_f64s(0.0);
-            for b in a + 1..p {
-                sum = simd.mul_add_f64s(sums[shape.entry(a, b)], normal[at(b, i)], sum);
+    // The innermost loops run over the parameters, which do not wait for each other.
+    let mut inner = [simd.splat_f64s(0.0); MOST_REGRESSORS];
+    for a in 0..p {
+        inner[..p].fill(simd.splat_f64s(0.0));
+        for b in a + 1..p {
+            let sum = sums[shape.entry(a, b)];
+            for i in 0..p {
+                inner[i] = simd.mul_add_f64s(sum, normal[b * p + i], inner[i]);
             }
-            sum = simd.mul_add_f64s(sums[shape.entry(a, a)], normal[at(a, i)], simd.add_f64s(sum, sum));
-            *variance = simd.mul_add_f64s(normal[at(a, i)], sum, *variance);
         }
-    }
-    for (i, variance) in variances[..p].iter().enumerate() {
-        normal[shape.row(i)] = *variance;
+        let sum = sums[shape.entry(a, a)];
+        for i in 0..p {
+            // What is off the diagonal counts twice.
+            let twice = simd.add_f64s(inner[i], inner[i]);
+            let whole = simd.mul_add_f64s(sum, normal[a * p + i], twice);
+            let variance = &mut variances[shape.row(i)];
+            *variance = simd.mul_add_f64s(normal[a * p + i], whole, *variance);
+        }
     }
     simd.sub_f64s(sums[shape.row(p)], trace)
 }

@@ -6,6 +6,7 @@
 
 use std::ops::IndexMut;
 
+use crate::simd::aligned::OnLines;
 use crate::simd::vectors::Lanes;
 
 /// The initial weight of a column, so that no division is by zero. Squares of samples that matter are far above it.
@@ -17,16 +18,25 @@ const UNDETERMINED: f64 = 1e-290;
 /// The most regressors a problem may have.
 pub(crate) const MOST_REGRESSORS: usize = 16;
 
+/// The most pairs of different regressors.
+pub(crate) const MOST_PAIRS: usize = MOST_REGRESSORS * (MOST_REGRESSORS - 1) / 2;
+
 /// Number of regressors and right-hand sides, known at compile time or not.
 pub(crate) trait Dimensions: Copy + Send + Sync {
     /// The numbers of one factor, as many as [`Dimensions::size`].
     type Factor<V: Copy>: Clone + IndexMut<usize, Output = V>;
+
+    /// Numbers of a square matrix by regressors.
+    type Square<V: Copy>: IndexMut<usize, Output = V>;
 
     fn regressors(self) -> usize;
     fn rhs_count(self) -> usize;
 
     /// A factor full of one value.
     fn factor<V: Copy>(self, value: V) -> Self::Factor<V>;
+
+    /// A square full of one value.
+    fn square<V: Copy>(self, value: V) -> Self::Square<V>;
 
     /// Numbers in a factor: for each regressor its weight, the rest of its row of `U` and its right-hand sides; then the residual
     /// sums of squares.
@@ -63,7 +73,8 @@ pub(crate) struct Many {
 macro_rules! few {
     ($($regressors:literal has $size:literal),*) => {$(
         impl Dimensions for Few<$regressors> {
-            type Factor<V: Copy> = [V; $size];
+            type Factor<V: Copy> = OnLines<V, $size>;
+            type Square<V: Copy> = OnLines<V, { $regressors * $regressors }>;
 
             #[inline(always)]
             fn regressors(self) -> usize {
@@ -76,16 +87,22 @@ macro_rules! few {
             }
 
             #[inline(always)]
-            fn factor<V: Copy>(self, value: V) -> [V; $size] {
-                [value; $size]
+            fn factor<V: Copy>(self, value: V) -> OnLines<V, $size> {
+                OnLines([value; $size])
+            }
+
+            #[inline(always)]
+            fn square<V: Copy>(self, value: V) -> Self::Square<V> {
+                OnLines([value; $regressors * $regressors])
             }
         }
     )*};
 }
-few!(1 has 3, 2 has 6, 3 has 10, 4 has 15);
+few!(1 has 3, 2 has 6, 3 has 10, 4 has 15, 5 has 21, 6 has 28, 7 has 36, 8 has 45);
 
 impl Dimensions for Many {
     type Factor<V: Copy> = Vec<V>;
+    type Square<V: Copy> = Vec<V>;
 
     fn regressors(self) -> usize {
         self.regressors
@@ -97,6 +114,10 @@ impl Dimensions for Many {
 
     fn factor<V: Copy>(self, value: V) -> Vec<V> {
         vec![value; self.size()]
+    }
+
+    fn square<V: Copy>(self, value: V) -> Vec<V> {
+        vec![value; self.regressors * self.regressors]
     }
 }
 

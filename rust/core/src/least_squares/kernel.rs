@@ -281,9 +281,9 @@ pub(crate) fn finish<S: Lanes, H: Dimensions>(
     let mut faded = None;
     // No closure: a large one is compiled on its own, without the instructions that were chosen.
     if let Some(sums) = &summary.sums {
-        let mut normal = shape.factor(simd.splat_f64s(0.0));
-        freedom = simd.div_f64s(simd.splat_f64s(1.0), fading::freedom(simd, shape, values, sums, &mut normal));
-        faded = Some(normal);
+        let mut variances = shape.factor(simd.splat_f64s(0.0));
+        freedom = simd.div_f64s(simd.splat_f64s(1.0), fading::freedom(simd, shape, values, sums, &mut variances));
+        faded = Some(variances);
     }
     if plan.normal {
         let pairs = (0..p).flat_map(|i| (i + 1..p).map(move |k| (i, k)));

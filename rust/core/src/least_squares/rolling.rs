@@ -94,6 +94,10 @@ impl RollingLeastSquares {
                 (2, 1) => self.solve_blocks(Few::<2>, run, equations, scratch, outputs, go_on),
                 (3, 1) => self.solve_blocks(Few::<3>, run, equations, scratch, outputs, go_on),
                 (4, 1) => self.solve_blocks(Few::<4>, run, equations, scratch, outputs, go_on),
+                (5, 1) => self.solve_blocks(Few::<5>, run, equations, scratch, outputs, go_on),
+                (6, 1) => self.solve_blocks(Few::<6>, run, equations, scratch, outputs, go_on),
+                (7, 1) => self.solve_blocks(Few::<7>, run, equations, scratch, outputs, go_on),
+                (8, 1) => self.solve_blocks(Few::<8>, run, equations, scratch, outputs, go_on),
                 (regressors, rhs_count) => {
                     self.solve_blocks(Many { regressors, rhs_count }, run, equations, scratch, outputs, go_on);
                 }

@@ -1,6 +1,7 @@
 //! Regressors times the residuals of rows, and the products of each pair of these, as standard errors of correlated residuals need them.
 
 use crate::record::samples::LARGEST;
+use crate::simd::aligned::Aligned;
 use crate::simd::vectors::{Lanes, MOST_LANES};
 
 /// Regressors times residuals of some rows, side by side, zero where there are none.
@@ -8,7 +9,7 @@ use crate::simd::vectors::{Lanes, MOST_LANES};
 pub(crate) struct RowProducts {
     pub(crate) first: isize,
     /// Whole vectors of numbers a row, of which the first are those of its regressors.
-    pub(crate) values: Vec<f64>,
+    pub(crate) values: Aligned,
     /// Rows that count before each row.
     pub(crate) counts: Vec<u32>,
     /// The columns that a row's products are made of, one after the other: regressors, the right-hand side, weights; then parameters where
@@ -16,10 +17,10 @@ pub(crate) struct RowProducts {
     pub(crate) columns: Vec<f64>,
 }
 
-/// So many numbers of each of some rows. What they held before is left there.
-pub(crate) fn side_by_side<const N: usize>(numbers: &mut Vec<f64>, rows: usize) -> &mut [[f64; N]] {
+/// So many numbers of each of some rows, whatever they held before.
+pub(crate) fn side_by_side<const N: usize>(numbers: &mut Aligned, rows: usize) -> &mut [[f64; N]] {
     if numbers.len() < rows * N {
-        numbers.resize(rows * N, 0.0);
+        *numbers = Aligned::zeros(rows * N);
     }
     numbers[..rows * N].as_chunks_mut::<N>().0
 }

@@ -1,6 +1,6 @@
 //! Memory aligned to cache lines, so that no vector crosses one.
 
-use std::ops::{Deref, DerefMut};
+use std::ops::{Deref, DerefMut, Index, IndexMut};
 
 /// Bytes of a cache line, and of the longest vector.
 const LINE: usize = 64;
@@ -49,6 +49,28 @@ impl DerefMut for Aligned {
         debug_assert!(self.first + self.len <= self.values.len());
         // SAFETY: as above.
         unsafe { self.values.get_unchecked_mut(self.first..self.first + self.len) }
+    }
+}
+
+/// Vectors that begin with a cache line. What registers cannot hold stays on the stack, which is aligned to less: there each second vector
+/// might cross a line, at twice the cost.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+pub(crate) struct OnLines<V, const N: usize>(pub(crate) [V; N]);
+
+impl<V, const N: usize> Index<usize> for OnLines<V, N> {
+    type Output = V;
+
+    #[inline(always)]
+    fn index(&self, place: usize) -> &V {
+        &self.0[place]
+    }
+}
+
+impl<V, const N: usize> IndexMut<usize> for OnLines<V, N> {
+    #[inline(always)]
+    fn index_mut(&mut self, place: usize) -> &mut V {
+        &mut self.0[place]
     }
 }
 
