@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 import tvident
 from signals import signal
 from tvident import Status, StrongForm
+from tvident._regression import Alignment
 
 Array = npt.NDArray[np.float64]
 
@@ -76,7 +77,7 @@ def test_derivatives_are_those_of_the_batch(
     assert np.allclose(joined(outs, "time"), np.arange(0, y.size, step) / 100)
 
 
-@settings(max_examples=6)
+@settings(max_examples=12)
 @given(
     PIECES,
     st.integers(1, 5),
@@ -84,16 +85,29 @@ def test_derivatives_are_those_of_the_batch(
     st.sampled_from([9, 64, 300]),
     st.sampled_from([1, 4]),
     st.sampled_from([0, 7]),
+    st.tuples(st.sampled_from(get_args(Alignment)), st.sampled_from([None, 6, 9]), st.sampled_from([None, 30.0])),
 )
 def test_windows_of_rows_are_those_of_the_batch(
-    lengths: list[int], p: int, q: int, window: int, step: int, resume: int
+    lengths: list[int],
+    p: int,
+    q: int,
+    window: int,
+    step: int,
+    resume: int,
+    told: tuple[Alignment, int | None, float | None],
 ) -> None:
     generator = np.random.default_rng(p + 10 * q + window)
     A, b = generator.standard_normal((1000, p)), generator.standard_normal((1000, q))
     A[400, 0] = np.nan
-    stream = tvident.RollingStream(window, step=step)
+    b[[0, 405, 998], -1] = np.nan
+    alignment, least, half_life = told
+    options: dict[str, Any] = {"alignment": alignment, "min_observations": least, "step": step}
+    if alignment != "centre":
+        options["half_life"] = half_life
+    stream = tvident.RollingStream(window, **options)
+    assert stream.delay == {"centre": window - 1 - window // 2, "trailing": 0, "leading": window - 1}[alignment]
     outs = streamed(stream, 1000, lengths, lambda one, piece: one.push(A[piece], b[piece]), resume)
-    batch = tvident.rolling_least_squares(A, b, window, step=step)
+    batch = tvident.rolling_least_squares(A, b, window, **options)
     for name in ("params", "stderr", "rss", "condition", "status"):
         found = np.concatenate([getattr(out, name) for out in outs])
         assert np.array_equal(found, getattr(batch, name), equal_nan=name != "status"), name
@@ -264,6 +278,17 @@ def test_wrong_calls_say_what_would_be_right() -> None:
     with pytest.raises(ValueError, match="must have rows"):
         rolling.finish()
     rolling.push(np.ones((3, 2)), np.ones(3))
+    with pytest.raises(ValueError, match="alignment must be"):
+        tvident.RollingStream(5, alignment="left")  # type: ignore[arg-type]
+    for least in (0, 6):
+        with pytest.raises(ValueError, match="min_observations"):
+            tvident.RollingStream(5, min_observations=least)
+    with pytest.raises(ValueError, match="half_life must go with alignment"):
+        tvident.RollingStream(5, half_life=3)
+    with pytest.raises(ValueError, match="more rows than the 3 regressors"):
+        tvident.RollingStream(9, half_life=0.5, alignment="trailing").push(np.ones((9, 3)), np.ones(9))
+    with pytest.raises(ValueError, match="more than the 3 regressors"):
+        tvident.RollingStream(5, min_observations=3).push(np.ones((9, 3)), np.ones(9))
     with pytest.raises(ValueError, match="2 regressors and 1 right-hand sides"):
         rolling.push(np.ones((3, 3)), np.ones(3))
     with pytest.raises(ValueError, match="as many samples"):

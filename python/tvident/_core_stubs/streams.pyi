@@ -1,6 +1,6 @@
 # Records that go on.
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias, final
 
 import numpy as np
@@ -68,7 +68,7 @@ class PolynomialStream:
 class RollingStream:
     def __new__(
         cls,
-        window: int,
+        windows: Mapping[str, object],
         regressors: int,
         rhs_count: int,
         *,

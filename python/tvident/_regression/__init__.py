@@ -1,9 +1,14 @@
 """Solves least squares in every window of rows."""
 
 from tvident._regression.rolling import MOST_REGRESSORS, RollingRegression, rolling_least_squares
+from tvident._regression.windows import Alignment, RegressionWindows, half_life_given, least_given
 
 __all__ = [
     "MOST_REGRESSORS",
+    "Alignment",
+    "RegressionWindows",
     "RollingRegression",
+    "half_life_given",
+    "least_given",
     "rolling_least_squares",
 ]

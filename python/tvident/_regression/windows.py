@@ -42,6 +42,11 @@ class RegressionWindows:
     at_least: int | None
     half_life: float | None
 
+    @property
+    def after(self) -> int:
+        """Rows of a window after the row that it belongs to."""
+        return {"centre": self.rows - 1 - self.rows // 2, "trailing": 0, "leading": self.rows - 1}[self.alignment]
+
     def around_rows(self) -> RegressionWindows:
         """Return windows of the same length around every row, in which all rows count the same."""
         return replace(self, alignment="centre", half_life=None)
@@ -69,22 +74,30 @@ def windows_given(asked: AskedWindows, rows: int, regressors: int) -> Regression
     length = arguments.window_length("window_length", asked.window_length, period or 1.0, odd=False)
     arguments.check_window("window_length", length, rows, least=regressors + 1)
     alignment = arguments.one_of("alignment", asked.alignment, get_args(Alignment))
-    at_least = None
-    if asked.min_observations is not None:
-        at_least = arguments.whole_number("min_observations", asked.min_observations)
-        if not regressors < at_least <= length:
-            raise ValueError(
-                f"min_observations must be more than the {regressors} regressors and at most the window's {length} rows; got {at_least}; "
-                f"use {regressors + 1} to {length}"
-            )
-    fading = None
-    if asked.half_life is not None:
-        fading = _half_life(asked.half_life, period or 1.0, alignment, length, regressors)
+    at_least = least_given(asked.min_observations, length, regressors)
+    fading = half_life_given(asked.half_life, period or 1.0, alignment, length, regressors)
     return RegressionWindows(length, alignment, at_least, fading)
 
 
-def _half_life(value: float | str, period: float, alignment: str, length: int, regressors: int) -> float:
-    """Return a half-life in rows."""
+def least_given(min_observations: int | None, length: int, regressors: int) -> int | None:
+    """Return how many rows windows of a length must hold; None where nothing was said."""
+    if min_observations is None:
+        return None
+    at_least = arguments.whole_number("min_observations", min_observations)
+    if not regressors < at_least <= length:
+        raise ValueError(
+            f"min_observations must be more than the {regressors} regressors and at most the window's {length} rows; got {at_least}; "
+            f"use {regressors + 1} to {length}"
+        )
+    return at_least
+
+
+def half_life_given(
+    value: float | str | None, period: float, alignment: str, length: int, regressors: int
+) -> float | None:
+    """Return a half-life in rows, which are so many seconds apart; None where nothing was said."""
+    if value is None:
+        return None
     rows = arguments.seconds("half_life", value) / period if isinstance(value, str) else value
     half_life = arguments.positive_number("half_life", rows)
     if alignment == "centre":

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
-from tvident._regression import MOST_REGRESSORS
+from tvident._regression import MOST_REGRESSORS, Alignment, RegressionWindows, half_life_given, least_given
 from tvident._stream.pieces import Stream
 
 
@@ -21,7 +21,7 @@ class StreamedRegression:
     Attributes
     ----------
     row : ndarray of int64, shape (k,)
-        Numbers of the rows at the centres of the windows.
+        Numbers of the rows that the windows belong to: at their centres, or as the alignment says.
     params, stderr : ndarray of float64, shape (k, p) or (k, p, q)
     rss : ndarray of float64, shape (k,) or (k, q)
     condition : ndarray of float64, shape (k,)
@@ -42,26 +42,37 @@ class RollingStream(Stream[StreamedRegression]):
 
     Pieces may hold one row or millions. The numbers are those of one call with all rows, bit for bit (to rounding where a column of ``A``
     other than the first is a constant, which a call with all rows takes first), however the stream is cut; the
-    window around a row is given with the row :attr:`delay` rows later. Memory does not grow with what has come.
+    window of a row is given with the row :attr:`delay` rows later. Memory does not grow with what has come.
 
     Parameters
     ----------
     window_length : int
         Rows in a window, more than there are regressors.
+    alignment : {"centre", "trailing", "leading"}, optional
+        Where in its window the row is that it belongs to, as in :func:`rolling_least_squares`. Trailing windows, which end with their row,
+        are given at once.
+    half_life : float, optional
+        Rows after which a row weighs half, away from the one that a window belongs to, with trailing or leading windows: as in
+        :func:`rolling_least_squares`. By default all rows of a window weigh the same.
+    min_observations : int, optional
+        Rows without a missing value that a window must hold, more than there are regressors: missing rows are left out, and the status of
+        their windows says GAP. By default a missing row makes its windows NaN, and near the ends half of the rows suffice.
     step : int, optional
         Every how many rows a result is wanted.
 
     Attributes
     ----------
     delay : int
-        Rows from one to its window: the rows of a window after its centre.
+        Rows from one to its window: the rows of a window after the one it belongs to. None of trailing windows, half a window of centred
+        ones, all but one of leading ones.
     rows : int
         Rows that have come so far.
 
     Raises
     ------
     ValueError
-        If a length is not positive.
+        If a length is not positive, an alignment has another name, ``min_observations`` is more than a window has, or ``half_life`` goes
+        with centred windows.
     TypeError
         If a number is not whole.
 
@@ -92,10 +103,33 @@ class RollingStream(Stream[StreamedRegression]):
     (376, 2)
     >>> stream.push(A[400], b[400]).params.round(6)
     array([[2., 3.]])
+
+    Windows that end with the newest row, of at least 20 rows that are not missing:
+
+    >>> stream = tvident.RollingStream(50, alignment="trailing", min_observations=20)
+    >>> stream.delay
+    0
+    >>> b[30:40] = np.nan
+    >>> stream.push(A[:100], b[:100]).params[[10, 49]].round(6)
+    array([[nan, nan],
+           [ 2.,  3.]])
     """
 
-    def __init__(self, window_length: int, *, step: int = 1) -> None:
-        self._window = arguments.whole_number("window_length", window_length, least=1)
+    def __init__(
+        self,
+        window_length: int,
+        *,
+        alignment: Alignment = "centre",
+        half_life: float | None = None,
+        min_observations: int | None = None,
+        step: int = 1,
+    ) -> None:
+        length = arguments.whole_number("window_length", window_length, least=1)
+        where = arguments.one_of("alignment", alignment, get_args(Alignment))
+        # What depends on the number of regressors is checked when that comes, with the first rows.
+        least = least_given(min_observations, length, 0)
+        rows = None if half_life is None else arguments.positive_number("half_life", half_life)
+        self._windows = RegressionWindows(length, where, least, half_life_given(rows, 1.0, where, length, 0))
         self._step = arguments.whole_number("step", step, least=1)
         self._shape: tuple[int, int] | None = None
         self._one_rhs = True
@@ -109,7 +143,7 @@ class RollingStream(Stream[StreamedRegression]):
         --------
         push : gives windows that late.
         """
-        return self._window - 1 - self._window // 2
+        return self._windows.after
 
     @property
     def rows(self) -> int:
@@ -134,12 +168,13 @@ class RollingStream(Stream[StreamedRegression]):
         Returns
         -------
         StreamedRegression
-            Windows around the next rows up to :attr:`delay` before the last one that has come.
+            Windows of the next rows up to :attr:`delay` before the last one that has come.
 
         Raises
         ------
         ValueError
-            If the stream has ended, lengths differ, or there are other columns than before.
+            If the stream has ended, lengths differ, there are other columns than before, not fewer than ``min_observations``, or as many as
+            the rows of which ``half_life`` leaves the weight.
         TypeError
             If an array is complex or holds no numbers.
 
@@ -169,7 +204,11 @@ class RollingStream(Stream[StreamedRegression]):
                 f"A and b must have as many rows as each other; got {regressors.shape[0]} and {rhs.shape[0]}; push them together"
             )
         if self._stream is None:
-            self._shape, self._one_rhs = _shape_of(regressors, rhs), rhs.ndim == 1
+            shape = _shape_of(regressors, rhs)
+            windows = self._windows
+            least_given(windows.at_least, windows.rows, shape[0])
+            half_life_given(windows.half_life, 1.0, windows.alignment, windows.rows, shape[0])
+            self._shape, self._one_rhs = shape, rhs.ndim == 1
             self._stream = self._begun(None)
         columns = rhs[:, np.newaxis] if rhs.ndim == 1 else rhs
         return self._given(self._stream.push(regressors.T, columns.T))
@@ -184,7 +223,7 @@ class RollingStream(Stream[StreamedRegression]):
         return (
             None
             if self._shape is None
-            else _core.RollingStream(self._window, *self._shape, step=self._step, state=state)
+            else _core.RollingStream(self._windows.told(), *self._shape, step=self._step, state=state)
         )
 
     def _given(self, settled: _core.StreamedRegressions) -> StreamedRegression:
@@ -197,7 +236,7 @@ class RollingStream(Stream[StreamedRegression]):
         return StreamedRegression(row, params, stderr, rss, found.condition, found.status)
 
     def __repr__(self) -> str:
-        return f"<RollingStream after {self.rows} rows, windows of {self._window}, {self._progress()}>"
+        return f"<RollingStream after {self.rows} rows, windows of {self._windows.rows}, {self._progress()}>"
 
 
 def _shape_of(regressors: npt.NDArray[Any], rhs: npt.NDArray[Any]) -> tuple[int, int]:

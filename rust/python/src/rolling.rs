@@ -27,7 +27,7 @@ pub(crate) struct RowWindows {
 }
 
 impl RowWindows {
-    fn plan(&self, regressors: usize, rhs_count: usize) -> PyResult<RollingLeastSquares> {
+    pub(crate) fn plan(&self, regressors: usize, rhs_count: usize) -> PyResult<RollingLeastSquares> {
         let instructions = Instructions::current();
         let plan =
             RollingLeastSquares::new(self.rows, regressors, rhs_count, Vec::new(), HALF_OF_THE_DIGITS, instructions);

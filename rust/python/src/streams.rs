@@ -7,16 +7,15 @@ use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyUntypedArr
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use tvident::lanes::Elements;
-use tvident::least_squares::{HALF_OF_THE_DIGITS, Regressions, RollingLeastSquares};
+use tvident::least_squares::Regressions;
 use tvident::local_polynomials::{Estimates, LocalPolynomials as Plan};
 use tvident::record::Samples;
-use tvident::simd::Instructions;
 use tvident::stream::{PolynomialState, PolynomialStream as Polynomials, RollingState, RollingStream as Rolling};
 
 use crate::arrays::{rows, zeros};
 use crate::local_polynomials::{LocalEstimates, LocalPolynomials};
 use crate::records::{StridedSamples, records};
-use crate::rolling::RollingRegressions;
+use crate::rolling::{RollingRegressions, RowWindows};
 use crate::watch::exception;
 
 /// Samples between two looks for Ctrl-C; shorter pieces keep the interpreter's lock, which costs less than giving it back.
@@ -201,18 +200,15 @@ pub(crate) struct RollingStream {
 #[pymethods]
 impl RollingStream {
     #[new]
-    #[pyo3(signature = (window, regressors, rhs_count, *, step=1, state=None))]
+    #[pyo3(signature = (windows, regressors, rhs_count, *, step=1, state=None))]
     fn new(
-        window: usize,
+        windows: RowWindows,
         regressors: usize,
         rhs_count: usize,
         step: usize,
         state: Option<Stored<'_>>,
     ) -> PyResult<Self> {
-        let instructions = Instructions::current();
-        let plan =
-            RollingLeastSquares::new(window, regressors, rhs_count, Vec::new(), HALF_OF_THE_DIGITS, instructions);
-        let plan = plan.map_err(|error| exception(&error))?;
+        let plan = windows.plan(regressors, rhs_count)?;
         let state = match state {
             None => RollingState::default(),
             Some((first, rows, given, ended)) => RollingState { first, rows: rows.as_slice()?.to_vec(), given, ended },

@@ -79,7 +79,7 @@ impl<H: Dimensions, const PLAIN: bool> Kernel for RollingKernel<'_, '_, '_, H, P
                 for offset in some.clone() {
                     let place = (offset - rows.start) * size;
                     suffix.load(simd, self.shape, &self.scratch.suffixes[place..place + size]);
-                    self.merge(simd, &mut suffix, &prefix, offset, &mut row);
+                    suffix.merge(simd, self.shape, self.run.plan, &prefix, offset, &mut row);
                     suffix.store(simd, self.shape, &mut self.scratch.suffixes[place..place + size]);
                     self.append(simd, &mut prefix, offset, 1, &mut row);
                 }
@@ -115,7 +115,7 @@ pub(crate) struct WindowSummary<F> {
 impl<F> WindowSummary<F> {
     /// Writes it to memory, which holds it exactly.
     #[inline(always)]
-    fn store<S: Lanes, H: Dimensions<Factor<S::f64s> = F>>(&self, simd: S, shape: H, to: &mut [f64]) {
+    pub(crate) fn store<S: Lanes, H: Dimensions<Factor<S::f64s> = F>>(&self, simd: S, shape: H, to: &mut [f64]) {
         store(simd, shape, to, &self.factor);
         if let Some(sums) = &self.sums {
             let half = to.len() / 2;
@@ -125,10 +125,71 @@ impl<F> WindowSummary<F> {
 
     /// Reads it from memory.
     #[inline(always)]
-    fn load<S: Lanes, H: Dimensions<Factor<S::f64s> = F>>(&mut self, simd: S, shape: H, from: &[f64]) {
+    pub(crate) fn load<S: Lanes, H: Dimensions<Factor<S::f64s> = F>>(&mut self, simd: S, shape: H, from: &[f64]) {
         load(simd, shape, from, &mut self.factor);
         if let Some(sums) = &mut self.sums {
             load(simd, shape, &from[from.len() / 2..], sums);
+        }
+    }
+
+    /// The summary of no rows, with sums where windows fade.
+    #[inline(always)]
+    pub(crate) fn nothing<S: Lanes, H: Dimensions<Factor<S::f64s> = F>>(simd: S, shape: H, fades: bool) -> Self {
+        let sums = fades.then(|| shape.factor(simd.splat_f64s(0.0)));
+        Self { factor: empty(simd, shape), sums }
+    }
+
+    /// Appends the row at an offset of a block, or of the block after it, with the weight of its noise. The row is overwritten.
+    #[inline(always)]
+    pub(crate) fn append<S: Lanes, H: Dimensions<Factor<S::f64s> = F>>(
+        &mut self,
+        simd: S,
+        shape: H,
+        plan: &RollingLeastSquares,
+        (offset, block): (usize, usize),
+        row: &mut F,
+        mut weight: S::f64s,
+    ) {
+        if let (Some(fading), Some(sums)) = (&plan.fading, &mut self.sums) {
+            // The block's rows are appended from its last to its first, those of the next block from its first to its last.
+            let part = if fading.newest_first == (block == 1) {
+                fading::fade(simd, shape, &mut self.factor, sums, fading.left[1]);
+                1.0
+            } else {
+                fading.left[if block == 0 { plan.window - 1 - offset } else { offset }]
+            };
+            fading::add(simd, shape, sums, row, weight, part);
+            weight = simd.mul_f64s(weight, simd.splat_f64s(part));
+        }
+        append(simd, shape, &mut self.factor, row, 0, weight);
+    }
+
+    /// Merges the rows of a block from an offset on with those of the block after it up to that offset. `row` is scratch memory.
+    #[inline(always)]
+    pub(crate) fn merge<S: Lanes, H: Dimensions<Factor<S::f64s> = F>>(
+        &mut self,
+        simd: S,
+        shape: H,
+        plan: &RollingLeastSquares,
+        prefix: &Self,
+        offset: usize,
+        row: &mut F,
+    ) where
+        F: Clone,
+    {
+        let (Some(fading), Some(sums), Some(others)) = (&plan.fading, &mut self.sums, &prefix.sums) else {
+            merge(simd, shape, &mut self.factor, &prefix.factor, row);
+            return;
+        };
+        if fading.newest_first {
+            fading::fade(simd, shape, &mut self.factor, sums, fading.left[offset]);
+            merge(simd, shape, &mut self.factor, &prefix.factor, row);
+            fading::merge(simd, shape, sums, others);
+        } else {
+            let (mut factor, mut others) = (prefix.factor.clone(), others.clone());
+            fading::fade(simd, shape, &mut factor, &mut others, fading.left[plan.window - offset]);
+            merge(simd, shape, &mut self.factor, &factor, row);
+            fading::merge(simd, shape, sums, &others);
         }
     }
 }
@@ -137,9 +198,7 @@ impl<H: Dimensions, const PLAIN: bool> RollingKernel<'_, '_, '_, H, PLAIN> {
     /// The summary of no rows.
     #[inline(always)]
     fn nothing<S: Lanes>(&self, simd: S) -> WindowSummary<H::Factor<S::f64s>> {
-        let fades = !PLAIN && self.run.plan.fading.is_some();
-        let sums = fades.then(|| self.shape.factor(simd.splat_f64s(0.0)));
-        WindowSummary { factor: empty(simd, self.shape), sums }
+        WindowSummary::nothing(simd, self.shape, !PLAIN && self.run.plan.fading.is_some())
     }
 
     /// Appends the row at an offset of each lane's block, or of the block after it.
@@ -159,49 +218,13 @@ impl<H: Dimensions, const PLAIN: bool> RollingKernel<'_, '_, '_, H, PLAIN> {
         for column in 0..columns {
             row[column] = strips[column].in_place(simd, place);
         }
-        let mut weight = simd.splat_f64s(1.0);
-        if !PLAIN && plan.is_weighted(self.equations) {
-            weight = strips[columns].in_place(simd, place);
-        }
-        if let (Some(fading), Some(sums)) = (&plan.fading, &mut summary.sums) {
-            // The block's rows are appended from its last to its first, those of the next block from its first to its last.
-            let part = if fading.newest_first == (block == 1) {
-                fading::fade(simd, shape, &mut summary.factor, sums, fading.left[1]);
-                1.0
-            } else {
-                fading.left[if block == 0 { plan.window - 1 - offset } else { offset }]
-            };
-            fading::add(simd, shape, sums, row, weight, part);
-            weight = simd.mul_f64s(weight, simd.splat_f64s(part));
-        }
-        append(simd, shape, &mut summary.factor, row, 0, weight);
-    }
-
-    /// Merges the rows of each lane's block from an offset on with those of the block after it up to that offset.
-    #[inline(always)]
-    fn merge<S: Lanes>(
-        &self,
-        simd: S,
-        suffix: &mut WindowSummary<H::Factor<S::f64s>>,
-        prefix: &WindowSummary<H::Factor<S::f64s>>,
-        offset: usize,
-        row: &mut H::Factor<S::f64s>,
-    ) {
-        let shape = self.shape;
-        let (Some(fading), Some(sums), Some(others)) = (&self.run.plan.fading, &mut suffix.sums, &prefix.sums) else {
-            merge(simd, shape, &mut suffix.factor, &prefix.factor, row);
+        if PLAIN {
+            append(simd, shape, &mut summary.factor, row, 0, simd.splat_f64s(1.0));
             return;
-        };
-        if fading.newest_first {
-            fading::fade(simd, shape, &mut suffix.factor, sums, fading.left[offset]);
-            merge(simd, shape, &mut suffix.factor, &prefix.factor, row);
-            fading::merge(simd, shape, sums, others);
-        } else {
-            let (mut factor, mut others) = (prefix.factor.clone(), others.clone());
-            fading::fade(simd, shape, &mut factor, &mut others, fading.left[self.run.plan.window - offset]);
-            merge(simd, shape, &mut suffix.factor, &factor, row);
-            fading::merge(simd, shape, sums, &others);
         }
+        let is_weighted = plan.is_weighted(self.equations);
+        let weight = if is_weighted { strips[columns].in_place(simd, place) } else { simd.splat_f64s(1.0) };
+        summary.append(simd, shape, plan, (offset, block), row, weight);
     }
 
     /// One over the degrees of freedom of each lane's window.

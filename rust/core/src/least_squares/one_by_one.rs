@@ -9,7 +9,7 @@ use std::ops::Range;
 use crate::lanes::output::Outputs;
 use crate::lanes::store::Write;
 use crate::lanes::tile::Tile;
-use crate::least_squares::givens_factor::{Dimensions, Few, Many, append, empty, load, merge, store};
+use crate::least_squares::givens_factor::{Dimensions, Few, Many};
 use crate::least_squares::kernel::{WindowSummary, finish};
 use crate::least_squares::plan::{Regressions, RollingLeastSquares, Slots};
 use crate::least_squares::side_by_side::{RollingRun, SEGMENT};
@@ -44,6 +44,7 @@ impl OneByOne {
     pub(crate) fn new(plan: &RollingLeastSquares) -> Self {
         let lanes = plan.instructions.lanes();
         let factor = Many { regressors: plan.regressors, rhs_count: plan.rhs_count }.size() * lanes;
+        let factor = plan.summary(factor);
         Self {
             base: None,
             done: 0,
@@ -116,27 +117,25 @@ impl<H: Dimensions> Kernel for OneByOneKernel<'_, '_, '_, H> {
             self.begin(simd);
         }
         let (shape, places) = (self.shape, self.state.tile.places());
-        let size = shape.size() * S::F64_LANES;
+        let size = self.run.plan.summary(shape.size() * S::F64_LANES);
         let mut row = shape.factor(simd.splat_f64s(0.0));
-        let mut prefix = empty(simd, shape);
-        load(simd, shape, &self.state.prefix, &mut prefix);
-        let ahead = (window / 2).cast_signed() - window.cast_signed();
+        let mut prefix = self.nothing(simd);
+        prefix.load(simd, shape, &self.state.prefix);
+        let ahead = self.run.plan.before.cast_signed() - window.cast_signed();
         for offset in offsets.clone() {
             // Only now: the row after a window need not have come.
             for done in self.state.done..offset {
                 self.append(simd, &mut prefix, window + done, &mut row);
             }
             self.state.done = offset;
-            let centre = (self.run.base + offset).cast_signed() + ahead;
-            let centre = centre.unsigned_abs();
-            if !self.outputs.elements.of(centre..centre + 1).is_empty() {
+            let own = ((self.run.base + offset).cast_signed() + ahead).unsigned_abs();
+            if !self.outputs.elements.of(own..own + 1).is_empty() {
                 self.hold_suffixes(simd, offset / SEGMENT, &mut row);
-                let mut factor = empty(simd, shape);
-                load(simd, shape, &self.state.suffixes[offset % SEGMENT * size..], &mut factor);
-                merge(simd, shape, &mut factor, &prefix, &mut row);
-                let count = self.run.spanned(self.run.base + offset);
+                let mut summary = self.nothing(simd);
+                summary.load(simd, shape, &self.state.suffixes[offset % SEGMENT * size..][..size]);
+                summary.merge(simd, shape, self.run.plan, &prefix, offset, &mut row);
+                let count = counted(&self.run, self.source, self.run.base + offset);
                 let freedom = simd.splat_f64s(1.0 / count.saturating_sub(shape.regressors()) as f64);
-                let summary = WindowSummary { factor, sums: None };
                 let none = |_: usize| simd.splat_f64s(f64::NAN);
                 let fields = &mut self.state.tile.fields_of::<S>(offset);
                 finish(simd, shape, self.run.plan, &summary, freedom, fields, &mut row, none);
@@ -150,25 +149,31 @@ impl<H: Dimensions> Kernel for OneByOneKernel<'_, '_, '_, H> {
                     .run(simd);
             }
         }
-        store(simd, shape, &mut self.state.prefix, &prefix);
+        prefix.store(simd, shape, &mut self.state.prefix);
         self.mark();
     }
 }
 
 impl<H: Dimensions> OneByOneKernel<'_, '_, '_, H> {
+    /// The summary of no rows.
+    #[inline(always)]
+    fn nothing<S: Lanes>(&self, simd: S) -> WindowSummary<H::Factor<S::f64s>> {
+        WindowSummary::nothing(simd, self.shape, self.run.plan.fading.is_some())
+    }
+
     /// Begins a block: nothing of the next one came yet, and the suffixes that others are built from.
     #[inline(always)]
     fn begin<S: Lanes>(&mut self, simd: S) {
         let (shape, window) = (self.shape, self.run.plan.window);
-        let size = shape.size() * S::F64_LANES;
+        let size = self.run.plan.summary(shape.size() * S::F64_LANES);
         let mut row = shape.factor(simd.splat_f64s(0.0));
-        let mut suffix = empty(simd, shape);
-        store(simd, shape, &mut self.state.prefix, &suffix);
+        let mut suffix = self.nothing(simd);
+        suffix.store(simd, shape, &mut self.state.prefix);
         for segment in (1..window.div_ceil(SEGMENT)).rev() {
             for offset in (segment * SEGMENT..window.min((segment + 1) * SEGMENT)).rev() {
                 self.append(simd, &mut suffix, offset, &mut row);
             }
-            store(simd, shape, &mut self.state.checkpoints[(segment - 1) * size..], &suffix);
+            suffix.store(simd, shape, &mut self.state.checkpoints[(segment - 1) * size..][..size]);
         }
         self.state.base = Some(self.run.base);
         self.state.done = 0;
@@ -182,38 +187,63 @@ impl<H: Dimensions> OneByOneKernel<'_, '_, '_, H> {
             return;
         }
         let (shape, window) = (self.shape, self.run.plan.window);
-        let size = shape.size() * S::F64_LANES;
-        let mut suffix = empty(simd, shape);
+        let size = self.run.plan.summary(shape.size() * S::F64_LANES);
+        let mut suffix = self.nothing(simd);
         if segment + 1 < window.div_ceil(SEGMENT) {
-            load(simd, shape, &self.state.checkpoints[segment * size..], &mut suffix);
+            suffix.load(simd, shape, &self.state.checkpoints[segment * size..][..size]);
         }
         for offset in (segment * SEGMENT..window.min((segment + 1) * SEGMENT)).rev() {
             self.append(simd, &mut suffix, offset, row);
-            store(simd, shape, &mut self.state.suffixes[offset % SEGMENT * size..], &suffix);
+            suffix.store(simd, shape, &mut self.state.suffixes[offset % SEGMENT * size..][..size]);
         }
         self.state.segment = segment;
     }
 
     /// Appends the row at an offset from the block's first. One that is no equation or holds an unusable value is zero.
     #[inline(always)]
-    fn append<S: Lanes>(&self, simd: S, factor: &mut H::Factor<S::f64s>, offset: usize, row: &mut H::Factor<S::f64s>) {
-        let (shape, place) = (self.shape, self.run.base + offset);
-        let number = place.checked_sub(self.run.plan.window).filter(|number| self.run.rows.contains(number));
+    fn append<S: Lanes>(
+        &self,
+        simd: S,
+        summary: &mut WindowSummary<H::Factor<S::f64s>>,
+        offset: usize,
+        row: &mut H::Factor<S::f64s>,
+    ) {
+        let (shape, plan, place) = (self.shape, self.run.plan, self.run.base + offset);
+        let number = place.checked_sub(plan.window).filter(|number| self.run.rows.contains(number));
         let values = number.map(|number| self.source.row(number));
-        let values = values.filter(|values| values.iter().all(|value| is_usable(*value)));
+        let usable = values.filter(|values| values.iter().all(|value| is_usable(*value)));
         for column in 0..shape.regressors() + shape.rhs_count() {
-            row[column] = simd.splat_f64s(values.map_or(0.0, |values| values[column]));
+            row[column] = simd.splat_f64s(usable.map_or(0.0, |values| values[column]));
         }
-        append(simd, shape, factor, row, 0, simd.splat_f64s(1.0));
+        // What fades counts its rows, and those that are left out are none.
+        let counts = if plan.at_least.is_some() { usable.is_some() } else { values.is_some() };
+        let weight = if plan.fading.is_some() && !counts { 0.0 } else { 1.0 };
+        let (block, offset) = (offset / plan.window, offset % plan.window);
+        summary.append(simd, shape, plan, (offset, block), row, simd.splat_f64s(weight));
     }
 
-    /// Flags windows that are incomplete or hold an unusable value.
+    /// Flags windows that are incomplete, lack rows or hold an unusable value.
     fn mark(&mut self) {
         let (base, before) = (self.run.base, self.run.plan.window);
-        let unusable = &mut self.state.unusable;
-        unusable.clear();
+        let mut places = std::mem::take(&mut self.state.unusable);
+        places.clear();
         let bad = self.source.unusable().iter().filter(|row| self.run.rows.contains(row));
-        unusable.extend(bad.filter_map(|row| (row + before).checked_sub(base)));
-        self.run.mark_windows(unusable, &[], |window| self.run.spanned(window), self.outputs);
+        places.extend(bad.filter_map(|row| (row + before).checked_sub(base)));
+        let leaves_out = self.run.plan.at_least.is_some();
+        let (unusable, missing): (&[usize], &[usize]) = if leaves_out { (&[], &places) } else { (&places, &[]) };
+        let count = |window| counted(&self.run, self.source, window);
+        self.run.mark_windows(unusable, missing, count, self.outputs);
+        self.state.unusable = places;
     }
+}
+
+/// How many rows of a window count.
+fn counted(run: &RollingRun<'_>, source: &dyn RowSource, window: usize) -> usize {
+    let spanned = run.spanned(window);
+    if run.plan.at_least.is_none() {
+        return spanned;
+    }
+    let before = |row: usize| source.unusable().partition_point(|&bad| bad < row);
+    let first = window.saturating_sub(run.plan.window).max(run.rows.start);
+    spanned - before(window.min(run.rows.end)).saturating_sub(before(first))
 }

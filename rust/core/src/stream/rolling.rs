@@ -73,11 +73,10 @@ impl RollingStream {
         RollingState { first, rows: rows.to_vec(), given: self.given, ended: self.end.is_some() }
     }
 
-    /// Rows from one to its window: the window around a row is given with the row so many later.
+    /// Rows from one to its window: the window of a row is given with the row so many later.
     #[must_use]
     pub fn delay(&self) -> usize {
-        let window = self.plan.window();
-        window - 1 - window / 2
+        self.plan.window() - 1 - self.plan.before
     }
 
     /// Rows taken in so far.

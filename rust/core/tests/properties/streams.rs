@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::columns::{Columns, kinds_of_regression};
 use proptest::prelude::*;
 use tvident::lanes::Elements;
-use tvident::least_squares::{Equations, HALF_OF_THE_DIGITS, Regressions, RollingLeastSquares};
+use tvident::least_squares::{Alignment, Equations, HALF_OF_THE_DIGITS, Regressions, RollingLeastSquares};
 use tvident::local_polynomials::{Criterion, Estimates, LocalPolynomials, Order, PolynomialOptions, Selection};
 use tvident::record::Samples;
 use tvident::simd::Instructions;
@@ -162,12 +162,18 @@ proptest! {
         window in prop::sample::select(&[7_usize, 20, 64, 301, 2500][..]),
         step in prop::sample::select(&[1_usize, 1, 4][..]),
         lengths in prop::collection::vec(prop::sample::select(&[1_usize, 2, 9, 100, 700][..]), 1..6),
-        seed in any::<u64>(),
-        resume in any::<bool>(),
+        alignment in prop::sample::select(&[Alignment::Centre, Alignment::Trailing, Alignment::Leading][..]),
+        (leaves_out, fades) in (any::<bool>(), any::<bool>()),
+        (seed, resume) in (any::<u64>(), any::<bool>()),
     ) {
         let columns: Vec<Vec<f64>> = (0..p + q).map(|column| signal(4000, seed.wrapping_add(1 + column as u64))).collect();
         let pairs: Vec<(usize, usize)> = (1..p).map(|i| (0, i)).collect();
-        let plan = || RollingLeastSquares::new(window, p, q, pairs.clone(), HALF_OF_THE_DIGITS, Instructions::current()).expect("valid");
+        let plan = || {
+            let plan = RollingLeastSquares::new(window, p, q, pairs.clone(), HALF_OF_THE_DIGITS, Instructions::current());
+            let plan = plan.expect("valid").aligned(alignment);
+            let plan = if fades && alignment != Alignment::Centre { plan.with_half_life(40.0) } else { plan };
+            if leaves_out { plan.of_at_least(p + 1) } else { plan }
+        };
         let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         let rows = 0..columns[0].len();
         let expected = regressions(p, q, &rows, step, |regressions| {
