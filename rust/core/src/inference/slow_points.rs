@@ -62,22 +62,27 @@ impl Points<'_> {
         for first in 0..apart {
             sides.iter_mut().for_each(Side::clear);
             let nearby = AroundPoints::new(&self, first, apart);
-            for step in 0..nearby.steps {
+            // Every part is called from one place: each is long, and compiled wherever it is called.
+            for step in 0..=nearby.steps {
                 let seen = nearby.seen(&self, step);
                 for (side, weight) in sides.iter_mut().zip(seen.weights) {
                     if weight != Packet::ZERO {
                         side.push((layout, slow, terms), self.equations, &seen, weight);
                     }
+                    if side.waiting == AT_A_TIME * (slow + layout.constant) || step == nearby.steps {
+                        absorb(layout, &mut side.summary, &mut side.rows, side.waiting, false);
+                        side.waiting = 0;
+                    }
                 }
             }
             let [outside, inside] = &mut sides;
-            outside.absorb(layout);
-            inside.absorb(layout);
-            solve(layout, &outside.summary, &noise, Some(1.0), &mut scratch, &mut fields);
-            solved[0].put_apart(first, apart, &fields);
-            merge(layout, &mut outside.summary, &inside.summary, 0.0, &mut merged);
-            solve(layout, &outside.summary, &noise, Some(1.0), &mut scratch, &mut fields);
-            solved[1].put_apart(first, apart, &fields);
+            for (which, solved) in solved.iter_mut().enumerate() {
+                if which == 1 {
+                    merge(layout, &mut outside.summary, &inside.summary, 0.0, &mut merged);
+                }
+                solve(layout, &outside.summary, &noise, Some(1.0), &mut scratch, &mut fields);
+                solved.put_apart(first, apart, &fields);
+            }
         }
         solved
     }
@@ -122,7 +127,7 @@ impl AroundPoints {
         nearby
     }
 
-    /// The equations that are so many after the first of each point.
+    /// The equations that are so many after the first of each point: none after the last of all.
     #[inline(always)]
     fn seen(&self, points: &Points<'_>, step: usize) -> Seen {
         let mut seen =
@@ -192,15 +197,6 @@ impl Side {
         {
             *count += if counts && weight > 0.0 { all as f64 } else { 0.0 };
         }
-        if self.waiting == AT_A_TIME * all {
-            self.absorb(layout);
-        }
-    }
-
-    #[inline(always)]
-    fn absorb(&mut self, layout: Layout) {
-        absorb(layout, &mut self.summary, &mut self.rows, self.waiting, false);
-        self.waiting = 0;
     }
 }
 
