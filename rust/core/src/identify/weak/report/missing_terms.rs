@@ -40,7 +40,7 @@ impl Session<'_, '_, '_> {
         weak.rows.regressors.extend(more);
         weak.rows.clear_unusable();
         let regressors = first..weak.rows.regressors.len();
-        let mut suspects = self.of_torque(weak, decided, fit, &rhs, regressors, &candidates)?;
+        let mut suspects = self.of_torque(weak, decided, (fit, &rhs, errors.error), regressors, &candidates)?;
         if decided.white.is_some() {
             weak.rows = decided.as_white(std::mem::take(&mut weak.rows), &mut self.stages)?;
             rhs.clone_from(&weak.rows.rhs);

@@ -7,6 +7,7 @@
 use std::ops::Range;
 
 use crate::error::Error;
+use crate::identify::scanned::OTHER_CONSTANT;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::report::filter::{UNSURE, shared_noise};
 use crate::identify::weak::session::Session;
@@ -23,50 +24,63 @@ use crate::weak_form::weak_rows::WeakRows;
 /// torque without noise is seen as a quarter of a percent.
 const LEAST_OF_POWERS: f64 = 2.5e-5;
 
-/// From how many times the half-width on another test function has the last word.
+/// From how many times the half-width on another test function is asked.
 const WIDER: usize = 2;
 
 impl Session<'_, '_, '_> {
-    /// What the torque tells beside all that may be missing, whose regressors are some of the rows'. Where the test function was made narrower than those
-    /// that agree with it, the widest of these has the last word: noise is less there, and windows are longer.
+    /// What the torque tells beside all that may be missing, whose regressors are some of the rows', and whose fit is given with its right-hand side and
+    /// its error of prediction. Where the test function was made narrower than those
+    /// that agree with it, the widest of these contradicts what it tells: noise is less there, and windows are longer.
     pub(crate) fn of_torque(
         &mut self,
         weak: &WeakRows,
         decided: &Decided,
-        fit: &Fit,
-        rhs: &[f64],
+        fitted: (&Fit, &[f64], f64),
         regressors: Range<usize>,
         candidates: &[Missing],
     ) -> Result<Vec<Suspect>, Error> {
-        let suspects = self.of_torque_in(weak, decided, fit, rhs, regressors, candidates)?;
+        let told = self.of_torque_in(weak, decided, fitted, (regressors, candidates), &[])?;
+        let mut suspects: Vec<_> = told.into_iter().map(|(suspect, _)| suspect).collect();
         let widest = self.scan.widest().unwrap_or(0);
         let is_wider = self.scan.moved && widest >= WIDER * weak.function.half_width() && decided.jumps.is_empty();
-        if !is_wider || !suspects.iter().any(Suspect::is_conspicuous) {
+        let doubted: Vec<_> = suspects.iter().filter(|one| one.is_conspicuous()).map(|one| one.missing).collect();
+        if !is_wider || doubted.is_empty() {
             return Ok(suspects);
         }
         let model = decided.ordered();
         let mut wide = self.chosen_with(widest, &model)?;
         let fitted = self.fit_first(&wide, &model)?;
-        let Some(fit) = &fitted.fit else { return Ok(Vec::new()) };
+        let Some(fit) = &fitted.fit else { return Ok(suspects) };
         let more = self.regressors_of(candidates, &wide.weak, None)?;
         let rows = &mut wide.weak.rows;
         let first = rows.regressors.len();
         rows.regressors.extend(more);
         rows.clear_unusable();
         let (rhs, regressors) = (rows.rhs.clone(), first..rows.regressors.len());
-        self.of_torque_in(&wide.weak, &fitted, fit, &rhs, regressors, candidates)
+        for (other, is_little) in
+            self.of_torque_in(&wide.weak, &fitted, (fit, &rhs, fitted.error), (regressors, candidates), &doubted)?
+        {
+            let is_other =
+                |one: &Suspect| (one.value - other.value).abs() > OTHER_CONSTANT * one.error.hypot(other.error);
+            let place = suspects.iter().position(|one| one.missing == other.missing && is_other(one));
+            match place {
+                Some(place) if is_little => drop(suspects.remove(place)),
+                Some(place) => suspects[place] = other,
+                None => {}
+            }
+        }
+        Ok(suspects)
     }
 
-    /// The same with the test function of these rows.
+    /// The same with the test function of these rows, and whether each is too little to be said: of what is doubted, or of what is not too little.
     fn of_torque_in(
         &mut self,
         weak: &WeakRows,
         decided: &Decided,
-        fit: &Fit,
-        rhs: &[f64],
-        regressors: Range<usize>,
-        candidates: &[Missing],
-    ) -> Result<Vec<Suspect>, Error> {
+        (fit, rhs, error): (&Fit, &[f64], f64),
+        (regressors, candidates): (Range<usize>, &[Missing]),
+        doubted: &[Missing],
+    ) -> Result<Vec<(Suspect, bool)>, Error> {
         let rows = &weak.rows;
         let (known, expected) = self.covariance(weak, self.parameters(&decided.model, fit));
         let model = decided.ordered();
@@ -78,7 +92,7 @@ impl Session<'_, '_, '_> {
         };
         let (left, usable) = residuals(&problem, &beside, &mut self.stages)?;
         let shown = RowCovariance::of_residuals(&left, &usable, 4 * weak.reach());
-        if shown.variance() > NOISE_MODEL_FAILS * known.variance() {
+        if error.min(shown.variance() / known.variance()) > NOISE_MODEL_FAILS {
             // Equations that leave too much beside all of these lack something else.
             return Ok(Vec::new());
         }
@@ -90,7 +104,8 @@ impl Session<'_, '_, '_> {
         for (place, &missing) in candidates.iter().enumerate().filter(|(_, missing)| missing.is_of_torque()) {
             let value = beside.pooled.values[count + place];
             let least = if missing == Missing::Resonance { NEGLIGIBLE } else { LEAST_OF_POWERS };
-            if value * value * rows.mean_square_of(regressors.start + place) < least * rows.mean_square() {
+            let is_little = value * value * rows.mean_square_of(regressors.start + place) < least * rows.mean_square();
+            if if doubted.is_empty() { is_little } else { !doubted.contains(&missing) } {
                 continue;
             }
             let variance = beside.variance_of(&problem, count + place, &covariance, &mut self.stages)?;
@@ -110,7 +125,7 @@ impl Session<'_, '_, '_> {
                     suspect.error += lag.abs() * variance.sqrt();
                 }
             }
-            suspects.push(suspect);
+            suspects.push((suspect, is_little));
         }
         Ok(suspects)
     }
