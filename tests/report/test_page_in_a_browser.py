@@ -243,9 +243,10 @@ def test_words_of_a_plot_stand_apart_and_on_one_line(browser: Any, short: tuple[
         return bad;
     }"""
     for title in ("Stiffness K", "Natural frequency", "Torque, averaged over the test function", "Status over time"):
-        question = "(title) => tvidentReport.charts.find((one) => one.about.title === title).div.scrollIntoView()"
-        opened.page.evaluate(question, title)
-        opened.page.wait_for_timeout(200)
+        chart = "(title) => tvidentReport.charts.find((one) => one.about.title === title)"
+        opened.page.evaluate(f"{chart}.div.scrollIntoView()", title)
+        opened.page.wait_for_function(f"{chart}.isListening", arg=title)
+    opened.page.wait_for_selector(".annotation-text", state="attached")
     assert opened.ask(f"({overlapping})()") == []
     # The same time stands at the same place in every plot, that of the status too, whose names are in the page.
     assert (
