@@ -81,27 +81,38 @@ def test_progress_is_shown_on_a_terminal_and_not_in_a_pipe(tmp_path: Path) -> No
     assert b"100%" in shown
 
 
-def test_an_interrupt_where_nothing_can_be_raised_is_heard(tmp_path: Path) -> None:
-    # What runs when an object goes cannot raise; every import ends with that, and the first two seconds of a command are imports.
+def is_aborted(folder: Path, body: str, seconds: float) -> None:
+    """Check that a command which does this is interrupted, in so many seconds."""
     script = """
-        import signal, time, weakref
+        import time
         from tvident._command_line import group
 
         class Commands:
             def info(self, *_, **__):
-                gone = set()
-                watched = weakref.ref(gone, lambda _: signal.raise_signal(signal.SIGINT))
-                del gone
-                time.sleep(20)
+                {body}
                 print("went on")
 
         group.commands = Commands
         group.main(["info", "a.csv"])
     """
-    (tmp_path / "a.csv").write_text("a\n1\n")
-    command = [sys.executable, "-c", textwrap.dedent(script)]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=19)
+    (folder / "a.csv").write_text("a\n1\n")
+    whole = textwrap.dedent(script).format(body=textwrap.indent(textwrap.dedent(body).strip(), 8 * " ").strip())
+    done = subprocess.run(
+        [sys.executable, "-c", whole], cwd=folder, capture_output=True, text=True, check=False, timeout=seconds
+    )
     assert (done.returncode, done.stdout, done.stderr.strip()) == (1, "", "Aborted!")
+
+
+def test_an_interrupt_where_nothing_can_be_raised_is_heard(tmp_path: Path) -> None:
+    # What runs when an object goes cannot raise; every import ends with that, and the first two seconds of a command are imports.
+    body = """
+        import signal, weakref
+        gone = set()
+        watched = weakref.ref(gone, lambda _: signal.raise_signal(signal.SIGINT))
+        del gone
+        time.sleep(20)
+    """
+    is_aborted(tmp_path, body, 19)
 
 
 @pytest.mark.parametrize(
@@ -115,23 +126,7 @@ def test_an_interrupt_where_nothing_can_be_raised_is_heard(tmp_path: Path) -> No
 def test_an_interrupt_within_an_import_is_heard_after_it_or_soon(tmp_path: Path, module: str) -> None:
     # Modules made by Cython, as lxml's, take back what is raised while they begin.
     (tmp_path / "imported.py").write_text(f"import signal\nimport time\n{module}\n")
-    script = """
-        import time
-        from tvident._command_line import group
-
-        class Commands:
-            def info(self, *_, **__):
-                import imported
-                time.sleep(20)
-                print("went on")
-
-        group.commands = Commands
-        group.main(["info", "a.csv"])
-    """
-    (tmp_path / "a.csv").write_text("a\n1\n")
-    command = [sys.executable, "-c", textwrap.dedent(script)]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=15)
-    assert (done.returncode, done.stdout, done.stderr.strip()) == (1, "", "Aborted!")
+    is_aborted(tmp_path, "import imported\ntime.sleep(20)", 15)
 
 
 def test_an_interrupt_stops_at_once_and_leaves_no_half_written_file(tmp_path: Path) -> None:

@@ -288,13 +288,18 @@ class Task:
         found = form.scan(motions, kinds, lag=lags, masks=data.masks, weights=weights, workers=data.workers)
         return tuple(scan_of(one, self._names) for one in found)
 
-    def _again(self, settings: dict[str, Any], angles: npt.NDArray[np.number], *stretch: Any) -> Identification:
+    def _again(
+        self,
+        settings: dict[str, Any],
+        angles: npt.NDArray[np.number],
+        some: slice | None = None,
+        known: Mapping[str, Any] | None = None,
+    ) -> Identification:
         """Identify another angle with what was chosen, or that of a stretch with what else is known; its missing values are left out."""
         data, given = self._data, None
-        if stretch:
-            some, known = stretch
+        if some is not None:
             data = data.stretch(some)
-            given = {name: cut(value, some) for name, value in {**self._known, **known}.items()}
+            given = {name: cut(value, some) for name, value in {**self._known, **(known or {})}.items()}
         task = self._replayed(settings, replace(data, angles=angles, propagate=False, step=1), given)
         return task.run(progress=None, diagnose=False)
 

@@ -113,20 +113,6 @@ def part_of_stretch(length: int) -> tuple[int, int, int]:
     return 0, length - 2 * round(_SHARE * length), length - round(_SHARE * length)
 
 
-def evaluated(
-    model: Model,
-    angle: npt.NDArray[np.number],
-    torque: npt.NDArray[np.number],
-    parts: list[tuple[int, int, int]],
-    window_length: int,
-    *,
-    simulated: bool = True,
-) -> HeldBack:
-    """Return what a model that was fitted to the rest explains of the ends of the parts; if asked for, simulated as well."""
-    responses = responses_of(model, angle, torque, parts, window_length, simulated=simulated)
-    return judged(angle, responses, parts, simulated=simulated)
-
-
 def responses_of(
     model: Model,
     angle: npt.NDArray[np.number],
@@ -136,7 +122,7 @@ def responses_of(
     *,
     simulated: bool = True,
 ) -> Iterator[npt.NDArray[np.float64]]:
-    """Return the angle that was simulated, if asked for, and the one that was predicted, at the ends of the parts."""
+    """Return the angle that a model of the rest simulates, if asked for, and the one that it predicts, at the ends of the parts."""
     pieces, whole = [], []
     # Where a term is not linear the state takes many simulations; the last ten test functions tell it.
     is_linear = set(model.values) <= {*COEFFICIENTS, OFFSET}
@@ -160,9 +146,7 @@ def judged(
     simulated: bool = True,
 ) -> HeldBack:
     """Return what responses explain of the ends of the parts: the angle that was simulated, if it was, and the one that was predicted."""
-    held = np.zeros(angle.shape[-1], bool)
-    for _, first, end in parts:
-        held[first:end] = True
+    held = _held(angle, parts)
     shares, response = [], np.empty(0)
     for response in responses:
         share = accounted_for(angle[..., held], response[..., held])
@@ -180,7 +164,13 @@ def _without_the_worst(
     squares = np.nan_to_num((angle - predicted) ** 2, nan=np.inf)
     errors = [squares[first:end].mean() for _, first, end in parts]
     kept = np.argsort(errors)[: len(parts) - int(_SUDDEN * len(parts))]
-    there = np.zeros(angle.size, bool)
-    for place in kept:
-        there[parts[place][1] : parts[place][2]] = True
+    there = _held(angle, [parts[place] for place in kept])
     return float(accounted_for(angle[there], predicted[there]))
+
+
+def _held(angle: npt.NDArray[np.number], parts: list[tuple[int, int, int]]) -> npt.NDArray[np.bool_]:
+    """Return which samples are held back of the parts."""
+    held = np.zeros(angle.shape[-1], bool)
+    for _, first, end in parts:
+        held[first:end] = True
+    return held

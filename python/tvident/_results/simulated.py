@@ -15,7 +15,6 @@ from tvident._results.held_back import (
     MORE_PARTS,
     PARTS,
     HeldBack,
-    evaluated,
     judged,
     part_of_stretch,
     parts_of,
@@ -255,7 +254,9 @@ class Simulated:
         parts = parts_of(samples, length if isinstance(length, int) else 1, PARTS if ahead is None else MORE_PARTS)
         try:
             model = self._rest_of(parts, recorded)
-            found = evaluated(model, recorded.angles, recorded.torques, parts, length, simulated=ahead is None)
+            asked = ahead is None
+            responses = responses_of(model, recorded.angles, recorded.torques, parts, length, simulated=asked)
+            found = judged(recorded.angles, responses, parts, simulated=asked)
             return found if found.why_not else replace(found, ahead=length * model.period)
         except ValueError as error:
             return HeldBack(why_not=str(error))

@@ -28,9 +28,9 @@ const LEAST_OF_POWERS: f64 = 2.5e-5;
 const WIDER: usize = 2;
 
 impl Session<'_, '_, '_> {
-    /// What the torque tells beside all that may be missing, whose regressors are some of the rows', and whose fit is given with its right-hand side and
-    /// its error of prediction. Where the test function was made narrower than those
-    /// that agree with it, the widest of these contradicts what it tells: noise is less there, and windows are longer.
+    /// What the torque tells beside all that may be missing, whose regressors are some of the rows'; the fit comes with its right-hand side and its error
+    /// of prediction. Where the test function was made narrower than those that agree with it, the widest of these contradicts what it tells: noise is
+    /// less there, and windows are longer.
     pub(crate) fn of_torque(
         &mut self,
         weak: &WeakRows,
@@ -105,7 +105,8 @@ impl Session<'_, '_, '_> {
             let value = beside.pooled.values[count + place];
             let least = if missing == Missing::Resonance { NEGLIGIBLE } else { LEAST_OF_POWERS };
             let is_little = value * value * rows.mean_square_of(regressors.start + place) < least * rows.mean_square();
-            if if doubted.is_empty() { is_little } else { !doubted.contains(&missing) } {
+            let is_asked = if doubted.is_empty() { !is_little } else { doubted.contains(&missing) };
+            if !is_asked {
                 continue;
             }
             let variance = beside.variance_of(&problem, count + place, &covariance, &mut self.stages)?;
