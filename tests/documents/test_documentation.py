@@ -243,7 +243,10 @@ def test_files_that_the_design_names_exist() -> None:
     ],
 )
 def test_every_argument_has_an_option_of_its_name(function: Any, command: str, without: set[str]) -> None:
-    options = {option for one in main.commands[command].params for option in one.opts if isinstance(one, click.Option)}
+    # Commands are loaded when they are asked for.
+    loaded = main.get_command(click.Context(main), command)
+    assert loaded is not None
+    options = {option for one in loaded.params for option in one.opts if isinstance(one, click.Option)}
     renamed = {"t": "time", "terms": "term"}
     for name in inspect.signature(function).parameters.keys() - without:
         assert f"--{renamed.get(name, name).replace('_', '-')}" in options
