@@ -242,6 +242,27 @@ def test_interrupted_work_leaves_no_result_and_goes_on(rig: tvident.Recording, m
     assert not Path(".out.npy.tvident").exists()
 
 
+def test_one_call_at_a_time_writes_a_result(rig: tvident.Recording) -> None:
+    source = write("in.npy", rig.angle, rig.torque)
+    options: dict[str, Any] = {"angle": "angle", "torque": "torque", "sample_rate": 1000, "method": "paper"}
+    refused: list[str] = []
+
+    def again(_done: int, _total: int) -> None:
+        # A call with other settings would remove what the first has kept.
+        with pytest.raises(BlockingIOError, match=r"one call at a time") as raised:
+            tvident.identify_file(source, "out.npy", **options, step=2)
+        refused.append(str(raised.value))
+
+    tvident.identify_file(source, "out.npy", **options, progress=again)
+    assert refused
+    assert not Path(".out.npy.tvident").exists()
+    # An error lets the next call go on, even while its traceback is kept.
+    with pytest.raises(KeyError) as raised:
+        tvident.identify_file(source, "out.npy", **(options | {"angle": "none"}))
+    tvident.identify_file(source, "out.npy", **options)
+    assert raised.tb is not None
+
+
 def test_interrupted_work_goes_on_with_columns_where_rows_are_no_result(rig: tvident.Recording) -> None:
     source = write("in.npy", rig.angle, rig.torque)
     options: dict[str, Any] = {"angle": "angle", "torque": "torque", "sample_rate": 1000, "method": "paper", "step": 3}

@@ -103,6 +103,8 @@ def identify_file(
         If there is no such channel.
     OSError
         If the output cannot be written.
+    BlockingIOError
+        If another call writes the same output now.
 
     Notes
     -----
@@ -174,6 +176,7 @@ def identify_file(
     }
     with ExitStack() as stack, arguments.reporter(progress, "identification") as report:
         source, kept = _opened(source_path, place, told, mark if is_text else None)
+        stack.callback(kept.close)
         stack.callback(source.close)
         try:
             recording = _recording(source, (angle, torque, t), (angle_unit, torque_unit), (delta, sample_rate))
@@ -195,7 +198,11 @@ def _opened(path: Path, output: Path, told: Mapping[str, Any], of_text: str | No
     """Return the recording, as rows of numbers where it is a text with a mark, and what is kept of an earlier call."""
     if of_text is not None and path.is_file():
         kept = Kept(output, told)
-        return copied(path, kept.folder, of_text), kept
+        try:
+            return copied(path, kept.folder, of_text), kept
+        except BaseException:
+            kept.close()
+            raise
     return opened(path), Kept(output, told)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import shutil
 from bisect import bisect_right
 from collections.abc import Mapping
@@ -14,6 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._files import printable
+from tvident._in_pieces.alone import NAME as LOCK
+from tvident._in_pieces.alone import alone_in
 from tvident._in_pieces.rows import read_columns, read_some, row_of, write_columns, write_rows
 from tvident._status import Status
 
@@ -39,15 +42,26 @@ class Kept:
         The result that is to be.
     told : mapping
         Everything that the numbers depend on, as JSON has it: of another input, or other settings, nothing is used.
+
+    Raises
+    ------
+    BlockingIOError
+        If another call writes that result now.
     """
 
     def __init__(self, output: Path, told: Mapping[str, Any]) -> None:
         self.folder = output.with_name(f".{output.name}.tvident")
         self._told = hashlib.sha256(json.dumps([_FORMAT, told], sort_keys=True).encode()).hexdigest()
+        try:
+            self._lock = alone_in(self.folder)
+        except BlockingIOError:
+            place = printable(output)
+            raise BlockingIOError(
+                f"one call at a time may write a result; another writes {place}; wait, or write elsewhere"
+            ) from None
         self._state = self._read()
         if self._state is None:
-            shutil.rmtree(self.folder, ignore_errors=True)
-            self.folder.mkdir()
+            self._clear()
             self._state = {"told": self._told, "notes": [], "rows": 0, "pieces": [], "flags": {}, "facts": {}}
             self._write()
 
@@ -90,7 +104,8 @@ class Kept:
     @property
     def is_empty(self) -> bool:
         """Whether nothing is kept that would be missed."""
-        return not self._found["notes"] and not self._found["facts"] and len(list(self.folder.iterdir())) == 1
+        holds = {one.name for one in self.folder.iterdir()} - {LOCK, "state.json"}
+        return not self._found["notes"] and not self._found["facts"] and not holds
 
     @property
     def count(self) -> int:
@@ -117,7 +132,16 @@ class Kept:
 
     def remove(self) -> None:
         """Remove the folder."""
+        self._clear()
+        if os.name == "nt":  # Open files cannot be removed there.
+            self.close()
         shutil.rmtree(self.folder, ignore_errors=True)
+        self.close()
+
+    def close(self) -> None:
+        """Let another call go on here."""
+        if self._lock is not None:
+            self._lock.close()
 
     @property
     def place(self) -> Path:
@@ -142,6 +166,14 @@ class Kept:
         except (OSError, ValueError, KeyError, TypeError):
             return None
         return dict(state)
+
+    def _clear(self) -> None:
+        """Remove all that is in the folder but what says that a call works there."""
+        for one in self.folder.iterdir():
+            if one.is_dir() and not one.is_symlink():
+                shutil.rmtree(one, ignore_errors=True)
+            elif one.name != LOCK:
+                one.unlink(missing_ok=True)
 
     def _write(self) -> None:
         beside = self.folder / "state.json.new"
