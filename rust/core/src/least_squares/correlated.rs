@@ -21,7 +21,7 @@ use crate::least_squares::row_products::{RowProducts, multiply, pairs, side_by_s
 use crate::least_squares::sliding_sums::{begin, slide, sliding_sums};
 use crate::record::subsample::stretches;
 use crate::simd::aligned::Aligned;
-use crate::simd::vectors::{Kernel, Lanes, MOST_LANES, dispatch};
+use crate::simd::vectors::{Kernel, Lanes, MOST_LANES, apart, dispatch};
 use crate::status::Status;
 
 /// Rows of which the correlation of the residuals is learnt: it is known to a few thousandths then.
@@ -269,6 +269,23 @@ impl Fits<'_> {
     }
 }
 
+/// The kernel that makes the products of some rows, of `R` regressors, or of up to `N` where that is zero.
+struct ProductsOfRows<'a, 'b, 'c, const N: usize, const R: usize> {
+    fits: &'a Fits<'b>,
+    range: Range<isize>,
+    end: usize,
+    into: &'c mut RowProducts,
+}
+
+impl<const N: usize, const R: usize> Kernel for ProductsOfRows<'_, '_, '_, N, R> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, simd: S) {
+        self.fits.products::<S, N, R>(simd, self.range, self.end, self.into);
+    }
+}
+
 /// The kernel that learns how neighbours in some rows are correlated, by regressor.
 struct Correlations<'a, 'b, 'c> {
     fits: &'a Fits<'b>,
@@ -282,6 +299,7 @@ impl Kernel for Correlations<'_, '_, '_> {
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) -> Vec<Neighbours> {
         match self.fits.plan.regressors {
+            ..=4 if S::F64_LANES == 1 => self.run_with::<S, 4, 0>(simd),
             1 => self.run_with::<S, 4, 1>(simd),
             2 => self.run_with::<S, 4, 2>(simd),
             3 => self.run_with::<S, 4, 3>(simd),
@@ -296,7 +314,8 @@ impl Correlations<'_, '_, '_> {
     #[inline(always)]
     fn run_with<S: Lanes, const N: usize, const R: usize>(self, simd: S) -> Vec<Neighbours> {
         let Self { fits, rows, products } = self;
-        fits.products::<S, N, R>(simd, rows.start.cast_signed()..rows.end.cast_signed(), rows.end, products);
+        let range = rows.start.cast_signed()..rows.end.cast_signed();
+        apart(simd, ProductsOfRows::<N, R> { fits, range, end: rows.end, into: &mut *products });
         let mut sums: [Neighbours; N] = std::array::from_fn(|_| Neighbours::default());
         for rows in products.values.as_chunks::<N>().0[..rows.len()].windows(2) {
             for (regressor, sums) in sums.iter_mut().enumerate() {
@@ -323,8 +342,11 @@ impl Kernel for Sandwich<'_, '_, '_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
-        // Numbers of a row side by side, of the pairs of them, and of the regressors where these are few.
+        // Numbers of a row side by side, of the pairs of them, and of the regressors where these are few and vectors pay for kernels of
+        // their own.
         match self.fits.plan.regressors {
+            ..=4 if S::F64_LANES == 1 => self.run_with::<S, 4, 12, 0>(simd),
+            ..=8 if S::F64_LANES == 1 => self.run_with::<S, 8, 40, 0>(simd),
             1 => self.run_with::<S, 4, 1, 1>(simd),
             2 => self.run_with::<S, 4, 8, 2>(simd),
             3 => self.run_with::<S, 4, 8, 3>(simd),
@@ -355,7 +377,11 @@ impl Sandwich<'_, '_, '_> {
         let until = from_neighbours + (count + correlated).cast_signed();
         // Of rows after the last window nothing is asked, and nothing may be known.
         let known = rows.end - 1 + fits.plan.window - fits.plan.before;
-        fits.products::<S, N, R>(simd, from_neighbours..until, known, products);
+        let (range, end) = (from_neighbours..until, known);
+        match R {
+            5.. => apart(simd, ProductsOfRows::<N, 0> { fits, range, end, into: &mut *products }),
+            _ => apart(simd, ProductsOfRows::<N, R> { fits, range, end, into: &mut *products }),
+        }
         let of_rows = products.values.as_chunks::<N>().0;
         let neighbours = if correlated == 1 {
             &of_rows[..count]

@@ -56,20 +56,15 @@ impl<'a> ErrorScale<'a> {
             let scales = &mut scales[..sums.len()];
             self.of_windows(first, counts, scales);
             for (place, sums) in (0..).step_by(S::F64_LANES).zip(sums.chunks(S::F64_LANES)) {
-                let scales = &scales[place..];
                 let into = (first + place - rows.start, normal, &mut *errors);
-                if sums.len() == S::F64_LANES {
-                    self.write_some::<S, N, P, R, true>(simd, sums, scales, into);
-                } else {
-                    self.write_some::<S, N, P, R, false>(simd, sums, scales, into);
-                }
+                self.write_some::<S, N, P, R>(simd, sums, &scales[place..], into);
             }
         }
     }
 
     /// The same for as many windows as a vector holds, or fewer.
     #[inline(always)]
-    fn write_some<S: Lanes, const N: usize, const P: usize, const R: usize, const FULL: bool>(
+    fn write_some<S: Lanes, const N: usize, const P: usize, const R: usize>(
         &self,
         simd: S,
         sums: &[[f64; P]],
@@ -77,9 +72,8 @@ impl<'a> ErrorScale<'a> {
         (place, normal, errors): (usize, &[&[f64]], &mut [&mut [f64]]),
     ) {
         let (p, count) = (if R == 0 { self.plan.regressors } else { R }, sums.len());
-        let some = |numbers: &[f64]| {
-            if FULL { simd.load(numbers, 0) } else { simd.partial_load_f64s(&numbers[..count]) }
-        };
+        // A load under a mask takes no longer than another, and serves fewer windows as well. A store does, on some processors.
+        let some = |numbers: &[f64]| simd.partial_load_f64s(&numbers[..count]);
         let mut of_pairs = OnLines([simd.splat_f64s(0.0); P]);
         turn(simd, sums, &mut of_pairs.0);
         for (sum, &factor) in of_pairs.0.iter_mut().zip(&self.factors) {
@@ -112,7 +106,7 @@ impl<'a> ErrorScale<'a> {
             // Where there are no parameters the diagonal is NaN, and so is the error.
             let error = simd.sqrt_f64s(simd.mul_f64s(scale, variance));
             let into = &mut errors[place..];
-            if FULL {
+            if count == S::F64_LANES {
                 simd.store(into, 0, error);
             } else {
                 simd.partial_store_f64s(&mut into[..count], error);

@@ -9,15 +9,12 @@ use std::ops::Range;
 use crate::exec::pool::GoOn;
 use crate::lanes::output::Outputs;
 use crate::lanes::store::Write;
-use crate::lanes::tile::WindowFields;
 use crate::least_squares::fading;
-use crate::least_squares::givens_factor::{
-    Dimensions, append, covariance, empty, explained, invert, load, merge, solve, squared_norm, store,
-};
-use crate::least_squares::plan::{Equations, RollingLeastSquares, Slots};
-use crate::least_squares::side_by_side::{RollingRun, RollingScratch, SEGMENT};
-use crate::simd::vectors::{Kernel, Lanes, MOST_LANES};
-use crate::status::Status;
+use crate::least_squares::givens_factor::{Dimensions, append, empty, load, merge, store};
+use crate::least_squares::plan::{Equations, RollingLeastSquares};
+use crate::least_squares::side_by_side::{Load, RollingRun, RollingScratch, SEGMENT};
+use crate::least_squares::solutions::{Count, Solutions};
+use crate::simd::vectors::{Kernel, Lanes, apart};
 
 /// Rows of every lane between two calls of `go_on`: some 10 ms with 16 regressors.
 const ASK: usize = 256;
@@ -37,7 +34,7 @@ impl<H: Dimensions, const PLAIN: bool> Kernel for RollingKernel<'_, '_, '_, H, P
 
     #[inline(always)]
     fn run<S: Lanes>(mut self, simd: S) {
-        let full = self.run.load(simd, self.equations, self.scratch);
+        let full = apart(simd, Load { run: &self.run, equations: self.equations, scratch: self.scratch });
         let window = self.run.plan.window;
         let size = self.run.plan.summary(self.shape.size() * S::F64_LANES);
         let segments = window.div_ceil(SEGMENT);
@@ -83,16 +80,7 @@ impl<H: Dimensions, const PLAIN: bool> Kernel for RollingKernel<'_, '_, '_, H, P
                     suffix.store(simd, self.shape, &mut self.scratch.suffixes[place..place + size]);
                     self.append(simd, &mut prefix, offset, 1, &mut row);
                 }
-                for offset in some.clone() {
-                    let place = (offset - rows.start) * size;
-                    suffix.load(simd, self.shape, &self.scratch.suffixes[place..place + size]);
-                    let (freedom, own) = (self.freedom(simd, offset, full), offset + self.run.plan.before);
-                    let RollingScratch { strips, tile, .. } = &mut *self.scratch;
-                    let place = if own < window { strips[0].place(own, 0) } else { strips[0].place(own - window, 1) };
-                    let at = |column: usize| strips[column].in_place(simd, place);
-                    let fields = &mut tile.fields_of::<S>(offset);
-                    finish(simd, self.shape, self.run.plan, &suffix, freedom, fields, &mut row, at);
-                }
+                self.solve(simd, some.clone(), rows.start, full);
                 // The last windows are written together with some that were written before, to fill the vectors.
                 if some.end % places == 0 || some.end == window {
                     self.write(simd, some.end.saturating_sub(places)..some.end);
@@ -227,19 +215,16 @@ impl<H: Dimensions, const PLAIN: bool> RollingKernel<'_, '_, '_, H, PLAIN> {
         summary.append(simd, shape, plan, (offset, block), row, weight);
     }
 
-    /// One over the degrees of freedom of each lane's window.
+    /// Solves the windows at some offsets of each lane's block. Suffixes, which are whole windows now, are held from a first offset on.
     #[inline(always)]
-    fn freedom<S: Lanes>(&self, simd: S, offset: usize, full: bool) -> S::f64s {
-        let (plan, p) = (self.run.plan, self.shape.regressors());
-        if full {
-            return simd.splat_f64s(1.0 / (plan.window - p) as f64);
-        }
-        let mut freedom = [0.0; MOST_LANES];
-        for (lane, freedom) in freedom[..S::F64_LANES].iter_mut().enumerate() {
-            let count = self.run.count(self.scratch, self.run.first(lane) + offset);
-            *freedom = 1.0 / count.saturating_sub(p) as f64;
-        }
-        simd.load(&freedom, 0)
+    fn solve<S: Lanes>(&mut self, simd: S, offsets: Range<usize>, first: usize, full: bool) {
+        let (run, shape) = (&self.run, self.shape);
+        let RollingScratch { strips, tile, suffixes, counts, .. } = &mut *self.scratch;
+        let size = run.plan.summary(shape.size() * S::F64_LANES);
+        let summaries = &suffixes[(offsets.start - first) * size..(offsets.end - first) * size];
+        let count = |lane: usize, offset: usize| run.count(counts, run.first(lane) + offset);
+        let count: Option<&Count<'_>> = if full { None } else { Some(&count) };
+        apart(simd, Solutions { shape, plan: run.plan, offsets, summaries, count, rows: Some(strips), tile });
     }
 
     /// Writes out the windows at some offsets of each lane's block.
@@ -257,104 +242,6 @@ impl<H: Dimensions, const PLAIN: bool> RollingKernel<'_, '_, '_, H, PLAIN> {
             fixed_order: None,
             outputs: &mut *self.outputs,
         };
-        write.run(simd);
-    }
-}
-
-/// Flags as the tile holds them.
-#[inline(always)]
-fn code<S: Lanes>(simd: S, status: Status) -> S::f64s {
-    simd.splat_f64s(256.0 * f64::from(status.bits()))
-}
-
-/// Solves each lane's window: what is known of it goes to its fields in the tile. `values` is scratch memory; `own` gives columns of the
-/// window's own row, where what is left of that is asked for.
-#[inline(always)]
-#[allow(clippy::too_many_arguments, reason = "a window and where its results go")]
-pub(crate) fn finish<S: Lanes, H: Dimensions>(
-    simd: S,
-    shape: H,
-    plan: &RollingLeastSquares,
-    summary: &WindowSummary<H::Factor<S::f64s>>,
-    mut freedom: S::f64s,
-    fields: &mut WindowFields<'_>,
-    values: &mut H::Factor<S::f64s>,
-    own: impl Fn(usize) -> S::f64s,
-) {
-    let factor = &summary.factor;
-    let (p, q) = (shape.regressors(), shape.rhs_count());
-    let slots = Slots::of_shape(plan, p, q);
-    // The condition number comes first: where it exceeds the precision, no result has any digits.
-    invert(simd, shape, factor, values);
-    let mut squares = simd.splat_f64s(0.0);
-    for i in 0..p {
-        let variance = covariance(simd, shape, values, i, i);
-        squares = simd.mul_add_f64s(squared_norm(simd, shape, factor, i), variance, squares);
-    }
-    let condition = simd.sqrt_f64s(simd.mul_f64s(squares, simd.splat_f64s(p as f64)));
-    let greatest = simd.splat_f64s(1.0 / (f64::EPSILON * plan.window as f64));
-    let determined = simd.less_than_f64s(condition, greatest);
-    let ill = simd.greater_than_f64s(condition, simd.splat_f64s(plan.ill_conditioned));
-    let flags = simd.select_f64s(ill, code(simd, Status::ILL_CONDITIONED), simd.splat_f64s(0.0));
-    let deficient = code(simd, Status::INVALID | Status::RANK_DEFICIENT);
-    let condition = simd.select_f64s(determined, condition, simd.splat_f64s(f64::INFINITY));
-    fields.put(simd, slots.condition, condition);
-    fields.put(simd, slots.condition + 1, simd.select_f64s(determined, flags, deficient));
-
-    let mut faded = None;
-    // No closure: a large one is compiled on its own, without the instructions that were chosen.
-    if let Some(sums) = &summary.sums {
-        let mut variances = shape.factor(simd.splat_f64s(0.0));
-        freedom = simd.div_f64s(simd.splat_f64s(1.0), fading::freedom(simd, shape, values, sums, &mut variances));
-        faded = Some(variances);
-    }
-    if plan.normal {
-        let pairs = (0..p).flat_map(|i| (i + 1..p).map(move |k| (i, k)));
-        for (pair, (i, k)) in pairs.enumerate() {
-            fields.put(simd, slots.normal + pair, covariance(simd, shape, values, i, k));
-        }
-    }
-    for rhs in 0..q {
-        let residual = factor[shape.row(p) + rhs];
-        let variance = simd.mul_f64s(residual, freedom);
-        fields.put(simd, slots.residuals + rhs, residual);
-        for (pair, &(i, j)) in plan.covariances.iter().enumerate() {
-            let one = covariance(simd, shape, values, i.min(j), i.max(j));
-            fields.put(simd, slots.covariances + pair * q + rhs, simd.mul_f64s(one, variance));
-        }
-        let deviation = simd.sqrt_f64s(variance);
-        fields.put(simd, slots.deviations + rhs, deviation);
-        for i in 0..p {
-            let over = match &faded {
-                Some(variances) => variances[shape.row(i)],
-                None => covariance(simd, shape, values, i, i),
-            };
-            let error = if plan.normal { over } else { simd.mul_f64s(simd.sqrt_f64s(over), deviation) };
-            fields.put(simd, slots.errors + i * q + rhs, error);
-        }
-    }
-    for rhs in 0..q {
-        solve(simd, shape, factor, rhs, values);
-        for i in 0..p {
-            fields.put(simd, i * q + rhs, values[i]);
-        }
-        if plan.fit {
-            let mut residual = own(p + rhs);
-            for i in 0..p {
-                residual = simd.negate_mul_add_f64s(own(i), values[i], residual);
-            }
-            fields.put(simd, slots.own_residuals + rhs, residual);
-            let explained = explained(simd, shape, factor, rhs, usize::from(plan.constant_first));
-            let all = simd.add_f64s(explained, factor[shape.row(p) + rhs]);
-            fields.put(simd, slots.rsquared + rhs, simd.div_f64s(explained, all));
-        }
-    }
-    // Few windows are not determined, and they are written twice. Selected, not added: of two that are no number, addition gives either,
-    // and which one is the compiler's choice in every path.
-    if simd.bits(determined) != (1 << S::F64_LANES) - 1 {
-        for slot in 0..slots.condition {
-            let value = fields.get(simd, slot);
-            fields.put(simd, slot, simd.select_f64s(determined, value, simd.splat_f64s(f64::NAN)));
-        }
+        apart(simd, write);
     }
 }

@@ -13,6 +13,7 @@ pub(crate) mod rounds;
 pub(crate) mod row_products;
 pub(crate) mod side_by_side;
 pub(crate) mod sliding_sums;
+pub(crate) mod solutions;
 pub(crate) mod stacked_qr;
 
 pub use plan::{Alignment, Equations, HALF_OF_THE_DIGITS, Regressions, RollingLeastSquares};

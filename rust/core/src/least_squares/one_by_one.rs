@@ -10,12 +10,13 @@ use crate::lanes::output::Outputs;
 use crate::lanes::store::Write;
 use crate::lanes::tile::Tile;
 use crate::least_squares::givens_factor::{Dimensions, Few, Many};
-use crate::least_squares::kernel::{WindowSummary, finish};
+use crate::least_squares::kernel::WindowSummary;
 use crate::least_squares::plan::{Regressions, RollingLeastSquares, Slots};
 use crate::least_squares::side_by_side::{RollingRun, SEGMENT};
+use crate::least_squares::solutions::{Count, Solutions};
 use crate::record::samples::is_usable;
 use crate::simd::aligned::Aligned;
-use crate::simd::vectors::{Kernel, Lanes, dispatch};
+use crate::simd::vectors::{Kernel, Lanes, apart, dispatch, dispatch_vectors};
 
 /// Rows by their numbers.
 pub(crate) trait RowSource {
@@ -35,6 +36,8 @@ pub(crate) struct OneByOne {
     segment: usize,
     prefix: Aligned,
     suffixes: Aligned,
+    /// The window that is solved.
+    window: Aligned,
     checkpoints: Aligned,
     tile: Tile,
     unusable: Vec<usize>,
@@ -51,6 +54,7 @@ impl OneByOne {
             segment: usize::MAX,
             prefix: Aligned::zeros(factor),
             suffixes: Aligned::zeros(plan.window.min(SEGMENT) * factor),
+            window: Aligned::zeros(factor),
             checkpoints: Aligned::zeros((plan.window.div_ceil(SEGMENT) - 1) * factor),
             tile: Tile::new(Slots::of(plan).fields(), lanes.next_multiple_of(8), lanes),
             unusable: Vec::new(),
@@ -81,19 +85,30 @@ impl RollingLeastSquares {
             let next = end.min(base + self.window);
             let run = RollingRun { plan: self, base, windows: window..next, rows: equations.clone() };
             let outputs = &mut outputs;
-            let instructions = self.instructions;
-            match (self.regressors, self.rhs_count) {
-                (1, 1) => dispatch(instructions, OneByOneKernel { run, shape: Few::<1>, source, state, outputs }),
-                (2, 1) => dispatch(instructions, OneByOneKernel { run, shape: Few::<2>, source, state, outputs }),
-                (3, 1) => dispatch(instructions, OneByOneKernel { run, shape: Few::<3>, source, state, outputs }),
-                (4, 1) => dispatch(instructions, OneByOneKernel { run, shape: Few::<4>, source, state, outputs }),
-                (regressors, rhs_count) => {
-                    let shape = Many { regressors, rhs_count };
-                    dispatch(instructions, OneByOneKernel { run, shape, source, state, outputs });
+            match self.few() {
+                Some(1) => self.one_by_one(Few::<1>, run, source, state, outputs),
+                Some(2) => self.one_by_one(Few::<2>, run, source, state, outputs),
+                Some(3) => self.one_by_one(Few::<3>, run, source, state, outputs),
+                Some(4) => self.one_by_one(Few::<4>, run, source, state, outputs),
+                _ => {
+                    let shape = Many { regressors: self.regressors, rhs_count: self.rhs_count };
+                    dispatch(self.instructions, OneByOneKernel { run, shape, source, state, outputs });
                 }
             }
             window = next;
         }
+    }
+
+    /// Solves windows of one block, with vectors.
+    fn one_by_one<H: Dimensions>(
+        &self,
+        shape: H,
+        run: RollingRun<'_>,
+        source: &dyn RowSource,
+        state: &mut OneByOne,
+        outputs: &mut Outputs<'_>,
+    ) {
+        dispatch_vectors(self.instructions, OneByOneKernel { run, shape, source, state, outputs });
     }
 }
 
@@ -134,19 +149,20 @@ impl<H: Dimensions> Kernel for OneByOneKernel<'_, '_, '_, H> {
                 let mut summary = self.nothing(simd);
                 summary.load(simd, shape, &self.state.suffixes[offset % SEGMENT * size..][..size]);
                 summary.merge(simd, shape, self.run.plan, &prefix, offset, &mut row);
-                let count = counted(&self.run, self.source, self.run.base + offset);
-                let freedom = simd.splat_f64s(1.0 / count.saturating_sub(shape.regressors()) as f64);
-                let none = |_: usize| simd.splat_f64s(f64::NAN);
-                let fields = &mut self.state.tile.fields_of::<S>(offset);
-                finish(simd, shape, self.run.plan, &summary, freedom, fields, &mut row, none);
+                summary.store(simd, shape, &mut self.state.window);
+                let count = |_lane: usize, offset: usize| counted(&self.run, self.source, self.run.base + offset);
+                let OneByOne { tile, window: summaries, .. } = &mut *self.state;
+                let (plan, offsets, rows, count) =
+                    (self.run.plan, offset..offset + 1, None, Some(&count as &Count<'_>));
+                apart(simd, Solutions { shape, plan, offsets, summaries, count, rows, tile });
             }
             if (offset + 1) % places == 0 || offset + 1 == offsets.end {
                 let rows = offset - (offset - offsets.start).min(offset % places)..offset + 1;
                 let windows = self.run.base + rows.start..self.run.base + rows.end;
                 let (tile, base) = (&self.state.tile, self.run.base.cast_signed());
                 let outputs = &mut *self.outputs;
-                Write { tile, rows, base, block: window, records: None, windows, ahead, fixed_order: None, outputs }
-                    .run(simd);
+                let (block, records, fixed_order) = (window, None, None);
+                apart(simd, Write { tile, rows, base, block, records, windows, ahead, fixed_order, outputs });
             }
         }
         prefix.store(simd, shape, &mut self.state.prefix);

@@ -11,7 +11,7 @@ use crate::least_squares::givens_factor::{Dimensions, Few, Many};
 use crate::least_squares::kernel::RollingKernel;
 use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares, Slots};
 use crate::least_squares::side_by_side::{RollingRun, RollingScratch, SEGMENT};
-use crate::simd::vectors::dispatch;
+use crate::simd::vectors::{dispatch, dispatch_vectors};
 
 /// Rows in a piece of work, about.
 const PIECE: usize = 1 << 14;
@@ -89,25 +89,32 @@ impl RollingLeastSquares {
             let run = RollingRun { plan: self, base: first, windows: window..next, rows: equations.rows.clone() };
             let scratch = &mut *scratch;
             let outputs = &mut outputs;
-            match (self.regressors, self.rhs_count) {
-                (1, 1) => self.solve_blocks(Few::<1>, run, equations, scratch, outputs, go_on),
-                (2, 1) => self.solve_blocks(Few::<2>, run, equations, scratch, outputs, go_on),
-                (3, 1) => self.solve_blocks(Few::<3>, run, equations, scratch, outputs, go_on),
-                (4, 1) => self.solve_blocks(Few::<4>, run, equations, scratch, outputs, go_on),
-                (5, 1) => self.solve_blocks(Few::<5>, run, equations, scratch, outputs, go_on),
-                (6, 1) => self.solve_blocks(Few::<6>, run, equations, scratch, outputs, go_on),
-                (7, 1) => self.solve_blocks(Few::<7>, run, equations, scratch, outputs, go_on),
-                (8, 1) => self.solve_blocks(Few::<8>, run, equations, scratch, outputs, go_on),
-                (regressors, rhs_count) => {
-                    self.solve_blocks(Many { regressors, rhs_count }, run, equations, scratch, outputs, go_on);
+            match self.few() {
+                Some(1) => self.solve_few(Few::<1>, run, equations, scratch, outputs, go_on),
+                Some(2) => self.solve_few(Few::<2>, run, equations, scratch, outputs, go_on),
+                Some(3) => self.solve_few(Few::<3>, run, equations, scratch, outputs, go_on),
+                Some(4) => self.solve_few(Few::<4>, run, equations, scratch, outputs, go_on),
+                Some(5) => self.solve_few(Few::<5>, run, equations, scratch, outputs, go_on),
+                Some(6) => self.solve_few(Few::<6>, run, equations, scratch, outputs, go_on),
+                Some(7) => self.solve_few(Few::<7>, run, equations, scratch, outputs, go_on),
+                Some(8) => self.solve_few(Few::<8>, run, equations, scratch, outputs, go_on),
+                _ => {
+                    let shape = Many { regressors: self.regressors, rhs_count: self.rhs_count };
+                    let kernel = RollingKernel::<_, false> { run, shape, equations, scratch, outputs, go_on };
+                    dispatch(self.instructions, kernel);
                 }
             }
             window = next;
         }
     }
 
-    /// Solves the windows of some blocks side by side.
-    fn solve_blocks<H: Dimensions>(
+    /// The number of regressors, where it is small and kernels that know it pay: with one right-hand side, and vectors.
+    pub(crate) fn few(&self) -> Option<usize> {
+        (self.rhs_count == 1 && self.instructions.lanes() > 1).then_some(self.regressors)
+    }
+
+    /// Solves the windows of some blocks side by side, with vectors.
+    fn solve_few<H: Dimensions>(
         &self,
         shape: H,
         run: RollingRun<'_>,
@@ -117,9 +124,11 @@ impl RollingLeastSquares {
         go_on: &GoOn<'_>,
     ) {
         if self.is_weighted(equations) {
-            dispatch(self.instructions, RollingKernel::<_, false> { run, shape, equations, scratch, outputs, go_on });
+            let kernel = RollingKernel::<_, false> { run, shape, equations, scratch, outputs, go_on };
+            dispatch_vectors(self.instructions, kernel);
         } else {
-            dispatch(self.instructions, RollingKernel::<_, true> { run, shape, equations, scratch, outputs, go_on });
+            let kernel = RollingKernel::<_, true> { run, shape, equations, scratch, outputs, go_on };
+            dispatch_vectors(self.instructions, kernel);
         }
     }
 }

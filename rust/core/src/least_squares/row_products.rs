@@ -1,5 +1,7 @@
 //! Regressors times the residuals of rows, and the products of each pair of these, as standard errors of correlated residuals need them.
 
+use std::ops::Range;
+
 use crate::record::samples::LARGEST;
 use crate::simd::aligned::Aligned;
 use crate::simd::vectors::{Lanes, MOST_LANES};
@@ -39,11 +41,7 @@ pub(crate) fn multiply<S: Lanes, const N: usize>(
     let mut before = 0;
     for (first, counts) in (0..).step_by(lanes).zip(counts.chunks_mut(lanes)) {
         let columns = (columns, rows);
-        let counted = if counts.len() == lanes {
-            multiply_some::<S, N, true>(simd, columns, parameters, first, values)
-        } else {
-            multiply_some::<S, N, false>(simd, columns, parameters, first, values)
-        };
+        let counted = multiply_some::<S, N>(simd, columns, parameters, first..first + counts.len(), values);
         for (lane, count) in counts.iter_mut().enumerate() {
             *count = before + (counted & ((2 << lane) - 1)).count_ones();
         }
@@ -52,19 +50,17 @@ pub(crate) fn multiply<S: Lanes, const N: usize>(
     before
 }
 
-/// The same for as many rows as a vector has lanes, or for the last of the given number of rows; returns which of them count.
+/// The same for as many of the rows as a vector has lanes, or fewer; returns which of them count.
 #[inline(always)]
-fn multiply_some<S: Lanes, const N: usize, const FULL: bool>(
+fn multiply_some<S: Lanes, const N: usize>(
     simd: S,
     (columns, rows): (&[f64], usize),
     parameters: &[&[f64]],
-    first: usize,
+    some_rows: Range<usize>,
     values: &mut [f64],
 ) -> u32 {
-    let p = parameters.len();
-    let some = |numbers: &[f64]| {
-        if FULL { simd.load(numbers, first) } else { simd.partial_load_f64s(&numbers[first..rows]) }
-    };
+    let (p, first) = (parameters.len(), some_rows.start);
+    let some = |numbers: &[f64]| simd.partial_load_f64s(&numbers[some_rows.clone()]);
     let column = |number: usize| some(&columns[number * rows..][..rows]);
     let (none, largest) = (simd.splat_f64s(0.0), simd.splat_f64s(LARGEST));
     let mut residual = column(p);

@@ -9,7 +9,7 @@ use crate::least_squares::givens_factor::{Dimensions, Many};
 use crate::least_squares::plan::{Equations, RollingLeastSquares, Slots};
 use crate::record::samples::{Samples, all_usable, is_usable};
 use crate::simd::aligned::Aligned;
-use crate::simd::vectors::Lanes;
+use crate::simd::vectors::{Kernel, Lanes};
 use crate::status::Status;
 
 /// Suffix factors that are kept at a time. Longer windows keep one of so many and recompute the others.
@@ -30,7 +30,7 @@ pub struct RollingScratch {
     missing: Vec<usize>,
     left_out: Vec<usize>,
     /// Rows that count before each row of the run. Not made where every window is full.
-    counts: Vec<u32>,
+    pub(crate) counts: Vec<u32>,
     pub(crate) strips: Vec<Strips>,
     pub(crate) suffixes: Aligned,
     pub(crate) checkpoints: Aligned,
@@ -69,11 +69,27 @@ pub(crate) struct RollingRun<'a> {
     pub(crate) rows: Range<usize>,
 }
 
-impl RollingRun<'_> {
-    /// Lays out the rows of the run. Rows that are no equations, or hold an unusable value, become zero. Returns whether every row of every
-    /// window counts.
+/// The kernel that lays out the rows of a run. Rows that are no equations, or hold an unusable value, become zero. Tells whether every row of
+/// every window counts.
+pub(crate) struct Load<'a, 'b> {
+    pub(crate) run: &'b RollingRun<'a>,
+    pub(crate) equations: &'b Equations<'a>,
+    pub(crate) scratch: &'b mut RollingScratch,
+}
+
+impl Kernel for Load<'_, '_> {
+    type Output = bool;
+
     #[inline(always)]
-    pub(crate) fn load<S: Lanes>(&self, simd: S, equations: &Equations<'_>, scratch: &mut RollingScratch) -> bool {
+    fn run<S: Lanes>(self, simd: S) -> bool {
+        self.run.load(simd, self.equations, self.scratch)
+    }
+}
+
+impl RollingRun<'_> {
+    /// Lays out the rows of the run. Returns whether every row of every window counts.
+    #[inline(always)]
+    fn load<S: Lanes>(&self, simd: S, equations: &Equations<'_>, scratch: &mut RollingScratch) -> bool {
         let RollingScratch { column, unusable, missing, left_out, counts, strips, .. } = scratch;
         let before = self.plan.window;
         let end = self.base + column.len();
@@ -144,9 +160,9 @@ impl RollingRun<'_> {
     }
 
     /// How many rows of a window count, where not every window is full.
-    pub(crate) fn count(&self, scratch: &RollingScratch, window: usize) -> usize {
+    pub(crate) fn count(&self, counts: &[u32], window: usize) -> usize {
         let first = window - self.base;
-        (scratch.counts[first + self.plan.window] - scratch.counts[first]) as usize
+        (counts[first + self.plan.window] - counts[first]) as usize
     }
 
     /// The window that begins in row 0 of a lane.
@@ -165,7 +181,7 @@ impl RollingRun<'_> {
         if full && unusable.is_empty() {
             return;
         }
-        let count = |window| if full { self.spanned(window) } else { self.count(scratch, window) };
+        let count = |window| if full { self.spanned(window) } else { self.count(&scratch.counts, window) };
         self.mark_windows(unusable, missing, count, outputs);
         self.forget_residuals(&scratch.left_out, outputs);
     }

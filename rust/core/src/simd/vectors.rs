@@ -94,24 +94,40 @@ pub(crate) trait Kernel {
 
 /// Runs a kernel with the given instructions.
 pub(crate) fn dispatch<K: Kernel>(instructions: Instructions, kernel: K) -> K::Output {
+    with_vectors(instructions, kernel).unwrap_or_else(|kernel| kernel.run(Scalar::new()))
+}
+
+/// The same with instructions that have vectors. Kernels that are compiled for many sizes need not be compiled for single numbers as well.
+pub(crate) fn dispatch_vectors<K: Kernel>(instructions: Instructions, kernel: K) -> K::Output {
+    with_vectors(instructions, kernel).unwrap_or_else(|_| unreachable!("{instructions:?} has no vectors"))
+}
+
+/// Runs a kernel where there are vectors, or gives it back.
+fn with_vectors<K: Kernel>(instructions: Instructions, kernel: K) -> Result<K::Output, K> {
     match instructions {
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx512 => {
             let simd = pulp::x86::V4::try_new().expect("only instructions that run here are chosen");
-            simd.vectorize(On { simd, kernel })
+            Ok(apart(simd, kernel))
         }
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx2 => {
             let simd = pulp::x86::V3::try_new().expect("only instructions that run here are chosen");
-            simd.vectorize(On { simd, kernel })
+            Ok(apart(simd, kernel))
         }
         #[cfg(target_arch = "aarch64")]
         Instructions::Neon => {
             let simd = pulp::aarch64::Neon::try_new().expect("only instructions that run here are chosen");
-            simd.vectorize(On { simd, kernel })
+            Ok(apart(simd, kernel))
         }
-        _ => kernel.run(Scalar::new()),
+        _ => Err(kernel),
     }
+}
+
+/// Runs a part of a kernel that is compiled apart from it, for the same instructions. What several kernels use is compiled once then.
+#[inline(always)]
+pub(crate) fn apart<S: Lanes, K: Kernel>(simd: S, kernel: K) -> K::Output {
+    simd.vectorize(On { simd, kernel })
 }
 
 /// A kernel and the instructions it runs with.
