@@ -99,7 +99,9 @@ class AskedTogether:
         self._check_window(asked["regression_window"], found.regression_window)
         again = replace(self, forms=[{name: getattr(found, name) for name in asked}], report=None)
         chosen = [name for name, value in asked.items() if value is None]
-        return Part(found, equations, lambda others: again.part(others, samples, noise or found.noise), chosen)
+        # The colour of noise is not given, but read with its variance.
+        same = noise or (None if max(found.colours, default=1.0) > 1 else found.noise)
+        return Part(found, equations, lambda others: again.part(others, samples, same), chosen)
 
     @staticmethod
     def _check_window(wanted: int | None, nearest: int) -> None:

@@ -69,6 +69,12 @@ def _reasons_of(one: _core.MergedIdentification) -> list[str]:
     reasons = [
         f"{function}; rows are predicted with {one.prediction_error:.2f} times the variance of the channels' noise"
     ]
+    colour = max(one.colours, default=1.0)
+    if colour > 1:
+        reasons.append(
+            f"the noise of an angle is {colour:.2g} times as strong at low frequencies as at the highest: products are corrected for it, "
+            "and errors are larger by it"
+        )
     if one.scan.plateau is not None:
         first, last = (one.scan.window_length[place] for place in one.scan.plateau)
         reasons.append(

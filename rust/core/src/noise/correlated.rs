@@ -38,6 +38,30 @@ impl CorrelatedNoise {
         self.first_order.is_empty()
     }
 
+    /// The noise whose covariances are the means of those of some noises.
+    pub(crate) fn mean(noises: &[&Self]) -> Self {
+        let share = 1.0 / noises.len().max(1) as f64;
+        let mut mean = Self::white(noises.iter().map(|noise| share * noise.white).sum());
+        for &(correlation, variance) in noises.iter().flat_map(|noise| &noise.first_order) {
+            match mean.first_order.iter_mut().find(|(other, _)| *other == correlation) {
+                Some((_, sum)) => *sum += share * variance,
+                None => mean.first_order.push((correlation, share * variance)),
+            }
+        }
+        mean
+    }
+
+    /// The same white noise with a part of the others.
+    pub(crate) fn with_part(&self, part: f64) -> Self {
+        let first_order = self.first_order.iter().map(|&(correlation, variance)| (correlation, part * variance));
+        Self { white: self.white, first_order: if part > 0.0 { first_order.collect() } else { Vec::new() } }
+    }
+
+    /// Samples over which the slowest of the noises falls to a part of `1/e`.
+    pub(crate) fn memory(&self) -> f64 {
+        self.first_order.iter().map(|(correlation, _)| -1.0 / correlation.ln()).fold(0.0, f64::max)
+    }
+
     /// The density at an angular frequency per sample: that of white noise is its variance.
     #[must_use]
     pub fn density(&self, frequency: f64) -> f64 {
@@ -91,6 +115,17 @@ mod tests {
             assert!((found - row.sum::<f64>()).abs() < 1e-14, "row {i}");
         }
         assert_eq!(CorrelatedNoise::white(9.0).correlate(&sequence), sequence);
+    }
+
+    #[test]
+    fn the_mean_of_noises_has_the_mean_of_their_covariances() {
+        let [one, other] = [vec![(0.5, 2.0), (0.9, 1.0)], vec![(0.9, 3.0)]].map(|each| CorrelatedNoise::new(1.0, each));
+        let mean = CorrelatedNoise::mean(&[&one, &other]);
+        assert_eq!(mean, CorrelatedNoise::new(1.0, vec![(0.5, 1.0), (0.9, 2.0)]));
+        assert!((mean.memory() + 0.9_f64.ln().recip()).abs() < 1e-12);
+        assert_eq!(CorrelatedNoise::white(2.0).memory(), 0.0);
+        assert_eq!(mean.with_part(0.5), CorrelatedNoise::new(1.0, vec![(0.5, 0.5), (0.9, 1.0)]));
+        assert!(mean.with_part(0.0).is_white());
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! The choice of the test function of merged rows: that of every equation as if its mass stood alone, and their mean.
 
+use std::f64::consts::PI;
+
 use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::identify::merged::session::MergedSession;
@@ -131,7 +133,10 @@ impl MergedSession<'_, '_, '_> {
             self.merged.elements.iter().any(|one| one.known.is_none() && one.entries.iter().any(of))
         });
         let noise = [self.noise[0][channel], self.noise[1][equation]];
-        Ok(Evidence { power, samples, noise, coloured: None, delta: self.options.delta, unknown })
+        let colour = &self.colours[channel];
+        let density = |bin: usize| colour.density(2.0 * PI * bin as f64 / length as f64);
+        let coloured = (!colour.is_white()).then(|| (0..power.len()).map(density).collect());
+        Ok(Evidence { power, samples, noise, coloured, delta: self.options.delta, unknown })
     }
 
     /// Inertia, damping and stiffness of a mass with everything else held.

@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::exec::pool::Watch;
 use crate::exec::stages::Stages;
 use crate::identify::merged::choice::noise_of;
+use crate::identify::merged::fading::colours_of;
 use crate::identify::merged::found::MergedFound;
 use crate::identify::merged::interleaved::{Interleaved, Weights};
 use crate::identify::merged::session::{EXPONENT, MergedSession};
@@ -15,6 +16,8 @@ use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 
 /// Stages of a call, about: only for showing progress.
 const STAGES: usize = 60;
+/// Rounds of taking less of the noise's colour where less is left.
+const FADINGS: usize = 3;
 
 /// Identifies what trials and masses share, in weak form.
 ///
@@ -34,6 +37,7 @@ pub fn identify_merged(
         merged,
         options,
         noise: [Vec::new(), Vec::new()],
+        colours: Vec::new(),
         parameters: merged.elements.iter().map(|element| element.known.unwrap_or(0.0)).collect(),
         weights: Weights { angles: Vec::new(), equations: Vec::new() },
         all,
@@ -45,9 +49,20 @@ pub fn identify_merged(
         stages,
     };
     session.noise = noise_of(&mut session)?;
+    session.colours = colours_of(&mut session)?;
     session.choose()?;
     let model = session.model();
-    let Some(fitted) = session.settle(&model)? else { return session.nothing() };
+    let Some(mut fitted) = session.settle(&model)? else { return session.nothing() };
+    for _ in 0..FADINGS {
+        if !session.fade(&fitted) {
+            break;
+        }
+        session.jumps.clear();
+        session.choose()?;
+        let model = session.model();
+        let Some(again) = session.settle(&model)? else { return session.nothing() };
+        fitted = again;
+    }
     let (mut found, at_rows) = session.report(&fitted)?;
     let windowed = fitted.model.windowed.clone();
     drop(fitted);

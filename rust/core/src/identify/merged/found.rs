@@ -38,6 +38,8 @@ pub struct MergedFound {
     pub prediction_error: f64,
     /// Variances of the noise of every angle and every torque.
     pub noise: (Vec<f64>, Vec<f64>),
+    /// How many times as strong the noise of every angle is at the lowest frequencies as at the highest, where those variances are read.
+    pub colours: Vec<f64>,
     /// What was found of every unknown, in the order of the elements.
     pub elements: Vec<FoundElement>,
     /// Places of the constants among the unknowns, and their covariance, row by row.

@@ -8,7 +8,9 @@ use crate::equation::motion::Coefficient;
 use crate::equation::rows::{Regressor, Rows};
 use crate::error::Error;
 use crate::exec::stages::Stages;
+use crate::identify::merged::colour::coloured_kernels;
 use crate::identify::merged::system::{Element, Entry, Merged, Multiplied, Trial};
+use crate::noise::correlated::CorrelatedNoise;
 use crate::weak_form::test_function::{Kernels, TestFunction};
 use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows};
 
@@ -26,10 +28,11 @@ pub(crate) struct Channels {
     each: Vec<WeakRows>,
 }
 
-/// What is known of the noise: standard deviations of the angles, and what every equation is divided by.
+/// What is known of the noise: of every angle columns whose products are those of its noise in the kernels, values before slopes, and
+/// what every equation is divided by.
 #[derive(Clone, Debug)]
 pub(crate) struct Weights {
-    pub(crate) angles: Vec<f64>,
+    pub(crate) angles: Vec<[[Vec<f64>; 3]; 2]>,
     pub(crate) equations: Vec<f64>,
 }
 
@@ -189,6 +192,16 @@ impl Interleaved {
         self.take_known(merged);
     }
 
+    /// The columns by which the noise of an angle enters: its kernels, or where it is coloured what has their products.
+    pub(crate) fn columns_of(&self, noise: &CorrelatedNoise) -> [[Vec<f64>; 3]; 2] {
+        if !noise.is_white() {
+            return coloured_kernels(noise, &self.kernels);
+        }
+        let deviation = noise.variance().sqrt();
+        let scaled = |kernel: &Vec<f64>| kernel.iter().map(|value| deviation * value).collect();
+        [&self.kernels.values, &self.kernels.slopes].map(|kernels| kernels.each_ref().map(scaled))
+    }
+
     /// The kernels by which the noise of all angles enters all equations, one after another, so that their products are the sums over
     /// angles and the means over equations.
     fn set_noise(&mut self, merged: &Merged<'_>, weights: &Weights) {
@@ -200,10 +213,10 @@ impl Interleaved {
             for Entry { equation, of, factor } in &element.entries {
                 let Multiplied::Motion { channel, coefficient } = *of else { continue };
                 let first = (equation * weights.angles.len() + channel) * length;
-                let factor = share * weights.equations[*equation] * weights.angles[channel] * factor;
-                let kernels = [&self.kernels.values[coefficient], &self.kernels.slopes[coefficient]];
-                for (noise, kernel) in regressor.noise.iter_mut().zip(kernels) {
-                    noise[first..first + length].iter_mut().zip(kernel).for_each(|(sum, k)| *sum += factor * k);
+                let factor = share * weights.equations[*equation] * factor;
+                for (noise, columns) in regressor.noise.iter_mut().zip(&weights.angles[channel]) {
+                    let column = &columns[coefficient];
+                    noise[first..first + length].iter_mut().zip(column).for_each(|(sum, k)| *sum += factor * k);
                 }
             }
         }

@@ -1,6 +1,8 @@
 //! Identification from rows that are merged: of repeated trials that share their parameters, and of coupled masses.
 
 pub(crate) mod choice;
+pub(crate) mod colour;
+pub(crate) mod fading;
 pub(crate) mod fitted;
 pub(crate) mod form;
 pub(crate) mod found;

@@ -1,5 +1,7 @@
 //! Values, standard errors and flags from merged rows.
 
+use std::f64::consts::PI;
+
 use crate::error::Error;
 use crate::identify::kinds::Kind;
 use crate::identify::merged::fitted::MergedFit;
@@ -242,6 +244,7 @@ impl MergedSession<'_, '_, '_> {
             lengths: Vec::new(),
             prediction_error: 1.0,
             noise: (self.noise[0].clone(), self.noise[1].clone()),
+            colours: self.colours.iter().map(|noise| (noise.density(0.0) / noise.density(PI)).max(1.0)).collect(),
             elements: self.merged.unknowns().into_iter().map(unknown).collect(),
             constants: Vec::new(),
             covariance: Vec::new(),

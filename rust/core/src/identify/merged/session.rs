@@ -4,10 +4,12 @@ use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::exec::stages::Stages;
 use crate::identify::kinds::Kind;
+use crate::identify::merged::colour::{memory, noisy};
 use crate::identify::merged::interleaved::{Channels, Interleaved, Weights};
 use crate::identify::merged::system::{Entry, Merged, MergedOptions, Multiplied};
 use crate::identify::scanned::Scan;
 use crate::inference::jumps::jump::Jump;
+use crate::noise::correlated::CorrelatedNoise;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
@@ -30,6 +32,8 @@ pub(crate) struct MergedSession<'a, 'b, 'c> {
     pub(crate) options: &'a MergedOptions,
     /// Variances of the noise of angles and torques.
     pub(crate) noise: [Vec<f64>; 2],
+    /// The noise of every angle with its colour.
+    pub(crate) colours: Vec<CorrelatedNoise>,
     /// The elements' values as far as they are known, those of windowed ones about.
     pub(crate) parameters: Vec<f64>,
     pub(crate) weights: Weights,
@@ -129,13 +133,15 @@ impl MergedSession<'_, '_, '_> {
         let variance = |equation: usize| {
             let of_angles = (0..self.merged.channels()).map(|channel| {
                 let mixed = self.mixed(equation, channel);
-                self.noise[0][channel] * products(&mixed, &mixed, 0)
+                let (factor, noisy) = noisy(&self.colours[channel], &mixed);
+                factor * products(&mixed, &noisy, 0)
             });
             self.noise[1][equation] * torque + of_angles.sum::<f64>()
         };
         let least = self.least_variance();
         let equations = (0..equations).map(|one| 1.0 / variance(one).max(least).sqrt()).collect();
-        Weights { angles: self.noise[0].iter().map(|variance| variance.sqrt()).collect(), equations }
+        let angles = self.colours.iter().map(|noise| self.all.columns_of(noise)).collect();
+        Weights { angles, equations }
     }
 
     /// The variance that no equation's noise is below.
@@ -162,19 +168,25 @@ impl MergedSession<'_, '_, '_> {
         let mixed: Vec<Vec<Vec<f64>>> = (0..equations)
             .map(|equation| (0..channels).map(|channel| self.mixed(equation, channel)).collect())
             .collect();
+        let noisy: Vec<Vec<(f64, Vec<f64>)>> = mixed
+            .iter()
+            .map(|each| each.iter().zip(&self.colours).map(|(kernel, noise)| noisy(noise, kernel)).collect())
+            .collect();
         let weights = &self.weights.equations;
         // Between a row of one equation and a row of another so many times later.
         let between = |one: usize, other: usize, times: usize| {
             let of_angles = (0..channels)
                 .map(|channel| {
-                    self.noise[0][channel] * products(&mixed[other][channel], &mixed[one][channel], times * stride)
+                    let (factor, noisy) = &noisy[one][channel];
+                    factor * products(&mixed[other][channel], noisy, times * stride)
                 })
                 .sum::<f64>();
             let of_torque =
                 if one == other { self.noise[1][one] * products(torque, torque, times * stride) } else { 0.0 };
             weights[one] * weights[other] * (of_angles + of_torque)
         };
-        let times = torque.len().div_ceil(stride);
+        let memory = self.colours.iter().map(|noise| memory(noise, torque.len())).max().unwrap_or(0);
+        let times = (torque.len() + memory).div_ceil(stride);
         let distances = (times - 1) * group + equations;
         let mut lags = vec![0.0; distances * equations];
         for time in 0..times {
