@@ -100,13 +100,15 @@ pub(crate) struct TestNoise<'a> {
     /// What variances are multiplied by.
     pub(crate) inflation: f64,
     pub(crate) from: NoiseFrom,
+    /// Equations whose rows take turns.
+    pub(crate) equations: usize,
 }
 
 /// Tests every constant of a fit; the result is `None` if the blocks do not determine it.
 pub(crate) fn test(
     problem: &Problem<'_>,
     fit: &Fit,
-    TestNoise { expected, covariance, inflation, from }: TestNoise<'_>,
+    TestNoise { expected, covariance, inflation, from, equations }: TestNoise<'_>,
     instructions: Instructions,
     stages: &mut Stages<'_, '_>,
 ) -> Result<Vec<Option<Test>>, Error> {
@@ -129,7 +131,7 @@ pub(crate) fn test(
     let at = |index: usize| index * rows / (BLOCKS * PARTS);
     let part = |index: usize| at(index)..at(index + 1);
     let free: Vec<bool> =
-        (0..BLOCKS * PARTS).map(|index| is_free(problem, &part(index), expected, inflation)).collect();
+        (0..BLOCKS * PARTS).map(|index| is_free(problem, (&part(index), equations), expected, inflation)).collect();
     // One alone is between two movements.
     let is_alone = |index: usize| !(index > 0 && free[index - 1] || free.get(index + 1) == Some(&true));
     let driven: Vec<bool> = (0..free.len()).map(|index| !free[index] || is_alone(index)).collect();
@@ -162,16 +164,29 @@ fn longest_run(holds: &[bool], places: Range<usize>) -> Option<Range<usize>> {
     runs.rev().max_by_key(Range::len)
 }
 
-/// Whether no torque acts in most of some rows: about its median there, which an offset takes, it is within chance of its noise.
-fn is_free(problem: &Problem<'_>, rows: &Range<usize>, expected: Expected, inflation: f64) -> bool {
-    let used = || rows.clone().filter(|&row| problem.usable[row] && problem.root(row) > 0.0);
-    let mut torques: Vec<f64> = used().map(|row| problem.rhs[row] / problem.root(row)).collect();
-    let Some(torque) = median(&mut torques) else { return false };
-    let square = |row: usize| (problem.rhs[row] - torque * problem.root(row)).powi(2);
-    let mut squares: Vec<f64> = used().map(square).collect();
-    let scattered = SCATTER_OF_MEDIAN * (expected.variance_inflation / squares.len() as f64).sqrt();
-    let most = MEDIAN_OF_SQUARES * (1.0 + FREE * scattered) * inflation * expected.torque;
-    median(&mut squares).is_some_and(|square| square <= most)
+/// Whether no torque acts in most of some rows of every equation: about its median there, which an offset takes, it is within chance of its
+/// noise.
+fn is_free(
+    problem: &Problem<'_>,
+    (rows, equations): (&Range<usize>, usize),
+    expected: Expected,
+    inflation: f64,
+) -> bool {
+    let of = |equation: usize| {
+        let used = || {
+            let rows = rows.clone().filter(move |row| row % equations == equation);
+            rows.filter(|&row| problem.usable[row] && problem.root(row) > 0.0)
+        };
+        let mut torques: Vec<f64> = used().map(|row| problem.rhs[row] / problem.root(row)).collect();
+        let torque = median(&mut torques)?;
+        let square = |row: usize| (problem.rhs[row] - torque * problem.root(row)).powi(2);
+        let mut squares: Vec<f64> = used().map(square).collect();
+        let scattered = SCATTER_OF_MEDIAN * (expected.variance_inflation / squares.len() as f64).sqrt();
+        let most = MEDIAN_OF_SQUARES * (1.0 + FREE * scattered) * inflation * expected.torque;
+        median(&mut squares).map(|square| square <= most)
+    };
+    let each: Vec<bool> = (0..equations).filter_map(of).collect();
+    !each.is_empty() && each.iter().all(|free| *free)
 }
 
 /// The constants of some rows as if there were no others, and their covariance: in windows as long as they are, or in the longest that jumps
@@ -299,7 +314,7 @@ mod tests {
         let covariance = &RowCovariance::by_distance(vec![variance]);
         let fit = Fit::in_rows(&problem, 64, white(variance), Instructions::Scalar).expect("constants");
         let expected = white(variance);
-        let noise = TestNoise { expected, covariance, inflation: 1.0, from };
+        let noise = TestNoise { expected, covariance, inflation: 1.0, from, equations: 1 };
         staged(|stages| test(&problem, &fit, noise, Instructions::Scalar, stages))
     }
 

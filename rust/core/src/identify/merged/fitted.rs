@@ -172,29 +172,23 @@ impl MergedSession<'_, '_, '_> {
         let Some(mut fitted) = self.fitted(model)? else { return Ok(None) };
         loop {
             let tests = self.tests(&fitted)?;
-            let tested = |element: usize| self.merged.elements[element].kind == Kind::Automatic;
             let of_constants = fitted.model.constant.iter().copied().zip(tests);
             let found: Vec<(usize, Test)> = of_constants.filter_map(|(one, test)| Some((one, test?))).collect();
             fitted.tests.retain(|(one, _)| fitted.model.windowed.contains(one));
             fitted.tests.extend(found.clone());
-            let mut differs: Vec<&(usize, Test)> =
-                found.iter().filter(|(_, test)| test.probability < constancy::NO_CHANCE).collect();
-            fitted.contradicted = !differs.is_empty();
+            fitted.contradicted = found.iter().any(|(_, test)| test.probability < constancy::NO_CHANCE);
             // What constants leave may be so much that no part of the record differs by more, though one of them changes.
-            let hidden = differs.is_empty() && fitted.error > NOISE_MODEL_FAILS;
-            if hidden {
-                differs = found.iter().collect();
-            }
-            differs.retain(|(one, _)| tested(*one));
-            differs.sort_by(|a, b| b.1.excess().total_cmp(&a.1.excess()));
-            // An unknown that varies makes others seem to vary, too: the one that explains most is set free.
+            let hidden = !fitted.contradicted && fitted.error > NOISE_MODEL_FAILS;
             let before = self.parameters.clone();
+            let tried = if hidden { self.suspects(&fitted.model)? } else { self.different(found) };
+            // An unknown that varies makes others seem to vary, too: the one that explains most is set free.
             let mut best: Option<(MergedFit, Vec<f64>)> = None;
-            for &&(one, _) in differs.iter().take(TRIED) {
+            for one in tried.into_iter().take(TRIED) {
                 self.parameters.clone_from(&before);
-                let mut freer = fitted.model.clone();
-                freer.constant.retain(|&other| other != one);
-                freer.windowed.push(one);
+                let freer = without(&fitted.model, one);
+                if hidden {
+                    self.begin_with(&freer)?;
+                }
                 let Some(found) = self.fitted(&freer)? else { continue };
                 if best.as_ref().is_none_or(|(best, _)| found.error < best.error) {
                     best = Some((found, self.parameters.clone()));
@@ -211,9 +205,40 @@ impl MergedSession<'_, '_, '_> {
             // Windows were compared with weights of parameters that were wrong while this one was held constant.
             self.parameters = parameters;
             self.fill();
-            let again = self.fitted(&found.model)?.unwrap_or(found);
+            let again = if hidden && self.jumps.is_empty() {
+                // So was the test function.
+                self.freed.clone_from(&found.model.windowed);
+                self.choose()?;
+                let Some(again) = self.fitted(&found.model)? else { return Ok(None) };
+                again
+            } else {
+                self.fitted(&found.model)?.unwrap_or(found)
+            };
             fitted = MergedFit { tests: std::mem::take(&mut fitted.tests), ..again };
         }
+    }
+
+    /// Constants that nobody asked for and that differ between parts of the record, those first that differ most.
+    fn different(&self, mut found: Vec<(usize, Test)>) -> Vec<usize> {
+        found.retain(|(one, test)| test.probability < constancy::NO_CHANCE && self.is_open(*one));
+        found.sort_by(|a, b| b.1.excess().total_cmp(&a.1.excess()));
+        found.into_iter().map(|(one, _)| one).collect()
+    }
+
+    /// Constants that nobody asked for, those first that leave least where short windows follow them.
+    fn suspects(&mut self, model: &Model) -> Result<Vec<usize>, Error> {
+        let open: Vec<usize> = model.constant.iter().copied().filter(|&one| self.is_open(one)).collect();
+        let mut left = Vec::new();
+        for one in open {
+            left.extend(self.begin_with(&without(model, one))?.map(|left| (one, left)));
+        }
+        left.sort_by(|a, b| a.1.total_cmp(&b.1));
+        Ok(left.into_iter().map(|(one, _)| one).collect())
+    }
+
+    /// Whether the record decides what kind an element is of.
+    fn is_open(&self, element: usize) -> bool {
+        self.merged.elements[element].kind == Kind::Automatic
     }
 
     /// Whether each constant is the same in all parts of the record.
@@ -229,7 +254,16 @@ impl MergedSession<'_, '_, '_> {
             covariance: &fitted.covariance,
             inflation: fitted.error.max(1.0),
             from: NoiseFrom::Channels,
+            equations: self.merged.equations(),
         };
         constancy::test(&problem, &fitted.fit, noise, self.options.instructions, &mut self.stages)
     }
+}
+
+/// A model with one constant less, which is windowed.
+fn without(model: &Model, one: usize) -> Model {
+    let mut freer = model.clone();
+    freer.constant.retain(|&other| other != one);
+    freer.windowed.push(one);
+    freer
 }

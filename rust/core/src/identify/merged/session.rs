@@ -13,6 +13,7 @@ use crate::noise::correlated::CorrelatedNoise;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
+use crate::regression::residuals::residuals;
 use crate::regression::row_covariance::RowCovariance;
 use crate::regression::window_length::Scale;
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
@@ -32,6 +33,8 @@ pub(crate) struct MergedSession<'a, 'b, 'c> {
     pub(crate) options: &'a MergedOptions,
     /// Variances of the noise of angles and torques.
     pub(crate) noise: [Vec<f64>; 2],
+    /// Elements that are windowed although nobody asked for it, since constants leave too much.
+    pub(crate) freed: Vec<usize>,
     /// The noise of every angle with its colour.
     pub(crate) colours: Vec<CorrelatedNoise>,
     /// The elements' values as far as they are known, those of windowed ones about.
@@ -50,11 +53,12 @@ pub(crate) struct MergedSession<'a, 'b, 'c> {
 }
 
 impl MergedSession<'_, '_, '_> {
-    /// What is windowed and what is constant, as asked.
+    /// What is windowed and what is constant, as asked or as it had to be.
     pub(crate) fn model(&self) -> Model {
         let unknowns = self.merged.unknowns();
-        let windowed = unknowns.iter().map(|&place| self.merged.elements[place].kind == Kind::Windowed);
-        Model::new(&unknowns, windowed, true)
+        let is_windowed =
+            |place: &usize| self.merged.elements[*place].kind == Kind::Windowed || self.freed.contains(place);
+        Model::new(&unknowns, unknowns.iter().map(is_windowed), true)
     }
 
     /// Builds the rows of all trials with a test function.
@@ -78,7 +82,12 @@ impl MergedSession<'_, '_, '_> {
 
     /// A first estimate, in windows of a few test functions.
     pub(crate) fn pilot(&mut self) -> Result<(), Error> {
-        let model = self.model();
+        self.pilot_of(&self.model()).map(|_| ())
+    }
+
+    /// A first estimate of a model, in the rows as they are now.
+    fn pilot_of(&mut self, model: &Model) -> Result<Option<Fit>, Error> {
+        let mut last = None;
         for _ in 0..WEIGHTINGS {
             self.fill();
             let scale = if model.windowed.is_empty() {
@@ -92,10 +101,22 @@ impl MergedSession<'_, '_, '_> {
             let problem = model.problem(&self.all.rows, &self.all.rows.rhs, 1.0, None);
             let instructions = self.options.instructions;
             let fit = Fit::new(&problem, scale, Expected::UNKNOWN, instructions, &mut self.stages)?;
-            let Some(fit) = fit else { return Ok(()) };
-            self.remember(&model, &fit);
+            let Some(fit) = fit else { return Ok(None) };
+            self.remember(model, &fit);
+            last = Some(fit);
         }
-        Ok(())
+        Ok(last)
+    }
+
+    /// A first estimate of a model as if nothing were known, and the mean square that it leaves of the rows: with weights from the parameters
+    /// of a wrong model, equations without a torque would hold all that they tie at what that model makes of it.
+    pub(crate) fn begin_with(&mut self, model: &Model) -> Result<Option<f64>, Error> {
+        self.parameters = self.merged.elements.iter().map(|element| element.known.unwrap_or(0.0)).collect();
+        let Some(fit) = self.pilot_of(model)? else { return Ok(None) };
+        let problem = model.problem(&self.all.rows, &self.all.rows.rhs, 1.0, None);
+        let (left, usable) = residuals(&problem, &fit, &mut self.stages)?;
+        let count = usable.iter().filter(|usable| **usable).count() as f64;
+        Ok(Some(left.iter().map(|left| left * left).sum::<f64>() / count.max(1.0)).filter(|left| left.is_finite()))
     }
 
     /// Takes the values of a fit as those of the elements, as far as they are numbers.

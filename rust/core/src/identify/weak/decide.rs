@@ -148,6 +148,7 @@ impl Session<'_, '_, '_> {
             covariance: &decided.covariance,
             inflation: decided.error.max(1.0),
             from: if is_raised { NoiseFrom::Equations } else { NoiseFrom::Channels },
+            equations: 1,
         };
         let results = constancy::test(&problem, fit, noise, self.options.instructions, &mut self.stages)?;
         // Tests of what was set free before stand as they were.
