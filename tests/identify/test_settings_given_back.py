@@ -6,10 +6,13 @@ import json
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 import tvident
 from calls import paper, strong, weak
+
+Array = npt.NDArray[np.float64]
 
 N = 400
 TIME = np.arange(N) / 1000
@@ -116,3 +119,67 @@ def test_names_that_no_result_has_are_refused(more: dict[str, Any], words: str) 
         tvident.identify(ANGLE, TORQUE, sample_rate=1000, settings=settings)
     with pytest.raises(TypeError, match=words):
         tvident.IdentificationStream(sample_rate=1000, settings=settings)
+
+
+def _rig(seed: int, seconds: float = 20.0) -> tvident.Recording:
+    return tvident.simulate_torsional_rig(seconds, seed=seed, torque_snr_db=40.0, angle_noise=1e-3)
+
+
+def _of_two_that_change(seed: int) -> tuple[Array, Array]:
+    """Return a motion whose inertia and damping change, the damping more plainly."""
+    generator, time = np.random.default_rng(seed), np.arange(20_000) / 1000
+    frequencies, phases = np.linspace(0.5, 12, 47), generator.uniform(0, 2 * np.pi, 47)
+    waves = 0.05 / (1 + (frequencies / 4) ** 2) * np.exp(1j * (2 * np.pi * frequencies * time[:, np.newaxis] + phases))
+    angle, velocity, acceleration = (
+        (waves * (2j * np.pi * frequencies) ** power).sum(axis=1).real for power in range(3)
+    )
+    inertia, damping = 0.0123 * (1 + 0.3 * np.sin(time)), 0.05 * (1 + 0.5 * time / 20)
+    torque = inertia * acceleration + damping * velocity + 13.0 * angle
+    noise = generator.standard_normal((2, time.size))
+    return angle + 1e-3 * np.std(angle) * noise[0], torque + 1e-2 * np.std(torque) * noise[1]
+
+
+def _records() -> dict[str, tuple[Array, Array, dict[str, Any]]]:
+    slider, noisy = _rig(0), tvident.simulate_torsional_rig(8.0, seed=3, angle_noise=3e-2)
+    held = np.repeat(slider.angle[::5], 5)
+    return {
+        "stiffness wrongly constant": (slider.angle, slider.torque, {"stiffness": "constant"}),
+        "and late": (slider.angle[3:], slider.torque[:-3], {"stiffness": "constant", "lag": "auto"}),
+        "late": (slider.angle[3:], slider.torque[:-3], {"lag": "auto"}),
+        "torque noisier than its quietest band": (slider.angle, slider.torque, {}),
+        "held": (held, slider.torque, {}),
+        "short and noisy": (noisy.angle, noisy.torque, {}),
+        "two that change": (*_of_two_that_change(2), {}),
+        "two that change beside a constant": (*_of_two_that_change(2), {"stiffness": "constant"}),
+    }
+
+
+@pytest.mark.parametrize("name", _records())
+def test_a_repeated_call_finds_and_says_the_same(name: str) -> None:
+    angle, torque, asked = _records()[name]
+    first = tvident.identify(angle, torque, sample_rate=1000, **asked)
+    again = tvident.identify(angle, torque, sample_rate=1000, settings=json.loads(json.dumps(first.settings)))
+    assert again.record_status == first.record_status
+    for column, values in first.columns().items():
+        np.testing.assert_array_equal(again.columns()[column], values, err_msg=column)
+    assert again.constants == first.constants
+    assert again.advice == first.advice
+    assert again.settings == first.settings
+    if name.startswith("stiffness"):
+        assert first.record_status & tvident.Status.SCALES_DISAGREE
+
+
+def test_a_kind_that_is_given_beside_settings_is_not_decided_again() -> None:
+    angle, torque = _of_two_that_change(2)
+    settings = tvident.identify(angle, torque, sample_rate=1000).settings
+    assert settings["tested"] == ["damping", "inertia"]
+    again = tvident.identify(angle, torque, sample_rate=1000, settings=settings, damping="constant")
+    assert again.settings["tested"] == ["inertia"]
+    assert again.settings["kinds"]["damping"] == "constant"
+
+
+def test_settings_of_another_record_leave_its_lag_to_be_suspected() -> None:
+    record = _rig(1)
+    settings = tvident.identify(record.angle[3:], record.torque[:-3], sample_rate=1000, lag="auto").settings
+    other = tvident.identify(record.angle[6:], record.torque[:-6], sample_rate=1000, settings=settings)
+    assert other.record_status & tvident.Status.LAG_SUSPECTED

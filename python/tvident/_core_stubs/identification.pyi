@@ -37,6 +37,10 @@ class WeakForm:
         linear: bool = True,
         noise: tuple[float | None, float | None] = ...,
         shown_noise: Sequence[float] | None = None,
+        tested: Sequence[int] | None = None,
+        near: Sequence[int | None] | None = None,
+        width_from: Sequence[str | None] | None = None,
+        found_lag: bool = False,
     ) -> WeakForm: ...
 
 @final
@@ -231,6 +235,12 @@ class Identification:
     def order(self) -> npt.NDArray[np.uint8]: ...
     @property
     def jumps(self) -> list[int]: ...
+    @property
+    def width_from(self) -> str | None: ...
+    @property
+    def near(self) -> int | None: ...
+    @property
+    def changing(self) -> list[int]: ...
     @property
     def noise(self) -> ChannelNoise | None: ...
     @property

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 from tvident import _arguments as arguments
 from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, Term
+from tvident._identify.earlier import (
+    angle_zero,
+    arguments_of_result,
+    form_of_result,
+    kept,
+    of_each,
+    tested,
+    with_earlier_kinds,
+)
 from tvident._identify.methods import Form, Method, StrongForm, WeakForm
 
 _OF_METHOD: dict[str, dict[str, Any]] = {
@@ -33,38 +41,6 @@ _OF_METHOD: dict[str, dict[str, Any]] = {
     },
 }
 """What is used beside the form where nothing is given; forms of the user's own take the same as "auto"."""
-
-
-_FORMS: dict[str, type[Form]] = {"weak": WeakForm, "strong": StrongForm}
-
-_BESIDE_FORM = frozenset(
-    (
-        *("method", "form", "chosen", "kinds", "known", "terms", "own_terms", "inner", "needed", "expansions"),
-        *(
-            "lag",
-            "lag_stderr",
-            "lag_samples",
-            "angle_zero",
-            "shown_noise",
-            "stderr_factors",
-            "quantisation",
-            "loss",
-            "period",
-        ),
-        *(
-            "instrument",
-            "weights",
-            "sample_rate",
-            "step",
-            "times",
-            "spline_order",
-            "bridged",
-            "clock_offset",
-            "clock_drift",
-        ),
-    )
-)
-"""What settings of results hold beside those of their form."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +77,12 @@ class Request:
         Nobody asked for this form.
     kept : sequence of str
         What an earlier result chose, and this one takes from it.
+    tested : sequence of str
+        Coefficients whose kinds it decided upon.
+    width_from : sequence of str or None
+        Where it took the test function of every record from.
+    windows_near : sequence of int or None
+        The windows near which it compared lengths.
     lag_stderr : float or sequence of float, optional
         Of a lag that an earlier result found, in seconds.
     """
@@ -120,6 +102,9 @@ class Request:
     needed: Mapping[str, Any]
     chosen: bool
     kept: Sequence[str] = ()
+    tested: Sequence[str] = ()
+    width_from: Sequence[str | None] = ()
+    windows_near: Sequence[int | None] = ()
     lag_stderr: Any = None
 
     @property
@@ -138,6 +123,10 @@ class Request:
         """Whether an earlier result chose this, and its choice stands."""
         is_open = name != "lag" and name not in self.by_record and getattr(self.form, name) == "auto"
         return name in self.kept and not is_open
+
+    def asked(self, kinds: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the kinds as they were asked for, where an earlier result decided."""
+        return {name: "auto" if name in self.tested else kind for name, kind in kinds.items()}
 
     def noise_of_equations(self, records: int) -> Sequence[float] | None:
         """Return the variances that an earlier result of as many records showed."""
@@ -180,11 +169,11 @@ def resolve(
     by_record: dict[str, Sequence[Any]] = {}
     before: dict[str, Any] = {}
     if earlier is not None:
-        before = _of_result(earlier, given)
+        before = arguments_of_result(earlier, given)
         if "terms" in given:
-            given["terms"] = _with_earlier_kinds(given["terms"], earlier)
+            given["terms"] = with_earlier_kinds(given["terms"], earlier)
         if arguments.is_word(method, "auto"):
-            name, form, by_record = _form_of_result(earlier)
+            name, form, by_record = form_of_result(earlier)
     asked = _OF_METHOD["paper" if name == "paper" else "auto"] | before | given
     if earlier is not None and earlier.get("instrument") and not has_instrument:
         raise ValueError("settings of a result with an instrument need it again; got none; pass instrument=")
@@ -203,6 +192,7 @@ def resolve(
         )
     elif not arguments.is_word(lag, "auto"):
         lag = arguments.finite_number("lag", lag)
+    has_form = not arguments.is_word(method, "auto")
     same_lag = earlier is not None and "lag" not in given and earlier.get("sample_rate") == sample_rate
     return Request(
         name=name,
@@ -213,26 +203,18 @@ def resolve(
         lag=lag,
         shown_noise=earlier.get("shown_noise") if earlier is not None and isinstance(form, WeakForm) else None,
         lag_samples=earlier.get("lag_samples") if same_lag and earlier is not None else None,
-        angle_zero=_angle_zero(earlier) if earlier is not None and isinstance(form, WeakForm) else None,
+        angle_zero=angle_zero(earlier) if earlier is not None and isinstance(form, WeakForm) else None,
         quantisation=asked["quantisation"],
         period=None if asked["period"] is None else arguments.positive_number("period", asked["period"]),
         inner={} if earlier is None else dict(earlier.get("inner") or {}),
         needed={} if earlier is None else dict(earlier.get("needed") or {}),
         chosen=earlier is None and name == "auto",
-        kept=() if earlier is None else _kept(earlier, given, has_form=not arguments.is_word(method, "auto")),
+        kept=() if earlier is None else kept(earlier, given, has_form=has_form),
+        tested=() if earlier is None else tested(earlier, given),
+        width_from=of_each(earlier, "width_from") if earlier is not None and not has_form else (),
+        windows_near=of_each(earlier, "windows_near") if earlier is not None and not has_form else (),
         lag_stderr=None if earlier is None or "lag" in given else earlier.get("lag_stderr"),
     )
-
-
-def _kept(earlier: Mapping[str, Any], given: Mapping[str, Any], *, has_form: bool) -> Sequence[str]:
-    """Return what an earlier result chose that neither an argument nor a form replaces."""
-    return [name for name in earlier["chosen"] if (name not in given if name == "lag" else not has_form)]
-
-
-def _angle_zero(earlier: Mapping[str, Any]) -> Sequence[float] | None:
-    """Return the angle at which the spring of every record was relaxed."""
-    found = earlier.get("angle_zero")
-    return [found] if isinstance(found, int | float) else found
 
 
 def _as_far_as_measured(
@@ -327,120 +309,6 @@ def _method(method: Method) -> tuple[str, Form]:
     raise ValueError(
         f"method must be 'auto', 'paper', a WeakForm or a StrongForm; got {arguments.shown(method)}; use one of these"
     )
-
-
-def _form_of_result(earlier: Mapping[str, Any]) -> tuple[str, Form, dict[str, Sequence[Any]]]:
-    """Return the method of an earlier result, and what it chose for every record of a batch."""
-    kind: Any = _FORMS[earlier["form"]]
-    values = {one.name: earlier[one.name] for one in fields(kind)}
-    if values.get("averaging") and "regression_window" in earlier["chosen"]:
-        # Where windows of all lengths are averaged, which of them predicts best is a matter of the record, as their weights are.
-        values["regression_window"] = "auto"
-    by_record: dict[str, Sequence[Any]] = {
-        key: value for key, value in values.items() if isinstance(value, list | tuple)
-    }
-    return str(earlier["method"]), kind(**(values | dict.fromkeys(by_record, "auto"))), by_record
-
-
-def _of_result(earlier: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the arguments beside the form that an earlier result's settings stand for."""
-    try:
-        kinds, known = dict(earlier["kinds"]), dict(earlier["known"])
-        terms = [(str(name), str(kind)) for name, kind in earlier["terms"]]
-        asked = {name: earlier[name] for name in ("lag", "quantisation")}
-        asked["period"] = earlier.get("period")
-        is_whole = _is_whole(earlier, kinds, known)
-    except (KeyError, TypeError, ValueError):
-        is_whole = False
-    if not is_whole:
-        raise TypeError(
-            f"settings must be those of an earlier result; got {arguments.shown(earlier)}; pass result.settings"
-        )
-    _check_names(earlier, kinds, known)
-    for name in COEFFICIENTS:
-        asked[name] = known[name] if kinds[name] == "known" else kinds[name]
-        if asked[name] == "expanded" and name not in given:
-            raise ValueError(
-                f"settings hold no channel, and {name} is an expansion; got none; pass {name}=Expansion(…) again"
-            )
-        if asked[name] is None and name not in given:
-            raise ValueError(
-                f"settings hold no {name}, since it was known at every sample; got None; pass {name}= again"
-            )
-    if "terms" not in given:
-        check_no_own_terms(earlier.get("own_terms"), [name for name, _ in terms])
-    return asked | {"terms": terms}
-
-
-def check_no_own_terms(own: Sequence[str] | None, names: Sequence[str]) -> None:
-    """Refuse settings with terms of the user's own where no terms are given."""
-    if own:
-        raise ValueError(
-            f"settings hold no functions, and term {own[0]!r} is one of the user's own; got no terms; pass terms= again, "
-            f"with all of {', '.join(names)}"
-        )
-
-
-def _check_names(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Mapping[str, Any]) -> None:
-    """Refuse names that no result has: what is misspelled would be ignored.
-
-    Raises
-    ------
-    TypeError
-        With the name that comes nearest.
-    """
-    of_form = {form: {one.name for one in fields(kind)} for form, kind in _FORMS.items()}
-    names = _BESIDE_FORM | of_form[earlier["form"]]
-    unknowns = {*COEFFICIENTS, *(name for name, _ in earlier["terms"]), *(earlier.get("inner") or {})}
-    for within, has, may in (("", earlier, names), (" kinds", kinds, unknowns), (" known", known, unknowns)):
-        foreign = [name for name in has if name not in may]
-        if not foreign:
-            continue
-        other = next((form for form in of_form if foreign[0] in of_form[form]), None)
-        cure = (
-            f"it belongs to the {other} form"
-            if other and not within
-            else arguments.nearest(foreign[0], may) or "leave it out"
-        )
-        raise TypeError(
-            f"settings{within} must hold names that a result of the {earlier['form']} form has; got {arguments.shown(foreign[0])}; {cure}"
-        )
-
-
-def _is_whole(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Mapping[str, Any]) -> bool:
-    """Return whether settings have what a result's have: files of settings may be edited, or others."""
-    form: Any = _FORMS[earlier["form"]]
-    lists = [earlier["chosen"], earlier.get("own_terms", [])]
-    return (
-        all(isinstance(one, list | tuple) for one in lists)
-        and all(isinstance(name, str) for one in lists for name in one)
-        and all(isinstance(kinds[name], str) and (kinds[name] != "known" or name in known) for name in COEFFICIENTS)
-        and all(one.name in earlier for one in fields(form))
-        and isinstance(earlier["method"], str)
-        and all(_is_finite(one) for name in ("lag_samples", "shown_noise") for one in earlier.get(name) or ())
-        and all(_is_finite(one) for one in _angle_zero(earlier) or ())
-        and all(
-            all(map(_is_finite, one)) if isinstance(one, list | tuple) else _is_finite(one)
-            for one in dict(earlier.get("inner") or {}).values()
-        )
-    )
-
-
-def _is_finite(number: object) -> bool:
-    return isinstance(number, int | float) and math.isfinite(number)
-
-
-def _with_earlier_kinds(terms: Sequence[Any], earlier: Mapping[str, Any]) -> Sequence[Any]:
-    """Return terms that are given again, those without a kind with that of the earlier result."""
-    if isinstance(terms, str | Term):
-        return terms  # refused where terms are read
-    kinds = dict(earlier["terms"])
-
-    def with_kind(term: Any) -> Any:
-        name = term.name if isinstance(term, Term) else term
-        return (term, kinds[name]) if isinstance(name, str) and name in kinds else term
-
-    return [with_kind(term) for term in terms]
 
 
 def plain(settings: Mapping[str, Any]) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from tvident._identify.searched import Searched, factor_of, search
 from tvident._identify.settings import Request, plain, resolve
 from tvident._identify.told import Told
 from tvident._identify.used import as_used
+from tvident._identify.written import lag_that_was_found, tested_in_order
 from tvident._results import Estimates, Identification, Recorded, Scan, Words, chosen, of_records, scan_of, settings_of
 
 Numbers = npt.NDArray[np.float64]
@@ -236,7 +237,7 @@ class Task:
         is_strong = is_told_by_weak_form(self._data, self._request)
         if self.inner or not (is_strong or is_to_be_tried(self._data, self._request, found)):
             return None
-        given = {name: self._known.get(name, value) for name, value in self._request.parameters.items()}
+        given = self._request.asked(self._request.parameters) | self._known
 
         def run(request: Request, data: Data, *, diagnose: bool) -> Identification:
             return Task(data, request).run(progress=None, diagnose=diagnose)
@@ -339,9 +340,18 @@ class Task:
         ]
         rows_of = [None if value == "auto" else self._rows(value) for value in self._each("regression_window")]
         exponents = [None if value == "auto" else int(exponent_of(value)) for value in self._each("exponent")]
-        linear, shown = form.variation != "constant", self._request.noise_of_equations(self._data.records)
+        request, records = self._request, self._data.records
         return _core.WeakForm(
-            lengths, exponents, rows_of, averaging=bool(form.averaging), linear=linear, shown_noise=shown
+            lengths,
+            exponents,
+            rows_of,
+            averaging=bool(form.averaging),
+            linear=form.variation != "constant",
+            shown_noise=request.noise_of_equations(records),
+            tested=[self._names.index(name) for name in request.tested if name in self._names],
+            near=request.windows_near if len(request.windows_near) == records else None,
+            width_from=request.width_from if len(request.width_from) == records else None,
+            found_lag="lag" in request.kept,
         )
 
     def _each(self, name: str) -> Sequence[Any]:
@@ -407,21 +417,15 @@ class Task:
             lag = {"lag": request.lag}
         else:
             chosen = [one for one in names if "auto" in self._each(one) or one in request.kept]
+            used["width_from"] = by_record([one.width_from for one in found])
+            used["windows_near"] = by_record([one.near for one in found])
+            used["tested"] = tested_in_order(self._unknowns, found, request)
             used["angle_zero"] = by_record([0.0 if one.angle_zero is None else one.angle_zero.value for one in found])
             used["shown_noise"] = [one.shown_noise for one in found if one.shown_noise is not None] or None
-            used["variation"] = "constant" if request.form.variation == "constant" else "linear"
-            if request.lag == "auto":
+            used["variation"] = request.form.variation.replace("auto", "linear")
+            if request.lag == "auto" or "lag" in request.kept:
                 chosen.append("lag")
-                lags = [(0.0, None) if one.lag is None else (one.lag.value, one.lag.stderr) for one in found]
-                lag = {
-                    "lag": by_record([late * data.period for late, _ in lags]),
-                    "lag_stderr": by_record([None if error is None else error * data.period for _, error in lags]),
-                    "lag_samples": [late for late, _ in lags],
-                }
-            elif "lag" in request.kept:
-                chosen.append("lag")
-                kept = {"lag_stderr": request.lag_stderr, "lag_samples": request.lag_samples}
-                lag |= {name: value for name, value in kept.items() if value is not None}
+                lag |= lag_that_was_found(request, found, by_record, data.period)
         kinds = dict.fromkeys(COEFFICIENTS, "known")
         for place, unknown in enumerate(self._unknowns):
             turned_out = {one.unknowns[place].kind for one in found}

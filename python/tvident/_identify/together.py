@@ -14,8 +14,8 @@ from tvident._clocks import grid_of
 from tvident._derivatives import plan
 from tvident._equation import LINEAR_UNITS, OFFSET, UNITS, Unknown, all_terms
 from tvident._identify.columns import WINDOW_OF_TERMS, Columns
+from tvident._identify.earlier import check_no_own_terms
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, WeakForm, exponent_of
-from tvident._identify.settings import check_no_own_terms
 from tvident._units import ROTARY, Axis, axis_of, times_in_seconds
 
 if TYPE_CHECKING:

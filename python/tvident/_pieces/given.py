@@ -89,7 +89,13 @@ class Given:
             # What was chosen is in the settings; what was given to choose from is not asked again.
             equation = {} if settings is None else equation
             # Nor is the length of windows that predicts best, which a record of its own would choose anew.
-            method, settings = "auto" if isinstance(method, WeakForm) else method, {**chosen, "chosen": []}
+            method, settings = (
+                "auto" if isinstance(method, WeakForm) else method,
+                {
+                    **chosen,
+                    "chosen": [one for one in chosen["chosen"] if one == "lag"],
+                },
+            )
         units: dict[str, Any] = {} if self.axis.system is ROTARY else {"angle_unit": "m", "torque_unit": "N"}
         return {
             "delta": self.period,

@@ -18,7 +18,16 @@ At: TypeAlias = float | str | dt.date | np.datetime64 | None
 """When a part of a result begins or ends: seconds, or a date."""
 
 _LISTS = ("lag_samples", "shown_noise")
-_ONE_EACH = ("window_length", "exponent", "regression_window", "lag", "lag_stderr", "angle_zero")
+_ONE_EACH = (
+    "window_length",
+    "exponent",
+    "regression_window",
+    "lag",
+    "lag_stderr",
+    "angle_zero",
+    "width_from",
+    "windows_near",
+)
 _BY_RECORD = (*_ONE_EACH, *_LISTS)
 """Settings that are a list where there are several records."""
 

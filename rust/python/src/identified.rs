@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use tvident::Status;
 use tvident::identify::{
     FreeOffset, Identification as Found, InstrumentTest, Kind, Outside, Scan as FoundScan, Unknown as FoundUnknown,
-    WeakDetails,
+    WeakDetails, WidthFrom,
 };
 use tvident::inference::{Suspect as FoundSuspect, Test};
 use tvident::noise::Defect;
@@ -162,6 +162,12 @@ pub(crate) struct Identification {
     record_status: u16,
     order: Py<PyArray1<u8>>,
     jumps: Vec<usize>,
+    /// Where the test function came from that was chosen.
+    width_from: Option<&'static str>,
+    /// Samples of the windows near which lengths were compared, where not all were.
+    near: Option<usize>,
+    /// Places of the unknowns that change, in the order in which they were found to.
+    changing: Vec<usize>,
     noise: Option<ChannelNoise>,
     shown_noise: Option<f64>,
     lengths: Vec<TriedLength>,
@@ -235,6 +241,9 @@ impl Identification {
             order: PyArray1::from_vec(py, found.order).unbind(),
             instrument: instrument.map(|test| Instrument { exogeneity: test.exogeneity, strength: test.strength }),
             jumps: found.jumps,
+            width_from: weak.and_then(|weak| weak.width_from).map(width_from),
+            near: weak.and_then(|weak| weak.near),
+            changing: weak.map(|weak| weak.changing.clone()).unwrap_or_default(),
             noise: weak.map(|weak| ChannelNoise { angle: weak.noise[0], torque: weak.noise[1] }),
             shown_noise: weak.map(|weak| weak.shown_noise),
             lengths: weak.map(|weak| tried(&weak.lengths)).unwrap_or_default(),
@@ -291,6 +300,19 @@ pub(crate) fn kind(name: &str) -> Option<Kind> {
         "varying" => Some(Kind::Varying),
         _ => None,
     }
+}
+
+/// Where a test function came from, and its name.
+const WIDTHS_FROM: [(WidthFrom, &str); 3] =
+    [(WidthFrom::Spectra, "spectra"), (WidthFrom::End, "end"), (WidthFrom::Plateau, "plateau")];
+
+fn width_from(from: WidthFrom) -> &'static str {
+    WIDTHS_FROM.iter().find(|(one, _)| *one == from).map_or("", |(_, name)| name)
+}
+
+/// Where a test function came from, by its name.
+pub(crate) fn width_from_named(name: &str) -> Option<WidthFrom> {
+    WIDTHS_FROM.iter().find(|(_, one)| *one == name).map(|(from, _)| *from)
 }
 
 impl From<Test> for ConstancyTest {

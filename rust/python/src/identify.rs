@@ -8,15 +8,15 @@ use pyo3::prelude::*;
 use tvident::equation::Motion;
 use tvident::exec::workers as threads;
 use tvident::identify::{
-    Identification as Found, InstrumentTest, Kind, Method, Options, StrongForm as Strong, Task, WeakForm as Weak,
-    around, constants_of_rows, identify_all, identify_with_instruments, parts_of_scatter, rows_of_part, scan_windows,
-    scatter_of_windows,
+    Identification as Found, InstrumentTest, Kind, Method, Options, Repeated, StrongForm as Strong, Task,
+    WeakForm as Weak, around, constants_of_rows, identify_all, identify_with_instruments, parts_of_scatter,
+    rows_of_part, scan_windows, scatter_of_windows,
 };
 use tvident::least_squares::Summary;
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
-use crate::identified::{Identification, Scan, kind};
+use crate::identified::{Identification, Scan, kind, width_from_named};
 use crate::local_polynomials::LocalPolynomials;
 use crate::motions::Motions;
 use crate::records::{copied, flags, records};
@@ -31,7 +31,7 @@ pub(crate) struct WeakForm {
 #[pymethods]
 impl WeakForm {
     #[new]
-    #[pyo3(signature = (window_length, exponent, regression_window, *, averaging=true, linear=true, noise=(None, None), shown_noise=None))]
+    #[pyo3(signature = (window_length, exponent, regression_window, *, averaging=true, linear=true, noise=(None, None), shown_noise=None, tested=None, near=None, width_from=None, found_lag=false))]
     fn new(
         window_length: Vec<Option<usize>>,
         exponent: Vec<Option<usize>>,
@@ -40,6 +40,10 @@ impl WeakForm {
         linear: bool,
         noise: (Option<f64>, Option<f64>),
         shown_noise: Option<Vec<f64>>,
+        tested: Option<Vec<usize>>,
+        near: Option<Vec<Option<usize>>>,
+        width_from: Option<Vec<Option<String>>>,
+        found_lag: bool,
     ) -> Self {
         let each = window_length.into_iter().zip(exponent).zip(regression_window).enumerate();
         let settings = each.map(|(record, ((window_length, exponent), regression_window))| Weak {
@@ -50,6 +54,12 @@ impl WeakForm {
             linear,
             noise: noise.into(),
             shown_noise: shown_noise.as_ref().and_then(|each| each.get(record).copied()),
+            repeated: Repeated {
+                tested: tested.clone().unwrap_or_default(),
+                near: near.as_ref().and_then(|each| each.get(record).copied().flatten()),
+                width_from: width_from.as_ref().and_then(|each| width_from_named(each.get(record)?.as_deref()?)),
+                found_lag,
+            },
         });
         Self { settings: settings.collect() }
     }

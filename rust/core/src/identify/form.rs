@@ -81,6 +81,7 @@ pub(crate) fn weak(
     watch: &mut Watch<'_>,
 ) -> Result<Identification, Error> {
     let regressors = regressors(&task.motion);
+    let asked = asked(&options.kinds, &form.repeated.tested);
     let weak_options = WeakOptions {
         delta: options.delta,
         half_width: form.window_length.map(|length| length / 2),
@@ -88,10 +89,14 @@ pub(crate) fn weak(
         regression_window: form.regression_window,
         averaging: form.averaging,
         linear: form.linear,
-        kinds: in_weak_form(&options.kinds, &regressors, form.averaging),
+        kinds: in_weak_form(&asked, &regressors, form.averaging),
+        decided: decided(&form.repeated.tested, &options.kinds, &regressors),
         noise: form.noise,
         shown_noise: form.shown_noise,
         lag: task.lag,
+        found_lag: form.repeated.found_lag,
+        near: form.repeated.near,
+        width_from: form.repeated.width_from,
         angle_zero: task.angle_zero,
         quantisation: options.quantisation,
         step: options.step,
@@ -118,6 +123,9 @@ pub(crate) fn weak(
         mostly_noise: found.mostly_noise,
         unexplained: found.unexplained,
         lag: found.lag,
+        width_from: found.width_from,
+        near: found.near,
+        changing: found.changing.iter().map(|&one| place(one)).collect(),
         angle_zero: found.angle_zero,
         free_offset: found.free_offset,
         suspects: found.suspects,
@@ -194,6 +202,18 @@ pub(crate) fn strong(
         jumps: Vec::new(),
         weak: None,
     })
+}
+
+/// The kinds as they were asked for, where an earlier identification decided upon some.
+fn asked(given: &[Kind], tested: &[usize]) -> Vec<Kind> {
+    let each = given.iter().enumerate();
+    each.map(|(place, &kind)| if tested.contains(&place) { Kind::Automatic } else { kind }).collect()
+}
+
+/// What an earlier identification decided of unknowns that were automatic: which of them change.
+fn decided(tested: &[usize], given: &[Kind], regressors: &[usize]) -> Vec<(usize, bool)> {
+    let each = tested.iter().filter(|&&place| given.get(place).is_some_and(|kind| *kind != Kind::Automatic));
+    each.map(|&place| (regressors[place], given[place] != Kind::Constant)).collect()
 }
 
 /// The numbers of the regressors whose factors are unknown.

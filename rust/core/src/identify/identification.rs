@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::identify::kinds::Kind;
+use crate::identify::options::WidthFrom;
 use crate::identify::scanned::Scan;
 use crate::identify::weak::angle_zero::outcome::AngleZero;
 use crate::identify::weak::angle_zero::outcome::FreeOffset;
@@ -96,6 +97,12 @@ pub struct WeakDetails {
     pub mostly_noise: bool,
     /// Whether the motion explains no more of the torque than chance, so that nothing is determined.
     pub unexplained: bool,
+    /// Where the test function came from; `None` if it was given.
+    pub width_from: Option<WidthFrom>,
+    /// Samples of the windows near which lengths were compared, where not all were.
+    pub near: Option<usize>,
+    /// Places of the unknowns that change, in the order in which they were found to.
+    pub changing: Vec<usize>,
     /// The lag that was estimated; `None` if it was given or is not determined.
     pub lag: Option<Lag>,
     /// The angle at which the spring is relaxed, where a constant offset was contradicted and this predicts better.

@@ -22,7 +22,7 @@ pub use kinds::Kind;
 pub use merged::form::identify_merged;
 pub use merged::found::{FoundElement, MergedFound};
 pub use merged::system::{Element, Entry, Merged, MergedOptions, Multiplied, Trial};
-pub use options::{Method, Options, StrongForm, Task, WeakForm};
+pub use options::{Method, Options, Repeated, StrongForm, Task, WeakForm, WidthFrom};
 pub use route::identify_all;
 pub use scanned::{FEWEST_WIDTHS, OTHER_CONSTANT, Scan};
 pub use strong::constant::{constants_of_rows, rows_of_part};

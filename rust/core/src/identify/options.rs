@@ -34,6 +34,34 @@ pub struct WeakForm {
     pub noise: [Option<f64>; 2],
     /// The variance of the torque's noise as equations show it; judged from the record where not given.
     pub shown_noise: Option<f64>,
+    /// What else an earlier identification of the record tells.
+    pub repeated: Repeated,
+}
+
+/// Where a test function came from that a record chose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WidthFrom {
+    /// The spectra suggest it.
+    Spectra,
+    /// They do, and it is the narrowest or the widest of those that were tried.
+    End,
+    /// Other widths than the one that they suggest agree.
+    Plateau,
+}
+
+/// What an earlier identification of a record was asked and found, beside what is given to one that repeats it: without it choices that are given would
+/// count as certain, and be judged as if nothing else had been asked.
+#[derive(Clone, Debug, Default)]
+pub struct Repeated {
+    /// Places of the unknowns whose kinds were automatic, and which it decided as they are given now: those that change in the order in which they were
+    /// found to.
+    pub tested: Vec<usize>,
+    /// Samples of the windows near which lengths were compared, where not all were.
+    pub near: Option<usize>,
+    /// Where the test function came from; `None` where it was given.
+    pub width_from: Option<WidthFrom>,
+    /// Whether the lag that is given was found in the record, so that errors hold its own.
+    pub found_lag: bool,
 }
 
 impl Default for WeakForm {
@@ -46,6 +74,7 @@ impl Default for WeakForm {
             linear: true,
             noise: [None; 2],
             shown_noise: None,
+            repeated: Repeated::default(),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::equation::motion::Coefficient;
 use crate::error::Error;
+use crate::identify::options::WidthFrom;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
 use crate::noise::spectrum::power_in_pieces;
@@ -94,7 +95,8 @@ impl Session<'_, '_, '_> {
         if let (Some(width), Some(exponent)) = (width, exponent) {
             let weak = self.rows(TestFunction::new(width, exponent, delta)?)?;
             let parameters = self.pilot(&weak, model)?;
-            return Ok(Chosen { weak, parameters, at_end: false, fitted: None, fitted_before: None });
+            let at_end = self.options.width_from == Some(WidthFrom::End);
+            return Ok(Chosen { weak, parameters, at_end, fitted: None, fitted_before: None });
         }
         // So many rows are left that windows of several test functions fit in.
         let widest = samples / if model.windowed.is_empty() { 8 } else { 16 };

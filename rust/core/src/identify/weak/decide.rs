@@ -78,6 +78,7 @@ impl Session<'_, '_, '_> {
             found: None,
             fit: None,
             first: None,
+            near: None,
             error: 1.0,
             tests: Vec::new(),
             lengths: Vec::new(),
@@ -112,12 +113,14 @@ impl Session<'_, '_, '_> {
         decided.constants_jump = constants_jump;
         let rows = &chosen.weak.rows;
         decided.slow = self.of_kind(Kind::Varying);
+        let mut changing = self.options.decided.iter().filter(|(_, changes)| *changes).map(|(unknown, _)| *unknown);
         let mut model = Cow::Borrowed(model);
         loop {
             if !decided.slow.is_empty() {
                 self.set_free(rows, &model, &mut decided)?;
             }
-            let Some(worst) = self.test(rows, &mut decided)? else { break };
+            let worst = self.test(rows, &mut decided)?;
+            let Some(worst) = changing.next().or(worst) else { break };
             if model.windowed.is_empty() {
                 // Beside constants it is followed in windows, as a stiffness is.
                 let constant = model.constant.iter().copied().filter(|&one| one != worst).collect();
@@ -155,7 +158,7 @@ impl Session<'_, '_, '_> {
         decided.tests.retain(|(one, _)| decided.slow.contains(one));
         let constants = decided.model.constant.iter().zip(results);
         decided.tests.extend(constants.filter_map(|(&one, test)| test.map(|test| (one, test))));
-        let tested = self.of_kind(Kind::Automatic);
+        let tested = self.undecided();
         let conspicuous = decided.tests.iter().filter(|(one, test)| {
             tested.contains(one) && !decided.slow.contains(one) && test.probability < constancy::NO_CHANCE
         });
@@ -167,8 +170,7 @@ impl Session<'_, '_, '_> {
     /// Sets all that was tested free where one of them changes and yet the rows are predicted badly: a parameter that varies beside one that is held
     /// constant needs windows so short that a test sees nothing.
     fn set_others_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided) -> Result<(), Error> {
-        let others: Vec<usize> =
-            self.of_kind(Kind::Automatic).into_iter().filter(|one| !decided.slow.contains(one)).collect();
+        let others: Vec<usize> = self.undecided().into_iter().filter(|one| !decided.slow.contains(one)).collect();
         if decided.slow.is_empty() || others.is_empty() || decided.error < BADLY {
             return Ok(());
         }

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::identify::options::WidthFrom;
 use crate::identify::results::{Constant, SampleResults};
 use crate::identify::scanned::Scan;
 use crate::identify::weak::angle_zero::outcome::AngleZero;
@@ -18,12 +19,16 @@ use crate::weak_form::test_function::TestFunction;
 pub(crate) struct WeakIdentified {
     /// The test function.
     pub(crate) function: TestFunction,
+    /// Where it came from, if the record chose it.
+    pub(crate) width_from: Option<WidthFrom>,
     /// Variances of the noise of angle and torque.
     pub(crate) noise: [f64; 2],
     /// The variance of the torque's noise that everything was chosen with.
     pub(crate) shown_noise: f64,
     /// Samples spanned by the windows that windowed unknowns are eliminated in: those that predict best where none were given.
     pub(crate) regression_window: usize,
+    /// Samples of the windows near which they were compared, where not all were.
+    pub(crate) near: Option<usize>,
     /// Lengths of windows that were tried, in samples, and how well each predicts.
     pub(crate) lengths: Vec<(usize, f64)>,
     /// Mean squared error of predicting a row from others, over the noise's.

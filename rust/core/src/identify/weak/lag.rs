@@ -202,7 +202,7 @@ impl Session<'_, '_, '_> {
         fit: &Fit,
         errors: &Errors,
     ) -> Result<Option<Vec<f64>>, Error> {
-        if self.options.lag.is_some() {
+        if !self.finds_lag() {
             return Ok(None);
         }
         let (mut model, rows) = (decided.ordered(), decided.rows(&weak.rows));

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::identify::kinds::Kind;
+use crate::identify::options::WidthFrom;
 use crate::inference::missing_terms::Missing;
 use crate::simd::instructions::Instructions;
 
@@ -24,12 +25,20 @@ pub(crate) struct WeakOptions {
     pub(crate) linear: bool,
     /// How each unknown comes about: unknown coefficients in the order inertia, damping, stiffness, then terms.
     pub(crate) kinds: Vec<Kind>,
+    /// Which of those that are automatic an earlier identification decided upon, in its order, and whether they change.
+    pub(crate) decided: Vec<(usize, bool)>,
     /// Variances of the noise of angle and torque; estimated where not given.
     pub(crate) noise: [Option<f64>; 2],
     /// The variance of the torque's noise as equations show it; judged from the record where not given.
     pub(crate) shown_noise: Option<f64>,
     /// By how many samples the torque comes late; estimated where not given.
     pub(crate) lag: Option<f64>,
+    /// Whether a lag that is given was found in the record.
+    pub(crate) found_lag: bool,
+    /// Samples of the windows near which lengths are compared first, where an identification that this one repeats did so.
+    pub(crate) near: Option<usize>,
+    /// Where a test function that is given came from, if the record chose it.
+    pub(crate) width_from: Option<WidthFrom>,
     /// About which angle the spring is relaxed: zero, or another one that is estimated from there on; where not given zero, unless the record
     /// contradicts that.
     pub(crate) angle_zero: Option<f64>,

@@ -87,7 +87,7 @@ impl Session<'_, '_, '_> {
         known: &[Pulse],
         torque: &dyn Samples,
     ) -> Result<Vec<Pulse>, Error> {
-        let decides = self.options.averaging && self.options.lag == Some(0.0);
+        let decides = self.options.averaging && self.options.lag == Some(0.0) && !self.finds_lag();
         if !decides || model.windowed != [STIFFNESS] {
             return Ok(Vec::new());
         }

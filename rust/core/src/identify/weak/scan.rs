@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::error::Error;
+use crate::identify::options::WidthFrom;
 use crate::identify::scanned::{Scans, wider};
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decide::{BADLY, BETTER};
@@ -50,7 +51,7 @@ impl Session<'_, '_, '_> {
             chosen = self.without_shortest_windows(chosen, model, last)?;
         }
         let used = chosen.weak.function.half_width();
-        self.scan.moved = used != before;
+        self.scan.moved = used != before || self.options.width_from == Some(WidthFrom::Plateau);
         self.scan.contradicted = scans.contradict(used);
         Ok(chosen)
     }

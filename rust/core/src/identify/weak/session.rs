@@ -59,6 +59,17 @@ impl Session<'_, '_, '_> {
         unknowns.iter().zip(&self.options.kinds).filter(|(_, one)| **one == kind).map(|(index, _)| *index).collect()
     }
 
+    /// Regressors of the unknowns that the record is to decide upon.
+    pub(crate) fn undecided(&self) -> Vec<usize> {
+        let is_decided = |unknown: &usize| self.options.decided.iter().any(|(one, _)| one == unknown);
+        self.of_kind(Kind::Automatic).into_iter().filter(|unknown| !is_decided(unknown)).collect()
+    }
+
+    /// Whether the lag of the torque is found in the record, here or by an identification that this one repeats.
+    pub(crate) fn finds_lag(&self) -> bool {
+        self.options.lag.is_none() || self.options.found_lag
+    }
+
     pub(crate) fn model(&self) -> Model {
         let windowed = self.options.kinds.iter().map(|kind| *kind == Kind::Windowed);
         Model::new(&self.unknowns(), windowed, self.options.linear)
@@ -109,7 +120,7 @@ impl Session<'_, '_, '_> {
         memory::ask_for_numbers((self.record.angle.len() / function.stride()).saturating_mul(numbers))?;
         let (delta, workers) = (self.options.delta, self.stages.workers);
         let mut record = self.record.clone();
-        if self.options.lag.is_none() {
+        if self.finds_lag() {
             record.terms.push(TermSamples::TorqueRate);
         }
         self.stages.stage(|watch| WeakRows::build(&record, function, delta, None, workers, watch))

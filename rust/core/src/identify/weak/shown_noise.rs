@@ -44,7 +44,15 @@ impl Session<'_, '_, '_> {
     pub(crate) fn choose(&mut self, model: &Model) -> Result<Chosen, Error> {
         let mut scans = None;
         let mut chosen = self.choose_first(model, &mut scans)?;
-        if self.options.shown_noise.is_some() || !self.show_noise(&mut chosen, model)? {
+        if self.options.shown_noise.is_some() {
+            self.best_before = self.options.near;
+            if self.best_before.is_some() {
+                chosen.fitted = Some(self.fit_first(&chosen, model)?);
+                self.best_before = None;
+            }
+            return Ok(chosen);
+        }
+        if !self.show_noise(&mut chosen, model)? {
             return Ok(chosen);
         }
         for _ in 0..ROUNDS {

@@ -67,6 +67,7 @@ impl Session<'_, '_, '_> {
         let mut compared = self.compared_roughly(rows, decided, &tried)?;
         if compared.is_none() {
             compared = self.near_best_before(weak, decided, &tried)?;
+            decided.near = self.best_before.filter(|_| compared.is_some());
         }
         let ComparedLengths { validated, ruled_out } = match compared {
             Some(compared) => compared,

@@ -48,9 +48,14 @@ impl Session<'_, '_, '_> {
             self.record.angle_zero = 0.0;
             chosen = self.choose(model)?;
         }
-        let Some(offset) = offset.filter(|_| self.options.angle_zero.is_none()) else {
+        let Some(offset) = offset else { return self.decide_and_choose_again(chosen, model) };
+        if self.options.angle_zero.is_some() {
+            if self.options.diagnose {
+                // An angle is looked for no more, but that a free offset would predict better is said again.
+                self.offset_is_missed(&mut chosen, model, offset)?;
+            }
             return self.decide_and_choose_again(chosen, model);
-        };
+        }
         // Before anything else follows what the offset may not: looking for parameters that vary and jump takes longest where nothing fits.
         let missed = self.offset_is_missed(&mut chosen, model, offset)?;
         if missed && let Some(settled) = self.with_angle_zero(model, offset, Some(&mut chosen))? {

@@ -40,7 +40,11 @@ impl Session<'_, '_, '_> {
         weak.rows.regressors.extend(more);
         weak.rows.clear_unusable();
         let regressors = first..weak.rows.regressors.len();
-        let mut suspects = self.of_torque(weak, decided, (fit, &rhs, errors.error), regressors, &candidates)?;
+        // What the torque tells is told beside a lag that may be missing, not beside one that was found; another record's may be another.
+        let found_lag = usize::from(self.options.found_lag && candidates.last() == Some(&Missing::Lag));
+        let (beside, regressors) =
+            (&candidates[..candidates.len() - found_lag], regressors.start..regressors.end - found_lag);
+        let mut suspects = self.of_torque(weak, decided, (fit, &rhs, errors.error), regressors, beside)?;
         if decided.white.is_some() {
             weak.rows = decided.as_white(std::mem::take(&mut weak.rows), &mut self.stages)?;
             rhs.clone_from(&weak.rows.rhs);
@@ -110,7 +114,7 @@ impl Session<'_, '_, '_> {
         let resonance = self.record.mask.is_none() && self.record.lag == 0.0 && self.record.noise.is_none();
         let of_torque =
             resonance.then_some(Missing::Resonance).into_iter().chain([Missing::TorqueSquare, Missing::TorqueCube]);
-        let all = terms.chain(std::iter::once(Missing::Lag)).chain(of_torque);
+        let all = terms.chain(of_torque).chain(std::iter::once(Missing::Lag));
         all.filter(|missing| !self.options.not_missing.contains(missing)).collect()
     }
 }

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::error::Error;
+use crate::identify::options::WidthFrom;
 use crate::identify::results::{Constant, RowResults, SampleResults};
 use crate::identify::scanned::Scan;
 use crate::identify::weak::choice::Chosen;
@@ -35,7 +36,7 @@ impl Session<'_, '_, '_> {
         let Chosen { mut weak, at_end, .. } = chosen;
         let stride = weak.stride;
         let ordered = decided.ordered();
-        let mut found = self.nothing_yet(&weak, decided);
+        let mut found = WeakIdentified { width_from: self.width_from(at_end), ..self.nothing_yet(&weak, decided) };
         let Some(fit) = &decided.fit else { return Ok((self.undetermined(found, decided)?, None)) };
         let given = self.options.regression_window.filter(|_| !self.options.averaging);
         found.regression_window = given.unwrap_or(fit.span * stride).min(self.record.angle.len());
@@ -152,14 +153,26 @@ impl Session<'_, '_, '_> {
         constants.iter().any(differs)
     }
 
+    /// Where the test function came from, if the record chose it.
+    fn width_from(&self, at_end: bool) -> Option<WidthFrom> {
+        match self.options.half_width {
+            Some(_) => self.options.width_from,
+            None if self.scan.moved => Some(WidthFrom::Plateau),
+            None if at_end => Some(WidthFrom::End),
+            None => Some(WidthFrom::Spectra),
+        }
+    }
+
     /// What is known before anything is fitted.
     fn nothing_yet(&self, weak: &WeakRows, decided: &Decided) -> WeakIdentified {
         let stride = weak.stride;
         WeakIdentified {
             function: weak.function,
+            width_from: None,
             noise: self.channel_noise,
             shown_noise: self.noise[1],
             regression_window: 0,
+            near: decided.near,
             lengths: decided.lengths.clone(),
             prediction_error: decided.error,
             weighted: decided.white.is_some(),
