@@ -148,6 +148,13 @@ impl Scan {
     }
 }
 
+impl OutsideMask {
+    fn new(outside: Outside) -> Self {
+        let other = |(unknown, value, stderr)| OtherValue { unknown, value, stderr };
+        Self { differing: outside.differing.into_iter().map(other).collect(), residual_ratio: outside.left }
+    }
+}
+
 /// What was found in one record. What only the weak form says is None or empty in strong form.
 #[pyclass(frozen, get_all, module = "tvident._core")]
 pub(crate) struct Identification {
@@ -222,11 +229,7 @@ impl Identification {
                 },
             )
         };
-        let outside = |outside: Outside| {
-            let other = |(unknown, value, stderr)| OtherValue { unknown, value, stderr };
-            let differing = outside.differing.into_iter().map(other).collect();
-            Py::new(py, OutsideMask { differing, residual_ratio: outside.left })
-        };
+        let outside = |outside| Py::new(py, OutsideMask::new(outside));
         let weak = found.weak.as_ref();
         Ok(Self {
             window_length: found.window_length,

@@ -15,6 +15,7 @@ pub(crate) mod side_by_side;
 pub(crate) mod sliding_sums;
 pub(crate) mod solutions;
 pub(crate) mod stacked_qr;
+pub(crate) mod window_summary;
 
 pub use plan::{Alignment, Equations, HALF_OF_THE_DIGITS, Regressions, RollingLeastSquares};
 pub use stacked_qr::{SharedParameters, Summary};

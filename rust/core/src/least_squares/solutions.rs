@@ -6,8 +6,8 @@ use crate::lanes::interleaved::Strips;
 use crate::lanes::tile::{Tile, WindowFields};
 use crate::least_squares::fading;
 use crate::least_squares::givens_factor::{Dimensions, covariance, explained, invert, solve, squared_norm};
-use crate::least_squares::kernel::WindowSummary;
 use crate::least_squares::plan::{RollingLeastSquares, Slots};
+use crate::least_squares::window_summary::WindowSummary;
 use crate::simd::vectors::{Kernel, Lanes, MOST_LANES};
 use crate::status::Status;
 

@@ -9,6 +9,7 @@ use crate::simd::instructions::Instructions;
 
 /// How to identify.
 #[derive(Clone, Debug)]
+#[allow(clippy::struct_excessive_bools, reason = "each says one thing that is asked for, whatever the others say")]
 pub(crate) struct WeakOptions {
     /// Seconds from one sample to the next.
     pub(crate) delta: f64,
