@@ -9,6 +9,7 @@ import time
 import numpy as np
 import numpy.typing as npt
 import pytest
+from scipy.signal import savgol_filter
 
 import tvident
 from reference.local_polynomials import fit_window
@@ -22,6 +23,9 @@ COEFFICIENTS = 2e-12
 OF_THE_BEST = 2.0
 # Noise found in M samples is good to 1/√(2M); of some thousand windows none is farther off than five times that.
 FARTHEST = 5.0
+# All orders compared and three derivatives, beside one pass of SciPy's filter of a fixed order: 1.1 in the build of the tests, without
+# AVX-512; .3 with what is shipped.
+AS_LONG_AS_A_FILTER = 1.5
 
 
 def rounding(fit: tvident.LocalPolynomialFit, y: Array, window: int) -> Array:
@@ -157,22 +161,25 @@ def test_a_glitch_leaves_with_its_sample() -> None:
     assert (np.abs(fit.derivatives - other.derivatives) <= bound)[:, without].all()
 
 
-def test_ten_million_samples_are_done_in_two_seconds_and_the_last_are_as_good_as_the_first() -> None:
+def test_ten_million_samples_take_a_filters_time_and_the_last_are_as_good_as_the_first() -> None:
     # The same minute again and again: the truth of the last is the result for the first.
     minute = 60_000
     repeats = 167
     once = waves(np.arange(minute) / minute, fastest=100.0)[0]
     y = np.tile(once + 0.01 * np.random.default_rng(4).standard_normal(minute), repeats)
-    seconds = []
+    ratios = []
     for _ in range(3):
-        # The processor's time of one thread, so that neighbours on the machine do not count.
+        # The processor's time of one thread, so that neighbours on the machine do not count, beside one pass of SciPy's filter: seconds
+        # say how fast a processor is.
         started = time.process_time()
+        savgol_filter(y, 201, 5)
+        filtered = time.process_time()
         fit = tvident.fit_local_polynomials(y, 201, workers=1)
-        seconds.append(time.process_time() - started)
-        if seconds[-1] < 2:
+        ratios.append((time.process_time() - filtered) / (filtered - started))
+        if ratios[-1] < AS_LONG_AS_A_FILTER:
             break
     assert y.size > 10_000_000
-    assert min(seconds) < 2
+    assert min(ratios) < AS_LONG_AS_A_FILTER
     first, last = slice(200, minute - 200), slice(y.size - minute + 200, y.size - 200)
     same = fit.order[first] == fit.order[last]
     assert same.mean() > 0.999  # ties may fall either way
