@@ -84,9 +84,7 @@ _DOORS = ("baselines", "figures", "recordings")
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        from importlib.metadata import version  # noqa: PLC0415 - takes longer than all the rest of this file
-
-        globals()[name] = version("tvident")
+        globals()[name] = import_module("tvident._choices").VERSION
         return globals()[name]
     if name in _DOORS:
         return import_module(f"tvident.{name}")

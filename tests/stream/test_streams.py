@@ -300,7 +300,7 @@ def test_a_stream_of_another_version_is_refused(monkeypatch: pytest.MonkeyPatch)
     stream.push(ANGLE[:500])
     kept = pickle.dumps(stream)
     assert pickle.loads(kept).samples == 500  # noqa: S301 - our own
-    monkeypatch.setattr("tvident._stream.pieces._version", lambda: "9.9")
+    monkeypatch.setattr("tvident._stream.pieces.VERSION", "9.9")
     with pytest.raises(ValueError, match=r"one of tvident 0\.\S+ in 9\.9; begin another"):
         pickle.loads(kept)  # noqa: S301 - our own
 

@@ -1,4 +1,4 @@
-"""Names what can be chosen: words for settings, and built-in terms. Without NumPy, for which help need not wait."""
+"""Names what can be chosen: words for settings, built-in terms, and the version. Without NumPy, for which help need not wait."""
 
 from tvident._choices.built_in import BUILT_IN, FRICTION, OFFSET, TERM_NAMES
 from tvident._choices.literals import (
@@ -12,12 +12,14 @@ from tvident._choices.literals import (
     Selection,
     Variation,
 )
+from tvident._choices.version import VERSION
 
 __all__ = [
     "BUILT_IN",
     "FRICTION",
     "OFFSET",
     "TERM_NAMES",
+    "VERSION",
     "Criterion",
     "Excitation",
     "Kind",

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from tvident import _arguments as arguments
 from tvident import _core
+from tvident._choices import VERSION
 from tvident._equation import GivenTerm
 from tvident._files import check_apart, full_name, is_time
 from tvident._identify import Method
@@ -160,7 +160,7 @@ def identify_file(
     is_text = source_path.suffix.lower() in TEXT
     mark = mark_of(source_path) if source_path.exists() else ""
     told = {
-        "version": version("tvident"),
+        "version": VERSION,
         "instructions": _core.instructions(),
         "recording": [
             mark,

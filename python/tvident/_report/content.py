@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident._choices import VERSION
 from tvident._report.packed import Series
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status, stretches_of
 from tvident._units import in_words_of
@@ -172,7 +173,7 @@ def content_of(shown: ShownResult, recorded: list[Series], title: str) -> tuple[
         "repeat": json.dumps(result.settings, indent=1) if shown.repeats else "",
         "summary": words,
         "charts": drawn.charts,
-        "version": _version(),
+        "version": VERSION,
     }
     return content, series
 
@@ -357,12 +358,3 @@ def _tone(result: ReportedResult, verdict: str) -> str:
     ):
         return "bad"
     return "doubtful" if result.advice or int(result.record_status) else "good"
-
-
-def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version  # noqa: PLC0415 - a third of the time that all rooms take to load
-
-    try:
-        return version("tvident")
-    except PackageNotFoundError:  # pragma: no cover - sources that were never installed
-        return ""

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident._choices import VERSION
 
 _FLOAT64 = np.dtype(np.float64)
 
@@ -60,10 +61,10 @@ class Stream(Generic[Out]):
 
     def __getstate__(self) -> dict[str, Any]:
         stream = None if self._stream is None else self._stream.state()
-        return {**self.__dict__, "_stream": stream, _MADE_BY: _version()}
+        return {**self.__dict__, "_stream": stream, _MADE_BY: VERSION}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
-        made_by, here = state.get(_MADE_BY), _version()
+        made_by, here = state.get(_MADE_BY), VERSION
         if made_by != here:
             raise ValueError(
                 f"a stream goes on in the version that it was kept by; got one of tvident {made_by} in {here}; begin another, or install "
@@ -143,10 +144,3 @@ def piece(name: str, values: npt.ArrayLike) -> npt.NDArray[Any]:
             f"{name} must be one sample or several along one axis; got shape {array.shape}; make a stream for every record"
         )
     return np.atleast_1d(array)
-
-
-def _version() -> str:
-    """Return the version of this package."""
-    from importlib.metadata import version  # noqa: PLC0415 - takes long, and only streams that are kept need it
-
-    return version("tvident")
