@@ -1,7 +1,7 @@
 """Times that are promised: of the command's first words, of the import, and of a report of an hour. Alone on the machine.
 
 The least of several runs counts, and processor time where other work on the machine may hold a program up: it makes both longer, never
-shorter.
+shorter. A slower machine may take longer by as much as NumPy takes longer to load there.
 """
 
 from __future__ import annotations
@@ -28,6 +28,9 @@ BUSY = 1.5
 
 MOST_BYTES = 25e6
 
+LOADED = 0.15
+"""Seconds for the interpreter with NumPy, where the times were promised."""
+
 
 def seconds_of(*arguments: str) -> float:
     """Give the processor time of the interpreter with these arguments, of its own start too."""
@@ -41,13 +44,18 @@ def seconds_of(*arguments: str) -> float:
     return min(found)
 
 
+def slowness() -> float:
+    """Give how much slower this machine is than those of the promise, now; never less than one."""
+    return max(1.0, seconds_of("-c", "import numpy") / LOADED) if hasattr(os, "wait4") else 1.0
+
+
 needs_wait4 = pytest.mark.skipif(not hasattr(os, "wait4"), reason="the system tells no processor time of a program")
 
 
 @needs_wait4
 @pytest.mark.parametrize(("option", "promised"), [("--help", 0.12), ("--version", 0.1)])
 def test_the_first_words_of_the_command_take_a_moment(option: str, promised: float) -> None:
-    assert seconds_of("-m", "tvident", option) < promised
+    assert seconds_of("-m", "tvident", option) < promised * slowness()
 
 
 @needs_wait4
@@ -72,5 +80,6 @@ def test_the_report_of_an_hour_is_built_in_two_seconds(tmp_path: Path) -> None:
         result.report(tmp_path / "hour.html", channels=channels)
         elapsed.append(time.perf_counter() - started)
         worked.append(time.process_time() - had_worked)
-    assert min(elapsed) < BUILT or min(worked) < BUSY * BUILT
+    most = BUILT * slowness()
+    assert min(elapsed) < most or min(worked) < BUSY * most
     assert (tmp_path / "hour.html").stat().st_size < MOST_BYTES

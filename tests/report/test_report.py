@@ -177,6 +177,17 @@ def test_numbers_of_a_page_have_the_digits_of_their_errors_and_stand_alone(tmp_p
     assert abs(float(value)) < 5 * float(error)
 
 
+def test_a_torque_that_is_drawn_twice_is_in_the_page_once(tmp_path: Path) -> None:
+    rig = tvident.simulate_torsional_rig(3.0)
+    method = tvident.StrongForm()
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=rig.sample_rate, method=method)
+    result.report(tmp_path / "page.html")
+    content = content_of(tmp_path / "page.html")
+    lines = {chart["title"]: chart["line"] for chart in content["charts"] if "line" in chart}
+    assert lines["Torque"] == lines["Torque and its prediction"]
+    assert [one["name"] for one in content["series"]].count("recorded") == 0
+
+
 def test_where_windows_have_no_equations_there_is_no_condition_number(tmp_path: Path) -> None:
     rig = tvident.simulate_torsional_rig(6.0)
     angle = rig.angle.copy()

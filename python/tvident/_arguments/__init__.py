@@ -16,6 +16,7 @@ from tvident._arguments.numbers import (
     whole_number,
 )
 from tvident._arguments.progress import Progress, reporter
+from tvident._arguments.ranges import percentiles
 from tvident._arguments.sampling import check_power, check_window, length_given, sample_period, seconds, window_length
 from tvident._arguments.shown import nearest, shown
 from tvident._arguments.times import (
@@ -67,6 +68,7 @@ __all__ = [
     "own_digits",
     "package_of",
     "percent",
+    "percentiles",
     "plain",
     "positive_number",
     "printed_step",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -253,6 +252,10 @@ class _DrawnSeries:
 
     def _add(self, name: str, unit: str, values: npt.NDArray[Any], *, every_sample: bool = False) -> int:
         period = (1 if every_sample else int(self.result.settings["step"])) / self.rate
+        # What the strong form compares is the torque as it was recorded: a plot may show what another one does.
+        for number, one in enumerate(self.series):
+            if one.values is values and (one.start, one.period) == (self.start, period):
+                return number
         self.series.append(Series(name, unit, values, self.start, period))
         return len(self.series) - 1
 
@@ -277,8 +280,6 @@ def _numbers(shown: ShownResult) -> list[dict[str, str]]:
     lines = []
     for name, found in values.items():
         kind = str(result.settings["kinds"].get(name, ""))
-        finite, error = found[np.isfinite(found)], result.stderr[name]
-        error = error[np.isfinite(error)]
         line = {
             "name": title_of(name),
             "unit": unit_of(name, result.units),
@@ -288,15 +289,18 @@ def _numbers(shown: ShownResult) -> list[dict[str, str]]:
         if name in result.constants:
             line["value"] = _apart(*map(float, result.constants[name]))
             line["kind"] = "constant over the record"
-        elif not finite.size:
+            lines.append(line)
+            continue
+        finite, error = (one[np.isfinite(one)] for one in (found, result.stderr[name]))
+        if not finite.size:
             line["value"] = "no value"
         elif kind == "known" and finite.min() == finite.max():
             line |= {"value": f"{finite[0]:.5g}", "kind": "known: as given"}
         else:
-            low, middle, high = np.percentile(finite, [5, 50, 95])
-            typical = float(np.median(error)) if error.size else math.nan
-            line["value"] = _apart(float(middle), typical)
-            ends = " and ".join(arguments.to_digits_of(float(one), typical) for one in (low, high))
+            low, middle, high = arguments.percentiles(finite, 5, 50, 95)
+            (typical,) = arguments.percentiles(error, 50)
+            line["value"] = _apart(middle, typical)
+            ends = " and ".join(arguments.to_digits_of(one, typical) for one in (low, high))
             line["more"] = "; ".join(filter(None, (f"90 % lie between {ends}", line["more"])))
             line["kind"] = "known: as given" if kind == "known" else f"{kind}: the median of its values"
         lines.append(line)

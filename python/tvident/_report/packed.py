@@ -14,6 +14,7 @@ import zlib
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -40,6 +41,9 @@ _MOST_THREADS = 4
 
 _CHUNK = 4096
 """Blocks that are worked on together: what they need stays in the cache."""
+
+_SHORT = 16
+"""Samples of a row."""
 
 _LOOKED_AT = 256
 """Blocks that tell how well a series compresses."""
@@ -158,8 +162,15 @@ def _of_extremes(series: Series, every: int) -> Series:
     whole = np.full(count * every, np.nan)
     whole[: series.values.size] = series.values
     rows = whole.reshape(count, every)
-    pairs = np.stack([np.fmin.reduce(rows, axis=1), np.fmax.reduce(rows, axis=1)], axis=1).ravel()
-    return replace(series, values=pairs, period=series.period * every / 2)
+    pairs = np.empty((count, 2))
+    for first in range(0, count, _CHUNK):
+        some = rows[first : first + _CHUNK]
+        for end, extreme in enumerate((np.fmin, np.fmax)):
+            # Of short rows column after column: NumPy reduces a row of four in ten times the time.
+            pairs[first : first + _CHUNK, end] = (
+                reduce(extreme, some.T) if every <= _SHORT else extreme.reduce(some, axis=1)
+            )
+    return replace(series, values=pairs.ravel(), period=series.period * every / 2)
 
 
 def _blocks(series: Series, first: int, last: int) -> Array:

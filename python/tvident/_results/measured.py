@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from tvident._arguments import to_digits_of, with_error
+from tvident._arguments import percentiles, to_digits_of, with_error
 
 Array = npt.NDArray[np.float64]
 
@@ -56,9 +56,10 @@ def number_of(values: Array, errors: Array, kind: str, unit: str, where: npt.NDA
     some = there & where if (there & where).any() else there
     if not some.any():
         return Measured(np.nan, np.nan, unit, kind, np.nan, np.nan)
-    found: Any = np.median(values[some]), np.median(errors[some])
-    least, greatest = np.percentile(values[some], _RANGE) if kind != "constant" else (found[0], found[0])
-    return Measured(float(found[0]), float(found[1]), unit, kind, float(least), float(greatest))
+    value, *ends = percentiles(values[some], 50, *_RANGE)
+    (error,) = percentiles(errors[some], 50)
+    least, greatest = ends if kind != "constant" else (value, value)
+    return Measured(value, error, unit, kind, least, greatest)
 
 
 def known_name(name: str, known: Iterable[str]) -> str:

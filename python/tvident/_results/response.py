@@ -177,7 +177,7 @@ def without_gaps(channel: Numbers) -> Array:
     filled = np.array(channel, dtype=np.float64)
     for row in filled.reshape(-1, filled.shape[-1]):
         there = np.isfinite(row)
-        if there.any():
+        if there.any() and not there.all():
             row[~there] = np.interp(np.flatnonzero(~there), np.flatnonzero(there), row[there])
     return filled
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tvident._arguments import own_digits, to_digits_of
+from tvident._arguments import own_digits, percentiles, to_digits_of
 from tvident._files import aligned
 from tvident._results.verdict import CHANGING, verdict
 from tvident._status import describe
@@ -74,8 +74,8 @@ def row_of(
 ) -> tuple[str, ...]:
     """Return the cells of a parameter: median, range where it changes, and median standard error."""
     finite, error = value[np.isfinite(value)], error[np.isfinite(error)]
-    numbers = np.percentile(finite, [50, 5, 95]).tolist() if finite.size else [np.nan] * 3
-    middle = float(np.median(error)) if error.size else np.nan
+    numbers = percentiles(finite, 50, 5, 95)
+    (middle,) = percentiles(error, 50)
     shown = [to_digits_of(number, middle) for number in numbers]
     if kind not in CHANGING:
         shown[1] = shown[2] = ""

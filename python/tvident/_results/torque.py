@@ -36,9 +36,9 @@ def compared(
     takes derivatives of the local polynomials.
     """
     late = float(model.lags[0])
-    places = np.arange(angle.size, dtype=np.float64)
     on_time: Array = np.asarray(torque, np.float64)
     if late != 0:
+        places = np.arange(angle.size, dtype=np.float64)
         on_time = np.asarray(np.interp(places + late, places, on_time, right=np.nan), np.float64)
     if settings["form"] == "strong":
         names = ("max_order", "criterion", "selection")
@@ -87,7 +87,6 @@ def _sum(
 ) -> Array:
     """Return the left-hand side of the equation of motion; terms are averages of functions of the motion at the samples."""
     angle, velocity, acceleration = motion
-    t = model.start + np.arange(angle.size) * model.period
     known = {"inertia": acceleration, "damping": velocity, "stiffness": angle}
     total = np.zeros(angle.size)
     for name, factor in model.values.items():
@@ -97,13 +96,23 @@ def _sum(
             regressor = known[name]
         elif name in model.own:
             regressor = _where_known(
-                np.asarray(model.own[name].values(t, *(one.copy() for one in at_samples))), averaged
+                np.asarray(model.own[name].values(_times(model, angle.size), *(one.copy() for one in at_samples))),
+                averaged,
             )
         else:
             inner = model.stribeck[:1] if BUILT_IN[name].inner else ()
             regressor = averaged(BUILT_IN[name].function(np, *at_samples, *inner))
-        total = total + np.broadcast_to(every_sample(factor, angle.size, 1), angle.shape) * regressor
-    return np.asarray(total)
+        factors = np.broadcast_to(every_sample(factor, angle.size, 1), angle.shape)
+        regressors = np.broadcast_to(regressor, angle.shape)
+        # Products of a whole record take longer to be put somewhere than to be computed.
+        for first in range(0, angle.size, _BLOCK):
+            some = slice(first, first + _BLOCK)
+            total[some] += factors[some] * regressors[some]
+    return total
+
+
+def _times(model: Model, samples: int) -> Array:
+    return np.asarray(model.start + np.arange(samples) * model.period)
 
 
 def _where_known(values: npt.NDArray[np.number], averaged: Callable[[Array], Array]) -> Array:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tvident._arguments import explained_in_words, percent, to_digits_of
+from tvident._arguments import explained_in_words, percent, percentiles, to_digits_of
 from tvident._results.words import BECOMES, OTHER_UNIT, TRIED
 from tvident._status import Status
 from tvident._units import in_words_of
@@ -198,7 +198,11 @@ def relative_error(value: Any, error: Any, trusted: Any) -> float | None:
         return None
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a record of which nothing can be trusted has no median
-        middles = (np.nanmedian(np.where(there, one, np.nan), axis=-1) for one in (error, np.abs(value)))
+        if there.ndim == 1:
+            some = slice(None) if there.all() else there
+            one, size = (percentiles(of[some], 50)[0] for of in (error, np.abs(value)))
+            return float(np.divide(one, size))
+        middles = (np.nanmedian(np.where(there, of, np.nan), axis=-1) for of in (error, np.abs(value)))
         return float(np.nanmedian(np.divide(*middles)))
 
 
