@@ -161,16 +161,21 @@ def _of_extremes(series: Series, every: int) -> Series:
     count = -(-series.values.size // every)
     whole = np.full(count * every, np.nan)
     whole[: series.values.size] = series.values
-    rows = whole.reshape(count, every)
-    pairs = np.empty((count, 2))
-    for first in range(0, count, _CHUNK):
+    return replace(series, values=_extremes(whole, every), period=series.period * every / 2)
+
+
+def _extremes(values: npt.NDArray[Any], every: int) -> Array:
+    """Return the least and the greatest of every so many numbers, in turns."""
+    rows = values.reshape(-1, every)
+    pairs = np.empty((len(rows), 2))
+    for first in range(0, len(rows), _CHUNK):
         some = rows[first : first + _CHUNK]
         for end, extreme in enumerate((np.fmin, np.fmax)):
             # Of short rows column after column: NumPy reduces a row of four in ten times the time.
             pairs[first : first + _CHUNK, end] = (
                 reduce(extreme, some.T) if every <= _SHORT else extreme.reduce(some, axis=1)
             )
-    return replace(series, values=pairs.ravel(), period=series.period * every / 2)
+    return pairs.ravel()
 
 
 def _blocks(series: Series, first: int, last: int) -> Array:
@@ -179,8 +184,12 @@ def _blocks(series: Series, first: int, last: int) -> Array:
     lacking = (last - first) * BLOCK - samples.size
     if lacking:
         samples = np.append(samples, np.full(lacking, np.nan))
+    return _without_huge(samples.reshape(-1, BLOCK))
+
+
+def _without_huge(samples: Array) -> Array:
     samples[~(np.abs(samples) < _HUGE)] = np.nan
-    return np.asarray(samples.reshape(-1, BLOCK))
+    return samples
 
 
 def _levels(rows: Array, low: Array, high: Array, top: int) -> npt.NDArray[Any]:
@@ -208,14 +217,13 @@ def _differences(levels: npt.NDArray[Any]) -> npt.NDArray[Any]:
 def _bits(series: Series, top: int, merged: int) -> float:
     """Return the bits that a number takes, from some blocks."""
     width = BLOCK if merged == 1 else BLOCK // 2 * merged
-    count = -(-series.values.size // width)
-    rows = []
-    for one in range(0, count, max(1, count // _LOOKED_AT)):
-        part = replace(series, values=series.values[one * width : (one + 1) * width])
-        rows.append(_blocks(part if merged == 1 else _of_extremes(part, merged), 0, 1))
-    if not rows:
-        return 0.0
-    levels = _found_levels(np.concatenate(rows), top)[2]
+    whole = series.values[: series.values.size // width * width].reshape(-1, width)
+    if not whole.size:  # less than a block
+        whole = np.full((1, width), np.nan)
+        whole[0, : series.values.size] = series.values
+    looked_at = np.array(whole[:: max(1, len(whole) // _LOOKED_AT)], np.float64)
+    rows = looked_at if merged == 1 else _extremes(looked_at, merged).reshape(-1, BLOCK)
+    levels = _found_levels(_without_huge(rows), top)[2]
     return min(_entropy(levels), _entropy(_differences(levels)))
 
 
