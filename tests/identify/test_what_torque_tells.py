@@ -15,6 +15,8 @@ from tvident import Status
 Array = npt.NDArray[np.float64]
 Excitation = Literal["multisine", "random", "chirp"]
 Pattern = Literal["slider", "constant"]
+EXCITATIONS: tuple[Excitation, ...] = ("multisine", "random", "chirp")
+BITS = (10, 12, 14, 16)
 
 RATE = 1000.0
 LEFT = 0.002
@@ -34,9 +36,11 @@ def rig(seed: int, excitation: Excitation, pattern: Pattern) -> tvident.Recordin
     )
 
 
-def identified(recording: tvident.Recording, torque: Array, pattern: Pattern) -> tvident.Identification:
+def identified(
+    recording: tvident.Recording, torque: Array, pattern: Pattern, angle: Array | None = None
+) -> tvident.Identification:
     kind = "constant" if pattern == "constant" else "windowed"
-    return tvident.identify(recording.angle, torque, sample_rate=RATE, stiffness=kind)
+    return tvident.identify(recording.angle if angle is None else angle, torque, sample_rate=RATE, stiffness=kind)
 
 
 @pytest.mark.parametrize("seed", [0, *long(1, 2, 3)])
@@ -122,3 +126,24 @@ def test_a_torque_that_comes_late_is_no_coupling_that_bends() -> None:
     result = tvident.identify(recording.angle[3:], recording.torque[:-3], sample_rate=RATE, stiffness="constant")
     assert result.record_status & Status.LAG_SUSPECTED
     assert not any(BENDS in line for line in result.advice)
+
+
+@pytest.mark.parametrize(
+    ("seed", "excitation", "bits"),
+    [
+        (0, "random", 16),
+        (1, "multisine", 14),
+        (0, "chirp", 12),
+        *long(*((s, e, b) for s in (2, 3) for e in EXCITATIONS for b in BITS)),
+    ],
+)
+def test_a_rounded_angle_beside_a_torque_without_noise_is_no_coupling(
+    seed: int, excitation: Excitation, bits: int
+) -> None:
+    """Narrow test functions were told of a coupling at 36 to 195 Hz: what a stiffness leaves that bends within its windows."""
+    recording = tvident.simulate_torsional_rig(
+        seed=seed, excitation=excitation, pattern="slider", torque_snr_db=200.0, angle_noise=0.0
+    )
+    step = 2 * np.max(np.abs(recording.angle)) / 2**bits
+    result = identified(recording, np.asarray(recording.torque), "slider", np.round(recording.angle / step) * step)
+    assert not any(NOT_LINEAR in line or BENDS in line for line in result.advice)
