@@ -182,7 +182,8 @@ class Improvement(_AskedOfRecord):
     def words(self, result: Identification, words: Words) -> Words:
         """Return words that begin with what to change, without what was tried in vain."""
         trial = self._trial(result)
-        advice = trial.advice() or self._exchanged(result)
+        remedy = trial.remedy()
+        advice = self._exchanged(result) if remedy is None else remedy.words
         useless, given_well = ([], []) if advice is not None else trial.useless()
         dropped = self._explained.suspicions(self._suspects if advice is not None else useless)
         starts = tuple(f"{name} was given as constant" for name in given_well)
@@ -193,6 +194,8 @@ class Improvement(_AskedOfRecord):
         )
         dropped += hidden[-1:]  # that nothing is explained, which it is with what is advised
         rest = [line for line in words.advice if line not in dropped and not line.startswith(starts)]
+        if remedy is not None and remedy.separates:
+            rest = [line for line in rest if NOT_DISTINGUISHED not in line]
         # What is tried differs little from what it is compared with where unknowns cannot be distinguished.
         before = next((place + 1 for place, line in enumerate(rest) if NOT_DISTINGUISHED in line), 0)
         return replace(words, advice=(*rest[:before], *([] if advice is None else [advice]), *rest[before:]))
@@ -269,7 +272,7 @@ class Improvement(_AskedOfRecord):
 
     @cached_property
     def _suspects(self) -> list[str]:
-        """What may be missing: what the core suspects, friction and a lag, and anything where no widths of the test function agree."""
+        """What may be missing: what the core suspects, friction and a lag, and anything where widths disagree or unknowns look alike."""
         suspects = [one.name for one in self._explained.suspects]
         others = ["lag", FRICTION]
         angles = as_used(self.data, [self.found]).angles
@@ -277,7 +280,7 @@ class Improvement(_AskedOfRecord):
         hardens = any(one in BUILT_IN and BUILT_IN[one].spring == "beside" for one in suspects)
         if self.data.axis.system is ROTARY and (hardens or is_large):
             others += [name for name, term in BUILT_IN.items() if term.spring == "instead"]
-        if self.found.record_status & Status.SCALES_DISAGREE:
+        if self.found.record_status & (Status.SCALES_DISAGREE | Status.ILL_CONDITIONED):
             others += [name for name, term in BUILT_IN.items() if not getattr(term, "inner", ())]
         present = {*suspects, *(one.name for one in self.terms)}
         return suspects + [name for name in dict.fromkeys(others) if name not in present]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +22,9 @@ _NOTHING = 1.05
 
 _BETTER = 0.8
 """What is advised leaves at most this part of what the model at hand leaves unexplained of parts that are held back."""
+
+_NEARLY_ALL = 0.1
+"""What explains nearly all that was left leaves at most this part of it."""
 
 _AS_GOOD = 1.25
 """Constants are advised where they leave at most so many times what changing parameters leave."""
@@ -78,12 +82,29 @@ class _Left:
 
 
 @dataclass(frozen=True)
-class _Remedy:
-    """What to change, in words, what it leaves unexplained beside the model at hand, and whether nothing contradicts it."""
+class Remedy:
+    """What to change, in words.
+
+    Parameters
+    ----------
+    ratio : float
+        What it leaves unexplained, beside what the model at hand does.
+    words : str
+    distinguishes : bool
+        All unknowns that there were, and one more, can be distinguished.
+    is_settled : bool
+        Nothing contradicts it.
+    """
 
     ratio: float
     words: str
+    distinguishes: bool
     is_settled: bool = False
+
+    @property
+    def separates(self) -> bool:
+        """Whether unknowns that cannot be distinguished follow from what is missing: with it they can, and next to nothing is left."""
+        return self.distinguishes and self.ratio <= _NEARLY_ALL
 
 
 @dataclass(frozen=True)
@@ -114,7 +135,7 @@ class Trial:
     is_as_asked: bool = False
     _now: dict[int | None, Unexplained] = field(default_factory=dict, init=False, repr=False)
 
-    def advice(self) -> str | None:
+    def remedy(self) -> Remedy | None:
         """Return what to change, and what that explains; None where nothing that was tried is better by far."""
         constant = {name: "constant" if isinstance(kind, str) else kind for name, kind in self.given.items()}
         if not any(isinstance(kind, str) for kind in constant.values()):
@@ -128,10 +149,10 @@ class Trial:
         is_settled = of_constants is not None and of_constants.is_settled
         beside = self._beside_changes(call) if is_changing and not is_settled else None
         if of_constants is None or (beside is not None and of_constants.ratio > _AS_GOOD * beside.ratio):
-            return None if beside is None else beside.words
-        return of_constants.words
+            return beside
+        return of_constants
 
-    def _of_constants(self, call: Call) -> _Remedy | None:
+    def _of_constants(self, call: Call) -> Remedy | None:
         """Return which suspects, or which stiffness of none, explain more where everything is constant."""
         chosen, best = [], self._spread(call)
         while rest := [one for one in self.suspects if one not in chosen]:
@@ -147,7 +168,7 @@ class Trial:
             return None
         return self._compared(call, without if is_none else call, chosen)
 
-    def _beside_changes(self, call: Call) -> _Remedy | None:
+    def _beside_changes(self, call: Call) -> Remedy | None:
         """Return which one suspect explains more of what is held back, with parameters as they were asked for.
 
         Each gets lengths of its own: those that were chosen follow what is missing.
@@ -168,7 +189,8 @@ class Trial:
         changed = self._with(call, best)
         terms = [term if isinstance(term, str) else term.name for term in changed["terms"]]
         change = f"lag={result.settings['lag']:.4g}" if best == "lag" else f"terms={terms}"
-        return _Remedy(left.ratio, f"{self._suspicion(best, result)}: try {change}; {left}{self._moved(result)}")
+        words = f"{self._suspicion(best, result)}: try {change}; {left}{self._moved(result)}"
+        return Remedy(left.ratio, words, _are_distinguished(result.record_status))
 
     def useless(self) -> tuple[list[str], list[str]]:
         """Return suspects that explain nothing, and constants that were given and predict as well as when they may change.
@@ -198,10 +220,19 @@ class Trial:
         return is_lost and not any(np.isfinite(getattr(self.result, name)).any() for name in COEFFICIENTS)
 
     def _identified(self, call: Call, *, diagnose: bool = False) -> Identification:
-        window = {name: self.result.settings[name] for name in ("window_length", "exponent")}
         return self.identify(
-            **(call | {"terms": [(term, "constant") for term in call["terms"]]}), **window, diagnose=diagnose
+            **(call | {"terms": [(term, "constant") for term in call["terms"]]}), **self._function, diagnose=diagnose
         )
+
+    @cached_property
+    def _function(self) -> dict[str, Any]:
+        """Return the test function of trials: the one at hand, or, where that hears mostly noise, the widest that agrees."""
+        settings = self.result.settings
+        function = {name: settings[name] for name in ("window_length", "exponent")}
+        scans = self.result._found.scans  # noqa: SLF001 - what was compared while it was identified
+        if self.result.record_status & Status.ILL_CONDITIONED and scans and scans[0].plateau is not None:
+            function["window_length"] = max(function["window_length"], scans[0].plateau[1])
+        return function
 
     def _spread(self, call: Call) -> float:
         """Return the variance of the residuals where everything is constant."""
@@ -226,7 +257,7 @@ class Trial:
         now = self._now[ahead]
         return _Left(now if found is self.result else unexplained(found, ahead), now)
 
-    def _compared(self, before: Call, call: Call, chosen: Sequence[str]) -> _Remedy | None:
+    def _compared(self, before: Call, call: Call, chosen: Sequence[str]) -> Remedy | None:
         """Return the advice in words, if it explains more of what is held back than the model at hand."""
         found = self._identified(call)
         if call["lag"] == "auto":
@@ -262,7 +293,11 @@ class Trial:
             changes.append(f"lag={call['lag']:.4g}")
         changes += [f"{name}='constant'" for name in changing if is_simple and call[name] == "constant"]
         said = f"{', '.join(words)}: try {', '.join(changes)}; {best}{self._moved(of_best)}"
-        return _Remedy(best.ratio, said, is_settled=is_simple and not flags & DOUBTFUL_RECORD)
+        is_settled = is_simple and not flags & DOUBTFUL_RECORD
+        # With an unknown less the others are told apart whatever the truth is.
+        is_more = bool(chosen) and not is_none
+        distinguishes = is_more and _are_distinguished(flags if is_simple else free.record_status)
+        return Remedy(best.ratio, said, distinguishes, is_settled=is_settled)
 
     def _moved(self, found: Identification) -> str:
         """Return which parameters a better equation finds elsewhere, in words."""
@@ -282,6 +317,11 @@ class Trial:
             return f"the torque is {'late' if late > 0 else 'early'} by {with_error(abs(late) * rate, error * rate)} samples"
         value, error, *_ = found.value(name)
         return BUILT_IN[name].suspicion.format(amount=f"{with_error(value, error)} {found.units.get(name, '')}")
+
+
+def _are_distinguished(flags: int) -> bool:
+    """Return whether unknowns can be distinguished."""
+    return not flags & (Status.ILL_CONDITIONED | Status.RANK_DEFICIENT)
 
 
 def _is_there(name: str, found: Identification) -> bool:
