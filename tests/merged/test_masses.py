@@ -210,6 +210,10 @@ def test_a_force_on_one_mass_is_enough_for_a_chain() -> None:
     [
         (changing, constant(18.0), 0),
         (constant(12.0), lambda t: 1.5 * changing(t), 0),
+        *long(
+            (constant(12.0), lambda t: np.where(t < 6, 12.0, 18.0), 0),
+            (changing, lambda t: 18 - 3 * np.sin(0.9 * t), 0),
+        ),
         *long(*((changing, constant(18.0), seed) for seed in range(1, 6))),
         *long(*((constant(12.0), lambda t: 1.5 * changing(t), seed) for seed in range(1, 6))),
     ],
@@ -224,6 +228,19 @@ def test_a_spring_that_changes_is_followed_where_a_force_acts_on_one_mass(base: 
     for mass, inertia in enumerate(simulated.inertia):
         assert abs(found.elements[f"inertia_{mass}"] / inertia - 1).max() < 0.01
     assert not found.record_status
+
+
+def test_what_any_multiple_satisfies_is_not_trusted_where_it_is_wrong() -> None:
+    # The spring between the masses changes and is asked for as constant: 10 to 20 % off.
+    simulated = chain([constant(12.0), lambda t: 1.5 * changing(t)], 12000, seed=0, driven=(0,))
+    structure = tvident.Chain(2, springs(2))
+    found = identify(
+        simulated.angle, simulated.torque, structure=structure, stiffness=["constant", "constant"], **OPTIONS
+    )
+    assert found.record_status & tvident.Status.ILL_CONDITIONED
+    assert not found.trusted.any()
+    assert found.summary().startswith("do not trust")
+    assert any("on which no force acts" in line for line in found.advice)
 
 
 def test_what_cannot_be_known_is_said_and_no_number() -> None:

@@ -21,6 +21,11 @@ _DOUBTS = {
     "or coupled in another way",
 }
 
+_SILENT = (
+    "the equation of a mass on which no force acts leaves more than noise explains: any multiple of its parameters satisfies it, so do not "
+    "trust the numbers; look for a spring that changes ('windowed'), or let a force act on every mass"
+)
+
 
 def words_of(
     result: Any, sampling: Sampling, found: Sequence[_core.MergedIdentification], scatter: Mapping[str, float]
@@ -30,6 +35,7 @@ def words_of(
     for one in found:
         reasons += _reasons_of(one)
         advice += [words for flag, words in _DOUBTS.items() if one.record_status & flag]
+        advice += [_SILENT] if one.misfit > 1 else []
     advice += _changing(result)
     for name, probability in result.tests.items():
         kind = result.kinds[name]

@@ -31,6 +31,9 @@ const JUMP_ROUNDS: usize = 4;
 /// Constants that differ between parts of the record which are set free for a trial, those that differ most.
 const TRIED: usize = 3;
 
+/// The elements' values and the equations' misfits that weights are made of.
+type Guess = (Vec<f64>, Vec<f64>);
+
 /// What was decided, and the fit it rests on.
 #[derive(Clone)]
 pub(crate) struct MergedFit {
@@ -41,6 +44,8 @@ pub(crate) struct MergedFit {
     pub(crate) expected: Expected,
     /// Mean squared error of predicting a row from others, over the noise's.
     pub(crate) error: f64,
+    /// The largest misfit of an equation without a torque; 1 where all are explained.
+    pub(crate) misfit: f64,
     pub(crate) scales: Vec<Scale>,
     /// Lengths that were tried, in samples, and the error of each.
     pub(crate) lengths: Vec<(usize, f64)>,
@@ -101,9 +106,15 @@ impl MergedSession<'_, '_, '_> {
                 error = Some(sum / (count - one.pooled.values.len() as f64).max(1.0) / expected.variance);
             }
             self.remember(model, &one);
+            if self.has_silence() {
+                let left = self.left_of_equations(model, &one)?;
+                self.take_misfits(&left);
+            }
             fit = Some((one, covariance, correlated, expected));
         }
+        let misfit = self.misfit();
         let error = error.filter(|error| error.is_finite()).unwrap_or(1.0);
+        let error = if misfit > 1.0 { error.max(misfit) } else { error };
         Ok(fit.map(|(fit, covariance, correlated, expected)| MergedFit {
             model: model.clone(),
             fit,
@@ -111,6 +122,7 @@ impl MergedSession<'_, '_, '_> {
             correlated,
             expected,
             error,
+            misfit,
             scales: tried,
             lengths,
             tests: Vec::new(),
@@ -179,31 +191,31 @@ impl MergedSession<'_, '_, '_> {
             fitted.contradicted = found.iter().any(|(_, test)| test.probability < constancy::NO_CHANCE);
             // What constants leave may be so much that no part of the record differs by more, though one of them changes.
             let hidden = !fitted.contradicted && fitted.error > NOISE_MODEL_FAILS;
-            let before = self.parameters.clone();
+            let before = (self.parameters.clone(), self.misfits.clone());
             let tried = if hidden { self.suspects(&fitted.model)? } else { self.different(found) };
             // An unknown that varies makes others seem to vary, too: the one that explains most is set free.
-            let mut best: Option<(MergedFit, Vec<f64>)> = None;
+            let mut best: Option<(MergedFit, Guess)> = None;
             for one in tried.into_iter().take(TRIED) {
-                self.parameters.clone_from(&before);
+                (self.parameters, self.misfits) = before.clone();
                 let freer = without(&fitted.model, one);
                 if hidden {
                     self.begin_with(&freer)?;
                 }
                 let Some(found) = self.fitted(&freer)? else { continue };
                 if best.as_ref().is_none_or(|(best, _)| found.error < best.error) {
-                    best = Some((found, self.parameters.clone()));
+                    best = Some((found, (self.parameters.clone(), self.misfits.clone())));
                 }
             }
             let most = if hidden { LACKING } else { BETTER };
             let free = fitted.model.windowed.is_empty() && !hidden;
             let better = |found: &MergedFit| free || found.error < most * fitted.error;
-            let Some((found, parameters)) = best.filter(|(found, _)| better(found)) else {
-                self.parameters = before;
+            let Some((found, after)) = best.filter(|(found, _)| better(found)) else {
+                (self.parameters, self.misfits) = before;
                 self.fill();
                 return Ok(Some(fitted));
             };
             // Windows were compared with weights of parameters that were wrong while this one was held constant.
-            self.parameters = parameters;
+            (self.parameters, self.misfits) = after;
             self.fill();
             let again = if hidden && self.jumps.is_empty() {
                 // So was the test function.

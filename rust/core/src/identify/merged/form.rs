@@ -37,6 +37,7 @@ pub fn identify_merged(
         merged,
         options,
         noise: [Vec::new(), Vec::new()],
+        misfits: Vec::new(),
         freed: Vec::new(),
         colours: Vec::new(),
         parameters: merged.elements.iter().map(|element| element.known.unwrap_or(0.0)).collect(),

@@ -36,6 +36,9 @@ pub struct MergedFound {
     pub lengths: Vec<(usize, f64)>,
     /// Mean squared error of predicting a row from others, over the noise's.
     pub prediction_error: f64,
+    /// How many times its noise is left of an equation without a torque, which any multiple of its parameters satisfies, at most; 1 where all
+    /// are explained.
+    pub misfit: f64,
     /// Variances of the noise of every angle and every torque.
     pub noise: (Vec<f64>, Vec<f64>),
     /// How many times as strong the noise of every angle is at the lowest frequencies as at the highest, where those variances are read.

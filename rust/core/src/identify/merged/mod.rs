@@ -11,5 +11,6 @@ pub(crate) mod jumps;
 pub(crate) mod report;
 pub(crate) mod scan;
 pub(crate) mod session;
+pub(crate) mod silent;
 pub(crate) mod spread;
 pub(crate) mod system;

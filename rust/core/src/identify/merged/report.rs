@@ -72,7 +72,7 @@ impl MergedSession<'_, '_, '_> {
         (found.covariance, found.pairs) = (covariance, pairs);
         for (holds, flag) in [
             (self.at_end || fitted.has_shortest_windows(), Status::WINDOW_LIMIT),
-            (found.condition > HARDLY_TOLD_APART || mostly_noise, Status::ILL_CONDITIONED),
+            (found.condition > HARDLY_TOLD_APART || mostly_noise || fitted.misfit > 1.0, Status::ILL_CONDITIONED),
             (fitted.error > NOISE_MODEL_FAILS, Status::NOISE_MODEL),
             (fitted.contradicted, Status::KIND_CONTRADICTED),
         ] {
@@ -222,6 +222,7 @@ impl MergedSession<'_, '_, '_> {
             regression_window: span.min(self.merged.samples),
             lengths: fitted.lengths.clone(),
             prediction_error: fitted.error,
+            misfit: fitted.misfit,
             jumps: fitted.jumps.iter().map(|jump| jump.sample).collect(),
             ..self.undetermined()
         }
@@ -243,6 +244,7 @@ impl MergedSession<'_, '_, '_> {
             regression_window: 0,
             lengths: Vec::new(),
             prediction_error: 1.0,
+            misfit: 1.0,
             noise: (self.noise[0].clone(), self.noise[1].clone()),
             colours: self.colours.iter().map(|noise| (noise.density(0.0) / noise.density(PI)).max(1.0)).collect(),
             elements: self.merged.unknowns().into_iter().map(unknown).collect(),

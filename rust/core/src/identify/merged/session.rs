@@ -13,7 +13,6 @@ use crate::noise::correlated::CorrelatedNoise;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
-use crate::regression::residuals::residuals;
 use crate::regression::row_covariance::RowCovariance;
 use crate::regression::window_length::Scale;
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
@@ -33,6 +32,8 @@ pub(crate) struct MergedSession<'a, 'b, 'c> {
     pub(crate) options: &'a MergedOptions,
     /// Variances of the noise of angles and torques.
     pub(crate) noise: [Vec<f64>; 2],
+    /// How many times its noise is left of every equation without a torque that is not explained; 1 of others.
+    pub(crate) misfits: Vec<f64>,
     /// Elements that are windowed although nobody asked for it, since constants leave too much.
     pub(crate) freed: Vec<usize>,
     /// The noise of every angle with its colour.
@@ -103,20 +104,23 @@ impl MergedSession<'_, '_, '_> {
             let fit = Fit::new(&problem, scale, Expected::UNKNOWN, instructions, &mut self.stages)?;
             let Some(fit) = fit else { return Ok(None) };
             self.remember(model, &fit);
+            if self.has_silence() {
+                let left = self.left_of_equations(model, &fit)?;
+                self.take_misfits(&left);
+            }
             last = Some(fit);
         }
         Ok(last)
     }
 
-    /// A first estimate of a model as if nothing were known, and the mean square that it leaves of the rows: with weights from the parameters
-    /// of a wrong model, equations without a torque would hold all that they tie at what that model makes of it.
+    /// A first estimate of a model as if nothing were known, and what it leaves of the equations, over the noise's: with weights from the
+    /// parameters of a wrong model, equations without a torque would hold all that they tie at what that model makes of it.
     pub(crate) fn begin_with(&mut self, model: &Model) -> Result<Option<f64>, Error> {
         self.parameters = self.merged.elements.iter().map(|element| element.known.unwrap_or(0.0)).collect();
+        self.misfits.clear();
         let Some(fit) = self.pilot_of(model)? else { return Ok(None) };
-        let problem = model.problem(&self.all.rows, &self.all.rows.rhs, 1.0, None);
-        let (left, usable) = residuals(&problem, &fit, &mut self.stages)?;
-        let count = usable.iter().filter(|usable| **usable).count() as f64;
-        Ok(Some(left.iter().map(|left| left * left).sum::<f64>() / count.max(1.0)).filter(|left| left.is_finite()))
+        let left = self.left_of_equations(model, &fit)?;
+        Ok(Some(left.iter().sum::<f64>() / left.len() as f64).filter(|left| left.is_finite()))
     }
 
     /// Takes the values of a fit as those of the elements, as far as they are numbers.
@@ -160,6 +164,7 @@ impl MergedSession<'_, '_, '_> {
             self.noise[1][equation] * torque + of_angles.sum::<f64>()
         };
         let least = self.least_variance();
+        let variance = |equation: usize| variance(equation) * self.misfits.get(equation).unwrap_or(&1.0);
         let equations = (0..equations).map(|one| 1.0 / variance(one).max(least).sqrt()).collect();
         let angles = self.colours.iter().map(|noise| self.all.columns_of(noise)).collect();
         Weights { angles, equations }

@@ -1,0 +1,50 @@
+//! Equations without a torque, which any multiple of their parameters satisfies, none at all best.
+//!
+//! Where such an equation is wrong, as long as a spring that changes is taken as constant, it pulls its parameters towards zero, and weights
+//! that follow from smaller parameters are larger and pull more. So what it leaves counts as its noise while it is not explained, and
+//! its parameters are not trusted if it stays so.
+
+use crate::error::Error;
+use crate::identify::merged::session::MergedSession;
+use crate::regression::fit::Fit;
+use crate::regression::limits::NOISE_MODEL_FAILS;
+use crate::regression::model::Model;
+use crate::regression::residuals::{residuals, usual_variance};
+
+impl MergedSession<'_, '_, '_> {
+    /// Whether no torque acts on some mass.
+    pub(crate) fn has_silence(&self) -> bool {
+        (0..self.merged.equations()).any(|equation| self.is_silent(equation))
+    }
+
+    fn is_silent(&self, equation: usize) -> bool {
+        self.noise[1].get(equation) == Some(&0.0) && self.trials.iter().all(|trial| trial.mean_square(equation) == 0.0)
+    }
+
+    /// What a fit leaves of the usual row of every equation, over the variance of its noise.
+    pub(crate) fn left_of_equations(&mut self, model: &Model, fit: &Fit) -> Result<Vec<f64>, Error> {
+        let problem = model.problem(&self.all.rows, &self.all.rows.rhs, 1.0, None);
+        let (left, usable) = residuals(&problem, fit, &mut self.stages)?;
+        let equations = self.merged.equations();
+        let of = |equation: usize| {
+            let rows = |row: &usize| row % equations == equation && usable[*row];
+            let mine: Vec<f64> = (0..left.len()).filter(rows).map(|row| left[row]).collect();
+            let misfit = self.misfits.get(equation).unwrap_or(&1.0);
+            usual_variance(&mine, &vec![true; mine.len()]).map_or(0.0, |variance| variance * misfit)
+        };
+        Ok((0..equations).map(of).collect())
+    }
+
+    /// Takes what is left of equations without a torque for their noise, where that does not explain it.
+    pub(crate) fn take_misfits(&mut self, left: &[f64]) {
+        let of = |(equation, &left): (usize, &f64)| {
+            if left > NOISE_MODEL_FAILS && self.is_silent(equation) { left } else { 1.0 }
+        };
+        self.misfits = left.iter().enumerate().map(of).collect();
+    }
+
+    /// The largest misfit of an equation without a torque.
+    pub(crate) fn misfit(&self) -> f64 {
+        self.misfits.iter().copied().fold(1.0, f64::max)
+    }
+}
