@@ -243,6 +243,22 @@ def test_what_any_multiple_satisfies_is_not_trusted_where_it_is_wrong() -> None:
     assert any("on which no force acts" in line for line in found.advice)
 
 
+@pytest.mark.parametrize("stepping", [0, 1])
+def test_no_spring_that_changes_is_trusted_as_a_constant_where_a_base_moves_alone(stepping: int) -> None:
+    # Of no torque at all weights were those of a torque of 1 N m: 20 to 430 % off, and trusted.
+    stiffness = [constant(12.0), constant(18.0)]
+    stiffness[stepping] = lambda t: np.where(t < 3, 12.0, 18.0)
+    simulated = chain(stiffness, 6000, seed=9, driven=(), base=True)
+    structure = tvident.Chain(2, springs(2), base=simulated.base)
+    kinds: Any = ["constant", "constant"]
+    found = identify(
+        simulated.angle, np.zeros((2, 6000)), structure=structure, inertia={1: 0.03}, stiffness=kinds, **OPTIONS
+    )
+    assert found.record_status & tvident.Status.ILL_CONDITIONED
+    assert not found.trusted.any()
+    assert any("on which no force acts" in line for line in found.advice)
+
+
 def test_what_cannot_be_known_is_said_and_no_number() -> None:
     simulated = chain([constant(12.0), constant(18.0)], 6000, seed=6, driven=(0,))
     full = identify(simulated.angle, simulated.torque, **OPTIONS)

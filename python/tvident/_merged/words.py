@@ -22,8 +22,8 @@ _DOUBTS = {
 }
 
 _SILENT = (
-    "the equation of a mass on which no force acts leaves more than noise explains: any multiple of its parameters satisfies it, so do not "
-    "trust the numbers; look for a spring that changes ('windowed'), or let a force act on every mass"
+    "the equation of a mass on which no force acts leaves more than noise explains, and where no force holds them parameters are drawn "
+    "towards zero: do not trust the numbers; look for a spring that changes ('windowed'), or let a force act on every mass"
 )
 
 

@@ -163,15 +163,17 @@ impl MergedSession<'_, '_, '_> {
             });
             self.noise[1][equation] * torque + of_angles.sum::<f64>()
         };
-        let least = self.least_variance();
-        let variance = |equation: usize| variance(equation) * self.misfits.get(equation).unwrap_or(&1.0);
-        let equations = (0..equations).map(|one| 1.0 / variance(one).max(least).sqrt()).collect();
+        let each: Vec<f64> = (0..equations).map(variance).collect();
+        let least = self.least_variance(&each);
+        let misfit = |equation: usize| self.misfits.get(equation).unwrap_or(&1.0);
+        let weight = |(equation, variance): (usize, f64)| 1.0 / (variance * misfit(equation)).max(least).sqrt();
+        let equations = each.into_iter().enumerate().map(weight).collect();
         let angles = self.colours.iter().map(|noise| self.all.columns_of(noise)).collect();
         Weights { angles, equations }
     }
 
-    /// The variance that no equation's noise is below.
-    fn least_variance(&self) -> f64 {
+    /// The variance that no equation's noise is below, of which there are estimates.
+    fn least_variance(&self, estimates: &[f64]) -> f64 {
         let mean = |equation: usize| {
             let of = self.trials.iter().map(|trial| trial.mean_square(equation));
             of.sum::<f64>() / self.trials.len().max(1) as f64
@@ -182,7 +184,12 @@ impl MergedSession<'_, '_, '_> {
         // Before anything is known of the motion, an equation without torque counts as the others do.
         let unknown = self.parameters.iter().all(|&value| value == 0.0);
         let least = (LEAST_NOISE * LEAST_NOISE * most).max(if unknown { noise * torque } else { 0.0 });
-        if least > 0.0 { least } else { 1.0 }
+        if least > 0.0 {
+            return least;
+        }
+        // Where no torque acts at all, one of which nothing is known yet counts as that with the least noise of the others.
+        let known = estimates.iter().copied().filter(|&variance| variance > 0.0).fold(f64::INFINITY, f64::min);
+        if known < f64::INFINITY { known } else { 1.0 }
     }
 
     /// The covariance of the rows as the noise of all channels makes it, and what windows are expected to leave.
