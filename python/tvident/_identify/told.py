@@ -82,7 +82,7 @@ class Told:
             doubts = events_that_stay(data.angles, data.torques)
             if not data.motion.recorded:
                 # What was made of several channels, or integrated, has no noise above the motion that would be the angle's alone.
-                doubts = [*doubts, *fed_back_in_records(data.angles, data.torques)]
+                doubts = [*doubts, *fed_back_in_records(data.angles, data.torques, self._inertias())]
             words = _with_doubts(words, doubts, several=several)
         else:
             each = [one + search for one, search in zip(self._of_records(names, settings), more, strict=True)]
@@ -163,13 +163,18 @@ class Told:
         if not data.motion.recorded:
             if data.weights is not None:
                 variances = [one * spread for one, spread in zip(variances, data.weights.spread, strict=True)]
-            coherences = _core.noise_coherence(data.angles, data.torques, variances)
+            coherences = _core.noise_coherence(data.angles, data.torques, variances, self._inertias())
         lags = np.broadcast_to(np.divide(settings["lag"], data.period), data.records)
         chosen = [name for name in settings["chosen"] if not self.request.is_kept(name)]
         return [
             Explained(one, names, chosen, tested, data.period, data.step, coherence, late, gains, data.units).words()
             for one, coherence, late, gains in zip(self.found, coherences, lags.tolist(), self._of_gains, strict=True)
         ]
+
+    def _inertias(self) -> list[float]:
+        """Return the usual inertia of every record over the square of the sample period; 0 where none was found."""
+        found = self.batch.values["inertia"].reshape(self.data.records, -1) / self.data.period**2
+        return [float(np.median(one[np.isfinite(one)])) if np.isfinite(one).any() else 0.0 for one in found]
 
     def _of_strong_form(self, settings: Mapping[str, Any]) -> ExplainedStrong:
         mask, step = self.data.mask, self.data.step

@@ -8,6 +8,9 @@
 //!
 //! is one over the number of segments if the noise of both is independent, and the share of the torque's power that comes from the angle's noise
 //! otherwise. What motion is left in the band makes it at most the share of motion in the angle's power.
+//!
+//! An angle without noise holds what a drive of steps moves there, which is no noise: the torque is what moves the inertia, `-Iω²θ`. A controller's
+//! torque grows less fast than that, and equals it at one frequency only.
 
 use std::f64::consts::PI;
 
@@ -27,6 +30,9 @@ const FREQUENCIES: usize = 32;
 /// Coherence of the noise from which on the torque holds that of the angle: four times what motion below the noise can make.
 pub const CORRELATED_NOISE: f64 = 0.3;
 
+/// The torque over what moves the inertia, where it is taken for that: within so much of one.
+const MOVED: f64 = 0.5;
+
 /// Sums of the spectra of two channels.
 struct Spectra {
     length: usize,
@@ -36,8 +42,9 @@ struct Spectra {
     segments: usize,
 }
 
-/// The mean coherence of angle and torque above the motion, less its bias; `None` if the record has no such band, or is too short.
-pub fn noise_coherence(angle: &dyn Samples, torque: &dyn Samples, variance: f64) -> Option<f64> {
+/// The mean coherence of angle and torque above the motion, less its bias; `None` if the record has no such band, is too short, or shows motion
+/// there. The inertia is over the square of the sample period, and 0 where it is not known.
+pub fn noise_coherence(angle: &dyn Samples, torque: &dyn Samples, variance: f64, inertia: f64) -> Option<f64> {
     let spectra = spectra(angle, torque)?;
     let count = spectra.segments as f64;
     // From the highest frequency down, as long as their mean is that of noise.
@@ -52,6 +59,15 @@ pub fn noise_coherence(angle: &dyn Samples, torque: &dyn Samples, variance: f64)
     }
     let band = first..highest;
     if band.len() < FREQUENCIES {
+        return None;
+    }
+    let is_moved = |frequency: &usize| {
+        let moving = -inertia * (2.0 * PI * *frequency as f64 / spectra.length as f64).powi(2);
+        let [real, imaginary] = spectra.both[*frequency].map(|value| value / (moving * spectra.angle[*frequency]));
+        (real - 1.0).hypot(imaginary) < MOVED
+    };
+    let moved = band.clone().filter(is_moved).count();
+    if 2 * moved > band.len() {
         return None;
     }
     let frequencies = band.len() as f64;
@@ -111,13 +127,28 @@ mod tests {
         let fed_back: Vec<f64> = moving.iter().zip(rest).map(|(angle, own)| -5.0 * angle + own).collect();
         let alone: Vec<f64> =
             rest[..16_384].iter().enumerate().map(|(sample, own)| 3.0 * motion(sample) + own).collect();
-        let of = |torque: &[f64]| noise_coherence(&moving.as_slice(), &torque, 1.0 / 12.0).unwrap();
+        let of = |torque: &[f64]| noise_coherence(&moving.as_slice(), &torque, 1.0 / 12.0, 0.0).unwrap();
         // 25 parts of the torque's 26 come from the angle. Of independent noise 120 segments leave less than 0.01 in the mean of 200 frequencies.
         assert!((of(&fed_back) - 25.0 / 26.0).abs() < 0.02 && of(&alone) < 0.01, "{} {}", of(&fed_back), of(&alone));
-        assert_eq!(noise_coherence(&moving.as_slice(), &alone.as_slice(), 1e-6), None);
+        assert_eq!(noise_coherence(&moving.as_slice(), &alone.as_slice(), 1e-6, 0.0), None);
         // Few samples are seen in short segments: 30 segments leave 0.05 of independent noise at most.
-        let of_few = |torque: &[f64]| noise_coherence(&&moving[..2000], &&torque[..2000], 1.0 / 12.0).unwrap();
+        let of_few = |torque: &[f64]| noise_coherence(&&moving[..2000], &&torque[..2000], 1.0 / 12.0, 0.0).unwrap();
         assert!((of_few(&fed_back) - 25.0 / 26.0).abs() < 0.05 && of_few(&alone) < 0.05);
-        assert_eq!(noise_coherence(&&moving[..1000], &&alone[..1000], 1.0 / 12.0), None);
+        assert_eq!(noise_coherence(&&moving[..1000], &&alone[..1000], 1.0 / 12.0, 0.0), None);
+    }
+    #[test]
+    fn what_a_rough_torque_moves_is_no_noise() {
+        let [mut angle, mut torque] = [(); 2].map(|()| vec![0.0; 16_384]);
+        for (wave, phase) in uniform(500).into_iter().enumerate() {
+            let frequency = PI * (wave as f64 + 0.5) / 500.0;
+            for (sample, (angle, torque)) in angle.iter_mut().zip(&mut torque).enumerate() {
+                let drive = (frequency * sample as f64 + 2.0 * PI * phase).sin();
+                *torque += drive;
+                *angle -= drive / frequency.powi(2);
+            }
+        }
+        let of = |inertia| noise_coherence(&angle.as_slice(), &torque.as_slice(), 1e9, inertia);
+        assert!(of(0.0).unwrap() > CORRELATED_NOISE, "{:?}", of(0.0));
+        assert_eq!(of(1.0), None);
     }
 }
