@@ -1,9 +1,12 @@
-//! The noise of the torque as the equations show it, where they leave more than the noise of the channels explains.
+//! The noise of the torque as the equations show it, where they leave more than the noise of the channels explains, or far less.
 //!
 //! The noise of a channel is read where its signal does not reach: at the highest frequencies. Coloured noise is stronger where the motion
 //! is, and there are changes that no window follows. Both leave more of the equations than so weak a noise would. Test functions and windows
 //! that are chosen for it are too wide and too short, and tests take what is left for a change of the parameters. So what is left counts as
 //! noise of the torque, and everything is chosen again with it, unless it is so much that the equations are wrong.
+//!
+//! A drive of steps or random signs reaches the highest frequencies, where it is read as noise, and angles without noise hold what it moves there.
+//! The equations leave far less then, and no noise makes more than what they leave.
 
 use crate::error::Error;
 use crate::identify::scanned::Scans;
@@ -12,6 +15,7 @@ use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
 use crate::inference::cross_validation::left_of_rows;
 use crate::noise::low_passed::density_above_motion;
+use crate::noise::{CORRELATED_NOISE, noise_coherence};
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::limits::UNEXPLAINED;
@@ -24,6 +28,8 @@ use crate::weak_form::weak_rows::WeakRows;
 
 /// What is left of the equations, over the variance that is expected, from which on it is more than the noise of the channels.
 const MORE: f64 = 2.0;
+/// The same from which on downwards the channels hold signal where their noise is read.
+const LESS: f64 = 0.5;
 /// Rounds of choosing the test function with the noise that the last one showed.
 const ROUNDS: usize = 3;
 /// Steps towards the noise that one test function shows, and the part of it that the last may change it by.
@@ -52,7 +58,13 @@ impl Session<'_, '_, '_> {
             }
             return Ok(chosen);
         }
-        if !self.show_noise(&mut chosen, model)? {
+        let mut rounds = 0;
+        while rounds < ROUNDS && self.bound_noise(&mut chosen, model)? {
+            (rounds, scans) = (rounds + 1, None);
+            chosen = self.choose_first(model, &mut scans)?;
+        }
+        // What was lowered to what the equations leave is what they show.
+        if rounds > 0 || !self.show_noise(&mut chosen, model)? {
             return Ok(chosen);
         }
         for _ in 0..ROUNDS {
@@ -79,8 +91,42 @@ impl Session<'_, '_, '_> {
 
     /// Chooses it with the noise of the channels, or with what was told of what the equations show.
     pub(crate) fn choose_first(&mut self, model: &Model, scans: &mut Option<Scans>) -> Result<Chosen, Error> {
-        self.noise = [self.channel_noise[0], self.options.shown_noise.unwrap_or(self.channel_noise[1])];
+        let torque = self.options.shown_noise.unwrap_or(self.channel_noise[1]);
+        self.channel_noise[1] = self.channel_noise[1].min(torque);
+        self.noise = [self.channel_noise[0], torque];
         self.choose_once(model, scans, None)
+    }
+
+    /// Lowers the noise of the torque to what the equations leave, if that is far less than the noise of the channels makes. Returns whether it is.
+    fn bound_noise(&mut self, chosen: &mut Chosen, model: &Model) -> Result<bool, Error> {
+        let fitted = self.take_fitted(chosen, model)?;
+        let weak = &chosen.weak;
+        let (_, expected) = self.covariance(weak, chosen.parameters);
+        let (left, usable) = match &fitted.fit {
+            // Constants follow nothing.
+            Some(fit) if fitted.model.windowed.is_empty() => {
+                let problem = fitted.model.problem(&weak.rows, &weak.rows.rhs, self.noise[0], None);
+                residuals(&problem, fit, &mut self.stages)?
+            }
+            Some(_) if fitted.error < LESS => self.left_unseen(weak, &fitted, FEW_WINDOWS)?,
+            _ => Default::default(),
+        };
+        chosen.fitted = Some(fitted);
+        let shown = usual_variance(&left, &usable).filter(|shown| *shown > 0.0 && *shown < LESS * expected.variance);
+        let Some(shown) = shown.filter(|_| !self.is_fed_back(chosen.parameters[0])) else { return Ok(false) };
+        let gain = RowCovariance::known(&weak.kernels, &weak.torque, [0.0; 3], [0.0, 1.0], weak.stride).variance();
+        let is_lower = shown < LESS * gain * self.channel_noise[1];
+        if is_lower {
+            self.channel_noise[1] = shown / gain;
+        }
+        Ok(is_lower)
+    }
+
+    /// Whether the torque holds the noise of the angle: then the noise of both cancels in part in the equations.
+    fn is_fed_back(&self, inertia: f64) -> bool {
+        let inertia = inertia / self.options.delta.powi(2);
+        noise_coherence(self.record.angle, self.record.torque, self.channel_noise[0], inertia)
+            .is_some_and(|coherence| coherence >= CORRELATED_NOISE)
     }
 
     fn choose_once(

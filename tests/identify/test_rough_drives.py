@@ -1,0 +1,52 @@
+"""Drives that reach the highest frequencies, as random signs do: what they hold there is no noise, of the torque or of the angle."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.signal import cont2discrete, lfilter
+
+import tvident
+from parameters import long
+from tvident import Status
+
+Array = npt.NDArray[np.float64]
+
+TRUTH = {"inertia": 0.1, "damping": 0.8, "stiffness": 11.0}
+RATE = 100.0
+NOISE = 0.02
+
+
+def random_signs(seed: int, angle_noise: float, seconds: float = 40.0) -> tuple[Array, Array]:
+    """Give angle and torque of a rig that is driven by random signs, which change half way between samples."""
+    generator = np.random.default_rng(seed)
+    samples = int(seconds * RATE)
+    held = int(0.3 * RATE)
+    signs = np.repeat(generator.choice([-1.0, 1.0], samples // held + 2), held)[:samples]
+    torque = 3.0 * np.concatenate([[signs[0]], np.repeat(signs, 2)[: 2 * samples - 1]])
+    system = [1.0], [TRUTH["inertia"], TRUTH["damping"], TRUTH["stiffness"]]
+    top, bottom, _ = cont2discrete(system, 0.5 / RATE)
+    angle = lfilter(np.ravel(top), bottom, torque)
+    noise = generator.standard_normal((2, samples))
+    return angle[::2] + angle_noise * np.std(angle) * noise[0], torque[::2] + NOISE * noise[1]
+
+
+@pytest.mark.parametrize("seed", [0, *long(*range(1, 12))])
+@pytest.mark.parametrize("angle_noise", [0.0, 1e-4, 1e-3])
+@pytest.mark.parametrize("stiffness", ["constant", "windowed"])
+def test_what_random_signs_hold_at_high_frequencies_is_no_noise(seed: int, angle_noise: float, stiffness: Any) -> None:
+    """Read from its highest frequencies the torque's noise was 20 times too large: errors were, too, and friction was not seen."""
+    angle, torque = random_signs(seed, angle_noise)
+    result = tvident.identify(angle, torque, sample_rate=RATE, stiffness=stiffness)
+    (shown,) = result.settings["shown_noise"]
+    assert np.sqrt(shown) < 4 * NOISE
+    assert not any("feeds it back" in line for line in result.advice)
+    if angle_noise >= 1e-3:  # beside less, what samples of jumps leave of the equations is seen: .1 % of the inertia
+        assert not result.record_status & (Status.CHANNEL_SUSPECTED | Status.TERM_SUSPECTED)
+    for name, truth in TRUTH.items():
+        value, error, *_ = result.value(name)
+        assert abs(value - truth) < 5 * error
+        assert error < 0.02 * truth
