@@ -133,7 +133,8 @@ impl Session<'_, '_, '_> {
                 let row = &white[(count + place) * problem.layout.constant + count..][..candidates.len()];
                 let by_noise = rows.len() as f64 * row.iter().zip(&shared).map(|(one, other)| one * other).sum::<f64>();
                 suspect.value -= by_noise;
-                suspect.error += UNSURE * by_noise.abs();
+                // The cube of a torque of two levels differs from it by its noise alone, and no noise is known so well.
+                suspect.error += by_noise.abs() * if missing == Missing::Resonance { UNSURE } else { 1.0 };
                 if let (Missing::Resonance, Some(lag)) = (missing, lag) {
                     // A torque that is late has half its lag's square of the second derivative.
                     let variance = beside.variance_of(&problem, count + lag, &covariance, &mut self.stages)?;
