@@ -249,7 +249,7 @@ CASES: list[tuple[Status, str, Callable[[], Shown], Callable[[], Shown]]] = [
     (
         Status.WINDOW_LIMIT,
         "few samples a cycle",
-        lambda: identified(rig().angle[::20], rig().torque[::20], rate=RATE / 20),
+        lambda: identified(rig().angle[::30], rig().torque[::30], rate=RATE / 30),
         lambda: identified(rig().angle[::10], rig().torque[::10], rate=RATE / 10),
     ),
     (

@@ -14,8 +14,8 @@ use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
 use crate::inference::cross_validation::left_of_rows;
+use crate::noise::coherence::{CORRELATED_NOISE, noise_coherence};
 use crate::noise::low_passed::density_above_motion;
-use crate::noise::{CORRELATED_NOISE, noise_coherence};
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::limits::UNEXPLAINED;
@@ -99,6 +99,9 @@ impl Session<'_, '_, '_> {
 
     /// Lowers the noise of the torque to what the equations leave, if that is far less than the noise of the channels makes. Returns whether it is.
     fn bound_noise(&mut self, chosen: &mut Chosen, model: &Model) -> Result<bool, Error> {
+        if self.options.noise[1].is_some() {
+            return Ok(false);
+        }
         let fitted = self.take_fitted(chosen, model)?;
         let weak = &chosen.weak;
         let (_, expected) = self.covariance(weak, chosen.parameters);
