@@ -183,3 +183,15 @@ def test_settings_of_another_record_leave_its_lag_to_be_suspected() -> None:
     settings = tvident.identify(record.angle[3:], record.torque[:-3], sample_rate=1000, lag="auto").settings
     other = tvident.identify(record.angle[6:], record.torque[:-6], sample_rate=1000, settings=settings)
     assert other.record_status & tvident.Status.LAG_SUSPECTED
+
+
+@pytest.mark.parametrize("pattern", ["constant", "slider"])
+def test_a_stiffness_that_was_automatic_and_changes_stays_so(pattern: Any) -> None:
+    """It was set free beside its own windows, and nothing was identified; nor by `held_back()`, which gives settings back."""
+    rig = tvident.simulate_torsional_rig(12.0, pattern=pattern)
+    first = tvident.identify(rig.angle, rig.torque, sample_rate=rig.sample_rate, stiffness="auto")
+    again = tvident.identify(rig.angle, rig.torque, sample_rate=rig.sample_rate, settings=first.settings)
+    assert again.trusted.mean() > 0.9
+    np.testing.assert_allclose(again.stiffness, first.stiffness, rtol=1e-6)
+    assert again.record_status == first.record_status
+    assert first.held_back().predicted > 95

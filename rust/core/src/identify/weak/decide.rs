@@ -113,7 +113,9 @@ impl Session<'_, '_, '_> {
         decided.constants_jump = constants_jump;
         let rows = &chosen.weak.rows;
         decided.slow = self.of_kind(Kind::Varying);
-        let mut changing = self.options.decided.iter().filter(|(_, changes)| *changes).map(|(unknown, _)| *unknown);
+        // What is in windows from the beginning is not set free beside itself.
+        let changing = self.options.decided.iter().filter(|(_, changes)| *changes).map(|(unknown, _)| *unknown);
+        let mut changing = changing.filter(|unknown| !model.windowed.contains(unknown)).collect::<Vec<_>>().into_iter();
         let mut model = Cow::Borrowed(model);
         loop {
             if !decided.slow.is_empty() {
