@@ -136,6 +136,7 @@ mod tests {
         assert!((of_few(&fed_back) - 25.0 / 26.0).abs() < 0.05 && of_few(&alone) < 0.05);
         assert_eq!(noise_coherence(&&moving[..1000], &&alone[..1000], 1.0 / 12.0, 0.0), None);
     }
+
     #[test]
     fn what_a_rough_torque_moves_is_no_noise() {
         let [mut angle, mut torque] = [(); 2].map(|()| vec![0.0; 16_384]);

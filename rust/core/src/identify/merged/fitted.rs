@@ -106,10 +106,7 @@ impl MergedSession<'_, '_, '_> {
                 error = Some(sum / (count - one.pooled.values.len() as f64).max(1.0) / expected.variance);
             }
             self.remember(model, &one);
-            if self.has_silence() {
-                let left = self.left_of_equations(model, &one)?;
-                self.take_misfits(&left);
-            }
+            self.take_misfits(model, &one)?;
             fit = Some((one, covariance, correlated, expected));
         }
         let misfit = self.misfit();

@@ -104,10 +104,7 @@ impl MergedSession<'_, '_, '_> {
             let fit = Fit::new(&problem, scale, Expected::UNKNOWN, instructions, &mut self.stages)?;
             let Some(fit) = fit else { return Ok(None) };
             self.remember(model, &fit);
-            if self.has_silence() {
-                let left = self.left_of_equations(model, &fit)?;
-                self.take_misfits(&left);
-            }
+            self.take_misfits(model, &fit)?;
             last = Some(fit);
         }
         Ok(last)

@@ -12,11 +12,7 @@ use crate::regression::model::Model;
 use crate::regression::residuals::{residuals, usual_variance};
 
 impl MergedSession<'_, '_, '_> {
-    /// Whether no torque acts on some mass.
-    pub(crate) fn has_silence(&self) -> bool {
-        (0..self.merged.equations()).any(|equation| self.is_silent(equation))
-    }
-
+    /// Whether no torque acts on a mass.
     fn is_silent(&self, equation: usize) -> bool {
         self.noise[1].get(equation) == Some(&0.0) && self.trials.iter().all(|trial| trial.mean_square(equation) == 0.0)
     }
@@ -27,20 +23,25 @@ impl MergedSession<'_, '_, '_> {
         let (left, usable) = residuals(&problem, fit, &mut self.stages)?;
         let equations = self.merged.equations();
         let of = |equation: usize| {
-            let rows = |row: &usize| row % equations == equation && usable[*row];
-            let mine: Vec<f64> = (0..left.len()).filter(rows).map(|row| left[row]).collect();
+            let rows: Vec<bool> =
+                usable.iter().enumerate().map(|(row, usable)| *usable && row % equations == equation).collect();
             let misfit = self.misfits.get(equation).unwrap_or(&1.0);
-            usual_variance(&mine, &vec![true; mine.len()]).map_or(0.0, |variance| variance * misfit)
+            usual_variance(&left, &rows).map_or(0.0, |variance| variance * misfit)
         };
         Ok((0..equations).map(of).collect())
     }
 
-    /// Takes what is left of equations without a torque for their noise, where that does not explain it.
-    pub(crate) fn take_misfits(&mut self, left: &[f64]) {
+    /// Takes what a fit leaves of equations without a torque for their noise, where that does not explain it.
+    pub(crate) fn take_misfits(&mut self, model: &Model, fit: &Fit) -> Result<(), Error> {
+        if !(0..self.merged.equations()).any(|equation| self.is_silent(equation)) {
+            return Ok(());
+        }
+        let left = self.left_of_equations(model, fit)?;
         let of = |(equation, &left): (usize, &f64)| {
             if left > NOISE_MODEL_FAILS && self.is_silent(equation) { left } else { 1.0 }
         };
         self.misfits = left.iter().enumerate().map(of).collect();
+        Ok(())
     }
 
     /// The largest misfit of an equation without a torque.

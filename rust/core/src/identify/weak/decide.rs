@@ -115,7 +115,7 @@ impl Session<'_, '_, '_> {
         decided.slow = self.of_kind(Kind::Varying);
         // What is in windows from the beginning is not set free beside itself.
         let changing = self.options.decided.iter().filter(|(_, changes)| *changes).map(|(unknown, _)| *unknown);
-        let mut changing = changing.filter(|unknown| !model.windowed.contains(unknown)).collect::<Vec<_>>().into_iter();
+        let mut changing = changing.filter(|unknown| !model.windowed.contains(unknown));
         let mut model = Cow::Borrowed(model);
         loop {
             if !decided.slow.is_empty() {

@@ -104,7 +104,6 @@ impl Session<'_, '_, '_> {
         }
         let fitted = self.take_fitted(chosen, model)?;
         let weak = &chosen.weak;
-        let (_, expected) = self.covariance(weak, chosen.parameters);
         let (left, usable) = match &fitted.fit {
             // Constants follow nothing.
             Some(fit) if fitted.model.windowed.is_empty() => {
@@ -115,14 +114,12 @@ impl Session<'_, '_, '_> {
             _ => Default::default(),
         };
         chosen.fitted = Some(fitted);
-        let shown = usual_variance(&left, &usable).filter(|shown| *shown > 0.0 && *shown < LESS * expected.variance);
+        let gain = gain_of_torque(weak);
+        let is_lower = |shown: &f64| *shown > 0.0 && *shown < LESS * gain * self.channel_noise[1];
+        let shown = usual_variance(&left, &usable).filter(is_lower);
         let Some(shown) = shown.filter(|_| !self.is_fed_back(chosen.parameters[0])) else { return Ok(false) };
-        let gain = RowCovariance::known(&weak.kernels, &weak.torque, [0.0; 3], [0.0, 1.0], weak.stride).variance();
-        let is_lower = shown < LESS * gain * self.channel_noise[1];
-        if is_lower {
-            self.channel_noise[1] = shown / gain;
-        }
-        Ok(is_lower)
+        self.channel_noise[1] = shown / gain;
+        Ok(true)
     }
 
     /// Whether the torque holds the noise of the angle: then the noise of both cancels in part in the equations.
@@ -144,8 +141,7 @@ impl Session<'_, '_, '_> {
 
     /// Takes what the equations leave for noise of the torque, if that is more than the noise of the channels. Returns whether it is.
     fn show_noise(&mut self, chosen: &mut Chosen, model: &Model) -> Result<bool, Error> {
-        let gain =
-            RowCovariance::known(&chosen.weak.kernels, &chosen.weak.torque, [0.0; 3], [0.0, 1.0], chosen.weak.stride);
+        let gain = gain_of_torque(&chosen.weak);
         let raised = self.noise != self.channel_noise;
         for step in 0..STEPS {
             let fitted = self.take_fitted(chosen, model)?;
@@ -159,7 +155,7 @@ impl Session<'_, '_, '_> {
             if (raised || step > 0) && (left - 1.0).abs() <= SETTLED {
                 break;
             }
-            let shown = self.noise[1] + (left - 1.0) * expected / gain.variance();
+            let shown = self.noise[1] + (left - 1.0) * expected / gain;
             self.noise[1] = shown.max(self.channel_noise[1]);
             let before = self.fit_near(chosen, model)?;
             if !raised && step == 0 {
@@ -264,4 +260,9 @@ impl Session<'_, '_, '_> {
         let more = of_torque(self.noise) - of_torque(self.channel_noise);
         decided.covariance.variance() / (decided.covariance.variance() - more).max(f64::MIN_POSITIVE)
     }
+}
+
+/// The variance of a row's noise, over that of the torque's.
+fn gain_of_torque(weak: &WeakRows) -> f64 {
+    RowCovariance::known(&weak.kernels, &weak.torque, [0.0; 3], [0.0, 1.0], weak.stride).variance()
 }
