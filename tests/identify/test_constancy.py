@@ -17,6 +17,7 @@ Array = npt.NDArray[np.float64]
 RATE = 1000.0
 SAMPLES = 20_000
 TIME = np.arange(SAMPLES) / RATE
+SHORT = 4000
 INERTIA, DAMPING, STIFFNESS = 0.0123, 0.03, 13.0
 
 
@@ -54,6 +55,21 @@ def test_what_grows_beside_a_constant_stiffness_is_found(
     assert np.sqrt(np.mean((getattr(result, name) / truth - 1) ** 2)) < wrong
     assert np.sqrt(np.mean((result.stiffness / STIFFNESS - 1) ** 2)) < 0.01
     assert f"{name} " in " ".join(result.reasons)
+
+
+@pytest.mark.parametrize("seed", [3, 4, *long(0, 1, 2, 5, 6, 7)])
+@pytest.mark.parametrize("by", [0.0, 0.5])
+def test_damping_that_grows_in_four_seconds_is_told_by_a_line(by: float, seed: int) -> None:
+    """Windows of the stiffness are two thirds of an eighth of the record: eight parts know next to nothing, p = .3 to .9."""
+    stiffness = STIFFNESS * (1 + 0.3 * np.sin(2 * np.pi * TIME / 4.0))
+    damping = DAMPING * (1 + by * TIME / TIME[SHORT - 1])
+    angle, torque = recording(seed, damping=damping, stiffness=stiffness)
+    result = tvident.identify(angle[:SHORT], torque[:SHORT], sample_rate=RATE)
+    assert result.settings["kinds"]["damping"] == ("varying" if by else "constant")
+    assert result.settings["kinds"]["inertia"] == "constant"
+    assert np.sqrt(np.mean((result.damping / damping[:SHORT] - 1) ** 2)) < 0.08
+    given = tvident.identify(angle[:SHORT], torque[:SHORT], sample_rate=RATE, damping="constant")
+    assert bool(given.record_status & Status.KIND_CONTRADICTED) == bool(by)
 
 
 @pytest.mark.parametrize("stiffness", ["windowed", "constant"])

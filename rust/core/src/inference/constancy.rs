@@ -8,6 +8,9 @@
 //! neighbours as well: what changes slowly hardly differs there. If those scatter more than noise explains, the blocks have to differ by more
 //! than that (analysis of variance, Fisher's F).
 //!
+//! A line in the place of each constant, beside the windows of the whole record, loses nothing where blocks are hardly longer than these: what a window
+//! takes, every block loses. Its slope over its standard error has one degree of freedom, where eight blocks have seven.
+//!
 //! Where no torque acts the equation is homogeneous: in a free decay, or at rest, it holds for any multiple of the parameters, and least squares finds
 //! the smallest, zero. Parts whose torque is no more than its noise are left out, and of a block the longest run of others stands for it.
 
@@ -47,6 +50,9 @@ const SCATTER_OF_MEDIAN: f64 = 2.34;
 /// Probability below which a difference is significant: once in 2000 records.
 pub const NO_CHANCE: f64 = 5e-4;
 
+/// The same for a line beside what blocks say: both together find what is not there hardly more often than blocks alone.
+const NO_CHANCE_OF_A_LINE: f64 = 0.1 * NO_CHANCE;
+
 /// The result of the test of one constant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Test {
@@ -72,6 +78,47 @@ pub(crate) enum NoiseFrom {
 
 /// The constants of some rows, and their variances; `None` if the rows do not determine them.
 type Estimate = Option<(Vec<f64>, Vec<f64>)>;
+
+/// What a constant gains from the middle of the record to its end, where it may follow a line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Trend {
+    pub(crate) value: f64,
+    pub(crate) growth: f64,
+    pub(crate) error: f64,
+}
+
+impl Trend {
+    /// The square of the growth over its variance.
+    pub(crate) fn excess(self) -> f64 {
+        (self.growth / self.error).powi(2)
+    }
+
+    /// Whether noise of the channels makes as much by no chance.
+    pub(crate) fn is_conspicuous(self) -> bool {
+        chi_squared_beyond(self.excess(), 1) < NO_CHANCE_OF_A_LINE
+    }
+
+    /// What it says of the constant.
+    fn test(self, from: NoiseFrom) -> Test {
+        let squares = self.excess();
+        let probability = chi_squared_beyond(squares, 1);
+        // The standard deviation of a line between minus one and one.
+        let deviation = self.growth.abs() / 3.0_f64.sqrt();
+        let mut test = Test { probability, spread: deviation / self.value.abs(), deviation, squares, freedom: 1 };
+        test.beside_scatter(1.0, from);
+        test
+    }
+}
+
+/// Contradicts tests of blocks where lines in the place of the constants say that one changes.
+pub(crate) fn beside_lines(tests: &mut [Option<Test>], trends: &[Option<Trend>], from: NoiseFrom) {
+    for (test, trend) in tests.iter_mut().zip(trends) {
+        let line = trend.map(|trend| trend.test(from));
+        if let Some(line) = line.filter(|line| line.probability < NO_CHANCE_OF_A_LINE) {
+            *test = Some(line);
+        }
+    }
+}
 
 impl Test {
     /// How much more the parts differ than noise explains: the mean of their squared differences over the variances.
@@ -343,6 +390,32 @@ mod tests {
                 assert!((tests[0].spread / line - 1.0).abs() < 0.15, "{}, {line}", tests[0].spread);
             }
         }
+    }
+
+    #[test]
+    fn a_line_contradicts_blocks_that_know_little() {
+        let block = Test { probability: 0.6, spread: 0.0, deviation: 0.0, squares: 0.9, freedom: 7 };
+        let line = |growth: f64| Some(Trend { value: 2.0, growth, error: 0.1 });
+        // Steep enough, level, unknown.
+        let trends = [line(0.5), line(0.3), None];
+        for (before, from, found) in [
+            (Some(block.clone()), NoiseFrom::Channels, [true, false, false]),
+            (None, NoiseFrom::Channels, [true, false, false]),
+            (Some(block.clone()), NoiseFrom::Equations, [false; 3]),
+        ] {
+            let mut tests = vec![before.clone(); 3];
+            beside_lines(&mut tests, &trends, from);
+            for (test, found) in tests.iter().zip(found) {
+                assert_eq!(test.as_ref().is_some_and(|test| test.probability < NO_CHANCE), found, "{test:?}");
+                assert!(found || *test == before);
+            }
+        }
+        let mut tests = [None];
+        beside_lines(&mut tests, &trends[..1], NoiseFrom::Channels);
+        // Five standard deviations; a line from -0.5 to 0.5 scatters by that over the root of three.
+        let test = tests[0].as_ref().expect("a line");
+        assert!((test.probability / 5.733_031_437_583_892e-7 - 1.0).abs() < 1e-12, "{}", test.probability);
+        assert!((test.spread / (0.25 / 3.0_f64.sqrt()) - 1.0).abs() < 4.0 * f64::EPSILON);
     }
 
     #[test]

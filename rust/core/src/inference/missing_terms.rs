@@ -14,7 +14,6 @@ use crate::record::derived::Mapped;
 use crate::record::samples::Samples;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
-use crate::regression::layout::Layout;
 use crate::regression::model::Model;
 use crate::regression::problem::Correlated;
 use crate::regression::row_covariance::RowCovariance;
@@ -123,14 +122,26 @@ pub(crate) struct JudgedTerm<'a> {
 impl JudgedTerm<'_> {
     /// Adds one regressor to the constants and returns its coefficient with its standard error, or `None` if it is not determined.
     pub(crate) fn factor(&self, regressor: usize, stages: &mut Stages<'_, '_>) -> Result<Option<(f64, f64)>, Error> {
+        Ok(self.factors(&[regressor], stages)?.and_then(|mut each| each.pop()))
+    }
+
+    /// The same of several regressors beside each other.
+    pub(crate) fn factors(
+        &self,
+        regressors: &[usize],
+        stages: &mut Stages<'_, '_>,
+    ) -> Result<Option<Vec<(f64, f64)>>, Error> {
         let mut model = self.model.clone();
-        model.constant.push(regressor);
+        model.constant.extend(regressors);
         let problem = model.problem(self.rows, self.rhs, self.noise, Some(self.correlated));
         let fit = self.fit.again(&problem, self.expected, self.instructions, stages)?;
         let Some(fit) = fit else { return Ok(None) };
-        let Layout { constant, .. } = problem.layout;
-        let variance = self.inflation * fit.variance_of(&problem, constant - 1, self.covariance, stages)?;
-        Ok(Some((fit.pooled.values[constant - 1], variance.sqrt())))
+        let added = self.model.constant.len()..problem.layout.constant;
+        let factor = |constant: usize| {
+            let variance = self.inflation * fit.variance_of(&problem, constant, self.covariance, stages)?;
+            Ok((fit.pooled.values[constant], variance.sqrt()))
+        };
+        added.map(factor).collect::<Result<_, Error>>().map(Some)
     }
 }
 

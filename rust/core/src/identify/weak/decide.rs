@@ -8,18 +8,23 @@ use crate::identify::kinds::Kind;
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
-use crate::inference::constancy::{self, NoiseFrom, TestNoise};
+use crate::inference::constancy::{self, NoiseFrom, TestNoise, Trend};
 use crate::inference::jumps::jump::Jump;
 use crate::inference::jumps::search;
+use crate::inference::missing_terms::JudgedTerm;
 use crate::inference::slowly_varying;
+use crate::inference::trend::tilted;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
+use crate::regression::subsample::stretches_of_rows;
 use crate::regression::window_length::Scale;
 
 /// The mean squared error of predicting rows, over the noise's, from which on more is tried, and the part of it that must be left to be
 /// worth it.
 pub(crate) const BADLY: f64 = 1.5;
 pub(crate) const BETTER: f64 = 0.8;
+/// The same where no test of parts says that anything changes.
+const FAR_BETTER: f64 = 0.5;
 
 /// Where constants jump, those that do not change in between stand unless others predict so much better.
 const SIMPLER: f64 = 0.98;
@@ -122,7 +127,12 @@ impl Session<'_, '_, '_> {
                 self.set_free(rows, &model, &mut decided)?;
             }
             let worst = self.test(rows, &mut decided)?;
-            let Some(worst) = changing.next().or(worst) else { break };
+            let Some(worst) = changing.next().or(worst) else {
+                if self.set_growing_free(rows, &model, &mut decided)? {
+                    continue;
+                }
+                break;
+            };
             if model.windowed.is_empty() {
                 // Beside constants it is followed in windows, as a stiffness is.
                 let constant = model.constant.iter().copied().filter(|&one| one != worst).collect();
@@ -155,7 +165,13 @@ impl Session<'_, '_, '_> {
             from: if is_raised { NoiseFrom::Equations } else { NoiseFrom::Channels },
             equations: 1,
         };
-        let results = constancy::test(&problem, fit, noise, self.options.instructions, &mut self.stages)?;
+        let mut results = constancy::test(&problem, fit, noise, self.options.instructions, &mut self.stages)?;
+        // What is left beside more than noise may follow a line as well.
+        let differs = results.iter().flatten().any(|test| test.probability < constancy::NO_CHANCE);
+        if !differs && decided.error < BADLY {
+            let trends = self.trends(rows, decided, fit)?;
+            constancy::beside_lines(&mut results, &trends, noise.from);
+        }
         // Tests of what was set free before stand as they were.
         decided.tests.retain(|(one, _)| decided.slow.contains(one));
         let constants = decided.model.constant.iter().zip(results);
@@ -167,6 +183,65 @@ impl Session<'_, '_, '_> {
         let worst = conspicuous.min_by(|a, b| a.1.probability.total_cmp(&b.1.probability)).map(|(one, _)| *one);
         let alone = decided.model.windowed.is_empty() && self.options.averaging;
         Ok(worst.filter(|_| fit.scale.is_some() || alone))
+    }
+
+    /// By how much inertia, damping and stiffness grow along the record where they are constants and something is windowed beside them: blocks lose
+    /// what windows take.
+    fn trends(&mut self, rows: &Rows, decided: &Decided, fit: &Fit) -> Result<Vec<Option<Trend>>, Error> {
+        let Decided { model, covariance, expected, .. } = decided;
+        let mut trends = vec![None; model.constant.len()];
+        let coefficients = self.record.coefficients.len();
+        let tested: Vec<usize> = model.constant.iter().copied().filter(|&one| one < coefficients).collect();
+        let Some(correlated) = &decided.correlated else { return Ok(trends) };
+        if model.windowed.is_empty() || tested.is_empty() || stretches_of_rows(rows.len()).is_some() {
+            return Ok(trends);
+        }
+        let mut rows = decided.rows(rows).clone();
+        let first = rows.regressors.len();
+        let tilted = tilted(&rows, &tested);
+        rows.regressors.extend(tilted);
+        let judged = JudgedTerm {
+            rows: &rows,
+            model,
+            rhs: decided.rhs(&rows),
+            noise: self.noise[0],
+            fit,
+            covariance,
+            correlated,
+            expected: *expected,
+            inflation: decided.error.max(1.0),
+            instructions: self.options.instructions,
+        };
+        let lines: Vec<usize> = (first..first + tested.len()).collect();
+        let Some(factors) = judged.factors(&lines, &mut self.stages)? else { return Ok(trends) };
+        for (unknown, (growth, error)) in tested.iter().zip(factors) {
+            if let Some(place) = model.constant.iter().position(|one| one == unknown) {
+                trends[place] = Some(Trend { value: fit.pooled.values[place], growth, error });
+            }
+        }
+        Ok(trends)
+    }
+
+    /// Sets the constant free that seems to grow most where rows are predicted badly, if that leaves far less: whatever is missing from an equation
+    /// follows a line a little. Returns whether it is free.
+    fn set_growing_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided) -> Result<bool, Error> {
+        let Some(fit) = decided.fit.as_ref().filter(|fit| fit.scale.is_some()) else { return Ok(false) };
+        if !decided.slow.is_empty() || decided.error < BADLY {
+            return Ok(false);
+        }
+        let trends = self.trends(rows, decided, fit)?;
+        let undecided = self.undecided();
+        let growing = decided.model.constant.iter().zip(&trends).filter_map(|(&one, trend)| Some((one, (*trend)?)));
+        let growing = growing.filter(|(one, trend)| undecided.contains(one) && trend.is_conspicuous());
+        let Some((most, _)) = growing.max_by(|a, b| a.1.excess().total_cmp(&b.1.excess())) else { return Ok(false) };
+        let mut free = decided.clone();
+        free.slow.push(most);
+        self.set_free(rows, model, &mut free)?;
+        let is_free = free.fit.is_some() && free.error < FAR_BETTER * decided.error;
+        if is_free {
+            decided.slow.push(most);
+        }
+        Ok(is_free)
     }
 
     /// Sets all that was tested free where one of them changes and yet the rows are predicted badly: a parameter that varies beside one that is held
