@@ -50,3 +50,17 @@ def test_what_random_signs_hold_at_high_frequencies_is_no_noise(seed: int, angle
         value, error, *_ = result.value(name)
         assert abs(value - truth) < 5 * error
         assert error < 0.02 * truth
+
+
+@pytest.mark.parametrize("seed", [0, *long(1, 2, 3)])
+def test_what_random_signs_move_is_no_noise_where_the_torque_is_late(seed: int) -> None:
+    """Behind a lag of two samples the motion was taken for feedback (coherence .99), and errors were 100 times too large."""
+    angle, torque = random_signs(seed, 0.0)
+    late = 2
+    result = tvident.identify(angle[late:], torque[:-late], sample_rate=RATE, lag=late / RATE)
+    (shown,) = result.settings["shown_noise"]
+    assert np.sqrt(shown) < 4 * NOISE
+    assert not any("feeds it back" in line for line in result.advice)
+    for name, truth in TRUTH.items():
+        value, error, *_ = result.value(name)
+        assert abs(value - truth) < 5 * error < 0.1 * truth

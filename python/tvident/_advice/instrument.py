@@ -50,9 +50,9 @@ def fed_back(coherence: float | None) -> list[str]:
 
 
 def fed_back_in_records(
-    angles: npt.NDArray[np.number], torques: npt.NDArray[np.number], inertias: list[float]
+    angles: npt.NDArray[np.number], torques: npt.NDArray[np.number], inertias: list[float], lags: list[float]
 ) -> list[tuple[int, str]]:
     """Return the same by record, where nothing is known of the noise yet."""
     variances = [one.sigma**2 for one in _core.noise(angles)]
-    coherences = _core.noise_coherence(angles, torques, variances, inertias)
+    coherences = _core.noise_coherence(angles, torques, variances, inertias, lags)
     return [(record, line) for record, coherence in enumerate(coherences) for line in fed_back(coherence)]

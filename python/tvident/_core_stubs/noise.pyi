@@ -37,7 +37,11 @@ def noise(
     samples: npt.NDArray[np.number], quantisation: float | None = None, passed: PassedNoise | None = None
 ) -> list[Noise]: ...
 def noise_coherence(
-    angle: npt.NDArray[np.number], torque: npt.NDArray[np.number], variances: list[float], inertias: list[float]
+    angle: npt.NDArray[np.number],
+    torque: npt.NDArray[np.number],
+    variances: list[float],
+    inertias: list[float],
+    lags: list[float],
 ) -> list[float | None]: ...
 def fuse(
     record: npt.NDArray[np.number],

@@ -83,7 +83,10 @@ class Told:
             doubts = events_that_stay(data.angles, data.torques)
             if not data.motion.recorded:
                 # What was made of several channels, or integrated, has no noise above the motion that would be the angle's alone.
-                doubts = [*doubts, *fed_back_in_records(data.angles, data.torques, self._inertias())]
+                doubts = [
+                    *doubts,
+                    *fed_back_in_records(data.angles, data.torques, self._inertias(), self._lags(settings)),
+                ]
             words = _with_doubts(words, doubts, several=several)
         else:
             each = [one + search for one, search in zip(self._of_records(names, settings), more, strict=True)]
@@ -161,16 +164,21 @@ class Told:
         variances = [one.noise.angle if one.noise else 0.0 for one in self.found]
         # What was made of several channels, or integrated, has no noise above the motion that would be the angle's alone.
         coherences: Sequence[float | None] = [None] * len(variances)
+        lags = self._lags(settings)
         if not data.motion.recorded:
             if data.weights is not None:
                 variances = [one * spread for one, spread in zip(variances, data.weights.spread, strict=True)]
-            coherences = _core.noise_coherence(data.angles, data.torques, variances, self._inertias())
-        lags = np.broadcast_to(np.divide(settings["lag"], data.period), data.records)
+            coherences = _core.noise_coherence(data.angles, data.torques, variances, self._inertias(), lags)
         chosen = [name for name in settings["chosen"] if not self.request.is_kept(name)]
         return [
             Explained(one, names, chosen, tested, data.period, data.step, coherence, late, gains, data.units).words()
-            for one, coherence, late, gains in zip(self.found, coherences, lags.tolist(), self._of_gains, strict=True)
+            for one, coherence, late, gains in zip(self.found, coherences, lags, self._of_gains, strict=True)
         ]
+
+    def _lags(self, settings: Mapping[str, Any]) -> list[float]:
+        """Return the lag of every torque in samples, as it was given or found."""
+        lags: list[float] = np.broadcast_to(np.divide(settings["lag"], self.data.period), self.data.records).tolist()
+        return lags
 
     def _inertias(self) -> list[float]:
         """Return the usual inertia of every record over the square of the sample period; 0 where none was found."""

@@ -117,19 +117,21 @@ pub(crate) fn parts_of_quantisation(samples: usize) -> Vec<(usize, usize)> {
 }
 
 /// The coherence of the noise of angle and torque of every record, above the motion; `variances` are those of the angles' noise, `inertias` over
-/// the square of the sample period, or 0 where they are not known.
+/// the square of the sample period, or 0 where they are not known, `lags` those of the torques in samples.
 #[pyfunction]
 pub(crate) fn noise_coherence(
     angle: &Bound<'_, PyUntypedArray>,
     torque: &Bound<'_, PyUntypedArray>,
     variances: Vec<f64>,
     inertias: Vec<f64>,
+    lags: Vec<f64>,
 ) -> PyResult<Vec<Option<f64>>> {
     let (angles, torques) = (records(angle)?, records(torque)?);
     let mut found = Vec::new();
     watched(angle.py(), None, |watch| {
-        for (((angle, torque), variance), inertia) in angles.iter().zip(&torques).zip(variances).zip(inertias) {
-            found.push(core_coherence(angle, torque, variance, inertia));
+        let motions = inertias.into_iter().zip(lags);
+        for (((angle, torque), variance), motion) in angles.iter().zip(&torques).zip(variances).zip(motions) {
+            found.push(core_coherence(angle, torque, variance, motion));
             if !watch(found.len(), angles.len()) {
                 return Err(Error::Cancelled);
             }

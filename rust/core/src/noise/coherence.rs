@@ -9,8 +9,8 @@
 //! is one over the number of segments if the noise of both is independent, and the share of the torque's power that comes from the angle's noise
 //! otherwise. What motion is left in the band makes it at most the share of motion in the angle's power.
 //!
-//! An angle without noise holds what a drive of steps moves there, which is no noise: the torque is what moves the inertia, `-Iω²θ`. A controller's
-//! torque grows less fast than that, and equals it at one frequency only.
+//! An angle without noise holds what a drive of steps moves there, which is no noise: the torque is what moves the inertia, `-Iω²θ`, late by the lag
+//! of its channel, known or not. A controller's torque grows less fast than that, and equals it at one frequency only.
 
 use std::f64::consts::PI;
 
@@ -33,6 +33,10 @@ pub const CORRELATED_NOISE: f64 = 0.3;
 /// The torque over what moves the inertia, where it is taken for that: within so much of one.
 const MOVED: f64 = 0.5;
 
+/// Samples by which a torque may be later or earlier than is known, and the steps in which that is sought.
+const LATER: f64 = 4.0;
+const STEPS: i32 = 16;
+
 /// Sums of the spectra of two channels.
 struct Spectra {
     length: usize,
@@ -43,8 +47,13 @@ struct Spectra {
 }
 
 /// The mean coherence of angle and torque above the motion, less its bias; `None` if the record has no such band, is too short, or shows motion
-/// there. The inertia is over the square of the sample period, and 0 where it is not known.
-pub fn noise_coherence(angle: &dyn Samples, torque: &dyn Samples, variance: f64, inertia: f64) -> Option<f64> {
+/// there. The inertia is over the square of the sample period, and 0 where it is not known; the lag of the torque is in samples.
+pub fn noise_coherence(
+    angle: &dyn Samples,
+    torque: &dyn Samples,
+    variance: f64,
+    (inertia, lag): (f64, f64),
+) -> Option<f64> {
     let spectra = spectra(angle, torque)?;
     let count = spectra.segments as f64;
     // From the highest frequency down, as long as their mean is that of noise.
@@ -61,13 +70,16 @@ pub fn noise_coherence(angle: &dyn Samples, torque: &dyn Samples, variance: f64,
     if band.len() < FREQUENCIES {
         return None;
     }
-    let is_moved = |frequency: &usize| {
-        let moving = -inertia * (2.0 * PI * *frequency as f64 / spectra.length as f64).powi(2);
-        let [real, imaginary] = spectra.both[*frequency].map(|value| value / (moving * spectra.angle[*frequency]));
-        (real - 1.0).hypot(imaginary) < MOVED
+    let is_moved = |frequency: usize, lag: f64| {
+        let pace = 2.0 * PI * frequency as f64 / spectra.length as f64;
+        let (sine, cosine) = (pace * lag).sin_cos();
+        let moving = -inertia * pace * pace;
+        let [real, imaginary] = spectra.both[frequency].map(|value| value / (moving * spectra.angle[frequency]));
+        (real - cosine).hypot(imaginary - sine) < MOVED
     };
-    let moved = band.clone().filter(is_moved).count();
-    if 2 * moved > band.len() {
+    let lags = (-STEPS..=STEPS).map(|step| lag + LATER * f64::from(step) / f64::from(STEPS));
+    let moved = lags.map(|lag| band.clone().filter(|&frequency| is_moved(frequency, lag)).count()).max();
+    if 2 * moved.unwrap_or(0) > band.len() {
         return None;
     }
     let frequencies = band.len() as f64;
@@ -127,29 +139,36 @@ mod tests {
         let fed_back: Vec<f64> = moving.iter().zip(rest).map(|(angle, own)| -5.0 * angle + own).collect();
         let alone: Vec<f64> =
             rest[..16_384].iter().enumerate().map(|(sample, own)| 3.0 * motion(sample) + own).collect();
-        let of = |torque: &[f64]| noise_coherence(&moving.as_slice(), &torque, 1.0 / 12.0, 0.0).unwrap();
+        let of = |torque: &[f64]| noise_coherence(&moving.as_slice(), &torque, 1.0 / 12.0, (0.0, 0.0)).unwrap();
         // 25 parts of the torque's 26 come from the angle. Of independent noise 120 segments leave less than 0.01 in the mean of 200 frequencies.
         assert!((of(&fed_back) - 25.0 / 26.0).abs() < 0.02 && of(&alone) < 0.01, "{} {}", of(&fed_back), of(&alone));
-        assert_eq!(noise_coherence(&moving.as_slice(), &alone.as_slice(), 1e-6, 0.0), None);
+        assert_eq!(noise_coherence(&moving.as_slice(), &alone.as_slice(), 1e-6, (0.0, 0.0)), None);
         // Few samples are seen in short segments: 30 segments leave 0.05 of independent noise at most.
-        let of_few = |torque: &[f64]| noise_coherence(&&moving[..2000], &&torque[..2000], 1.0 / 12.0, 0.0).unwrap();
+        let of_few =
+            |torque: &[f64]| noise_coherence(&&moving[..2000], &&torque[..2000], 1.0 / 12.0, (0.0, 0.0)).unwrap();
         assert!((of_few(&fed_back) - 25.0 / 26.0).abs() < 0.05 && of_few(&alone) < 0.05);
-        assert_eq!(noise_coherence(&&moving[..1000], &&alone[..1000], 1.0 / 12.0, 0.0), None);
+        assert_eq!(noise_coherence(&&moving[..1000], &&alone[..1000], 1.0 / 12.0, (0.0, 0.0)), None);
     }
 
     #[test]
     fn what_a_rough_torque_moves_is_no_noise() {
-        let [mut angle, mut torque] = [(); 2].map(|()| vec![0.0; 16_384]);
-        for (wave, phase) in uniform(500).into_iter().enumerate() {
-            let frequency = PI * (wave as f64 + 0.5) / 500.0;
-            for (sample, (angle, torque)) in angle.iter_mut().zip(&mut torque).enumerate() {
-                let drive = (frequency * sample as f64 + 2.0 * PI * phase).sin();
-                *torque += drive;
-                *angle -= drive / frequency.powi(2);
+        for lag in [0.0, 2.3] {
+            let [mut angle, mut torque] = [(); 2].map(|()| vec![0.0; 16_384]);
+            for (wave, phase) in uniform(500).into_iter().enumerate() {
+                let frequency = PI * (wave as f64 + 0.5) / 500.0;
+                for (sample, (angle, torque)) in angle.iter_mut().zip(&mut torque).enumerate() {
+                    let drive = |late: f64| (frequency * (sample as f64 - late) + 2.0 * PI * phase).sin();
+                    *torque += drive(lag);
+                    *angle -= drive(0.0) / frequency.powi(2);
+                }
+            }
+            let of = |motion| noise_coherence(&angle.as_slice(), &torque.as_slice(), 1e9, motion);
+            assert!(of((0.0, lag)).unwrap() > CORRELATED_NOISE, "{:?}", of((0.0, lag)));
+            assert_eq!((of((1.0, lag)), of((1.0, lag + 3.0))), (None, None));
+            // Of quite another lag, or of another inertia, it is not what moves that.
+            for motion in [(1.0, lag + 9.0), (3.0, lag), (0.3, lag)] {
+                assert!(of(motion).unwrap() > CORRELATED_NOISE, "{motion:?}");
             }
         }
-        let of = |inertia| noise_coherence(&angle.as_slice(), &torque.as_slice(), 1e9, inertia);
-        assert!(of(0.0).unwrap() > CORRELATED_NOISE, "{:?}", of(0.0));
-        assert_eq!(of(1.0), None);
     }
 }

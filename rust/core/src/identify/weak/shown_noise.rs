@@ -125,7 +125,7 @@ impl Session<'_, '_, '_> {
     /// Whether the torque holds the noise of the angle: then the noise of both cancels in part in the equations.
     fn is_fed_back(&self, inertia: f64) -> bool {
         let inertia = inertia / self.options.delta.powi(2);
-        noise_coherence(self.record.angle, self.record.torque, self.channel_noise[0], inertia)
+        noise_coherence(self.record.angle, self.record.torque, self.channel_noise[0], (inertia, self.record.lag))
             .is_some_and(|coherence| coherence >= CORRELATED_NOISE)
     }
 
