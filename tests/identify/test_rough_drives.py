@@ -64,3 +64,12 @@ def test_what_random_signs_move_is_no_noise_where_the_torque_is_late(seed: int) 
     for name, truth in TRUTH.items():
         value, error, *_ = result.value(name)
         assert abs(value - truth) < 5 * error < 0.1 * truth
+
+
+def test_by_how_much_widths_differ_is_said() -> None:
+    """Whether tenths of a percent or half of a parameter are at stake decides what a reader does."""
+    angle, torque = random_signs(0, 0.0, 8.0)
+    result = tvident.identify(angle[2:], torque[:-2], sample_rate=RATE)
+    assert "shows where they differ (from 9 to 21 samples inertia by 11 % and damping by 3.9 %)" in " ".join(
+        result.advice
+    )

@@ -8,8 +8,12 @@ import numpy as np
 
 from tvident import _core
 from tvident._advice.lists import listed
-from tvident._arguments import with_error
+from tvident._arguments import percent, with_error
+from tvident._equation import COEFFICIENTS
 from tvident._status import Status
+
+_NEAR = 3
+"""Widths about the one that is used, at least, to say by how much their parameters differ."""
 
 _TOLD = 3.0
 """Standard errors by which a number differs from zero, at least, to be told from it."""
@@ -56,7 +60,7 @@ def disagreement(
         words = (
             "test functions of different widths find different parameters, and none can be trusted: is a channel filtered, clipped, "
             "held or wrapped (give lag=, or make clipped samples NaN), is a term missing, or does a controller feed noise back into the "
-            "torque? result.scan().plot() shows where they differ; do not trust these numbers"
+            f"torque? result.scan().plot() shows where they differ{_by_how_much(found, names)}; do not trust these numbers"
         )
         return [words]
     narrowest, widest = (found.scan.window_length[place] for place in found.scan.plateau or (0, 0))
@@ -72,6 +76,24 @@ def disagreement(
         "torque? result.scan() lists what they find; do not trust these numbers"
     )
     return [words]
+
+
+def _by_how_much(found: _core.Identification, names: Sequence[str]) -> str:
+    """Return by how much inertia, damping and stiffness differ from half to twice the width that is used."""
+    scan, used = found.scan, found.window_length
+    near = [place for place, width in enumerate(scan.window_length if scan else []) if used <= 2 * width <= 4 * used]
+    if scan is None or len(near) < _NEAR:
+        return ""
+    differences = []
+    for column, unknown in enumerate(scan.unknowns):
+        values = np.array([scan.values[place][column] for place in near])
+        middle = abs(float(np.median(values)))
+        if names[unknown] in COEFFICIENTS and middle > 0:
+            differences.append(f"{names[unknown]} by {percent(float(np.ptp(values)) / middle)}")
+    if not differences:
+        return ""
+    narrowest, widest = (scan.window_length[place] for place in (near[0], near[-1]))
+    return f" (from {narrowest} to {widest} samples {listed(differences)})"
 
 
 def _none_of_stiffness(found: _core.Identification, names: Sequence[str]) -> str:
