@@ -73,3 +73,35 @@ def test_by_how_much_widths_differ_is_said() -> None:
     assert "shows where they differ (from 9 to 21 samples inertia by 11 % and damping by 3.9 %)" in " ".join(
         result.advice
     )
+
+
+def growing(seed: int) -> tuple[Array, Array, Array]:
+    """Give angle, torque and damping of such a rig for a minute, whose damping grows by half."""
+    generator = np.random.default_rng(seed)
+    samples, held, part = 6000, 25, 50
+    signs = np.repeat(generator.choice([-1.0, 1.0], samples // held + 2), held)[:samples]
+    torque = 10 * np.concatenate([[signs[0]], np.repeat(signs, 2)[: 2 * samples - 1]])
+    inertia, stiffness = TRUTH["inertia"], TRUTH["stiffness"]
+    damping = np.repeat(TRUTH["damping"] * np.linspace(1, 1.5, samples // part), part)
+    angle, state = np.empty(samples), np.zeros(2)
+    for sample in range(samples):
+        if sample % part == 0:
+            change = np.array([[0.0, 1.0], [-stiffness / inertia, -damping[sample] / inertia]])
+            system = change, np.array([[0.0], [1 / inertia]]), np.eye(2), np.zeros((2, 1))
+            step, drive, *_ = cont2discrete(system, 0.5 / RATE)
+        angle[sample] = state[0]
+        for moment in (2 * sample, 2 * sample + 1):
+            state = step @ state + drive[:, 0] * torque[moment]
+    return angle, torque[::2] + 0.4 * generator.standard_normal(samples), damping
+
+
+@pytest.mark.parametrize("seed", [2, *long(0, 1, 3)])
+def test_a_lag_is_found_beside_a_damping_that_grows(seed: int) -> None:
+    """A damping that was followed without the lag had taken a part of it: .5 of two samples was found, and an inertia 15 % too small."""
+    angle, torque, damping = growing(seed)
+    late = 2
+    result = tvident.identify(angle[late:], torque[:-late], sample_rate=RATE, lag="auto")
+    assert abs(RATE * result.settings["lag"] - late) < min(0.1, 5 * RATE * result.settings["lag_stderr"])
+    value, error, *_ = result.value("inertia")
+    assert abs(value - TRUTH["inertia"]) < min(0.05 * value, 5 * error)
+    assert np.median(np.abs(result.damping / damping[late:] - 1)) < 0.02

@@ -73,9 +73,10 @@ impl Session<'_, '_, '_> {
             let Some(found) = lag else { break };
             let settled = (found.value - before).abs() <= CHOSEN * found.error;
             if settled || choice == CHOICES {
-                // The rows at hand stand: they differ from those of the last step by less than can be told.
+                // The rows at hand stand: they differ from those of the last step by less than can be told, or by what is not known.
                 self.record.lag = before;
-                return Ok((chosen, decided, Some(Lag { value: before, ..found })));
+                let error = if settled { found.error } else { found.error.hypot(found.value - before) };
+                return Ok((chosen, decided, Some(Lag { value: before, error })));
             }
             self.record.lag = found.value;
         }
@@ -165,15 +166,17 @@ impl Session<'_, '_, '_> {
         decided: &Decided,
         fit: &Fit,
     ) -> Result<Option<(f64, f64)>, Error> {
-        // Slowly varying parameters depend on the angle only, so what they took off the right-hand side is the same for every lag.
+        // What slowly varying parameters took off the right-hand side depends on the angle only. Their levels are estimated anew: beside another lag they
+        // took a part of this one.
         let (before, without) = (&chosen.weak.rows.rhs, decided.rhs(&chosen.weak.rows));
         let slow = before.iter().zip(without).map(|(rhs, without)| rhs - without);
         let rhs = weak.rows.rhs.iter().zip(slow).map(|(rhs, slow)| rhs - slow).collect();
         let rows = decided.as_white(Rows { rhs, ..weak.rows.clone() }, &mut self.stages)?;
         let correlated = decided.model.correlated(&rows, &decided.covariance, &mut self.stages)?;
+        let model = decided.ordered();
         let judged = JudgedTerm {
             rows: &rows,
-            model: &decided.model,
+            model: &model,
             rhs: &rows.rhs,
             noise: self.noise[0],
             fit,
