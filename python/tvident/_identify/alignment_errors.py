@@ -44,7 +44,8 @@ def with_errors_of_alignment(found: Estimates, as_aligned: Estimates, moved: Seq
         if all(name in one.constants for one in moved):
             away = [np.subtract(one.constants[name][0], as_aligned.constants[name][0]) for one in moved]
             constants[name] = value, float(np.sqrt(error**2 + np.sum(np.square(np.nan_to_num(away)))))
-    return replace(found, errors=errors, covariances=covariances, constants=constants)
+    # What the alignment moves it moves at all samples.
+    return replace(found, errors=errors, covariances=covariances, constants=constants, in_common={})
 
 
 def _changes(as_aligned: Estimates, moved: Estimates) -> Mapping[str, Numbers]:

@@ -106,6 +106,7 @@ def estimates(
             for place, name in enumerate(names)
         },
         record_status=flags.reshape(shape) if shape else Status(int(flags[0])),
+        in_common={name: alone([one.unknowns[place].in_common for one in found]) for place, name in enumerate(names)},
     )
 
 

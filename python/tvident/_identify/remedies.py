@@ -11,7 +11,7 @@ import numpy as np
 
 from tvident._arguments import percent, with_error
 from tvident._equation import BUILT_IN, COEFFICIENTS
-from tvident._results import BECOMES, TRIED, Identification, predicted_ahead
+from tvident._results import BECOMES, TRIED, Identification, median_of, predicted_ahead
 from tvident._status import DOUBTFUL_RECORD, Status
 
 _WORTH = 0.9
@@ -305,7 +305,7 @@ class Trial:
         for name in COEFFICIENTS:
             if not isinstance(self.given[name], str) or found.settings["kinds"][name] == "known":
                 continue
-            (before, error, *_), (after, least, *_) = self.result.value(name), found.value(name)
+            (before, error), (after, least) = median_of(self.result, name), median_of(found, name)
             if abs(after - before) > max(_ELSEWHERE * np.hypot(error, least), _MATTERS * abs(after)):
                 words.append(f", {name}{BECOMES}{with_error(after, least)} {found.units[name]}")
         return "".join(words)

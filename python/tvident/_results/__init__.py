@@ -6,6 +6,7 @@ from tvident._results.explained import explained_steps
 from tvident._results.held_back import parts_of, where_held_back
 from tvident._results.loaded import from_file
 from tvident._results.measured import Measured, known_name, number_of
+from tvident._results.medians import median_of
 from tvident._results.parts import chosen, of_records, samples_between, settings_of
 from tvident._results.recorded import Recorded, begins_once, both_or_none, mark_of, still_there
 from tvident._results.records import IdentifiedRecords, Shared, covariance_between, with_shared
@@ -61,6 +62,7 @@ __all__ = [
     "known_name",
     "known_to",
     "mark_of",
+    "median_of",
     "negative",
     "number_of",
     "of_batch",

@@ -46,6 +46,8 @@ class Estimates:
         Of everything by name.
     expansions : mapping of str to ExpandedParameter
         Curves of parameters that are expansions.
+    in_common : mapping of str to float or ndarray, shape (\*)
+        The part of the squares of errors that all samples have in common, through constants; all of them where nothing is told.
     """
 
     values: Mapping[str, Array]
@@ -63,3 +65,4 @@ class Estimates:
     kinds: Mapping[str, npt.NDArray[np.str_]] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=lambda: UNITS)
     expansions: Mapping[str, ExpandedParameter] = field(default_factory=dict)
+    in_common: Mapping[str, Any] = field(default_factory=dict)

@@ -119,6 +119,7 @@ def of_records(found: Estimates, place: Any) -> Estimates:
         factors={name: factor[place] for name, factor in found.factors.items()},
         covariances={pair: each[place] for pair, each in found.covariances.items()},
         constants=constants,
+        in_common={name: number(np.asarray(part)[place]) for name, part in found.in_common.items()},
         condition=found.condition[place],
         residual_std=found.residual_std[place],
         order=found.order[place],

@@ -108,6 +108,7 @@ def with_shared(result: Identification, shared: Shared, changes: Mapping[str, Id
         errors=errors,
         factors={},
         covariances=covariances,
+        in_common={},
         constants={**shared.constants, **constants},
         kinds=kinds,
         record_status=Status(int(found.record_status)) | flag,

@@ -55,6 +55,7 @@ def store(path: Path, table: Table, found: Estimates, rest: Mapping[str, Any]) -
         "factors": {name: factor.tolist() for name, factor in found.factors.items()},
         "constants": {name: [np.asarray(one).tolist() for one in pair] for name, pair in found.constants.items()},
         "kinds": {name: np.asarray(kind).tolist() for name, kind in found.kinds.items()},
+        "in_common": {name: np.asarray(part).tolist() for name, part in found.in_common.items()},
         "record_status": flags.tolist(),
         "scans": [plain_scan(scan) for scan in found.scans],
         "labels": labels,
@@ -100,6 +101,7 @@ def _estimates(arrays: Arrays, facts: Mapping[str, Any]) -> Estimates:
         scans=tuple(scan_from(scan) for scan in facts["scans"]),
         labels=_labels(arrays, facts),
         kinds={name: np.asarray(kind) for name, kind in facts["kinds"].items()},
+        in_common={name: number(part) for name, part in facts.get("in_common", {}).items()},
         units=facts["units"],
     )
 

@@ -94,6 +94,7 @@ pub(crate) struct Unknown {
     values: Py<PyArray1<f64>>,
     stderr: Py<PyArray1<f64>>,
     factor: f64,
+    in_common: f64,
     test: Option<ConstancyTest>,
     untested: bool,
 }
@@ -213,6 +214,7 @@ impl Identification {
                     values: array(unknown.values),
                     stderr: array(unknown.unscaled_stderr),
                     factor: unknown.factor,
+                    in_common: unknown.in_common,
                     test: unknown.test.map(ConstancyTest::from),
                     untested: unknown.untested,
                 },

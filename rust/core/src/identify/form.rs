@@ -22,6 +22,8 @@ use crate::status::Status;
 struct Found {
     constants: Vec<Constant>,
     changing: Vec<usize>,
+    /// By unknown that changes: the part of its variance that all samples have in common; empty where that is not known.
+    in_common: Vec<f64>,
     /// Pairs of constants and their covariance.
     constant_pairs: Vec<(usize, usize, f64)>,
     /// Pairs of unknowns whose covariances are at the samples.
@@ -47,7 +49,8 @@ impl Found {
                 kind => kind,
             };
             let (values, stderr) = (take(&mut self.results.values), take(&mut self.results.errors));
-            Unknown { kind, ..Unknown::windowed(number, values, stderr, 1.0) }
+            let in_common = place.and_then(|place| self.in_common.get(place)).copied().unwrap_or(1.0);
+            Unknown { kind, in_common, ..Unknown::windowed(number, values, stderr, 1.0) }
         };
         asked.iter().zip(regressors).map(unknown).collect()
     }
@@ -81,7 +84,6 @@ pub(crate) fn weak(
     watch: &mut Watch<'_>,
 ) -> Result<Identification, Error> {
     let regressors = regressors(&task.motion);
-    let asked = asked(&options.kinds, &form.repeated.tested);
     let weak_options = WeakOptions {
         delta: options.delta,
         half_width: form.window_length.map(|length| length / 2),
@@ -89,7 +91,7 @@ pub(crate) fn weak(
         regression_window: form.regression_window,
         averaging: form.averaging,
         linear: form.linear,
-        kinds: in_weak_form(&asked, &regressors, form.averaging),
+        kinds: in_weak_form(&asked(&options.kinds, &form.repeated.tested), &regressors, form.averaging),
         decided: decided(&form.repeated.tested, &options.kinds, &regressors),
         noise: form.noise,
         shown_noise: form.shown_noise,
@@ -142,6 +144,7 @@ pub(crate) fn weak(
     let mut unknowns = Found {
         constants: found.constants,
         changing: found.changing,
+        in_common: found.in_common,
         constant_pairs: found.constant_pairs,
         pairs: found.pairs,
         results: found.results,
@@ -184,6 +187,7 @@ pub(crate) fn strong(
     let mut unknowns = Found {
         constants: found.constants,
         changing: found.changing,
+        in_common: Vec::new(),
         constant_pairs: Vec::new(),
         pairs: found.pairs,
         results: found.results,

@@ -27,6 +27,9 @@ pub struct Unknown {
     pub unscaled_stderr: Vec<f64>,
     /// What these are multiplied by: one, unless they are those of ordinary least squares, whose equations are correlated.
     pub factor: f64,
+    /// The part of their variances that all samples have in common, as the constants beside a windowed unknown pass it on: one where it is not known
+    /// to be less.
+    pub in_common: f64,
     /// Whether it is the same in all parts of the record, where that was tested.
     pub test: Option<Test>,
     /// Whether the record was to decide, and the form cannot ask it.
@@ -42,6 +45,7 @@ impl Unknown {
             values: vec![value],
             unscaled_stderr: vec![stderr],
             factor: 1.0,
+            in_common: 1.0,
             test: None,
             untested: false,
         }
@@ -49,7 +53,7 @@ impl Unknown {
 
     /// Values for every wanted sample, with standard errors and what those are multiplied by.
     pub(crate) fn windowed(number: usize, values: Vec<f64>, unscaled_stderr: Vec<f64>, factor: f64) -> Self {
-        Self { number, kind: Kind::Windowed, values, unscaled_stderr, factor, test: None, untested: false }
+        Self { kind: Kind::Windowed, values, unscaled_stderr, factor, ..Self::constant(number, f64::NAN, f64::NAN) }
     }
 
     /// Standard errors: one for every wanted sample, or one for the record.

@@ -63,6 +63,8 @@ pub(crate) struct WeakIdentified {
     pub(crate) outside_mask: Option<Outside>,
     /// Unknowns that change, in the order of the values at the samples.
     pub(crate) changing: Vec<usize>,
+    /// The part of their variances that all samples have in common; empty where nothing is known at samples.
+    pub(crate) in_common: Vec<f64>,
     /// Pairs of constants and their covariance.
     pub(crate) constant_pairs: Vec<(usize, usize, f64)>,
     /// Pairs of unknowns whose covariances are at the samples.

@@ -23,8 +23,19 @@ use crate::weak_form::weak_rows::WeakRows;
 /// The squares of independent rows of a window, over the noise's variance, add up to more than this by no chance.
 const BEYOND_CHANCE: f64 = 60.0;
 
-/// Standard errors and covariances by row, and the pairs of unknowns that the latter belong to.
-type ErrorsAtRows = (Vec<Vec<f64>>, Vec<Vec<f64>>, Vec<(usize, usize)>);
+/// Rows that are looked at for what all rows have in common.
+const LOOKED_AT: usize = 1024;
+
+/// Standard errors and covariances by row, and what holds for all rows.
+type ErrorsAtRows = (Vec<Vec<f64>>, Vec<Vec<f64>>, OfAllRows);
+
+/// What holds for the errors of all rows.
+pub(crate) struct OfAllRows {
+    /// Pairs of unknowns whose covariances there are.
+    pub(crate) pairs: Vec<(usize, usize)>,
+    /// By unknown: the part of its variance that all rows have in common.
+    pub(crate) in_common: Vec<f64>,
+}
 
 /// What was found of a record before its rows are put together.
 pub(crate) struct Fitted<'a> {
@@ -42,12 +53,8 @@ pub(crate) struct Fitted<'a> {
 }
 
 impl Session<'_, '_, '_> {
-    /// Puts together time-varying parameters and their errors, with the pairs of unknowns whose covariances are among them.
-    pub(crate) fn at_rows(
-        &mut self,
-        fitted: &Fitted<'_>,
-        tracks: Tracks,
-    ) -> Result<(RowResults, Vec<(usize, usize)>), Error> {
+    /// Puts together time-varying parameters and their errors.
+    pub(crate) fn at_rows(&mut self, fitted: &Fitted<'_>, tracks: Tracks) -> Result<(RowResults, OfAllRows), Error> {
         let Fitted { weak, problem, decided, all, constants, .. } = *fitted;
         let slow = decided.slow.len();
         // Residuals are those of the rows as they are, whose unit is the torque's.
@@ -67,7 +74,7 @@ impl Session<'_, '_, '_> {
             })?;
         }
         let slow_slopes = slowly.split_off(slow);
-        let (mut errors, mut covariances, pairs) = self.errors_at_rows(fitted, &tracks)?;
+        let (mut errors, mut covariances, of_all) = self.errors_at_rows(fitted, &tracks)?;
         let Tracks { first, values, slopes, condition, mut status, .. } = tracks;
         let untold = Magnitudes::new(plain, constants).untold(&errors[..problem.layout.windowed], weak.reach());
         for (status, _) in status.iter_mut().zip(untold).filter(|(_, untold)| *untold) {
@@ -80,7 +87,7 @@ impl Session<'_, '_, '_> {
                 errors[place] *= factor;
             }
             // The second of a pair changes, too; the first may be a constant.
-            for (&(one, _), covariances) in pairs.iter().zip(&mut covariances) {
+            for (&(one, _), covariances) in of_all.pairs.iter().zip(&mut covariances) {
                 let constant = decided.model.constant.contains(&one);
                 covariances[place] *= if constant { factor } else { factor * factor };
             }
@@ -97,7 +104,7 @@ impl Session<'_, '_, '_> {
             status,
             jumps: decided.jumps.clone(),
         };
-        Ok((results, pairs))
+        Ok((results, of_all))
     }
 
     /// By slow coefficient: the variance that noise gives it where equations are said to determine it to a variance of one, over its variance as
@@ -125,7 +132,7 @@ impl Session<'_, '_, '_> {
         Ok(variances)
     }
 
-    /// Standard errors of time-varying parameters, covariances of pairs of coefficients, and which pairs those are.
+    /// Standard errors of time-varying parameters and covariances of pairs of coefficients.
     fn errors_at_rows(&mut self, fitted: &Fitted<'_>, tracks: &Tracks) -> Result<ErrorsAtRows, Error> {
         let Fitted { problem, decided, errors, covariance, changes, .. } = *fitted;
         let count = problem.layout.constant;
@@ -174,7 +181,18 @@ impl Session<'_, '_, '_> {
                     .for_each(|(place, entry)| *entry = covariance(one, other, place));
             }
         })?;
-        Ok((standard, covariances, pairs.into_iter().map(|(one, other)| (names[one], names[other])).collect()))
+        // All of a slow coefficient follows from a few numbers.
+        let part = |one: usize| {
+            let step = tracks.status.len().div_ceil(LOOKED_AT).max(1);
+            let own = |place: usize| tracks.covariances[symmetric(one, one)][place] * errors.inflation;
+            let parts =
+                (0..tracks.status.len()).step_by(step).map(|place| 1.0 - own(place) / covariance(one, one, place));
+            median(&mut parts.filter(|part| part.is_finite()).collect::<Vec<_>>())
+                .map_or(1.0, |part| part.clamp(0.0, 1.0))
+        };
+        let in_common = (0..changing).map(|one| if one < windowed { part(one) } else { 1.0 }).collect();
+        let pairs = pairs.into_iter().map(|(one, other)| (names[one], names[other])).collect();
+        Ok((standard, covariances, OfAllRows { pairs, in_common }))
     }
 }
 

@@ -11,7 +11,7 @@ use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::found::WeakIdentified;
 use crate::identify::weak::outside_mask::Inside;
-use crate::identify::weak::report::at_rows::Fitted;
+use crate::identify::weak::report::at_rows::{Fitted, OfAllRows};
 use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::report::explained::Explained;
 use crate::identify::weak::report::filter::{LEAST_CHANGE, LeftOfFilter};
@@ -101,8 +101,8 @@ impl Session<'_, '_, '_> {
             changes: left.as_ref().map_or(&[], |left| left.changes.as_slice()),
             constants: &values,
         };
-        let (results, pairs) = self.at_rows(&fitted, tracks)?;
-        found.pairs = pairs;
+        let (results, OfAllRows { pairs, in_common }) = self.at_rows(&fitted, tracks)?;
+        (found.pairs, found.in_common) = (pairs, in_common);
         let rhs = decided.rhs(&weak.rows).to_vec();
         // A term hardly matters where next to nothing is left for it to explain.
         if errors.left > NEGLIGIBLE * weak.rows.mean_square() {
@@ -190,6 +190,7 @@ impl Session<'_, '_, '_> {
             free_offset: self.free_offset,
             outside_mask: None,
             changing: decided.model.windowed.iter().chain(&decided.slow).copied().collect(),
+            in_common: Vec::new(),
             constant_pairs: Vec::new(),
             pairs: Vec::new(),
             jumps: decided.jumps.iter().map(|jump| jump.sample).collect(),
