@@ -15,6 +15,7 @@ pub(crate) mod slow_points;
 pub(crate) mod slow_triangles;
 pub(crate) mod slowly_varying;
 pub(crate) mod trend;
+pub(crate) mod weighted_windows;
 pub(crate) mod window_averaging;
 pub(crate) mod windows_around;
 

@@ -2,7 +2,8 @@
 //!
 //! A window predicts rows that it does not contain. Its weight at a row is `exp(-½ (n e + n₀ ē))`. Here `e` is its mean squared error around the row
 //! over the noise variance, `n` the number of independent rows in that mean, and `ē` and `n₀` the same over the record. So jumps are followed from
-//! both sides, and long windows dominate where nothing changes.
+//! both sides, and long windows dominate where nothing changes. What windows differ by that predict alike is part of the standard errors: it is all
+//! that is seen of what a coefficient bends within them.
 
 use std::ops::Range;
 
@@ -11,6 +12,7 @@ use crate::exec::pool::{ROWS, ranges};
 use crate::exec::stages::Stages;
 use crate::inference::moving::moving;
 use crate::inference::over_record::{ErrorSums, OverRecord};
+use crate::inference::weighted_windows::WeightedWindows;
 use crate::inference::windows_around::{Around, WindowAtRow};
 use crate::regression::constants::Expected;
 use crate::regression::problem::Problem;
@@ -276,14 +278,11 @@ impl View<'_, '_> {
         let (windowed, total) = (self.problem.layout.windowed, self.problem.rows());
         let wide = rows.start.saturating_sub(nearby.rows)..(rows.end + nearby.rows).min(total);
         let (width, numbers) = (rows.len(), 3 * windowed);
-        // By row: sums of weights and of weighted numbers, and the least exponent so far, which all are relative to.
-        let mut weights = vec![0.0; width];
-        let mut least = vec![f64::INFINITY; width];
-        let mut sums = vec![0.0; width * numbers];
+        let mut weighted = WeightedWindows::new(width, windowed);
         let mut numbers_here = vec![0.0; numbers];
         // Rows that no promising window reaches, near an end or a gap, use the others.
         for hope in [true, false] {
-            let wanted: Vec<bool> = weights.iter().map(|&weight| hope || weight == 0.0).collect();
+            let wanted: Vec<bool> = weighted.are_missing().map(|missing| hope || missing).collect();
             if !wanted.contains(&true) {
                 break;
             }
@@ -320,27 +319,12 @@ impl View<'_, '_> {
                         let expected = candidate.record[which].at(self.problem.weight(row)).min(MOST);
                         let exponent = 0.5 * (here + record * expected);
                         self.numbers_at_row(&window, &mut numbers_here);
-                        let sums = &mut sums[place * numbers..(place + 1) * numbers];
-                        if exponent < least[place] {
-                            let shrink = (exponent - least[place]).exp();
-                            weights[place] *= shrink;
-                            for sum in sums.iter_mut() {
-                                *sum *= shrink;
-                            }
-                            least[place] = exponent;
-                        }
-                        let weight = (least[place] - exponent).exp();
-                        weights[place] += weight;
-                        sums.iter_mut().zip(&numbers_here).for_each(|(sum, number)| *sum += weight * number);
+                        weighted.add(place, exponent, &numbers_here);
                     }
                 }
             }
         }
-        for (place, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-            for (number, column) in columns.iter_mut().enumerate() {
-                column[place] = sums[place * numbers + number] / weight;
-            }
-        }
+        weighted.into_means(columns);
     }
 
     /// The values, slopes and standard errors of a window at a row.
