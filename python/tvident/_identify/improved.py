@@ -183,9 +183,11 @@ class Improvement(_AskedOfRecord):
         """Return words that begin with what to change, without what was tried in vain."""
         trial = self._trial(result)
         remedy = trial.remedy()
-        advice = self._exchanged(result) if remedy is None else remedy.words
+        advice, suspects = self._exchanged(result) if remedy is None else remedy.words, self._suspects
+        if advice is None and (undoubted := trial.undoubted([one.name for one in self._explained.suspects])):
+            suspects, advice = [undoubted[0]], undoubted[1]
         useless, given_well = ([], []) if advice is not None else trial.useless()
-        dropped = self._explained.suspicions(self._suspects if advice is not None else useless)
+        dropped = self._explained.suspicions(suspects if advice is not None else useless)
         starts = tuple(f"{name} was given as constant" for name in given_well)
         hidden = (
             self._explained.words().advice

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -40,6 +40,16 @@ _ELSEWHERE = 3.0
 
 _MATTERS = 0.01
 """A share of a parameter by which it must move to be told."""
+
+_LEFT_OVER = (
+    Status.RANK_DEFICIENT
+    | Status.ILL_CONDITIONED
+    | Status.NOISE_MODEL
+    | Status.TERM_SUSPECTED
+    | Status.LAG_SUSPECTED
+    | Status.CHANNEL_SUSPECTED
+)
+"""Flags of a record whose equations leave something over, or tell nothing apart."""
 
 _AGAINST = 0.1
 """A share of a weight that a negative stiffness beside it may have: with more the two are distinguished by nothing."""
@@ -134,13 +144,13 @@ class Trial:
     suspects: Sequence[str]
     is_as_asked: bool = False
     _now: dict[int | None, Unexplained] = field(default_factory=dict, init=False, repr=False)
+    _beside: dict[int, dict[str, Identification]] = field(default_factory=dict, init=False, repr=False)
 
     def remedy(self) -> Remedy | None:
         """Return what to change, and what that explains; None where nothing that was tried is better by far."""
-        constant = {name: "constant" if isinstance(kind, str) else kind for name, kind in self.given.items()}
-        if not any(isinstance(kind, str) for kind in constant.values()):
+        if not any(isinstance(kind, str) for kind in self.given.values()):
             return None
-        call: Call = constant | {"terms": list(self.terms), "lag": self.result.settings["lag"]}
+        call = self._of_constants_alone
         of_constants = self._of_constants(call)
         # What explains nothing with parameters that change is not explained by one term more either.
         is_changing = "windowed" in self.result.settings["kinds"].values() and not self._explains_nothing
@@ -151,6 +161,12 @@ class Trial:
         if of_constants is None or (beside is not None and of_constants.ratio > _AS_GOOD * beside.ratio):
             return beside
         return of_constants
+
+    @property
+    def _of_constants_alone(self) -> Call:
+        """The call that finds everything constant."""
+        constant = {name: "constant" if isinstance(kind, str) else kind for name, kind in self.given.items()}
+        return constant | {"terms": list(self.terms), "lag": self.result.settings["lag"]}
 
     def _of_constants(self, call: Call) -> Remedy | None:
         """Return which suspects, or which stiffness of none, explain more where everything is constant."""
@@ -173,24 +189,57 @@ class Trial:
 
         Each gets lengths of its own: those that were chosen follow what is missing.
         """
-        # Inertia and damping that may change take the place of what is missing.
-        kinds = {name: call[name] if name != "stiffness" else kind for name, kind in self.given.items()}
-        found = {}
-        for one in self.suspects:
-            changed = self._with(call, one)
-            found[one] = self.identify(**kinds, terms=changed["terms"], lag=changed["lag"], diagnose=True)
-        left_of = {one: self._left_of(result) for one, result in found.items() if _is_there(one, result)}
-        best = min(left_of, key=lambda one: left_of[one].ratio, default=None)
-        if best is None or not left_of[best].ratio <= _BETTER:
+        for found in self._each_beside_changes(call):
+            left_of = {one: self._left_of(result) for one, result in found.items() if _is_there(one, result)}
+            best = min(left_of, key=lambda one: left_of[one].ratio, default=None)
+            if best is not None and left_of[best].ratio <= _BETTER:
+                break
+        else:
             return None
         left, result = left_of[best], found[best]
         if not _holds(left.least.share, result.record_status):
             return None
-        changed = self._with(call, best)
-        terms = [term if isinstance(term, str) else term.name for term in changed["terms"]]
-        change = f"lag={result.settings['lag']:.4g}" if best == "lag" else f"terms={terms}"
-        words = f"{self._suspicion(best, result)}: try {change}; {left}{self._moved(result)}"
+        words = f"{self._suspicion(best, result)}: try {self._change(best, result)}; {left}{self._moved(result)}"
         return Remedy(left.ratio, words, _are_distinguished(result.record_status))
+
+    def undoubted(self, suspects: Sequence[str]) -> tuple[str, str] | None:
+        """Return the first suspect with which nothing else is suspected, if parameters are elsewhere then, and what to do in words.
+
+        For where prediction tells nothing: of a short record so little is left beside what is held back that any model predicts it badly.
+        """
+        if not (suspects and any(isinstance(kind, str) for kind in self.given.values())):
+            return None
+        for found in self._each_beside_changes(self._of_constants_alone):
+            for one in suspects:
+                result = found.get(one)
+                if result is None or result.record_status & _LEFT_OVER or not _is_there(one, result):
+                    continue
+                moved = self._moved(result)
+                if moved:
+                    change = self._change(one, result)
+                    return (
+                        one,
+                        f"{self._suspicion(one, result)}: give {change}; then nothing else is suspected{moved}",
+                    )
+        return None
+
+    def _each_beside_changes(self, call: Call) -> Iterator[dict[str, Identification]]:
+        """Yield what each suspect makes of the record: beside constants and stiffness as it was asked for, then as all was asked for.
+
+        Inertia and damping that may change take the place of what is missing, so they change beside it only where they were found to,
+        and where that explains more.
+        """
+        constant = {name: call[name] if name != "stiffness" else kind for name, kind in self.given.items()}
+        found = self.result.settings["kinds"]
+        may_change = any(found[name] == "varying" and constant[name] != self.given[name] for name in COEFFICIENTS)
+        for place, kinds in enumerate([constant, self.given] if may_change else [constant]):
+            if place not in self._beside:
+                changed = {one: self._with(call, one) for one in self.suspects}
+                self._beside[place] = {
+                    one: self.identify(**kinds, terms=each["terms"], lag=each["lag"], diagnose=True)
+                    for one, each in changed.items()
+                }
+            yield self._beside[place]
 
     def useless(self) -> tuple[list[str], list[str]]:
         """Return suspects that explain nothing, and constants that were given and predict as well as when they may change.
@@ -309,6 +358,12 @@ class Trial:
             if abs(after - before) > max(_ELSEWHERE * np.hypot(error, least), _MATTERS * abs(after)):
                 words.append(f", {name}{BECOMES}{with_error(after, least)} {found.units[name]}")
         return "".join(words)
+
+    def _change(self, one: str, found: Identification) -> str:
+        """Return how a suspect is given."""
+        if one == "lag":
+            return f"lag={found.settings['lag']:.4g}"
+        return f"terms={[term if isinstance(term, str) else term.name for term in (*self.terms, one)]}"
 
     def _suspicion(self, name: str, found: Identification) -> str:
         if name == "lag":
