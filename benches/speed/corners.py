@@ -137,6 +137,28 @@ def _irregular(share: float) -> Duel:
     )
 
 
+def _own_times(**how: Any) -> Callable[[float], Duel]:
+    """Pit local polynomials at times that scatter by half a step against those of uniform ones."""
+
+    def duel(share: float) -> Duel:
+        samples = max(_LEAST, int(200_000 * share))
+        generator = np.random.default_rng(25)
+        count = np.arange(samples, dtype=np.float64)
+        times = (count + generator.uniform(-0.25, 0.25, samples)) / signals.RATE
+        noise = 1e-3 * generator.standard_normal(samples)
+        scattered, uniform = (np.sin(40 * at) + noise for at in (times, count / signals.RATE))
+        return Duel(
+            [
+                lambda: tvident.fit_local_polynomials(scattered, 201, t=times, workers=1, **how),
+                lambda: tvident.fit_local_polynomials(uniform, 201, sample_rate=signals.RATE, workers=1, **how),
+            ],
+            _unchecked,
+            samples,
+        )
+
+    return duel
+
+
 _SHORT, _PLAIN = "5000 records of 400 samples, window 51", "window 201"
 
 CORNERS = [
@@ -198,6 +220,20 @@ CORNERS = [
         )
     ),
     Row("irregular", "`identify(t=)`, steps that scatter by 0.3 of a step", "uniform times", _irregular, most=6),
+    *(
+        Row(
+            f"own-times-{name}",
+            f"`fit_local_polynomials(t=)`, window 201, {what}",
+            "uniform times",
+            _own_times(**how),
+            most=6,
+        )
+        for name, what, how in (
+            ("4", "order 4", {"order": 4}),
+            ("10", "orders to 10", {"max_order": 10}),
+            ("15", "orders to 15", {"max_order": 15}),
+        )
+    ),
     Row("events", "`identify`, 4 million samples, a break every 4 s", "a quarter of them", _events, most=5),
     Row(
         "spoilt",

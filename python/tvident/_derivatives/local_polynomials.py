@@ -90,7 +90,7 @@ def fit_local_polynomials(
         Axis of time; where it is left out, the dimension of xarray that is called ``time`` or has dates.
     step : int, optional
         Every how many samples an estimate is wanted: the same numbers as ``[::step]`` of all of them, to rounding. From a tenth of
-        a window on each window is projected by itself and the cost is that of the windows that are wanted; below, the bits are the same.
+        a window on each window is projected by itself and the cost is that of the windows that are wanted; below, the bits are the same, where `t` is uniform.
     weights : array_like, shape (n,) or that of `y`, optional
         Weight of every sample, not negative: one over the variance of its noise, relative to the others. A sample of weight 0 is left out,
         whatever it holds. ``sigma`` is then that of a sample of weight 1. Every window is decomposed on its own, as those beside gaps are.
@@ -169,8 +169,9 @@ def fit_local_polynomials(
     from the samples as splines bring them onto a uniform grid, and takes the window's duration, or its number of samples where fewer lie
     in that than the order needs; steps longer than half of it split the record. On sums of sines with noise whose steps scatter by up to
     1.4 of a step (the most is 1.5) the error is 0.1 to 1.4 times that with the best of six windows. Standard errors are those of the
-    order without its bias: nominal 95 % intervals cover 84 to 96 %. ``"pooled"`` and ``"average"`` need uniform times. A window of 201
-    samples takes some 50 µs.
+    order without its bias: nominal 95 % intervals cover 84 to 96 %. ``"pooled"`` and ``"average"`` need uniform times. A window takes
+    0.4 to 1.2 µs, whatever its length: neighbours share one basis. Near gaps and outliers each is decomposed on its own, in some 20 µs with
+    201 samples.
 
     The cost is about 15 ns a sample and thread for any window length on a processor with AVX-512, about twice that with AVX2; averaged
     about twice as much; pooled about 300 ns, because the orders of every window need logarithms; ``"auto"`` about 5 µs a sample and

@@ -2,73 +2,42 @@
 //!
 //! The choice of the order, the derivatives near the ends and the standard errors are those of windows on a uniform grid
 //! ([`crate::local_polynomials`]); a window holds so many samples, or those of so many seconds.
+//!
+//! A QR decomposition says what a window's fit is. Nearly all windows have neighbours with whom they share a basis, which gives the same in a tenth to a
+//! hundredth of the time ([`crate::irregular::shared_windows`]).
 
+use std::collections::HashMap;
 use std::num::NonZeroUsize;
 use std::ops::Range;
 
 use crate::error::Error;
 use crate::exec::pool::{Piece, Watch, map};
+use crate::irregular::order_table::{NEGLIGIBLE, OrderTable};
 use crate::irregular::own_basis::{OwnBasis, dot};
+use crate::irregular::shared_buffers::GroupSamples;
+use crate::irregular::shared_windows::{WindowsAbreast, can_share};
+use crate::irregular::window_estimates::{WindowFit, WindowFits};
+use crate::irregular::window_places::{PlacedWindow, WindowSpan, groups};
 use crate::local_polynomials::options::Order;
 use crate::local_polynomials::sliding_projection::ROUNDING;
 use crate::record::samples::is_usable;
-use crate::status::Status;
+use crate::simd::instructions::Instructions;
+use crate::simd::vectors::dispatch;
 
-/// Windows of a piece of work.
+/// Windows of a piece of work, at least. So many times as long as a window, it has several groups of windows for each lane.
 const WINDOWS: usize = 256;
+const LENGTHS: usize = 4;
 
 /// The fewest samples of a window.
 pub const FEWEST: usize = 5;
 
-/// An order whose criterion is so much above the best has no weight.
-const NEGLIGIBLE: f64 = 80.0;
-
-/// How long windows are.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum WindowSpan {
-    /// So many samples, an odd number.
-    Samples(usize),
-    /// The samples of so many seconds.
-    Seconds(f64),
-}
-
-/// Local polynomials at given times.
-#[derive(Clone, Debug)]
-pub struct WindowFit {
-    /// Time of every sample in seconds, increasing.
-    pub times: Vec<f64>,
-    /// How long windows are.
-    pub span: WindowSpan,
-    /// How the order is determined.
-    pub order: Order,
-    /// The highest derivative that is wanted.
-    pub derivatives: usize,
-    /// Step of the samples' quantisation, or zero.
-    pub quantisation: f64,
-}
-
-/// What was found in some windows, one after the other.
-#[derive(Clone, Debug, Default)]
-pub struct WindowFits {
-    /// Derivatives from 0 on, and their standard errors.
-    pub derivatives: Vec<Vec<f64>>,
-    /// Standard errors of the derivatives.
-    pub errors: Vec<Vec<f64>>,
-    /// Order of the window.
-    pub order: Vec<u8>,
-    /// Bits of [`Status`].
-    pub status: Vec<u16>,
-    /// Standard deviation of the noise.
-    pub sigma: Vec<f64>,
-}
-
-/// Where a window lies.
-struct PlacedWindow {
-    samples: Range<usize>,
-    /// Its middle and its half length in seconds.
-    middle: f64,
-    half: f64,
-    edge: bool,
+/// Memory of one thread.
+#[derive(Debug, Default)]
+struct FitMemory {
+    basis: OwnBasis,
+    shared: GroupSamples,
+    /// By length of the window.
+    tables: HashMap<usize, OrderTable>,
 }
 
 /// One window's polynomials.
@@ -93,26 +62,115 @@ impl WindowFit {
         watch: &mut Watch<'_>,
     ) -> Result<WindowFits, Error> {
         let count = record.len().div_ceil(step);
-        let pieces = (0..count).step_by(WINDOWS).map(|first| first..count.min(first + WINDOWS));
+        let at_once = WINDOWS.max(LENGTHS * self.usual_length() / step);
+        let pieces = (0..count).step_by(at_once).map(|first| first..count.min(first + at_once));
         let pieces = pieces.map(|content| Piece { size: content.len(), content }).collect();
-        let work = |windows: Range<usize>, basis: &mut OwnBasis| {
-            let mut fits = WindowFits::new(self.derivatives);
-            windows.for_each(|window| self.one(record, window * step, basis, &mut fits));
-            fits
-        };
-        let parts = map(pieces, workers, OwnBasis::default, work, watch)?;
-        let mut all = WindowFits::new(self.derivatives);
+        let instructions = Instructions::current();
+        let work =
+            |windows: Range<usize>, memory: &mut FitMemory| self.piece(record, windows, step, instructions, memory);
+        let parts = map(pieces, workers, FitMemory::default, work, watch)?;
+        let mut all = WindowFits::new(self.derivatives, 0);
         for part in parts {
             all.append(part);
         }
         Ok(all)
     }
 
+    /// Samples of a window, on average.
+    fn usual_length(&self) -> usize {
+        match self.span {
+            WindowSpan::Samples(length) => length,
+            WindowSpan::Seconds(length) => {
+                let record = self.times[self.times.len() - 1] - self.times[0];
+                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of samples")]
+                let samples = (length / record.max(length) * self.times.len() as f64) as usize;
+                samples
+            }
+        }
+    }
+
+    /// Fits some windows: those that share a basis side by side, and the others one by one.
+    fn piece(
+        &self,
+        record: &[f64],
+        windows: Range<usize>,
+        step: usize,
+        instructions: Instructions,
+        memory: &mut FitMemory,
+    ) -> WindowFits {
+        let first = windows.start;
+        let placed = self.span.places(&self.times, windows, step);
+        let sample = |window: usize| (first + window) * step;
+        let mut fits = WindowFits::new(self.derivatives, placed.len());
+        let done = self.side_by_side(record, &placed, &sample, instructions, memory, &mut fits);
+        self.one_by_one(record, &placed, sample, &done, &mut memory.basis, &mut fits);
+        fits
+    }
+
+    /// Fits the windows that share a basis and lose nothing by it; returns which do.
+    fn side_by_side(
+        &self,
+        record: &[f64],
+        placed: &[PlacedWindow],
+        sample: &dyn Fn(usize) -> usize,
+        instructions: Instructions,
+        memory: &mut FitMemory,
+        fits: &mut WindowFits,
+    ) -> Vec<bool> {
+        let FitMemory { shared, tables, .. } = memory;
+        for length in placed.iter().map(|window| window.samples.len()) {
+            tables.entry(length).or_insert_with(|| OrderTable::new(self.order, length));
+        }
+        let degrees = |length: usize| {
+            let degrees = tables[&length].degrees;
+            (length >= FEWEST && can_share(degrees, self.derivatives)).then_some(degrees)
+        };
+        let mut groups = groups(&self.times, record, placed, degrees);
+        groups.sort_by_key(|group| group.degrees);
+        let mut done = vec![false; placed.len()];
+        let kernel = WindowsAbreast {
+            fit: self,
+            record,
+            placed,
+            samples: sample,
+            tables: &|length| &tables[&length],
+            groups: &groups,
+            memory: shared,
+            fits,
+            done: &mut done,
+        };
+        dispatch(instructions, kernel);
+        done
+    }
+
+    /// Fits the windows that are not done, each by a QR decomposition of its own.
+    fn one_by_one(
+        &self,
+        record: &[f64],
+        placed: &[PlacedWindow],
+        sample: impl Fn(usize) -> usize,
+        done: &[bool],
+        basis: &mut OwnBasis,
+        fits: &mut WindowFits,
+    ) {
+        let mut last: Option<(&PlacedWindow, Option<FittedWindow>)> = None;
+        for (place, window) in placed.iter().enumerate().filter(|(place, _)| !done[*place]) {
+            // Near the ends many samples have the same window.
+            let fitted = match &last {
+                Some((before, fitted)) if *before == window => fitted,
+                _ => &last.insert((window, self.fitted(record, window, basis))).1,
+            };
+            if let Some(fitted) = fitted {
+                self.one(window, fitted, sample(place), basis, fits, place);
+            }
+        }
+    }
+
     /// The criterion of every candidate order in the window around a sample; NaN where it cannot be fitted.
     #[must_use]
     pub fn scores(&self, record: &[f64], sample: usize) -> Vec<f64> {
         let mut basis = OwnBasis::default();
-        let window = self.window(sample);
+        let window = self.span.around(&self.times, sample);
         let Order::Chosen { criterion, highest } = self.order else { return vec![f64::NAN] };
         let score = |fitted: FittedWindow| {
             let length = window.samples.len();
@@ -122,50 +180,10 @@ impl WindowFit {
         self.fitted(record, &window, &mut basis).map_or_else(|| vec![f64::NAN; highest + 1], score)
     }
 
-    /// The window around a sample, within the record.
-    fn window(&self, sample: usize) -> PlacedWindow {
-        let (times, count) = (&self.times, self.times.len());
-        let (first, last) = (times[0], times[count - 1]);
-        match self.span {
-            WindowSpan::Samples(length) => {
-                let half = length / 2;
-                let begin = sample.saturating_sub(half).min(count - length.min(count));
-                let samples = begin..count.min(begin + length);
-                let (from, to) = (times[samples.start], times[samples.end - 1]);
-                let edge = sample < half || sample + half >= count;
-                PlacedWindow { samples, middle: f64::midpoint(from, to), half: (to - from) / 2.0, edge }
-            }
-            WindowSpan::Seconds(length) => {
-                let half = length / 2.0;
-                let middle = times[sample].min(last - half).max(first + half);
-                let begin = times.partition_point(|&time| time < middle - half);
-                let end = times.partition_point(|&time| time <= middle + half);
-                let edge = (middle - times[sample]).abs() > 0.0;
-                PlacedWindow { samples: begin..end, middle, half, edge }
-            }
-        }
-    }
-
-    /// Candidates in a window of so many samples: how many orders from 0 on.
-    fn candidates(&self, length: usize) -> usize {
-        match self.order {
-            Order::Fixed(order) => {
-                if length > order {
-                    order + 1
-                } else {
-                    0
-                }
-            }
-            Order::Chosen { criterion, highest } => {
-                (0..=highest).take_while(|&order| criterion.penalty(order, length).is_some()).count()
-            }
-        }
-    }
-
     /// Fits all candidates to a window, or `None` where it holds an unusable sample or too few.
     fn fitted(&self, record: &[f64], window: &PlacedWindow, basis: &mut OwnBasis) -> Option<FittedWindow> {
         let (samples, length) = (&record[window.samples.clone()], window.samples.len());
-        let candidates = self.candidates(length);
+        let candidates = OrderTable::new(self.order, length).degrees;
         if length < FEWEST || candidates == 0 || !samples.iter().all(|&value| is_usable(value)) {
             return None;
         }
@@ -184,13 +202,16 @@ impl WindowFit {
         Some(FittedWindow { coefficients, residuals, floor: quantised.max(ROUNDING * energy), reference })
     }
 
-    /// Fits the window around one sample.
-    fn one(&self, record: &[f64], sample: usize, basis: &mut OwnBasis, fits: &mut WindowFits) {
-        let window = self.window(sample);
-        let Some(fitted) = self.fitted(record, &window, basis) else {
-            fits.invalidate();
-            return;
-        };
+    /// Writes the estimates of a window that was fitted alone, whose basis is the last that was made.
+    fn one(
+        &self,
+        window: &PlacedWindow,
+        fitted: &FittedWindow,
+        sample: usize,
+        basis: &OwnBasis,
+        fits: &mut WindowFits,
+        place: usize,
+    ) {
         let (length, degrees) = (window.samples.len(), fitted.coefficients.len());
         let variance = |order: usize| {
             let free = length - order - 1;
@@ -222,24 +243,13 @@ impl WindowFit {
                 Some(shares) if !window.edge => sums.error(taken, shares, variance),
                 _ => (variance(order) * sums.gains[taken]).sqrt(),
             };
-            fits.derivatives[derivative].push(level + sums.values[taken] * scale);
-            fits.errors[derivative].push(error * scale);
+            fits.derivatives[derivative][place] = level + sums.values[taken] * scale;
+            fits.errors[derivative][place] = error * scale;
         }
-        let mut status = if window.edge { Status::EDGE } else { Status::GOOD };
-        if shares.is_some() && degrees > 1 {
-            if order == 0 {
-                status |= Status::LOWEST_ORDER;
-            }
-            if order + 1 == degrees {
-                status |= Status::HIGHEST_ORDER;
-            }
-        }
-        if fitted.residuals[order] <= fitted.floor {
-            status |= Status::EXACT;
-        }
-        fits.order.push(u8::try_from(order).unwrap_or(u8::MAX));
-        fits.status.push(status.bits());
-        fits.sigma.push(variance(order).sqrt());
+        let exact = fitted.residuals[order] <= fitted.floor;
+        fits.order[place] = u8::try_from(order).unwrap_or(u8::MAX);
+        fits.status[place] = self.status(order, degrees, window.edge, exact).bits();
+        fits.sigma[place] = variance(order).sqrt();
     }
 }
 
@@ -290,24 +300,126 @@ impl OrderSums {
     }
 }
 
-impl WindowFits {
-    fn new(derivatives: usize) -> Self {
-        let columns = vec![Vec::new(); derivatives + 1];
-        Self { derivatives: columns.clone(), errors: columns, ..Self::default() }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::irregular::shared_windows::LOST;
+    use crate::local_polynomials::criterion::Criterion;
+
+    /// Numbers between zero and one.
+    fn random(seed: &mut u64) -> f64 {
+        *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((*seed >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
     }
 
-    fn append(&mut self, mut other: Self) {
-        let pairs = self.derivatives.iter_mut().zip(&mut other.derivatives);
-        pairs.chain(self.errors.iter_mut().zip(&mut other.errors)).for_each(|(one, other)| one.append(other));
-        self.order.append(&mut other.order);
-        self.status.append(&mut other.status);
-        self.sigma.append(&mut other.sigma);
+    /// Noise of variance one.
+    fn noise(seed: &mut u64) -> f64 {
+        (-2.0 * random(seed).ln()).sqrt() * (std::f64::consts::TAU * random(seed)).cos()
     }
 
-    fn invalidate(&mut self) {
-        self.derivatives.iter_mut().chain(&mut self.errors).for_each(|column| column.push(f64::NAN));
-        self.order.push(0);
-        self.status.push(Status::INVALID.bits());
-        self.sigma.push(f64::NAN);
+    /// Steps of time: hardly, somewhat and much scattered, exponential, and with gaps.
+    const STEPS: [fn(&mut u64) -> f64; 5] = [
+        |seed| 1.0 + 0.02 * (random(seed) - 0.5),
+        |seed| 1.0 + 0.24 * (random(seed) - 0.5),
+        |seed| 0.5 + random(seed),
+        |seed| -random(seed).ln(),
+        |seed| if random(seed) < 0.01 { 40.0 } else { 0.9 + 0.2 * random(seed) },
+    ];
+
+    /// Noise of different levels, an offset, a motion that windows are too long for, and outliers.
+    const SIGNALS: [fn(f64, &mut u64) -> f64; 5] = [
+        |time, seed| (40.0 * time).sin() + 1e-3 * noise(seed),
+        |time, seed| (40.0 * time).sin() + 1e-10 * noise(seed),
+        |time, seed| 1e6 + (40.0 * time).sin() + 1e-3 * noise(seed),
+        |time, seed| (400.0 * time).sin() + 1e-3 * noise(seed),
+        |time, seed| (40.0 * time).sin() + 1e-3 * noise(seed) + if random(seed) < 0.002 { 1e6 } else { 0.0 },
+    ];
+
+    fn plan(times: Vec<f64>, span: WindowSpan, order: Order) -> WindowFit {
+        WindowFit { times, span, order, derivatives: 2, quantisation: 0.0 }
+    }
+
+    /// What a QR decomposition of every so-many-th window finds; of others nothing is known.
+    fn one_by_one(fit: &WindowFit, record: &[f64], every: usize) -> WindowFits {
+        let placed = fit.span.places(&fit.times, 0..record.len(), 1);
+        let mut fits = WindowFits::new(fit.derivatives, placed.len());
+        let skipped: Vec<bool> = (0..placed.len()).map(|window| window % every > 0).collect();
+        fit.one_by_one(record, &placed, |window| window, &skipped, &mut OwnBasis::default(), &mut fits);
+        fits
+    }
+
+    /// Compares windows in standard errors of their own. Where the noise is hardly above rounding, both are as far from the truth.
+    fn assert_same(found: &WindowFits, expected: &WindowFits, rounding: f64, what: &str) {
+        for window in (0..found.order.len()).filter(|window| !expected.sigma[*window].is_nan()) {
+            assert_eq!(found.order[window], expected.order[window], "{what}, order at {window}");
+            assert_eq!(found.status[window], expected.status[window], "{what}, status at {window}");
+            let near = |one: f64, other: f64, scale: f64| (one - other).abs() <= (10.0 * LOST + rounding) * scale;
+            let sigma = expected.sigma[window];
+            assert!(near(found.sigma[window], sigma, sigma), "{what}, noise at {window}");
+            for derivative in 0..found.derivatives.len() {
+                let error = expected.errors[derivative][window];
+                assert!(near(found.errors[derivative][window], error, error), "{what}, error at {window}");
+                let [one, other] = [found, expected].map(|fits| fits.derivatives[derivative][window]);
+                let digits = 4.0 * f64::EPSILON * other.abs();
+                assert!(
+                    (one - other).abs() <= (10.0 * LOST + rounding) * error + digits,
+                    "{what}, {derivative} at {window}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn windows_that_share_a_basis_are_what_each_is_alone() {
+        let chosen = |highest| Order::Chosen { criterion: Criterion::Aicc, highest };
+        for (steps, signal) in (0..STEPS.len()).flat_map(|steps| (0..SIGNALS.len()).map(move |signal| (steps, signal)))
+        {
+            let (mut seed, mut time) = (11, 3.0);
+            let mut step = || {
+                time += STEPS[steps](&mut seed) / 1000.0;
+                time
+            };
+            let times: Vec<f64> = (0..250).map(|_| step()).collect();
+            let record: Vec<f64> = times.iter().map(|time| SIGNALS[signal](*time, &mut seed)).collect();
+            for (case, (length, order)) in
+                [(11, chosen(10)), (51, Order::Fixed(4)), (51, chosen(15))].into_iter().enumerate()
+            {
+                let by_count = (steps + signal + case) % 2 == 0;
+                let span =
+                    if by_count { WindowSpan::Samples(length) } else { WindowSpan::Seconds(length as f64 / 1000.0) };
+                let fit = plan(times.clone(), span, order);
+                let what = format!("steps {steps}, signal {signal}, {span:?}, {order:?}");
+                // Rounding of the samples is 1e-16, in 1e-10 of noise.
+                let rounding = if signal == 1 { 1e-4 } else { 0.0 };
+                let found = fit.fit(&record, 1, NonZeroUsize::MIN, &mut |_, _| true).expect("nothing cancels");
+                assert_same(&found, &one_by_one(&fit, &record, 5), rounding, &what);
+            }
+        }
+    }
+
+    #[test]
+    fn nearly_all_windows_of_jittering_times_share_a_basis_on_every_path() {
+        let (mut seed, mut time) = (5, 0.0);
+        let mut step = || {
+            time += STEPS[2](&mut seed) / 1000.0;
+            time
+        };
+        let times: Vec<f64> = (0..800).map(|_| step()).collect();
+        let record: Vec<f64> = times.iter().map(|time| SIGNALS[0](*time, &mut seed)).collect();
+        let order = Order::Chosen { criterion: Criterion::Aicc, highest: 15 };
+        for span in [WindowSpan::Samples(101), WindowSpan::Seconds(0.051)] {
+            let fit = plan(times.clone(), span, order);
+            let expected = one_by_one(&fit, &record, 10);
+            for instructions in Instructions::available() {
+                let placed = fit.span.places(&fit.times, 0..record.len(), 1);
+                let mut found = WindowFits::new(fit.derivatives, placed.len());
+                let mut memory = FitMemory::default();
+                let done = fit.side_by_side(&record, &placed, &|window| window, instructions, &mut memory, &mut found);
+                let missed = placed.iter().zip(&done).filter(|(window, done)| !window.edge && !**done).count();
+                assert!(missed * 50 < record.len(), "{missed} with {instructions:?}");
+                fit.one_by_one(&record, &placed, |window| window, &done, &mut OwnBasis::default(), &mut found);
+                assert_same(&found, &expected, 0.0, &format!("{instructions:?}"));
+            }
+        }
     }
 }

@@ -1,0 +1,202 @@
+//! Samples of windows that share a basis, a group of them in each lane: time, sample, and what its polynomial leaves of the sample.
+
+use std::array::from_fn;
+use std::ops::Range;
+
+use crate::irregular::shared_factor::SharedFactor;
+use crate::irregular::shared_sums::{ChebyshevSums, MOST, TakenOff};
+use crate::irregular::window_places::{PlacedWindow, WindowGroup};
+use crate::simd::aligned::{Aligned, OnLines};
+use crate::simd::vectors::{Lanes, MOST_LANES};
+
+/// Samples that are added at once, so that none waits for the one before.
+const AT_ONCE: usize = 4;
+
+/// Memory of one thread.
+#[derive(Debug, Default)]
+pub(crate) struct GroupSamples {
+    /// From -1 to 1 over all windows of a group.
+    pub(crate) times: Aligned,
+    /// Minus the reference.
+    pub(crate) samples: Aligned,
+    pub(crate) left: Aligned,
+    /// Samples of each lane's group, and of its first window.
+    all: [usize; MOST_LANES],
+    first: [usize; MOST_LANES],
+    pub(crate) references: [f64; MOST_LANES],
+}
+
+/// Sums over the window that each lane is at.
+pub(crate) struct SlidSums<S: Lanes> {
+    /// Of polynomials, and of what is left of the samples.
+    pub(crate) left: ChebyshevSums<S>,
+    /// Squares of what is left, and the largest that they were.
+    pub(crate) square: S::f64s,
+    pub(crate) peak: S::f64s,
+    /// Samples and their squares.
+    pub(crate) level: S::f64s,
+    pub(crate) energy: S::f64s,
+    /// The polynomial that was taken off, of the highest order.
+    pub(crate) coefficients: OnLines<S::f64s, MOST>,
+    /// Squares of the sums of its coefficients' magnitudes, each from one on.
+    pub(crate) tails: OnLines<S::f64s, MOST>,
+}
+
+impl WindowGroup {
+    /// The middle of all windows, and one over their half length.
+    pub(crate) fn scale(&self) -> (f64, f64) {
+        (f64::midpoint(self.from, self.to), 2.0 / (self.to - self.from))
+    }
+}
+
+impl GroupSamples {
+    /// Reads the samples of a group into each lane.
+    pub(crate) fn read(
+        &mut self,
+        lanes: usize,
+        times: &[f64],
+        record: &[f64],
+        placed: &[PlacedWindow],
+        groups: &[WindowGroup],
+    ) {
+        let range =
+            |group: &WindowGroup| placed[group.windows.start].samples.start..placed[group.windows.end - 1].samples.end;
+        let longest = groups.iter().map(|group| range(group).len()).max().unwrap_or(0);
+        let rows = longest.next_multiple_of(AT_ONCE);
+        if self.times.len() < rows * lanes {
+            for column in [&mut self.times, &mut self.samples, &mut self.left] {
+                *column = Aligned::zeros(rows * lanes);
+            }
+        }
+        // Where a lane has no sample there are zeros, which change no sum.
+        let full =
+            if groups.len() < lanes { 0 } else { groups.iter().map(|group| range(group).len()).min().unwrap_or(0) };
+        for column in [&mut self.times, &mut self.samples] {
+            column[full * lanes..rows * lanes].fill(0.0);
+        }
+        (self.all, self.first) = ([0; MOST_LANES], [0; MOST_LANES]);
+        for (lane, group) in groups.iter().enumerate() {
+            let range = range(group);
+            let (middle, scale) = group.scale();
+            // Every window of the group holds this sample: if it is an outlier, only windows that hold the outlier lose digits.
+            let reference = record[range.start + range.len() / 2];
+            self.references[lane] = reference;
+            self.all[lane] = range.len();
+            self.first[lane] = placed[group.windows.start].samples.len();
+            let columns = self.times.chunks_exact_mut(lanes).zip(self.samples.chunks_exact_mut(lanes));
+            for ((time, sample), at) in columns.zip(range) {
+                time[lane] = (times[at] - middle) * scale;
+                sample[lane] = record[at] - reference;
+            }
+        }
+    }
+
+    /// Sums over each lane's first window, from which the polynomial that fits all of the group best was taken off.
+    #[inline(always)]
+    pub(crate) fn begin<S: Lanes>(&mut self, simd: S, degrees: usize, factor: &mut SharedFactor<S>) -> SlidSums<S> {
+        let (first, all) = (counts(&self.first), counts(&self.all));
+        let (first, all) = (simd.load(&first, 0), simd.load(&all, 0));
+        let zero = simd.splat_f64s(0.0);
+        let mut sums = ChebyshevSums::zero(simd);
+        let (mut energy, mut at) = (zero, 0);
+        let end = self.first.iter().max().map_or(0, |first| first.next_multiple_of(AT_ONCE));
+        while at < end {
+            let (times, samples) = (rows(simd, &self.times, at), rows(simd, &self.samples, at));
+            let weights: [S::f64s; AT_ONCE] = from_fn(|n| before(simd, at + n, first));
+            sums.add(simd, degrees, &times, &weights, &samples);
+            for n in 0..AT_ONCE {
+                let weighted = simd.mul_f64s(samples[n], weights[n]);
+                energy = simd.mul_add_f64s(weighted, samples[n], energy);
+            }
+            at += AT_ONCE;
+        }
+        let (moments, level) = (sums.moments.clone(), sums.products.0[0]);
+        let lanes = self.first.iter().zip(&self.all).filter(|(_, all)| **all > 0);
+        let mut at = lanes.map(|(first, _)| *first).min().unwrap_or(0) / AT_ONCE * AT_ONCE;
+        let end = self.all.iter().max().map_or(0, |all| all.next_multiple_of(AT_ONCE));
+        while at < end {
+            let (times, samples) = (rows(simd, &self.times, at), rows(simd, &self.samples, at));
+            let weights: [S::f64s; AT_ONCE] =
+                from_fn(|n| simd.sub_f64s(before(simd, at + n, all), before(simd, at + n, first)));
+            sums.add(simd, degrees, &times, &weights, &samples);
+            at += AT_ONCE;
+        }
+        factor.rows.0[degrees] = sums.products.0;
+        factor.decompose(simd, degrees, &sums.moments.0, 1);
+        let coefficients = factor.solution(simd, degrees, degrees);
+        let mut off = TakenOff::new(simd, coefficients);
+        for at in (0..end).step_by(AT_ONCE) {
+            let times = rows(simd, &self.times, at);
+            let mut samples = rows(simd, &self.samples, at);
+            let weights: [S::f64s; AT_ONCE] = from_fn(|n| before(simd, at + n, first));
+            off.take_off(simd, degrees, &times, &weights, &mut samples);
+            for (n, sample) in samples.into_iter().enumerate() {
+                simd.store(&mut self.left, (at + n) * S::F64_LANES, sample);
+            }
+        }
+        let TakenOff { coefficients, products, square, .. } = off;
+        let (mut tails, mut size) = (OnLines([zero; MOST]), zero);
+        for k in (0..degrees.min(MOST)).rev() {
+            size = simd.add_f64s(size, simd.abs_f64s(coefficients.0[k]));
+            tails.0[k] = simd.mul_f64s(size, size);
+        }
+        SlidSums { left: ChebyshevSums { moments, products }, square, peak: square, level, energy, coefficients, tails }
+    }
+}
+
+/// Some rows of a column.
+#[inline(always)]
+fn rows<S: Lanes>(simd: S, column: &Aligned, at: usize) -> [S::f64s; AT_ONCE] {
+    from_fn(|n| simd.load(column, (at + n) * S::F64_LANES))
+}
+
+/// One where a row lies before the end, zero where it does not.
+#[inline(always)]
+fn before<S: Lanes>(simd: S, row: usize, end: S::f64s) -> S::f64s {
+    let inside = simd.less_than_f64s(simd.splat_f64s(row as f64), end);
+    simd.select_f64s(inside, simd.splat_f64s(1.0), simd.splat_f64s(0.0))
+}
+
+fn counts(counts: &[usize; MOST_LANES]) -> [f64; MOST_LANES] {
+    counts.map(|count| count as f64)
+}
+
+impl<S: Lanes> SlidSums<S> {
+    /// Moves each lane's window: samples enter and leave, as places within the group.
+    #[inline(always)]
+    pub(crate) fn slide(
+        &mut self,
+        simd: S,
+        degrees: usize,
+        from: &GroupSamples,
+        entering: &[Range<usize>; MOST_LANES],
+        leaving: &[Range<usize>; MOST_LANES],
+    ) {
+        let most = entering.iter().chain(leaving).map(ExactSizeIterator::len).max().unwrap_or(0);
+        for place in 0..most {
+            let mut columns = [[[0.0; MOST_LANES]; 2]; 4];
+            for (side, (ranges, sign)) in [(entering, 1.0), (leaving, -1.0)].into_iter().enumerate() {
+                for (lane, range) in ranges.iter().enumerate().take(S::F64_LANES) {
+                    if place < range.len() {
+                        let at = (range.start + place) * S::F64_LANES + lane;
+                        columns[0][side][lane] = sign;
+                        columns[1][side][lane] = from.times[at];
+                        columns[2][side][lane] = from.samples[at];
+                        columns[3][side][lane] = from.left[at];
+                    }
+                }
+            }
+            let [weights, times, samples, left]: [[S::f64s; 2]; 4] =
+                from_fn(|column| from_fn(|side| simd.load(&columns[column][side], 0)));
+            self.left.add(simd, degrees, &times, &weights, &left);
+            for side in 0..2 {
+                let weighted = simd.mul_f64s(weights[side], samples[side]);
+                self.level = simd.add_f64s(self.level, weighted);
+                self.energy = simd.mul_add_f64s(weighted, samples[side], self.energy);
+                let weighted = simd.mul_f64s(weights[side], left[side]);
+                self.square = simd.mul_add_f64s(weighted, left[side], self.square);
+            }
+        }
+        self.peak = simd.max_f64s(self.peak, self.square);
+    }
+}

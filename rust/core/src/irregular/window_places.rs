@@ -1,0 +1,136 @@
+//! Where windows lie whose samples have times of their own, and which lie so close to each other that they share one basis.
+
+use std::ops::Range;
+
+use crate::record::samples::is_usable;
+
+/// A polynomial that is at most one in a window is at most `cosh(p acosh(1 + d))` at a distance of `d` half lengths from it (Chebyshev). Windows share a
+/// basis while that is less than `cosh(GROWTH)`, 202, at the far ends of all of them together: what rounding changes is amplified by its square.
+const GROWTH: f64 = 6.0;
+
+/// All of them together are longer than the shortest by no more than this part of it: low orders would fit them worse and worse.
+const REACH: f64 = 0.25;
+
+/// How long windows are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum WindowSpan {
+    /// So many samples, an odd number.
+    Samples(usize),
+    /// The samples of so many seconds.
+    Seconds(f64),
+}
+
+/// Where a window lies.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct PlacedWindow {
+    pub(crate) samples: Range<usize>,
+    /// Its middle and its half length in seconds.
+    pub(crate) middle: f64,
+    pub(crate) half: f64,
+    pub(crate) edge: bool,
+}
+
+/// Windows that follow each other and share a basis.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct WindowGroup {
+    /// Their numbers.
+    pub(crate) windows: Range<usize>,
+    /// Time of the first sample, and of the last.
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+    /// Candidates in each of them.
+    pub(crate) degrees: usize,
+    /// From the first sample of the shortest to its last.
+    shortest: f64,
+}
+
+impl WindowSpan {
+    /// The window around a sample, within the record, where samples before `begin` and all up to `end` are known to lie before its begin and end.
+    pub(crate) fn place(self, times: &[f64], sample: usize, begin: usize, end: usize) -> PlacedWindow {
+        let count = times.len();
+        let (first, last) = (times[0], times[count - 1]);
+        match self {
+            Self::Samples(length) => {
+                let half = length / 2;
+                let begin = sample.saturating_sub(half).min(count - length.min(count));
+                let samples = begin..count.min(begin + length);
+                let (from, to) = (times[samples.start], times[samples.end - 1]);
+                let edge = sample < half || sample + half >= count;
+                PlacedWindow { samples, middle: f64::midpoint(from, to), half: (to - from) / 2.0, edge }
+            }
+            Self::Seconds(length) => {
+                let half = length / 2.0;
+                let middle = times[sample].min(last - half).max(first + half);
+                let before = |from: usize, is_before: &dyn Fn(f64) -> bool| {
+                    from + times[from..].iter().take_while(|&&time| is_before(time)).count()
+                };
+                let begin = before(begin, &|time| time < middle - half);
+                let end = before(end.max(begin), &|time| time <= middle + half);
+                PlacedWindow { samples: begin..end, middle, half, edge: (middle - times[sample]).abs() > 0.0 }
+            }
+        }
+    }
+
+    /// The window around a sample, whatever lies before.
+    pub(crate) fn around(self, times: &[f64], sample: usize) -> PlacedWindow {
+        let Self::Seconds(length) = self else { return self.place(times, sample, 0, 0) };
+        // Twice as long a way back holds every window that the record's ends move.
+        let begin = times.partition_point(|&time| time < times[sample] - 1.5 * length);
+        self.place(times, sample, begin, begin)
+    }
+
+    /// The windows around every `step`-th sample, by their numbers.
+    pub(crate) fn places(self, times: &[f64], windows: Range<usize>, step: usize) -> Vec<PlacedWindow> {
+        let mut places: Vec<PlacedWindow> = Vec::with_capacity(windows.len());
+        for window in windows {
+            let place = match places.last() {
+                Some(before) => self.place(times, window * step, before.samples.start, before.samples.end),
+                None => self.around(times, window * step),
+            };
+            places.push(place);
+        }
+        places
+    }
+}
+
+/// By what part all windows of a group may be longer than the shortest.
+fn reach(degrees: usize) -> f64 {
+    let highest = degrees.saturating_sub(1).max(1) as f64;
+    // A distance of one is half a window.
+    (((GROWTH / highest).cosh() - 1.0) / 2.0).min(REACH)
+}
+
+/// Groups of windows that share a basis: those within the record whose samples are all usable and of which `degrees` says how many candidates they have.
+pub(crate) fn groups(
+    times: &[f64],
+    record: &[f64],
+    windows: &[PlacedWindow],
+    degrees: impl Fn(usize) -> Option<usize>,
+) -> Vec<WindowGroup> {
+    let mut groups: Vec<WindowGroup> = Vec::new();
+    // Samples are usable from this one to the one before `seen`.
+    let (mut usable, mut seen) = (0, 0);
+    for (number, window) in windows.iter().enumerate() {
+        let new = seen.max(window.samples.start);
+        if let Some(last) = record[new..window.samples.end.max(new)].iter().rposition(|&value| !is_usable(value)) {
+            usable = new + last + 1;
+        }
+        seen = seen.max(window.samples.end);
+        let Some(degrees) = degrees(window.samples.len()) else { continue };
+        if window.edge || usable > window.samples.start {
+            continue;
+        }
+        let (from, to) = (times[window.samples.start], times[window.samples.end - 1]);
+        let length = to - from;
+        if let Some(group) = groups.last_mut() {
+            let shortest = group.shortest.min(length);
+            let near = to - group.from <= (1.0 + reach(degrees)) * shortest && to >= group.to;
+            if near && group.windows.end == number && group.degrees == degrees {
+                (group.windows.end, group.to, group.shortest) = (number + 1, to, shortest);
+                continue;
+            }
+        }
+        groups.push(WindowGroup { windows: number..number + 1, from, to, degrees, shortest: length });
+    }
+    groups
+}
