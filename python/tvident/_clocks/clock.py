@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -44,6 +44,8 @@ class Clock:
         What was done.
     doubt : str
         What is wrong with the times; empty where nothing is.
+    passed : PassedNoise, optional
+        What white noise becomes on the grid, where that is known already.
     """
 
     grid: Grid
@@ -51,6 +53,7 @@ class Clock:
     order: int
     words: str = ""
     doubt: str = ""
+    passed: _core.PassedNoise | None = field(default=None, repr=False, compare=False)
 
     @property
     def period(self) -> float:
@@ -71,8 +74,8 @@ class Clock:
         resampling = _core.Resampling(
             places, samples, order=1 if self.kind == "even" else self.order, bridged=bridged, propagate=propagate
         )
-        passed = None if self.kind == "even" else resampling.passed_noise(workers=workers)
-        found = {name: resampling.onto_grid(values, workers=workers) for name, values in channels.items()}
+        passed = None if self.kind == "even" else self.passed or resampling.passed_noise(workers=workers)
+        found = _together(resampling, channels, workers)
         return Evened(found, grid.start + self.period * np.arange(samples, dtype=np.float64), places, passed)
 
 
@@ -113,6 +116,19 @@ class Evened:
         left = np.clip(np.searchsorted(self.places, grid, side="right") - 1, 0, self.places.size - 1)
         right = np.clip(np.searchsorted(self.places, grid, side="left"), 0, self.places.size - 1)
         return np.asarray(mask[..., left] & mask[..., right])
+
+
+def _together(
+    resampling: _core.Resampling, channels: Mapping[str, npt.NDArray[np.number]], workers: int | None
+) -> dict[str, Numbers]:
+    """Return channels on the grid, by splines whose equations are factored once for all of them."""
+    if not channels:
+        return {}
+    rows = {name: values.reshape(-1, values.shape[-1]) for name, values in channels.items()}
+    every = resampling.onto_grid(np.concatenate(list(rows.values()), dtype=np.float64), workers=workers)
+    parts = np.split(every, np.cumsum([len(one) for one in rows.values()])[:-1])
+    shapes = [values.shape[:-1] for values in channels.values()]
+    return {name: part.reshape(*shape, -1) for name, part, shape in zip(rows, parts, shapes, strict=True)}
 
 
 def clock_of(
@@ -170,7 +186,8 @@ def _told(
         order,
         f"{share}: the channels were brought onto a uniform grid of {1 / grid.period:.6g} Hz by splines of order {order}{_gaps(grid)}",
     )
-    said = _smoother(clock, channels, quantisation, workers)
+    said, passed = _smoother(clock, channels, quantisation, workers)
+    clock = replace(clock, passed=passed)
     in_number = {name: ratio for name, ratio in said.items() if ratio > _TELLS}
     if not in_number:
         return clock
@@ -202,7 +219,7 @@ def _as_earlier(clock: Clock, kind: Kind, order: int) -> Clock:
     """Return the clock of an earlier result, with what is wrong with the times now."""
     grid = clock.grid
     if kind == clock.kind:
-        return replace(clock, order=order)
+        return replace(clock, order=order, passed=clock.passed if order == clock.order else None)
     words = "channels were brought onto a uniform grid as in the earlier result"
     if clock.kind == "even":
         doubt = (
@@ -226,16 +243,20 @@ def _gaps(grid: Grid) -> str:
 
 def _smoother(
     clock: Clock, channels: Mapping[str, npt.NDArray[np.number]], quantisation: float | None, workers: int | None
-) -> dict[str, float]:
-    """Return the variance of every channel's noise in time over that in sample number."""
+) -> tuple[dict[str, float], _core.PassedNoise | None]:
+    """Return the variance of every channel's noise in time over that in sample number; and what white noise becomes, if that is all."""
     grid = clock.grid
     if grid.places.size < _FEWEST:
-        return {}
+        return {}, None
     first = max(0, (grid.places.size - _COMPARED) // 2)
     part = slice(first, first + _COMPARED)
     places = grid.places[part] - math.ceil(grid.places[first])
     # Over steps that splines do not follow well, too: where these are many nothing else would be left to compare.
-    grid = replace(grid, places=places, samples=math.floor(places[-1]) + 1, bridged=grid.longest)
+    compared = replace(grid, places=places, samples=math.floor(places[-1]) + 1, bridged=grid.longest)
+    # Of a short record without gaps that is what is done with all of it.
+    without_gaps = bool(np.diff(places).max() <= min(grid.bridged, grid.longest))
+    is_all = without_gaps and compared.samples == grid.samples and np.array_equal(places, grid.places)
+    grid = compared
     channels = {name: values[..., part] for name, values in channels.items()}
     clock, numbers = replace(clock, grid=grid), Clock(grid, "even", 0)
     in_time = clock.evened(channels, propagate=False, workers=workers)
@@ -253,4 +274,4 @@ def _smoother(
         there = [ratio for ratio in ratios if math.isfinite(ratio) and ratio > 0]
         if there:
             found[name] = float(np.median(there))
-    return found
+    return found, in_time.passed if is_all else None

@@ -90,7 +90,8 @@ def fit_local_polynomials(
         Axis of time; where it is left out, the dimension of xarray that is called ``time`` or has dates.
     step : int, optional
         Every how many samples an estimate is wanted: the same numbers as ``[::step]`` of all of them, to rounding. From a tenth of
-        a window on each window is projected by itself and the cost is that of the windows that are wanted; below, the bits are the same, where `t` is uniform.
+        a window on each window is projected by itself and the cost is that of the windows that are wanted; below, where `t` is uniform,
+        the bits are the same.
     weights : array_like, shape (n,) or that of `y`, optional
         Weight of every sample, not negative: one over the variance of its noise, relative to the others. A sample of weight 0 is left out,
         whatever it holds. ``sigma`` is then that of a sample of weight 1. Every window is decomposed on its own, as those beside gaps are.
