@@ -171,7 +171,7 @@ def fit_local_polynomials(
     in that than the order needs; steps longer than half of it split the record. On sums of sines with noise whose steps scatter by up to
     1.4 of a step (the most is 1.5) the error is 0.1 to 1.4 times that with the best of six windows. Standard errors are those of the
     order without its bias: nominal 95 % intervals cover 84 to 96 %. ``"pooled"`` and ``"average"`` need uniform times. A window takes
-    0.4 to 1.2 µs, whatever its length: neighbours share one basis. Near gaps and outliers each is decomposed on its own, in some 20 µs with
+    0.3 to 1.2 µs, whatever its length: neighbours share one basis. Near gaps and outliers each is decomposed on its own, in some 20 µs with
     201 samples.
 
     The cost is about 15 ns a sample and thread for any window length on a processor with AVX-512, about twice that with AVX2; averaged

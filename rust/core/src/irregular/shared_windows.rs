@@ -149,10 +149,10 @@ impl WindowsAbreast<'_> {
         let Workspace { columns, factor } = work;
         let wanted = self.fit.derivatives + 1;
         let zero = simd.splat_f64s(0.0);
-        let mut polynomials = OnLines([[zero; MOST]; DERIVATIVES]);
-        at(simd, degrees, simd.load(&abreast.time, 0), &mut polynomials.0[..wanted]);
+        let below = degrees + 2..degrees + 2 + wanted;
         factor.rows.0[degrees] = window.left.products.0;
-        factor.rows.0[degrees + 2..degrees + 2 + wanted].copy_from_slice(&polynomials.0[..wanted]);
+        at(simd, degrees, simd.load(&abreast.time, 0), &mut factor.rows.0[below.clone()]);
+        let before = sums(simd, degrees, &factor.rows.0[below], &window.coefficients.0);
         factor.decompose(simd, degrees, &window.left.moments.0, 2 + wanted);
         let own = OnLines(factor.rows.0[degrees]);
         let mut coefficients = turned(simd, degrees, factor, &window.coefficients.0);
@@ -172,7 +172,6 @@ impl WindowsAbreast<'_> {
             Order::Fixed(_) => residuals.fixed(simd, columns),
             Order::Chosen { .. } => residuals.choose(simd, columns),
         };
-        let before = sums(simd, degrees, &polynomials.0[..wanted], &window.coefficients.0);
         let (mut values, mut errors) = ([[0.0; MOST_LANES]; DERIVATIVES], [[0.0; MOST_LANES]; DERIVATIVES]);
         for derivative in 0..wanted {
             let row = &factor.rows.0[degrees + 2 + derivative];

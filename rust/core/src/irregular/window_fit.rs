@@ -6,7 +6,6 @@
 //! A QR decomposition says what a window's fit is. Nearly all windows have neighbours with whom they share a basis, which gives the same in a tenth to a
 //! hundredth of the time ([`crate::irregular::shared_windows`]).
 
-use std::collections::HashMap;
 use std::num::NonZeroUsize;
 use std::ops::Range;
 
@@ -37,7 +36,7 @@ struct FitMemory {
     basis: OwnBasis,
     shared: GroupSamples,
     /// By length of the window.
-    tables: HashMap<usize, OrderTable>,
+    tables: Vec<Option<Box<OrderTable>>>,
 }
 
 /// One window's polynomials.
@@ -119,10 +118,14 @@ impl WindowFit {
     ) -> Vec<bool> {
         let FitMemory { shared, tables, .. } = memory;
         for length in placed.iter().map(|window| window.samples.len()) {
-            tables.entry(length).or_insert_with(|| OrderTable::new(self.order, length));
+            if length >= tables.len() {
+                tables.resize(length + 1, None);
+            }
+            tables[length].get_or_insert_with(|| Box::new(OrderTable::new(self.order, length)));
         }
+        let table = |length: usize| tables[length].as_deref().expect("made for every window");
         let degrees = |length: usize| {
-            let degrees = tables[&length].degrees;
+            let degrees = table(length).degrees;
             (length >= FEWEST && can_share(degrees, self.derivatives)).then_some(degrees)
         };
         let mut groups = groups(&self.times, record, placed, degrees);
@@ -133,7 +136,7 @@ impl WindowFit {
             record,
             placed,
             samples: sample,
-            tables: &|length| &tables[&length],
+            tables: &table,
             groups: &groups,
             memory: shared,
             fits,
