@@ -61,7 +61,8 @@ impl WindowFit {
         watch: &mut Watch<'_>,
     ) -> Result<WindowFits, Error> {
         let count = record.len().div_ceil(step);
-        let at_once = WINDOWS.max(LENGTHS * self.usual_length() / step);
+        let lengths = if can_share(1, self.derivatives) { LENGTHS } else { 0 };
+        let at_once = WINDOWS.max(lengths * self.usual_length() / step);
         let pieces = (0..count).step_by(at_once).map(|first| first..count.min(first + at_once));
         let pieces = pieces.map(|content| Piece { size: content.len(), content }).collect();
         let instructions = Instructions::current();
