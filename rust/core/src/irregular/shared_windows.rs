@@ -68,7 +68,7 @@ struct Workspace<S: Lanes> {
 struct Abreast {
     /// The number of each lane's window, where it has one.
     windows: [Option<usize>; MOST_LANES],
-    /// Time of the sample that it is for, its ends, its length in samples; and one over the half length of the group.
+    /// Time of the sample that it is for, in the group's time, and one over the half length of the group.
     time: [f64; MOST_LANES],
     scale: [f64; MOST_LANES],
     /// What its own reference is above that of the group, and the reference of the group.
@@ -232,8 +232,8 @@ impl WindowsAbreast<'_> {
 
 /// Whether rounding changes a window's residual by no more than it may.
 ///
-/// Rounding makes of the normal matrix another, which differs from it by `ε` times the number of samples, and as much of the largest sum of squares that the
-/// right-hand side had. That changes a residual by as much as solutions are amplified: as one that is made to grow, or where a diagonal is large beside
+/// Rounding changes the normal matrix by `ε` times the number of samples, and the right-hand side by the same part of its largest sum of squares.
+/// That changes a residual by as much as solutions are amplified: as one that is made to grow, or where a diagonal is large beside
 /// its pivot. The polynomial that was taken off adds the rounding of its own sums, divided by each pivot.
 #[inline(always)]
 fn is_good<S: Lanes>(

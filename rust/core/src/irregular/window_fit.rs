@@ -26,6 +26,9 @@ use crate::simd::vectors::dispatch;
 /// Windows of a piece of work, at least. So many times as long as a window, it has several groups of windows for each lane.
 const WINDOWS: usize = 256;
 const LENGTHS: usize = 4;
+/// Pieces of a record at least, if they are no smaller than that, and samples in the windows of a piece at most: it may be that nothing can be shared.
+const PIECES: usize = 16;
+const MOST_SAMPLES: usize = 1 << 22;
 
 /// The fewest samples of a window.
 pub const FEWEST: usize = 5;
@@ -62,7 +65,9 @@ impl WindowFit {
     ) -> Result<WindowFits, Error> {
         let count = record.len().div_ceil(step);
         let lengths = if can_share(1, self.derivatives) { LENGTHS } else { 0 };
-        let at_once = WINDOWS.max(lengths * self.usual_length() / step);
+        let usual = self.usual_length().max(1);
+        let most = (MOST_SAMPLES / usual).min(count.div_ceil(PIECES));
+        let at_once = WINDOWS.max((lengths * usual / step).min(most));
         let pieces = (0..count).step_by(at_once).map(|first| first..count.min(first + at_once));
         let pieces = pieces.map(|content| Piece { size: content.len(), content }).collect();
         let instructions = Instructions::current();
