@@ -77,7 +77,8 @@ pub fn noise_coherence(
         let [real, imaginary] = spectra.both[frequency].map(|value| value / (moving * spectra.angle[frequency]));
         (real - cosine).hypot(imaginary - sine) < MOVED
     };
-    let lags = (-STEPS..=STEPS).map(|step| lag + LATER * f64::from(step) / f64::from(STEPS));
+    let steps = if inertia == 0.0 { 0 } else { STEPS };
+    let lags = (-steps..=steps).map(|step| lag + LATER * f64::from(step) / f64::from(STEPS));
     let moved = lags.map(|lag| band.clone().filter(|&frequency| is_moved(frequency, lag)).count()).max();
     if 2 * moved.unwrap_or(0) > band.len() {
         return None;
@@ -169,6 +170,21 @@ mod tests {
             for motion in [(1.0, lag + 9.0), (3.0, lag), (0.3, lag)] {
                 assert!(of(motion).unwrap() > CORRELATED_NOISE, "{motion:?}");
             }
+        }
+    }
+
+    #[test]
+    fn a_controller_is_no_rough_drive_whatever_the_inertia() {
+        let noise = uniform(2 * 16_384);
+        let (angle, rest) = noise.split_at(16_384);
+        let back = |sample: usize| angle[sample] - if sample > 0 { angle[sample - 1] } else { 0.0 };
+        // Proportional and derivative, with gains that a machine of this inertia bears.
+        for (proportional, derivative) in [(0.05, 0.0), (0.0, 0.3), (0.05, 0.3)] {
+            let torque: Vec<f64> = (0..angle.len())
+                .map(|sample| 0.02 * rest[sample] - proportional * angle[sample] - derivative * back(sample))
+                .collect();
+            let found = noise_coherence(&angle, &torque.as_slice(), 1.0 / 12.0, (1.0, 0.0));
+            assert!(found.is_some_and(|coherence| coherence > CORRELATED_NOISE), "{found:?}");
         }
     }
 }

@@ -171,12 +171,12 @@ mod tests {
     fn assert_is_of(found: &[Packet], rows: std::ops::Range<usize>, from: f64, before: f64) {
         let expected = products(&columns(rows.clone(), from));
         let was = products(&columns(rows.clone(), before));
-        let size = |i: usize| expected[i][i].max(was[i][i]);
+        let sizes: Vec<f64> = (0..4).map(|i| expected[i][i].max(was[i][i])).collect();
         let at = |row: usize, column: usize| if row <= column { found[LAYOUT.entry(row, column)].0[3] } else { 0.0 };
-        for i in 0..4 {
-            for j in 0..4 {
+        for (i, expected) in expected.iter().enumerate() {
+            for (j, &expected) in expected.iter().enumerate() {
                 let product: f64 = (0..4).map(|k| at(k, i) * at(k, j)).sum();
-                assert_near(product, expected[i][j], ROUNDING * (1.0 + size(j) + size(i)));
+                assert_near(product, expected, ROUNDING * (1.0 + sizes[j] + sizes[i]));
             }
         }
         let sum = |power: i32| rows.clone().map(|row| (row as f64 - from).powi(power)).sum::<f64>();
@@ -186,7 +186,7 @@ mod tests {
         }
         for (i, j) in [(0, 0), (1, 0), (1, 1)] {
             let noise = found[LAYOUT.noise() + symmetric(i, j)].0[3];
-            assert_near(noise, 2.0 * expected[i][j], ROUNDING * (1.0 + size(1)));
+            assert_near(noise, 2.0 * expected[i][j], ROUNDING * (1.0 + sizes[1]));
         }
     }
 

@@ -73,7 +73,8 @@ impl Session<'_, '_, '_> {
             let Some(found) = lag else { break };
             let settled = (found.value - before).abs() <= CHOSEN * found.error;
             if settled || choice == CHOICES {
-                // The rows at hand stand: they differ from those of the last step by less than can be told, or by what is not known.
+                // The rows at hand stand: they differ from those of the last step by less than can be told. Where they have not settled, the last step is a
+                // part of the error.
                 self.record.lag = before;
                 let error = if settled { found.error } else { found.error.hypot(found.value - before) };
                 return Ok((chosen, decided, Some(Lag { value: before, error })));
@@ -166,8 +167,8 @@ impl Session<'_, '_, '_> {
         decided: &Decided,
         fit: &Fit,
     ) -> Result<Option<(f64, f64)>, Error> {
-        // What slowly varying parameters took off the right-hand side depends on the angle only. Their levels are estimated anew: beside another lag they
-        // took a part of this one.
+        // What slowly varying parameters took off the right-hand side depends on the angle only. Their levels are estimated again beside the
+        // rate: found with another lag, they hold a part of it.
         let (before, without) = (&chosen.weak.rows.rhs, decided.rhs(&chosen.weak.rows));
         let slow = before.iter().zip(without).map(|(rhs, without)| rhs - without);
         let rhs = weak.rows.rhs.iter().zip(slow).map(|(rhs, slow)| rhs - slow).collect();

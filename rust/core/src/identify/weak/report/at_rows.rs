@@ -181,7 +181,6 @@ impl Session<'_, '_, '_> {
                     .for_each(|(place, entry)| *entry = covariance(one, other, place));
             }
         })?;
-        // All of a slow coefficient follows from a few numbers.
         let part = |one: usize| {
             let step = tracks.status.len().div_ceil(LOOKED_AT).max(1);
             let own = |place: usize| tracks.covariances[symmetric(one, one)][place] * errors.inflation;
@@ -190,6 +189,7 @@ impl Session<'_, '_, '_> {
             median(&mut parts.filter(|part| part.is_finite()).collect::<Vec<_>>())
                 .map_or(1.0, |part| part.clamp(0.0, 1.0))
         };
+        // All of a slow coefficient follows from a few numbers.
         let in_common = (0..changing).map(|one| if one < windowed { part(one) } else { 1.0 }).collect();
         let pairs = pairs.into_iter().map(|(one, other)| (names[one], names[other])).collect();
         Ok((standard, covariances, OfAllRows { pairs, in_common }))
