@@ -8,8 +8,8 @@
 //! neighbours as well: what changes slowly hardly differs there. If those scatter more than noise explains, the blocks have to differ by more
 //! than that (analysis of variance, Fisher's F).
 //!
-//! A line in the place of each constant, beside the windows of the whole record, loses nothing where blocks are hardly longer than these: what a window
-//! takes, every block loses. Its slope over its standard error has one degree of freedom, where eight blocks have seven.
+//! A line in the place of a constant of the motion, beside the windows of the whole record, loses nothing where blocks are hardly longer than
+//! these: what a window takes, every block loses. Its slope over its standard error has one degree of freedom, where eight blocks have seven.
 //!
 //! Where no torque acts the equation is homogeneous: in a free decay, or at rest, it holds for any multiple of the parameters, and least squares finds
 //! the smallest, zero. Parts whose torque is no more than its noise are left out, and of a block the longest run of others stands for it.

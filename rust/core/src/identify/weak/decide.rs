@@ -121,14 +121,15 @@ impl Session<'_, '_, '_> {
         // What is in windows from the beginning is not set free beside itself.
         let changing = self.options.decided.iter().filter(|(_, changes)| *changes).map(|(unknown, _)| *unknown);
         let mut changing = changing.filter(|unknown| !model.windowed.contains(unknown));
-        let mut model = Cow::Borrowed(model);
+        let (mut model, mut is_free) = (Cow::Borrowed(model), false);
         loop {
-            if !decided.slow.is_empty() {
+            if !decided.slow.is_empty() && !std::mem::take(&mut is_free) {
                 self.set_free(rows, &model, &mut decided)?;
             }
             let worst = self.test(rows, &mut decided)?;
             let Some(worst) = changing.next().or(worst) else {
-                if self.set_growing_free(rows, &model, &mut decided)? {
+                is_free = self.set_growing_free(rows, &model, &mut decided)?;
+                if is_free {
                     continue;
                 }
                 break;
@@ -166,9 +167,10 @@ impl Session<'_, '_, '_> {
             equations: 1,
         };
         let mut results = constancy::test(&problem, fit, noise, self.options.instructions, &mut self.stages)?;
-        // What is left beside more than noise may follow a line as well.
+        // Lines are asked only where rows are predicted about as well as noise allows: what a missing term leaves may follow a line, too. And only where
+        // nothing varies slowly: what was taken off for that has errors which a line does not know.
         let differs = results.iter().flatten().any(|test| test.probability < constancy::NO_CHANCE);
-        if !differs && decided.error < BADLY {
+        if !differs && decided.slow.is_empty() && decided.error < BADLY {
             let trends = self.trends(rows, decided, fit)?;
             constancy::beside_lines(&mut results, &trends, noise.from);
         }
@@ -215,7 +217,8 @@ impl Session<'_, '_, '_> {
         let lines: Vec<usize> = (first..first + tested.len()).collect();
         let Some(factors) = judged.factors(&lines, &mut self.stages)? else { return Ok(trends) };
         for (unknown, (growth, error)) in tested.iter().zip(factors) {
-            if let Some(place) = model.constant.iter().position(|one| one == unknown) {
+            let place = model.constant.iter().position(|one| one == unknown);
+            if let Some(place) = place.filter(|_| error > 0.0 && growth.is_finite()) {
                 trends[place] = Some(Trend { value: fit.pooled.values[place], growth, error });
             }
         }
@@ -223,7 +226,7 @@ impl Session<'_, '_, '_> {
     }
 
     /// Sets the constant free that seems to grow most where rows are predicted badly, if that leaves far less: whatever is missing from an equation
-    /// follows a line a little. Returns whether it is free.
+    /// follows a line a little. Returns whether it was.
     fn set_growing_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided) -> Result<bool, Error> {
         let Some(fit) = decided.fit.as_ref().filter(|fit| fit.scale.is_some()) else { return Ok(false) };
         if !decided.slow.is_empty() || decided.error < BADLY {
@@ -237,11 +240,11 @@ impl Session<'_, '_, '_> {
         let mut free = decided.clone();
         free.slow.push(most);
         self.set_free(rows, model, &mut free)?;
-        let is_free = free.fit.is_some() && free.error < FAR_BETTER * decided.error;
-        if is_free {
-            decided.slow.push(most);
+        let is_better = free.fit.is_some() && free.error < FAR_BETTER * decided.error;
+        if is_better {
+            *decided = free;
         }
-        Ok(is_free)
+        Ok(is_better)
     }
 
     /// Sets all that was tested free where one of them changes and yet the rows are predicted badly: a parameter that varies beside one that is held
