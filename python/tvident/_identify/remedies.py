@@ -207,7 +207,7 @@ class Trial:
 
         For where prediction tells nothing: of a short record so little is left beside what is held back that any model predicts it badly.
         """
-        if not (suspects and any(isinstance(kind, str) for kind in self.given.values())):
+        if self._explains_nothing or not (suspects and any(isinstance(kind, str) for kind in self.given.values())):
             return None
         for found in self._each_beside_changes(self._of_constants_alone):
             for one in suspects:
@@ -234,12 +234,16 @@ class Trial:
         may_change = any(found[name] == "varying" and constant[name] != self.given[name] for name in COEFFICIENTS)
         for place, kinds in enumerate([constant, self.given] if may_change else [constant]):
             if place not in self._beside:
-                changed = {one: self._with(call, one) for one in self.suspects}
-                self._beside[place] = {
-                    one: self.identify(**kinds, terms=each["terms"], lag=each["lag"], diagnose=True)
-                    for one, each in changed.items()
-                }
+                tried = {one: self._tried(kinds, self._with(call, one)) for one in self.suspects}
+                self._beside[place] = {one: found for one, found in tried.items() if found is not None}
             yield self._beside[place]
+
+    def _tried(self, kinds: Mapping[str, Any], call: Call) -> Identification | None:
+        """Return what is found with other terms or another lag; None where that cannot be asked of the record."""
+        try:
+            return self.identify(**kinds, terms=call["terms"], lag=call["lag"], diagnose=True)
+        except ValueError:
+            return None
 
     def useless(self) -> tuple[list[str], list[str]]:
         """Return suspects that explain nothing, and constants that were given and predict as well as when they may change.

@@ -35,12 +35,14 @@ def median_of(result: Any, name: str) -> tuple[float, float]:
     """
     one = result.value(name)
     in_common = float(np.asarray(result._found.in_common.get(name, 1.0)))  # noqa: SLF001 - of this room
-    if one.kind != "windowed":
+    length = result.settings["regression_window"]
+    # A record that determines nothing has no windows.
+    if one.kind != "windowed" or isinstance(length, str):
         return one.value, one.stderr
     values, errors = getattr(result, name), result.stderr[name]
     there = np.isfinite(values) & (errors > 0) & np.isfinite(errors)
     some = there & result.trusted if (there & result.trusted).any() else there
-    window = result.settings["regression_window"] / result.settings["step"]
+    window = length / result.settings["step"]
     return one.value, error_of_median(values, np.where(some, errors, np.nan), in_common, window)
 
 
