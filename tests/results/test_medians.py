@@ -101,3 +101,11 @@ def test_of_several_records_each_has_its_own() -> None:
     for record, rig in enumerate(rigs):
         alone = tvident.identify(rig.angle, rig.torque, sample_rate=rig.sample_rate)
         assert median_of(found[record], "stiffness") == pytest.approx(median_of(alone, "stiffness"), rel=1e-9)
+
+
+def test_a_record_that_determines_nothing_has_no_median() -> None:
+    """Its settings have no length of windows, by which an error of a median would count."""
+    draw = np.random.default_rng(0)
+    result = tvident.identify(draw.standard_normal(500), draw.standard_normal(500), sample_rate=100.0)
+    assert result.settings["regression_window"] == "auto"
+    assert np.isnan(median_of(result, "stiffness")).all()
