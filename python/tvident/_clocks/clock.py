@@ -245,18 +245,17 @@ def _smoother(
     clock: Clock, channels: Mapping[str, npt.NDArray[np.number]], quantisation: float | None, workers: int | None
 ) -> tuple[dict[str, float], _core.PassedNoise | None]:
     """Return the variance of every channel's noise in time over that in sample number; and what white noise becomes, if that is all."""
-    grid = clock.grid
-    if grid.places.size < _FEWEST:
+    whole = clock.grid
+    if whole.places.size < _FEWEST:
         return {}, None
-    first = max(0, (grid.places.size - _COMPARED) // 2)
+    first = max(0, (whole.places.size - _COMPARED) // 2)
     part = slice(first, first + _COMPARED)
-    places = grid.places[part] - math.ceil(grid.places[first])
+    places = whole.places[part] - math.ceil(whole.places[first])
     # Over steps that splines do not follow well, too: where these are many nothing else would be left to compare.
-    compared = replace(grid, places=places, samples=math.floor(places[-1]) + 1, bridged=grid.longest)
+    grid = replace(whole, places=places, samples=math.floor(places[-1]) + 1, bridged=whole.longest)
     # Of a short record without gaps that is what is done with all of it.
-    without_gaps = bool(np.diff(places).max() <= min(grid.bridged, grid.longest))
-    is_all = without_gaps and compared.samples == grid.samples and np.array_equal(places, grid.places)
-    grid = compared
+    without_gaps = bool(np.diff(places).max() <= min(whole.bridged, whole.longest))
+    is_all = without_gaps and grid.samples == whole.samples and np.array_equal(places, whole.places)
     channels = {name: values[..., part] for name, values in channels.items()}
     clock, numbers = replace(clock, grid=grid), Clock(grid, "even", 0)
     in_time = clock.evened(channels, propagate=False, workers=workers)

@@ -157,7 +157,7 @@ class Trial:
         # Where a parameter changes constants explain too little to tell what is missing: they take what lets them follow the change.
         # What constants explain down to the noise needs nothing that changes.
         is_settled = of_constants is not None and of_constants.is_settled
-        beside = self._beside_changes(call) if is_changing and not is_settled else None
+        beside = self._beside_changes() if is_changing and not is_settled else None
         if of_constants is None or (beside is not None and of_constants.ratio > _AS_GOOD * beside.ratio):
             return beside
         return of_constants
@@ -184,12 +184,12 @@ class Trial:
             return None
         return self._compared(call, without if is_none else call, chosen)
 
-    def _beside_changes(self, call: Call) -> Remedy | None:
+    def _beside_changes(self) -> Remedy | None:
         """Return which one suspect explains more of what is held back, with parameters as they were asked for.
 
         Each gets lengths of its own: those that were chosen follow what is missing.
         """
-        for found in self._each_beside_changes(call):
+        for found in self._each_beside_changes():
             left_of = {one: self._left_of(result) for one, result in found.items() if _is_there(one, result)}
             best = min(left_of, key=lambda one: left_of[one].ratio, default=None)
             if best is not None and left_of[best].ratio <= _BETTER:
@@ -209,7 +209,7 @@ class Trial:
         """
         if self._explains_nothing or not (suspects and any(isinstance(kind, str) for kind in self.given.values())):
             return None
-        for found in self._each_beside_changes(self._of_constants_alone):
+        for found in self._each_beside_changes():
             for one in suspects:
                 result = found.get(one)
                 if result is None or result.record_status & _LEFT_OVER or not _is_there(one, result):
@@ -223,12 +223,13 @@ class Trial:
                     )
         return None
 
-    def _each_beside_changes(self, call: Call) -> Iterator[dict[str, Identification]]:
+    def _each_beside_changes(self) -> Iterator[dict[str, Identification]]:
         """Yield what each suspect makes of the record: beside constants and stiffness as it was asked for, then as all was asked for.
 
         Inertia and damping that may change take the place of what is missing, so they change beside it only where they were found to,
         and where that explains more.
         """
+        call = self._of_constants_alone
         constant = {name: call[name] if name != "stiffness" else kind for name, kind in self.given.items()}
         found = self.result.settings["kinds"]
         may_change = any(found[name] == "varying" and constant[name] != self.given[name] for name in COEFFICIENTS)
