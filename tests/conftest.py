@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import os
 import signal
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -19,13 +20,25 @@ NO_RECORDINGS, A_MISSING_RECORDING = "no recordings at", "the recording "
 """How tests that need one say why they are skipped."""
 
 
+def is_long(item: pytest.Item, cases: Counter[str]) -> bool:
+    """Tell whether `make test-long` runs this one: it is marked so, or comes after the first cases of its test, of which `cases` counts."""
+    if item.get_closest_marker("long") is not None:
+        return True
+    first = item.get_closest_marker("first")
+    if first is None:
+        return False
+    test = item.nodeid.partition("[")[0]
+    cases[test] += 1
+    return bool(cases[test] > first.args[0])
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out what takes long, or with `TVIDENT_TESTS=long` everything else: each test is run by one of the two."""
     wanted = os.environ.get("TVIDENT_TESTS") == "long"
     parted: dict[bool, list[pytest.Item]] = {True: [], False: []}
+    cases: Counter[str] = Counter()
     for one in items:
-        is_long = one.get_closest_marker("long") is not None
-        parted[is_long == wanted].append(one)
+        parted[is_long(one, cases) == wanted].append(one)
     items[:] = parted[True]
     config.hook.pytest_deselected(items=parted[False])
 

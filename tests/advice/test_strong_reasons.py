@@ -135,6 +135,7 @@ def test_a_second_in_a_quarter_of_an_hour_is_told_of() -> None:
     assert any(one.startswith("orders ") for one in result.reasons)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("step", [1, 7])
 def test_advice_is_on_what_the_mask_leaves(step: int) -> None:
     rig = tvident.simulate_torsional_rig(40.0)
@@ -144,6 +145,7 @@ def test_advice_is_on_what_the_mask_leaves(step: int) -> None:
     assert not any("mask=" in one for one in result.advice)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -181,6 +183,7 @@ def test_a_record_that_the_weak_form_cannot_take_has_a_summary(lacks: str) -> No
     assert result.summary()
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("pattern", ["constant", "slider"])
 def test_swapped_channels_are_asked_about_where_exchanging_them_explains_the_record(pattern: Any) -> None:
     rig = tvident.simulate_torsional_rig(4.0, pattern=pattern)
@@ -193,6 +196,7 @@ def test_swapped_channels_are_asked_about_where_exchanging_them_explains_the_rec
         assert "swapped" not in advice(right)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("form", [calls.paper, calls.strong])
 @pytest.mark.parametrize("end", [3010, 6000])
 def test_nothing_is_said_of_a_model_where_samples_are_missing(form: Any, end: int) -> None:

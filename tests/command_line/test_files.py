@@ -42,6 +42,7 @@ def test_a_joint_of_a_bag_is_all_that_is_named(tmp_path: Path) -> None:
     assert "Missing option '--torque'" in neither.output
 
 
+@pytest.mark.first(1)
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 @pytest.mark.parametrize("write", [recorded_files.mcap, recorded_files.bag])
 def test_the_velocity_of_a_joint_is_used_where_something_measured_it(

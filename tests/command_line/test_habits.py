@@ -157,6 +157,7 @@ def test_a_run_is_repeated_from_its_result_and_from_toml(folder: Path) -> None:
     assert "must hold options of tvident identify, without dashes before them; got 'stifness'; use" in wrong.stderr
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("ending", [".csv", ".xlsx"])
 def test_a_table_is_repeated_from_the_settings_beside_it(folder: Path, ending: str) -> None:
     options = ["--inertia", "0.0123", "--term", "coulomb"]

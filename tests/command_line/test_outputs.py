@@ -259,6 +259,7 @@ def test_long_names_are_written(folder: Path) -> None:
         assert (folder / name).is_file()
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
 def test_a_signal_leaves_no_temporary_file(tmp_path: Path, number: signal.Signals) -> None:
     (tmp_path / "old.csv").write_text("old")

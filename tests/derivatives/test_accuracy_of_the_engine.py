@@ -71,6 +71,7 @@ def window(y: Array, centre: int, half: int = HALF, highest: int = 15) -> tuple[
     return exact(samples.tobytes(), highest), float(np.linalg.norm(samples - samples[half]))
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("kind", ["drift", "offset"])
 def test_coefficients_of_every_order_keep_their_digits(kind: str) -> None:
     """A coefficient shows as what one order more adds: to the value where it is even, to the first derivative where it is odd."""
@@ -95,6 +96,7 @@ def test_coefficients_of_every_order_keep_their_digits(kind: str) -> None:
                 )
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("half", [25, 100, 1000])
 def test_derivatives_of_chosen_orders_have_the_errors_of_their_coefficients(half: int) -> None:
     y = record("drift")
@@ -132,6 +134,7 @@ def test_an_offset_costs_the_acceleration_nothing() -> None:
             )
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("half", [25, 100, 1000])
 def test_residuals_keep_their_digits_where_noise_is_a_millionth(half: int) -> None:
     y = record("quiet")

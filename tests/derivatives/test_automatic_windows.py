@@ -189,6 +189,7 @@ def best_fixed(y: Array, truth: Array, d: int, rate: float, halves: list[int], i
     return min(errors)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("noise", [1e-3, 1e-2, 1e-1, 4096])
 @pytest.mark.parametrize("excitation", ["multisine", "chirp"])
 def test_the_rigs_acceleration_is_as_good_as_the_best_window_and_order(
@@ -234,6 +235,7 @@ def burst(t: Array) -> tuple[Array, Array]:
     return decay * np.sin(10 * t), decay * (10 * np.cos(10 * t) - 1.5 * np.sin(10 * t))
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("signal", "limit"),
     [(two_sines, 0.75), (triangles, 1.1), (growth, 1.25), (burst, 1.0)],
@@ -283,6 +285,7 @@ def test_stairs_of_a_coarse_encoder_are_not_taken_for_signal(seed: int) -> None:
     assert error("auto") < error(201)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("counts", "excitation"), [(128, "multisine"), (256, "multisine"), (256, "chirp")])
 def test_rounding_errors_that_crowd_at_low_frequencies_are_no_signal(counts: int, excitation: Any) -> None:
     """An encoder so coarse that the angle needs ten to twenty samples for a step, beside the best window and order known afterwards."""

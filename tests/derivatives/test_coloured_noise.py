@@ -67,6 +67,7 @@ def best_filter(y: Array, truth: Array, derivative: int) -> float:
     return min(errors)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("colour", ["0.5", "0.8", *long("0.9"), "1/f"])
 @pytest.mark.parametrize("kind", ["sine", *long("several sines"), "constant", "line"])
 def test_no_worse_than_the_best_filter(kind: str, colour: str) -> None:

@@ -247,6 +247,7 @@ def test_what_cannot_be_meant_is_refused(short: tvident.Recording, given: dict[s
         identify(short, **given)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     "others",
     [{}, {"inertia": "constant", "damping": "constant"}, {"method": tvident.WeakForm(regression_window=200)}],
@@ -352,6 +353,7 @@ def test_a_jump_that_functions_of_time_do_not_follow_is_said(seed: int) -> None:
     assert any("windows find a jump of stiffness (at 4" in line and "do not follow" in line for line in result.advice)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("last", "seed"), [(0.15, 2), (0.3, 1), *long((0.15, 1), (0.2, 1), (0.2, 2), (0.3, 2))])
 def test_a_jump_near_the_end_is_said(last: float, seed: int) -> None:
     # 6/x N m/rad.
@@ -361,6 +363,7 @@ def test_a_jump_near_the_end_is_said(last: float, seed: int) -> None:
     assert any("jump" in line or "do not follow" in line for line in result.advice)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("pattern", "seed"),
     [("slider", 3), ("ramp", 3), *long(*((one, seed) for one in ("slider", "ramp") for seed in (4, 5, 6)))],

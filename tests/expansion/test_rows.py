@@ -34,6 +34,7 @@ def of_time(family: str, size: int, samples: int) -> Basis:
     return Basis([Coordinate(places, rates, (0, seconds))], [family_of(family, 3)], [size])
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("role", "parts"), [("inertia", 2), ("damping", 1), ("stiffness", 0)])
 @settings(max_examples=8)
 @given(seed=st.integers(0, 1000), half=st.integers(14, 25), exponent=st.integers(5, 8), size=st.integers(1, 4))

@@ -183,6 +183,7 @@ def test_every_picture_draws_on_axes_of_ones_own(
         result.plot("torque", ax=three)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("what", ["poles", "torque", "scan"])
 def test_panels_inside_of_axes_keep_their_words_apart(result: tvident.Identification, what: Any) -> None:
     for is_free in (False, True):

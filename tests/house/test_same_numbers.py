@@ -99,6 +99,7 @@ WORKS: dict[str, Work] = {
 }
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("name", list(WORKS))
 @settings(max_examples=15)
 @given(

@@ -54,6 +54,7 @@ def scores(spikes: float, size: float, loss: str) -> tuple[Array, Array]:
     return errors, errors / np.concatenate([one.stderr[apart, 1] for one in found])
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("spikes", "size"), [(0.0, 0.0), (0.05, 10.0), (0.2, 10.0), (0.1, 1000.0)])
 def test_spikes_move_parameters_by_little_and_errors_know(spikes: float, size: float) -> None:
     errors, over = scores(spikes, size, "huber")

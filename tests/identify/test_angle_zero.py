@@ -43,6 +43,7 @@ def off(result: tvident.Identification, seed: int, zero: float) -> float:
     return float(abs(value - zero * rig(seed).angle.std()) / error)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("zero", [0.1, -0.3, 3.0])
 def test_the_spring_is_relaxed_at_another_angle(zero: float) -> None:
     for seed in SEEDS:
@@ -56,6 +57,7 @@ def test_the_spring_is_relaxed_at_another_angle(zero: float) -> None:
         assert not result.record_status & (Status.KIND_CONTRADICTED | Status.NOISE_MODEL | Status.SCALES_DISAGREE)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_few_rows_of_many_lead_to_the_same_zero(seed: int) -> None:
     """With little noise test functions are narrow and rows many, of which few compare windows while an angle is only tried."""
@@ -116,6 +118,7 @@ def test_it_is_found_beside_jumps_of_the_stiffness() -> None:
         assert len(result.jumps) == 4
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("pattern", ["slider", "constant"])
 def test_it_is_not_found_where_it_is_not(pattern: Pattern) -> None:
     for seed in SEEDS:

@@ -41,6 +41,7 @@ def grown(value: float, by: float) -> Array:
     return np.asarray(value * (1 + by * TIME / TIME[-1]))
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("kinds", [{}, {"stiffness": "constant"}])
 @pytest.mark.parametrize("seed", [0, *long(1, 2)])
 @pytest.mark.parametrize(
@@ -72,6 +73,7 @@ def test_damping_that_grows_in_four_seconds_is_told_by_a_line(by: float, seed: i
     assert bool(given.record_status & Status.KIND_CONTRADICTED) == bool(by)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("stiffness", ["windowed", "constant"])
 @pytest.mark.parametrize(("name", "by"), [("inertia", 0.05), ("damping", 0.5)])
 def test_a_constant_that_was_given_is_contradicted(name: str, by: float, stiffness: Any) -> None:
@@ -139,6 +141,7 @@ ALIKE = (0.75, 1.6)
 where errors were those of longer windows."""
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [3, 4, *long(5, 6, 7, 8)])
 def test_errors_between_jumps_are_those_of_each_part(seed: int) -> None:
     truth = np.where(TIME < 9.3, INERTIA, INERTIA * 1.2)
@@ -150,6 +153,7 @@ def test_errors_between_jumps_are_those_of_each_part(seed: int) -> None:
         assert ALIKE[0] < np.median(result.stderr["inertia"][part]) / own < ALIKE[1]
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", range(2))
 def test_a_small_jump_of_inertia_is_followed(seed: int) -> None:
     truth = np.where(TIME < 9.3, INERTIA, INERTIA * 1.05)

@@ -123,6 +123,7 @@ def test_one_pulse_that_is_misplaced_at_first_hides_no_other() -> None:
     assert any("for a short while" in reason for reason in result.reasons)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("pattern", "seed"), [("slider", 4), ("square", 0), ("ramp", 2)])
 def test_records_without_events_have_none(pattern: Any, seed: int) -> None:
     # Jumps and bends of the stiffness leave something, too, and so do the steps of an encoder.
@@ -148,6 +149,7 @@ def test_touches_are_said_where_they_are() -> None:
     assert calm.trusted[INSIDE].all()
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("damping", "seed", "named"), [(0.041, 1, True), (0.004, 2, False)])
 def test_a_gain_that_drifts_is_no_change_of_the_machine(damping: float, seed: int, named: bool) -> None:
     rig = tvident.simulate_torsional_rig(20.0, seed=seed, pattern="constant", damping=damping, angle_noise=1e-3)
@@ -164,6 +166,7 @@ def test_a_heavier_machine_is_no_gain_that_drifts() -> None:
     assert not any("by one factor" in advice for advice in result.advice)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("pattern", ["constant", "slider"])
 @pytest.mark.parametrize(("gain", "channel"), [(1.05, "torque"), (1.3, "torque"), (1.3, "angle")])
 def test_a_gain_that_jumps_is_no_change_of_the_machine(gain: float, channel: str, pattern: Pattern) -> None:
@@ -181,6 +184,7 @@ def test_a_gain_that_jumps_is_no_change_of_the_machine(gain: float, channel: str
     assert "errors hold if the model does: see what to do" in result.summary()
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("pattern", ["constant", "slider"])
 def test_an_inertia_that_jumps_is_no_gain_that_jumps(pattern: Pattern) -> None:
     heavier = tvident.simulate_torsional_rig(

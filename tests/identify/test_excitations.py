@@ -51,6 +51,7 @@ def record(drive: str, seed: int, *, damping: float = DAMPING, changes: bool = T
     return angle, torque, stiffness
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("changes", [True, False])
 @pytest.mark.parametrize("drive", ["sweep", "logarithmic sweep", "fades"])
 def test_what_a_few_blocks_tell_is_believed(drive: str, *, changes: bool) -> None:
@@ -66,6 +67,7 @@ def test_what_a_few_blocks_tell_is_believed(drive: str, *, changes: bool) -> Non
     assert np.sqrt(np.mean(np.square(error[found.trusted]))) < 3
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("changes", [True, False])
 @pytest.mark.parametrize(("seed", "damping"), [(100, 0.06), (102, 0.06), (103, 0.06), (100, 0.3)])
 def test_where_no_torque_acts_nothing_is_compared(seed: int, damping: float, *, changes: bool) -> None:
@@ -81,6 +83,7 @@ def test_where_no_torque_acts_nothing_is_compared(seed: int, damping: float, *, 
     assert not given.record_status & Status.KIND_CONTRADICTED
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("damping", [0.06, 0.3])
 def test_where_nothing_moves_nothing_is_told(damping: float) -> None:
     """Where the motion has faded *K* was up to 90 times too large, trusted; elsewhere errors were 1.3 to 3 times too small."""

@@ -27,6 +27,7 @@ def rig(seed: int = 0) -> tvident.Recording:
     return tvident.simulate_torsional_rig(seed=seed, pattern="constant", torque_snr_db=34.0, angle_noise=1e-4)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("cutoff", "order", "lag"), [(20.0, 1, 7.39), (20.0, 2, 11.91), (50.0, 1, 3.11)])
 @pytest.mark.parametrize("channel", ["angle", "torque"])
 def test_what_a_lag_leaves_of_a_filter_is_said_and_within_the_errors(
@@ -62,6 +63,7 @@ def test_what_a_filter_leaves_is_within_the_errors_of_what_seems_to_change(seed:
     assert np.sqrt(np.mean(score**2)) < CLOSE
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("samples", [-8, 2, 20])
 def test_a_lag_alone_leaves_no_filter(samples: int) -> None:
     recording = rig(1)
@@ -75,6 +77,7 @@ def test_a_lag_alone_leaves_no_filter(samples: int) -> None:
     assert result.value("inertia").stderr < 1.1 * alone.value("inertia").stderr
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("samples", [-3, 12])
 def test_a_lag_beside_the_one_that_is_given_is_suspected(samples: int) -> None:
     recording = rig(1)
@@ -89,6 +92,7 @@ def test_a_lag_beside_the_one_that_is_given_is_suspected(samples: int) -> None:
     assert told * RATE == pytest.approx(samples, abs=0.05)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [0, 5])
 def test_a_lag_much_longer_than_the_test_function_is_found(seed: int) -> None:
     recording = tvident.simulate_torsional_rig(seed=seed, pattern="slider", angle_noise=1e-3)
@@ -103,6 +107,7 @@ def test_a_lag_much_longer_than_the_test_function_is_found(seed: int) -> None:
 FORWARDS_AND_BACKWARDS = "seems to be low-passed by a filter that delays nothing"
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [0, 1, *long(2, 3, 4)])
 @pytest.mark.parametrize("pattern", ["slider", "constant"])
 @pytest.mark.parametrize(("cutoff", "order"), [(50.0, 1)])
@@ -122,6 +127,7 @@ def test_a_filter_of_the_angle_without_a_lag_is_said(cutoff: float, order: int, 
     assert alike.value("inertia").value == pytest.approx(np.mean(recording.inertia), rel=5e-3)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("pattern", ["slider", "constant"])
 def test_no_filter_is_said_of_what_was_not_filtered(pattern: Pattern, seed: int) -> None:

@@ -58,6 +58,7 @@ def error(result: tvident.Identification, rig: tvident.Recording, where: Any = s
     return float(np.sqrt(np.nanmean((result.stiffness / rig.stiffness - 1)[where] ** 2)))
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_units_change_nothing_but_the_numbers(rig: tvident.Recording, form: str) -> None:
     plain = identify(rig.angle, rig.torque, form)
@@ -67,6 +68,7 @@ def test_units_change_nothing_but_the_numbers(rig: tvident.Recording, form: str)
     np.testing.assert_array_equal(other.status, plain.status)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_types_of_numbers_are_not_noticed(rig: tvident.Recording, form: str) -> None:
     single = rig.angle.astype(np.float32), rig.torque.astype(np.float32)
@@ -78,6 +80,7 @@ def test_types_of_numbers_are_not_noticed(rig: tvident.Recording, form: str) -> 
     assert error(identify(*whole, form), rig) < LOSS * error(identify(rig.angle, rig.torque, form), rig)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("every", [3000, 500])
 def test_single_missing_samples_cost_little(rig: tvident.Recording, form: str, every: int) -> None:
@@ -105,6 +108,7 @@ def test_gaps_in_a_batch_concern_their_own_record(rig: tvident.Recording, form: 
         assert alone.status[[3250, 5000][place // 2]] & Status.GAP
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("form", FORMS)
 def test_what_becomes_of_missing_values_can_be_chosen(rig: tvident.Recording, form: str) -> None:
     angle = rig.angle.copy()
@@ -121,6 +125,7 @@ def test_what_becomes_of_missing_values_can_be_chosen(rig: tvident.Recording, fo
         identify(angle, rig.torque, form, nan_policy="raise")
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("form", ["auto", "weak", "strong"])
 def test_equations_are_taken_from_inside_the_mask_only(rig: tvident.Recording, form: str) -> None:
     torque = rig.torque.copy()
@@ -163,6 +168,7 @@ def late(torque: Array, samples: float) -> Array:
     return np.asarray(np.fft.irfft(turned)[: torque.size])
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("samples", [0.0, 0.4, 1.0, -2.0, 12.0])
 def test_a_lag_is_found(rig: tvident.Recording, samples: float) -> None:
     result = identify(rig.angle, late(rig.torque, samples), "auto", lag="auto")
@@ -175,6 +181,7 @@ def test_a_lag_is_found(rig: tvident.Recording, samples: float) -> None:
     np.testing.assert_allclose(again.inertia, result.inertia, rtol=UNITS_OF_ROUNDING)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("form", ["auto", "weak", "strong"])
 def test_a_lag_that_is_known_is_taken_off(rig: tvident.Recording, form: str) -> None:
     plain = error(identify(rig.angle, rig.torque, form), rig, slice(600, -600))

@@ -99,6 +99,7 @@ CASES: dict[str, tuple[Any, Any, float, Any, dict[str, float]]] = {
 }
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("name", CASES)
 def test_an_inner_parameter_is_found_within_its_error_and_nothing_else_is_biased(name: str) -> None:
     effect, _, noise, terms, truth = CASES[name]
@@ -120,6 +121,7 @@ def test_an_inner_parameter_is_found_within_its_error_and_nothing_else_is_biased
     assert not any("is not needed" in line for line in result.advice)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("name", CASES)
 def test_what_is_not_there_is_not_believed(name: str) -> None:
     _, nothing, noise, terms, truth = CASES[name]

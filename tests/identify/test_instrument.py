@@ -30,6 +30,7 @@ def records() -> tuple[Array, Array, Array]:
     return closed_loop(SEEDS)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("count", [20, *long(len(SEEDS))], ids="{} records".format)
 @pytest.mark.parametrize("method", ["auto", STRONG], ids=["weak", "strong"])
 def test_estimates_are_right_under_feedback_and_their_errors_hold(
@@ -47,6 +48,7 @@ def test_estimates_are_right_under_feedback_and_their_errors_hold(
     assert least <= np.mean(inside) <= most
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("every", [1, 10])
 @pytest.mark.parametrize("method", ["weak", "strong"])
 def test_other_units_and_rates(records: tuple[Array, Array, Array], method: str, every: int) -> None:
@@ -89,6 +91,7 @@ def is_said(result: Any) -> bool:
     return any("holds the angle's noise" in line and "instrument=" in line for line in result.advice)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("method", ["auto", STRONG], ids=["weak", "strong"])
 @pytest.mark.parametrize("samples", [20_000, 2500])
 def test_feedback_is_said_in_both_forms_and_of_few_samples(

@@ -109,6 +109,7 @@ def test_splines_of_settings_are_taken_and_not_looked_for(monkeypatch: pytest.Mo
     assert again.constants != result.constants
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("jitter", "noise"), [(0.3, (1e-3, 0.1)), (1.0, (1e-2, 0.1))])
 def test_errors_are_those_that_are_told(jitter: float, noise: tuple[float, float]) -> None:
     """Coverage of nominal 95 % intervals over 12 records and 3 constants, which scatters by 3.6 %, and no worse than uniform times."""

@@ -73,6 +73,7 @@ def test_records_of_one_length_stay_a_batch() -> None:
     )
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("stiffness", ["constant", "windowed"])
 def test_what_is_shared_and_the_rest_have_errors_that_hold(stiffness: str) -> None:
     form = tvident.WeakForm(

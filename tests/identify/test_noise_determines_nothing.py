@@ -61,6 +61,7 @@ CALLS: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("call", [*(one for one in CALLS if one != "varying"), *long("varying")])
 @pytest.mark.parametrize("record", RECORDS)
 def test_no_number_comes_from_noise(record: str, call: str) -> None:

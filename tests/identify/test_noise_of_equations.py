@@ -32,6 +32,7 @@ def error(values: Array, true: Array) -> float:
     return float(np.sqrt(np.mean((values / true - 1)[INTERIOR] ** 2)))
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("torque_snr_db", [*long(NOISE_FREE), 80.0])
 @pytest.mark.parametrize("converter", [False, True])
 def test_less_noise_is_never_worse(converter: bool, torque_snr_db: float) -> None:
@@ -60,6 +61,7 @@ def coloured(kind: str, samples: int, seed: int) -> Array:
     return np.asarray(noise / noise.std())
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("kind", ["0.8", "0.95", "pink"])
 def test_coloured_noise_of_the_torque_is_no_change_of_the_parameters(kind: str) -> None:
     within = []
@@ -78,6 +80,7 @@ def test_coloured_noise_of_the_torque_is_no_change_of_the_parameters(kind: str) 
     assert np.mean([one[INTERIOR] for one in within]) > LEAST_COVERAGE
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("kind", "seed"),
     [("0.95", 0), *long(("0.95", 8), ("0.95", 16)), ("pink", 16)],

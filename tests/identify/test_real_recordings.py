@@ -100,6 +100,7 @@ FRICTION: dict[str, Any] = {
 OFFSET = (-3.1648, 0.01)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("form", [weak, paper])
 @pytest.mark.parametrize("window", [None, 21, *long(*range(41, 201, 20)), 201])
 def test_the_positioning_system_in_both_forms(folder_of_recordings: Path, form: Form, window: int | None) -> None:
@@ -112,6 +113,7 @@ def test_the_positioning_system_in_both_forms(folder_of_recordings: Path, form: 
         assert found[name][0] == pytest.approx(published, rel=tolerance), name
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("form", [weak, paper])
 def test_the_mass_of_the_carriage_in_windows(folder_of_recordings: Path, form: Form) -> None:
     position, force = carriage(folder_of_recordings)

@@ -61,6 +61,7 @@ def error(result: tvident.Identification, simulated: tvident.SimulatedRecording)
     return float(np.sqrt(np.mean(away[known] ** 2))), float(inside.mean())
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("loss", LOSSES)
 @pytest.mark.parametrize("seed", [1, *long(2, 3, 4, 5, 6)])
 def test_a_rig_that_lost_samples_is_the_whole_rig(loss: tuple[float, int], seed: int) -> None:
@@ -80,6 +81,7 @@ def test_a_rig_that_lost_samples_is_the_whole_rig(loss: tuple[float, int], seed:
             assert result.trusted.mean() > 0.98
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("loss", LOSSES)
 @pytest.mark.parametrize("seed", [1, *long(2, 3)])
 def test_a_carriage_that_lost_samples_is_the_whole_carriage(

@@ -41,6 +41,7 @@ def hum(recorded: tvident.Recording, part: float = 0.01) -> Array:
     return np.asarray(recorded.angle + part * recorded.angle.std() * wave)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("seed", "angle_noise"), [(0, 1e-3), (1, 1e-2), (2, 1e-1)])
 def test_under_white_noise_the_test_function_of_the_spectra_lies_on_the_plateau(seed: int, angle_noise: float) -> None:
     recorded = rig(seed, angle_noise=angle_noise)
@@ -77,6 +78,7 @@ def test_without_noise_sums_in_place_of_integrals_contradict_nothing(rate: float
     assert (scan.stderr["inertia"] > 1e-8 * recorded.inertia[0]).all()
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_hum_is_left_to_wider_test_functions(seed: int) -> None:
     recorded = rig(seed)
@@ -166,6 +168,7 @@ def test_parts_of_results_have_the_scans_of_the_whole() -> None:
         both.scan(2)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
@@ -318,6 +321,7 @@ def test_a_robot_joint_that_rests(folder_of_recordings: Path) -> None:
     assert 2.3 <= result.constants["coulomb"][0] <= 2.6
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seeds", [range(500, 506), *long(range(500, 540))])
 @pytest.mark.parametrize("duration", [3.0, 5.0])
 def test_a_short_record_is_not_contradicted_by_blocks_that_are_too_few(duration: float, seeds: range) -> None:

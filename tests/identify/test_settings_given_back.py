@@ -154,6 +154,7 @@ def _records() -> dict[str, tuple[Array, Array, dict[str, Any]]]:
     }
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("name", _records())
 def test_a_repeated_call_finds_and_says_the_same(name: str) -> None:
     angle, torque, asked = _records()[name]

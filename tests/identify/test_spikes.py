@@ -89,6 +89,7 @@ def test_where_nothing_takes_them_out_the_summary_says_so() -> None:
     assert not any("neighbours" in line or "hold one and the same value" in line for line in clean.advice)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("channel", ["angle", "torque"])
 @pytest.mark.parametrize(("value", "length"), [(0.0, 1), (0.0, 5), *long((-999.0, 1)), (-999.0, 5)])
 def test_readings_that_failed_count_as_missing(channel: str, value: float, length: int) -> None:

@@ -16,6 +16,7 @@ SCATTER = 0.23
 KINDS = ("inertia", "damping", "stiffness")
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     "call",
     [
@@ -57,6 +58,7 @@ def test_errors_do_not_depend_on_the_way_the_equations_took() -> None:
         assert masked.stderr[name][2000] == pytest.approx(expected, rel=0.1), name
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("pattern", "angle_noise", "least"),
     # On the slider the stiffness bends within a window, and what inertia and stiffness take from each other has longer tails than a

@@ -205,6 +205,7 @@ def test_a_window_of_rows_around_every_sample_shrinks_towards_the_ends() -> None
     assert np.nanmedian(result.stiffness) == pytest.approx(13.0, rel=1e-2)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("workers", [2, 5])
 def test_the_numbers_do_not_depend_on_the_number_of_workers(workers: int) -> None:
     recording = tvident.simulate_torsional_rig(60.0, angle_noise=1e-2)
@@ -285,6 +286,7 @@ def test_equations_count_alike_where_the_noise_model_fails() -> None:
     assert both[0].constants == both[1].constants
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("samples", [16_393, 16_425, 16_440])
 def test_records_that_end_just_behind_a_piece_of_work_are_like_others(samples: int) -> None:
     # Rows are worked on by the 8192, of every second sample with this test function.

@@ -95,6 +95,7 @@ def resonating(seed: int, damping: float, share: float) -> tuple[Array, Array]:
     return angle + 1e-3 * np.std(angle) * noise[0], torque + 1e-2 * np.std(torque) * noise[1]
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("missing", "change", "moved"),
     [
@@ -152,6 +153,7 @@ def test_short_records_that_obey_are_trusted(seed: int) -> None:
     assert "another equation" not in found.summary()
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("seed", "damping", "share"), [(3, 0.01, 0.2), (4, 0.02, 0.3), *long((0, 0.01, 0.2), (7, 0.03, 0.3))]
 )
@@ -166,6 +168,7 @@ def test_a_hardening_spring_of_a_resonating_machine_is_named(seed: int, damping:
     assert found.summary().startswith("do not trust: ")
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_rig_that_obeys_hears_nothing(seed: int) -> None:
     """Nothing is advised where the spring changes and nothing is missing."""

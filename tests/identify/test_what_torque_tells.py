@@ -43,6 +43,7 @@ def identified(
     return tvident.identify(recording.angle if angle is None else angle, torque, sample_rate=RATE, stiffness=kind)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [0, *long(1, 2, 3)])
 @pytest.mark.parametrize("excitation", ["multisine", "random"])
 @pytest.mark.parametrize(
@@ -66,6 +67,7 @@ def test_a_sensor_that_is_not_linear_is_told_with_what_corrects_it(
     assert abs(corrected.value("inertia").value / truth - 1) < LEFT
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [10, *long(*range(11, 20))])
 @pytest.mark.parametrize("pattern", ["slider", "constant"])
 @pytest.mark.parametrize("excitation", ["multisine", "random", "chirp"])
@@ -106,6 +108,7 @@ def coupled(seed: int, resonance: float, *, behind: bool) -> tuple[Array, Array,
     return angles, torques, resonance
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [0, *long(1, 2, 3)])
 @pytest.mark.parametrize("stiffness", ["windowed", "constant"])
 @pytest.mark.parametrize("behind", [True, False])
@@ -128,6 +131,7 @@ def test_a_torque_that_comes_late_is_no_coupling_that_bends() -> None:
     assert not any(BENDS in line for line in result.advice)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("seed", "excitation", "bits"),
     [

@@ -86,6 +86,7 @@ def write(path: str, angle: npt.NDArray[Any], torque: npt.NDArray[Any]) -> str:
     return path
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("ending", "step"), [("npy", 1), ("npy", 7), ("parquet", 3), ("h5", 1), ("zarr", 1), ("csv", 100)]
 )
@@ -134,6 +135,7 @@ def test_missing_samples_leave_other_pieces_as_they_are(rig: tvident.Recording) 
     assert (written["status"][30_000:30_050] & Status.GAP != 0).all()
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("choose", [True, False])
 def test_the_weak_form_finds_what_one_call_in_memory_finds(rig: tvident.Recording, choose: bool) -> None:
     source = write("in.npy", rig.angle, rig.torque)

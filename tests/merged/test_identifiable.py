@@ -52,6 +52,7 @@ def entries(name: str) -> list[str]:
     return [f"{name}_{i}_{j}" for i in range(2) for j in range(2)]
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [1, *long(2, 3, 4)])
 @pytest.mark.parametrize("frequencies", [[[3.0], [3.0]], [[2.0], [5.0]]])
 def test_two_frequencies_do_not_tell_whole_matrices_apart(
@@ -82,6 +83,7 @@ def test_windows_that_one_frequency_moves_are_said_to_be_too_short(monkeypatch: 
         assert "within windows of" in found.identifiable[name].reason
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [1, *long(2, 3, 4)])
 @pytest.mark.parametrize("swing", [0.0, 3.0])
 @pytest.mark.parametrize("frequencies", [[[2.0, 4.0, 7.0]] * 2, [[2.0, 5.0], [3.0, 6.0]]])

@@ -86,6 +86,7 @@ def test_constants_of_a_chain_are_those_of_all_equations_together(seed: int, hal
     np.testing.assert_array_less(np.abs(values - expected), 1e-2 * np.array(errors))
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("masses", "most"), [(2, 0.004), (3, 0.01), *long((6, 0.01))])
 def test_one_spring_of_a_chain_is_followed(masses: int, most: float) -> None:
     rest = [constant(18.0 - 2 * place) for place in range(masses - 1)]
@@ -154,6 +155,7 @@ def test_a_change_is_found_that_makes_all_constants_fail(seed: int) -> None:
     assert not found.record_status & tvident.Status.NOISE_MODEL
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("changes", [True, False])
 def test_masses_respond_as_they_were_simulated(changes: bool) -> None:
     spring = changing if changes else constant(12.0)
@@ -205,6 +207,7 @@ def test_a_force_on_one_mass_is_enough_for_a_chain() -> None:
         assert found.identifiable[name]
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("base", "between", "seed"),
     [
@@ -243,6 +246,7 @@ def test_what_any_multiple_satisfies_is_not_trusted_where_it_is_wrong() -> None:
     assert any("on which no force acts" in line for line in found.advice)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("stepping", [0, 1])
 def test_no_spring_that_changes_is_trusted_as_a_constant_where_a_base_moves_alone(stepping: int) -> None:
     # Of no torque at all weights were those of a torque of 1 N m: 20 to 430 % off, and trusted.

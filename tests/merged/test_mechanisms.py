@@ -42,6 +42,7 @@ def explained(found: Any) -> Any:
     return 1 - left / np.nanvar(recorded, axis=1)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_double_pendulum_has_the_factors_that_it_was_made_with(seed: int) -> None:
     simulated = double_pendulum(6000, seed=seed)

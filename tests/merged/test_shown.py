@@ -39,6 +39,7 @@ def mechanism(step: int = 2) -> Any:
     return identify(one.angle, one.torque, t=one.time, structure=pendulum(), step=step, **FRICTION)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("made", [masses, trials, mechanism])
 def test_what_was_saved_comes_back(made: Any, tmp_path: Path) -> None:
     result = made()
@@ -88,6 +89,7 @@ def test_results_are_drawn() -> None:
     plt.close("all")
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("made", [masses, trials, mechanism])
 def test_a_part_is_that_of_the_whole(made: Any, tmp_path: Path) -> None:
     result = made()

@@ -141,6 +141,7 @@ def test_samples_of_weight_zero_are_missing() -> None:
     np.testing.assert_array_equal(found.stiffness, identify(clean.angle, missing, weights=masked, **OPTIONS).stiffness)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("structure", [True, False])
 def test_weights_of_masses(*, structure: bool) -> None:
     # A spring and dampers of a chain of two, the torques ten times as noisy in half of the record.

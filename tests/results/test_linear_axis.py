@@ -44,6 +44,7 @@ def test_words_are_those_of_the_axis(written: str, said: str) -> None:
     assert in_words_of(UNITS, written) == written
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("lag", [0, 4])
 def test_nothing_is_said_of_angles_where_there_are_none(form: str, lag: int, tmp_path: Path) -> None:

@@ -241,6 +241,7 @@ ALIKE = 1.0
 """Percent of the variance that the same samples may be explained by differently: constants are those of 59 s or of 590 s."""
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("stiffness", ["windowed", "constant"])
 def test_a_long_record_is_told_by_stretches_of_it(stiffness: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     long = tvident.simulate_torsional_rig(660.0, pattern="ramp" if stiffness == "windowed" else "constant", seed=5)

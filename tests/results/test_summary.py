@@ -40,6 +40,7 @@ def followed(result: tvident.Identification, angle: Any, torque: Any) -> tvident
     return found
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [2, 3])
 def test_a_machine_without_spring_is_told_so_and_is_right_when_it_follows(seed: int) -> None:
     angle, velocity, acceleration = motion(seed)
@@ -69,6 +70,7 @@ def test_a_spring_that_is_there_is_kept(folder_of_recordings: Path) -> None:
     assert again.held_back().predicted > result.held_back().predicted
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("late", "word"), [(2, "delayed|late"), (-2, "early")])
 def test_a_lag_is_late_or_early(late: int, word: str) -> None:
     rig = tvident.simulate_torsional_rig(duration=3.0, seed=2, pattern="constant")

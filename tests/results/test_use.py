@@ -61,6 +61,7 @@ def test_between_two_times() -> None:
             RESULT.between(begin, end)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("method", METHODS)
 def test_a_record_of_a_batch_is_what_it_would_be_alone(method: str) -> None:
     options = METHODS[method]
