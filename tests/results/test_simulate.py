@@ -253,7 +253,7 @@ def test_a_long_record_is_told_by_stretches_of_it(stiffness: Any, monkeypatch: p
     # The same samples, held back from a fit to all the others.
     tenth = round(32_768 / 10)
     parts = [(end - 66_000, end - 2 * tenth, end - tenth) for end in range(66_000, 660_001, 66_000)]
-    monkeypatch.setattr("tvident._results.simulated.stretches_of", lambda *_: [])
+    monkeypatch.setattr("tvident._results.simulated.ends_of_stretches", lambda *_: [])
     monkeypatch.setattr("tvident._results.simulated.parts_of", lambda *_: parts)
     result._held_back = None  # noqa: SLF001 - what is tested
     whole = result.held_back()

@@ -22,6 +22,9 @@ _SHARE = 0.1
 _STRETCH, _OF_STRETCH = 1 << 15, 100
 """Samples, and test functions, of a stretch at the end of each part: a record that is twice as long as ten of them is told by these."""
 
+_NEAR = 3
+"""Tenths of a stretch that are identified, of which the middle one is held back: what is farther away says little of it."""
+
 _SUDDEN = 0.1
 """The share of the parts that may hold a sudden change, which no model that was fitted beside it can foresee."""
 
@@ -100,17 +103,23 @@ def parts_of(samples: int, window_length: int, most: int = PARTS) -> list[tuple[
     return [(begin, end - max(1, round(_SHARE * (end - begin))), end) for begin, end in pairwise(ends)]
 
 
-def stretches_of(samples: int, window_length: int) -> list[slice]:
-    """Return the stretches that tell of a long record: the end of each part; none where a record is short."""
-    length = max(_STRETCH, _OF_STRETCH * window_length)
+def stretch_of(window_length: int) -> int:
+    """Return the samples of a stretch at the end of each part of a long record."""
+    return max(_STRETCH, _OF_STRETCH * window_length)
+
+
+def ends_of_stretches(samples: int, window_length: int) -> list[slice]:
+    """Return the last tenths of the stretches that tell of a long record; nothing of a short one."""
+    length = stretch_of(window_length)
     if samples < 2 * PARTS * length:
         return []
-    return [slice(end - length, end) for end in (round(samples * part / PARTS) for part in range(1, PARTS + 1))]
+    ends = (round(samples * part / PARTS) for part in range(1, PARTS + 1))
+    return [slice(end - _NEAR * round(_SHARE * length), end) for end in ends]
 
 
-def part_of_stretch(length: int) -> tuple[int, int, int]:
-    """Return the part of a stretch as :func:`parts_of` does: the last but one tenth, so that both sides are known."""
-    return 0, length - 2 * round(_SHARE * length), length - round(_SHARE * length)
+def held_back_of(samples: int) -> tuple[int, int, int]:
+    """Return what is held back of the last tenths of a stretch, as :func:`parts_of` does: between what is known on both sides."""
+    return 0, samples // _NEAR, samples - samples // _NEAR
 
 
 def responses_of(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any, TypeAlias
 
@@ -15,11 +16,12 @@ from tvident._results.held_back import (
     MORE_PARTS,
     PARTS,
     HeldBack,
+    ends_of_stretches,
+    held_back_of,
     judged,
-    part_of_stretch,
     parts_of,
     responses_of,
-    stretches_of,
+    stretch_of,
 )
 from tvident._results.recorded import Recorded, begins_once, both_or_none, still_there
 from tvident._results.response import Model, accounted_for, every_sample
@@ -31,6 +33,9 @@ Array: TypeAlias = npt.NDArray[np.float64]
 
 POOR = 2.0
 """Beside a gap values count whose errors are up to so many times the usual ones."""
+
+_AT_ONCE = 2
+"""Stretches of a long record that are identified at the same time."""
 
 
 class Simulated:
@@ -201,7 +206,8 @@ class Simulated:
 
         Parameters are identified once more without these samples, with the settings of this result, and interpolated between the others.
         Of a long record (at 1 kHz from 11 minutes on) the same is done in a stretch at the end of every tenth, of 33 s or a hundred test
-        functions; what is not windowed can hardly follow so few of its samples, and is not identified once more.
+        functions, from as many samples on either side as are held back of it; what is not windowed can hardly follow so few, and is not
+        identified once more.
         It is done when it is asked for first, by :meth:`summary` too, and takes about as long as to identify with ``settings=``.
 
         Returns
@@ -246,7 +252,7 @@ class Simulated:
         length = int(np.max(length)) if isinstance(length, list) and length else length
         length = ahead or length
         samples = recorded.angles.shape[-1]
-        some = stretches_of(samples, length) if ahead is None and isinstance(length, int) else []
+        some = ends_of_stretches(samples, length) if ahead is None and isinstance(length, int) else []
         if some and self._is_told_by_stretches:
             found = self._hold_back_of(some, length)
             if not found.why_not:
@@ -272,37 +278,41 @@ class Simulated:
             and "angle_zero" not in self.constants
         )
 
-    def _hold_back_of(self, stretches: list[slice], length: int) -> HeldBack:
-        """Return the same of stretches of a long record. What is not windowed can hardly follow so few samples, and is known."""
+    def _hold_back_of(self, ends: list[slice], length: int) -> HeldBack:
+        """Return the same of ends of stretches of a long record. What is not windowed can hardly follow so few samples, and is known."""
         recorded, model = self._recorded, self._model()
         assert recorded is not None  # noqa: S101 - asked before
-        responses, places = [], []
-        for some in stretches:
-            begin, first, end = part_of_stretch(some.stop - some.start)
-            angle = recorded.angles[some]
+        _, first, end = held_back_of(ends[0].stop - ends[0].start)
+
+        def responses(some: slice) -> list[Array]:
+            rest = self._rest_of_stretch(some, slice(first, end), model)
+            found = responses_of(rest, recorded.angles[some], recorded.torques[some], [(0, first, end)], length)
+            return [response[first:end] for response in found]
+
+        # Of one stretch not all work has several parts.
+        with ThreadPoolExecutor(_AT_ONCE) as pool:
             try:
-                rest = self._rest_of_stretch(some, (first, end), model)
-                found = responses_of(rest, angle, recorded.torques[some], [(begin, first, end)], length)
-                responses.append([response[first:end] for response in found])
+                simulated_and_predicted = map(np.concatenate, zip(*pool.map(responses, ends), strict=True))
             except ValueError as error:
                 # So little of it is there that nothing can be identified, while the whole record tells something.
                 return HeldBack(why_not=str(error))
-            places.append(np.arange(some.start + first, some.start + end))
-        held = places[0].size
-        parts = [(start, start, start + held) for start in range(0, held * len(places), held)]
-        simulated_and_predicted = map(np.concatenate, zip(*responses, strict=True))
-        told = judged(recorded.angles[np.concatenate(places)], simulated_and_predicted, parts)
-        stretch = (stretches[0].stop - stretches[0].start) * model.period
+            finally:
+                pool.shutdown(wait=False, cancel_futures=True)
+        angle = np.concatenate([recorded.angles[some][first:end] for some in ends])
+        held = end - first
+        parts = [(start, start, start + held) for start in range(0, angle.size, held)]
+        told = judged(angle, simulated_and_predicted, parts)
+        stretch = stretch_of(length) * model.period
         return told if told.why_not else replace(told, ahead=length * model.period, stretch=stretch)
 
-    def _rest_of_stretch(self, some: slice, held: tuple[int, int], model: Model) -> Model:
+    def _rest_of_stretch(self, some: slice, held: slice, model: Model) -> Model:
         """Return what is identified of a stretch without what is held back of it: what is windowed, and terms."""
         recorded, kinds = self._recorded, self.settings["kinds"]
         assert recorded is not None and recorded.again_in is not None  # noqa: S101, PT018 - asked before
         if "windowed" not in kinds.values():
             return replace(model, values={name: _within(value, some) for name, value in model.values.items()})
         angle = recorded.angles[some].astype(np.float64)
-        angle[slice(*held)] = np.nan
+        angle[held] = np.nan
         values = {name: model.values[name] for name in COEFFICIENTS if kinds.get(name) != "windowed"}
         known = {name: value if value.size > 1 else float(value[0]) for name, value in values.items()}
         rest = recorded.again_in(angle, some, known)
