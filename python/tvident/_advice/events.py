@@ -142,7 +142,7 @@ def comes_late(found: _core.Identification, defect: tuple[str, str, float], peri
 
 def unexplained_here(found: _core.Identification, period: float, step: int) -> list[str]:
     """Return where more is left than the noise of the rest explains, and what to do there."""
-    flagged = found.status & Status.NOISE_MODEL != 0
+    flagged = found.status & np.uint16(Status.NOISE_MODEL) != 0
     if found.outside_mask is not None or not flagged.any():
         return []
     words = (
@@ -157,7 +157,8 @@ def untold_here(found: _core.Identification, windowed: Sequence[str], period: fl
     """Return where the motion tells nothing of what is windowed, and what to do there."""
     told_apart = np.asarray(found.condition) <= _core.HARDLY_TOLD_APART
     # Of invalid samples, and where nothing is windowed, the flag is the record's.
-    flagged = (found.status & (Status.ILL_CONDITIONED | Status.INVALID) == Status.ILL_CONDITIONED) & told_apart
+    asked = np.uint16(Status.ILL_CONDITIONED | Status.INVALID)
+    flagged = (found.status & asked == Status.ILL_CONDITIONED) & told_apart
     if not (windowed and flagged.any()):
         return []
     words = (

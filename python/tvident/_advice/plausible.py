@@ -122,8 +122,8 @@ class Plausible:
         known = np.isfinite(values) & np.isfinite(errors)
         if not known.any():
             return 0
-        certain = np.where(np.abs(values) > _CERTAIN * errors, np.sign(values), 0.0)[known]
+        certain = known & (np.abs(values) > _CERTAIN * errors)
         for sign in (-1, 1):
-            if float(np.mean(certain == sign)) >= _MOSTLY:
+            if np.count_nonzero(certain & (sign * values > 0)) >= _MOSTLY * np.count_nonzero(known):
                 return sign
         return 0

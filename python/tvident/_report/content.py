@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._choices import VERSION
-from tvident._report.packed import Series
+from tvident._report.packed import Computed, Series
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status, stretches_of
 from tvident._units import in_words_of
 
@@ -187,7 +187,7 @@ class _DrawnSeries:
         result = self.result
         self.rate = float(result.settings["sample_rate"])
         self.start = float(result.time[0]) if result.time.size else 0.0
-        flagged = result.status & _worth_a_look(result) != 0
+        flagged = result.status & np.uint16(_worth_a_look(result)) != 0
         self.shade: int | None = None
         self._flagged = flagged if flagged.any() else None
 
@@ -209,8 +209,7 @@ class _DrawnSeries:
         for one in [*curves, *self.shown.derived()] if curves else []:
             if not np.isfinite(one.values).any():
                 continue
-            with np.errstate(all="ignore"):
-                band = [self._add(one.title, one.unit, one.values + sign * 2 * one.errors) for sign in (-1, 1)]
+            band = [self._add(one.title, one.unit, _sum(one.values, one.errors, by)) for by in (-2, 2)]
             line = self._add(one.title, one.unit, one.values)
             self._draw("Found", one.title, one.unit, line=line, band=band, robust=True)
 
@@ -219,7 +218,8 @@ class _DrawnSeries:
         if not np.isfinite(one.predicted).any():
             return
         unit = unit_of("torque", self.result.units)
-        series = {"recorded": one.recorded, "predicted": one.predicted, "left": one.recorded - one.predicted}
+        left = _sum(one.recorded, one.predicted, -1)
+        series: dict[str, Array | Computed] = {"recorded": one.recorded, "predicted": one.predicted, "left": left}
         numbers = [self._add(name, unit, values, every_sample=True) for name, values in series.items()]
         weak = self.result.settings["form"] == "weak"
         words = f"{one.title}, averaged over the test function" if weak else f"{one.title} and its prediction"
@@ -235,9 +235,10 @@ class _DrawnSeries:
         }
         for name, values in self.shown.quality.items():
             numbers = np.asarray(values)
-            if name == "condition":
+            if name == "condition" and (numbers == 0).any():
                 numbers = np.where(numbers == 0, np.nan, numbers)  # where windows have no equations
-            if np.isfinite(numbers).any() and np.nanmin(numbers) < np.nanmax(numbers):
+            # Nothing is less or greater where there is no number.
+            if numbers.size and np.fmin.reduce(numbers) < np.fmax.reduce(numbers):
                 unit = unit_of(name, self.result.units)
                 self._draw("How well", words[name], unit, line=self._add(name, unit, numbers), robust=name != "order")
 
@@ -250,7 +251,7 @@ class _DrawnSeries:
         if strips:
             self.charts.append({"group": "How well", "title": "Status over time", "unit": "", "strips": strips})
 
-    def _add(self, name: str, unit: str, values: npt.NDArray[Any], *, every_sample: bool = False) -> int:
+    def _add(self, name: str, unit: str, values: npt.NDArray[Any] | Computed, *, every_sample: bool = False) -> int:
         period = (1 if every_sample else int(self.result.settings["step"])) / self.rate
         # What the strong form compares is the torque as it was recorded: a plot may show what another one does.
         for number, one in enumerate(self.series):
@@ -261,6 +262,16 @@ class _DrawnSeries:
 
     def _draw(self, group: str, title: str, unit: str, **what: Any) -> None:
         self.charts.append({"group": group, "title": title, "unit": unit, "shade": self.shade} | what)
+
+
+def _sum(values: Array, others: Array, times: float) -> Computed:
+    """Return values and so many times others beside them."""
+
+    @np.errstate(all="ignore")
+    def part(some: slice) -> Array:
+        return values[some] + times * others[some]
+
+    return Computed(values.size, part)
 
 
 def title_of(name: str) -> str:
@@ -329,7 +340,8 @@ def _worth_a_look(result: ReportedResult) -> int:
 def _flags_over_time(result: ReportedResult) -> dict[Status, npt.NDArray[np.bool_]]:
     """Return where each flag is set, for flags that are set somewhere."""
     occurring = int(np.bitwise_or.reduce(result.status)) if result.status.size else 0
-    return {flag: result.status & flag != 0 for flag in Status if occurring & flag}
+    # NumPy takes a flag for a number of 64 bits.
+    return {flag: result.status & np.uint16(flag) != 0 for flag in Status if occurring & flag}
 
 
 def _warnings(result: ReportedResult, marks: Mapping[Status, npt.NDArray[np.bool_]]) -> list[dict[str, Any]]:

@@ -11,10 +11,9 @@ from __future__ import annotations
 import base64
 import os
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from functools import reduce
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -39,11 +38,11 @@ _SHRINK = 64
 
 _MOST_THREADS = 4
 
-_CHUNK = 4096
-"""Blocks that are worked on together: what they need stays in the cache."""
+_CHUNK = 1 << 16
+"""Samples that are worked on together: what they need stays in the cache."""
 
-_SHORT = 16
-"""Samples of a row."""
+_SHORT = 32
+"""Samples of a row: NumPy looks for the extremes of many rows so short in half of the time if the rows lie side by side."""
 
 _LOOKED_AT = 256
 """Blocks that tell how well a series compresses."""
@@ -53,13 +52,31 @@ _HUGE = 1e300
 
 
 @dataclass(frozen=True)
+class Computed:
+    """Numbers that are computed a part at a time: a whole record of them takes longer to be put somewhere than to be computed.
+
+    Parameters
+    ----------
+    size : int
+    part : callable
+        Gives some of them.
+    """
+
+    size: int
+    part: Callable[[slice], npt.NDArray[Any]]
+
+    def __getitem__(self, some: slice) -> npt.NDArray[Any]:
+        return self.part(some)
+
+
+@dataclass(frozen=True)
 class Series:
     """Numbers at equal distances in time.
 
     Parameters
     ----------
     name, unit : str
-    values : ndarray, shape (n,)
+    values : ndarray, shape (n,), or Computed
         What is not finite is missing.
     start, period : float
         Time of the first number, and from one to the next, in seconds.
@@ -69,7 +86,7 @@ class Series:
 
     name: str
     unit: str
-    values: npt.NDArray[Any]
+    values: npt.NDArray[Any] | Computed
     start: float
     period: float
     is_recorded: bool = False
@@ -101,15 +118,11 @@ def packed(series: Sequence[Series], most_bytes: int = _MOST_BYTES) -> list[Pack
             np.argmax([size if one.is_recorded else _SHRINK * size for one, size in zip(series, sizes, strict=True)])
         )
         # Two numbers stand for four samples at first, and for twice as many each time.
-        merged[largest] = max(4, 2 * merged[largest])
-        sizes[largest] = _size(series[largest], top, merged[largest])
-
-    def work(one: Series, every: int) -> Packed:
-        return _packed(one if every == 1 else _of_extremes(one, every), top, every)
-
+        every = merged[largest] = max(4, 2 * merged[largest])
+        sizes[largest] = _size(series[largest], _some_blocks(series[largest], every), top, every)
     # Nearly all of the work is NumPy's and zlib's, which let other threads run.
     with ThreadPoolExecutor(min(_MOST_THREADS, os.cpu_count() or 1)) as pool:
-        return list(pool.map(work, series, merged))
+        return list(pool.map(_packed, series, [top] * len(sizes), merged))
 
 
 def in_words(parts: Sequence[Packed]) -> str:
@@ -128,15 +141,19 @@ def in_words(parts: Sequence[Packed]) -> str:
 
 def _finest(series: Sequence[Series], most_bytes: int) -> tuple[int, list[float]]:
     """Return the highest level of the most bits that fit, and how many bytes each series takes with them."""
-    found = _sizes(series, _highest(_LEAST_BITS))
+    some = [_some_blocks(one, 1) for one in series]
+
+    def sizes(bits: int) -> list[float]:
+        return [_size(one, blocks, _highest(bits), 1) for one, blocks in zip(series, some, strict=True)]
+
+    found = sizes(_LEAST_BITS)
     if sum(found) > most_bytes:
         return _highest(_LEAST_BITS), found
     fit, too_many = _LEAST_BITS, _MOST_BITS + 1
     while too_many - fit > 1:
         bits = (fit + too_many) // 2
-        sizes = _sizes(series, _highest(bits))
-        if sum(sizes) <= most_bytes:
-            fit, found = bits, sizes
+        if sum(larger := sizes(bits)) <= most_bytes:
+            fit, found = bits, larger
         else:
             too_many = bits
     return _highest(fit), found
@@ -146,62 +163,72 @@ def _highest(bits: int) -> int:
     return (1 << bits) - 2
 
 
-def _sizes(series: Sequence[Series], top: int) -> list[float]:
-    return [_size(one, top, 1) for one in series]
+def _count(series: Series, merged: int) -> int:
+    """Return the numbers of a series: its samples, or the extremes of so many."""
+    return series.values.size if merged == 1 else 2 * -(-series.values.size // merged)
 
 
-def _size(series: Series, top: int, merged: int) -> float:
-    """Return the bytes that a series takes, packed as it is or by the extremes of so many samples."""
-    count = series.values.size if merged == 1 else 2 * -(-series.values.size // merged)
-    return count * (_bits(series, top, merged) / 8 + 8 / BLOCK)
+def _size(series: Series, some: Array, top: int, merged: int) -> float:
+    """Return the bytes that a series takes, packed as it is or by the extremes of so many samples; some blocks tell."""
+    levels = _levels(some, top)[2]
+    bits = min(_entropy(levels), _entropy(_differences(levels)))
+    return _count(series, merged) * (bits / 8 + 8 / BLOCK)
 
 
-def _of_extremes(series: Series, every: int) -> Series:
-    """Return the least and the greatest of every so many samples, in turns."""
-    count = -(-series.values.size // every)
-    whole = np.full(count * every, np.nan)
-    whole[: series.values.size] = series.values
-    return replace(series, values=_extremes(whole, every), period=series.period * every / 2)
+def _width(merged: int) -> int:
+    """Return the samples that a block stands for."""
+    return BLOCK if merged == 1 else BLOCK // 2 * merged
 
 
-def _extremes(values: npt.NDArray[Any], every: int) -> Array:
-    """Return the least and the greatest of every so many numbers, in turns."""
-    rows = values.reshape(-1, every)
-    pairs = np.empty((len(rows), 2))
-    for first in range(0, len(rows), _CHUNK):
-        some = rows[first : first + _CHUNK]
-        for end, extreme in enumerate((np.fmin, np.fmax)):
-            # Of short rows column after column: NumPy reduces a row of four in ten times the time.
-            pairs[first : first + _CHUNK, end] = (
-                reduce(extreme, some.T) if every <= _SHORT else extreme.reduce(some, axis=1)
-            )
-    return pairs.ravel()
+def _some_blocks(series: Series, merged: int) -> Array:
+    """Return blocks that tell how well a series compresses."""
+    width = _width(merged)
+    whole = max(1, series.values.size // width)
+    chosen = range(0, whole, max(1, whole // _LOOKED_AT))
+    samples = np.concatenate([_samples(series, width * one, width) for one in chosen])
+    return _blocks(samples, merged)
 
 
-def _blocks(series: Series, first: int, last: int) -> Array:
-    """Return some blocks as rows; missing numbers are NaN, and so is what the last block lacks."""
-    samples = series.values[first * BLOCK : last * BLOCK].astype(np.float64)
-    lacking = (last - first) * BLOCK - samples.size
-    if lacking:
-        samples = np.append(samples, np.full(lacking, np.nan))
-    return _without_huge(samples.reshape(-1, BLOCK))
+def _samples(series: Series, first: int, count: int) -> Array:
+    """Return some samples; those behind the end are NaN."""
+    samples = np.asarray(series.values[first : first + count], np.float64)
+    lacking = count - samples.size
+    return np.append(samples, np.full(lacking, np.nan)) if lacking else samples
 
 
-def _without_huge(samples: Array) -> Array:
-    samples[~(np.abs(samples) < _HUGE)] = np.nan
-    return samples
+def _blocks(samples: Array, merged: int) -> Array:
+    """Return samples as blocks, or their extremes: the least and the greatest of every so many, in turns."""
+    if merged == 1:
+        return samples.reshape(-1, BLOCK)
+    low, high, _ = _extremes(samples.reshape(-1, merged))
+    return np.stack([low, high], axis=1).reshape(-1, BLOCK)
 
 
-def _levels(rows: Array, low: Array, high: Array, top: int) -> npt.NDArray[Any]:
-    """Return where samples lie between the extremes of their block."""
+def _extremes(rows: Array) -> tuple[Array, Array, Array]:
+    """Return the least and the greatest of every row, and the rows with NaN where something is missing or beyond what is shown."""
+    table, axis = (np.ascontiguousarray(rows.T), 0) if rows.shape[1] <= _SHORT else (rows, 1)
+    low, high = table.min(axis=axis), table.max(axis=axis)
+    if not (low.min() > -_HUGE and high.max() < _HUGE):
+        table = np.where(np.abs(table) < _HUGE, table, np.nan)
+        rows = table if axis == 1 else table.T
+        low, high = np.fmin.reduce(table, axis=axis), np.fmax.reduce(table, axis=axis)
+    return low, high, rows
+
+
+def _levels(blocks: Array, top: int) -> tuple[Array, Array, npt.NDArray[Any]]:
+    """Return the extremes of every block, and where its samples lie between them."""
+    low, high, rows = _extremes(blocks)
     reach = high - low
-    scale = np.divide(top, reach, out=np.zeros_like(reach), where=reach > 0)
     with np.errstate(over="ignore", invalid="ignore"):
-        levels = (rows - low[:, np.newaxis]) * scale[:, np.newaxis] + 0.5
-    missing = np.isnan(levels)
-    if missing.any():
+        scale = np.divide(top, reach, out=np.zeros_like(reach), where=reach > 0)
+        levels = rows - low[:, np.newaxis]
+        levels *= scale[:, np.newaxis]
+        levels += 0.5
+    if rows is not blocks or not np.isfinite(scale).all():
+        missing = np.isnan(levels)
         levels[missing] = top + 1
-    return np.minimum(levels, top + 1, out=levels).astype(_kind(top))
+        np.minimum(levels, top + 1, out=levels)
+    return low, high, levels.astype(_kind(top))
 
 
 def _kind(top: int) -> type[np.unsignedinteger[Any]]:
@@ -212,26 +239,6 @@ def _differences(levels: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """Return levels less those before, as numbers without sign do."""
     flat = levels.ravel()
     return np.concatenate([flat[:1], flat[1:] - flat[:-1]])
-
-
-def _bits(series: Series, top: int, merged: int) -> float:
-    """Return the bits that a number takes, from some blocks."""
-    width = BLOCK if merged == 1 else BLOCK // 2 * merged
-    whole = series.values[: series.values.size // width * width].reshape(-1, width)
-    if not whole.size:  # less than a block
-        whole = np.full((1, width), np.nan)
-        whole[0, : series.values.size] = series.values
-    looked_at = np.array(whole[:: max(1, len(whole) // _LOOKED_AT)], np.float64)
-    rows = looked_at if merged == 1 else _extremes(looked_at, merged).reshape(-1, BLOCK)
-    levels = _found_levels(_without_huge(rows), top)[2]
-    return min(_entropy(levels), _entropy(_differences(levels)))
-
-
-def _found_levels(rows: Array, top: int) -> tuple[Array, Array, npt.NDArray[Any]]:
-    low, high = np.min(rows, axis=1), np.max(rows, axis=1)
-    if np.isnan(low).any():
-        low, high = np.fmin.reduce(rows, axis=1), np.fmax.reduce(rows, axis=1)
-    return low, high, _levels(rows, low, high, top)
 
 
 def _entropy(levels: npt.NDArray[Any]) -> float:
@@ -246,31 +253,30 @@ def _entropy(levels: npt.NDArray[Any]) -> float:
 
 
 def _packed(series: Series, top: int, merged: int) -> Packed:
-    count = -(-series.values.size // BLOCK)
-    kind = _kind(top)
-    low, high, levels = np.empty(count), np.empty(count), np.empty(count * BLOCK, kind)
-    for first in range(0, count, _CHUNK):
-        last = min(count, first + _CHUNK)
-        least, most, inside = _found_levels(_blocks(series, first, last), top)
-        low[first:last], high[first:last] = least, most
-        levels[first * BLOCK : last * BLOCK] = inside.ravel()
+    numbers, width = _count(series, merged), _width(merged)
+    count = -(-numbers // BLOCK)
+    low, high, levels = np.empty(count), np.empty(count), np.empty((count, BLOCK), _kind(top))
+    together = max(1, _CHUNK // width)
+    for first in range(0, count, together):
+        some = slice(first, min(count, first + together))
+        samples = _samples(series, width * first, width * (some.stop - first))
+        low[some], high[some], levels[some] = _levels(_blocks(samples, merged), top)
     # Single precision is enough for a distance from the middle, whatever the offset and the size.
     there = np.isfinite(low)
     bottom, ceiling = (float(low[there].min()), float(high[there].max())) if there.any() else (0.0, 0.0)
     middle, factor = bottom / 2 + ceiling / 2, (ceiling / 2 - bottom / 2) or 1.0
     extremes = (np.concatenate([low, high]) - middle) / factor
-    some = levels.reshape(-1, BLOCK)[:: max(1, count // _LOOKED_AT)]
-    by_difference = count > 0 and _entropy(_differences(some)) < _entropy(some)
-    if by_difference:
-        levels = _differences(levels)
+    seen = levels[:: max(1, count // _LOOKED_AT)]
+    by_difference = count > 0 and _entropy(_differences(seen)) < _entropy(seen)
+    flat = _differences(levels) if by_difference else levels.ravel()
     # Low bytes and high bytes apart: the high ones hardly change.
-    planes = np.ascontiguousarray(levels.view(np.uint8).reshape(levels.size, -1).T)
+    planes = np.ascontiguousarray(flat.view(np.uint8).reshape(flat.size, -1).T)
     about = {
         "name": series.name,
         "unit": series.unit,
         "start": series.start,
-        "period": series.period,
-        "count": series.values.size,
+        "period": series.period if merged == 1 else series.period * merged / 2,
+        "count": numbers,
         "merged": merged,
         "block": BLOCK,
         "top": top,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -37,16 +38,21 @@ def report(
     shown: list[_report.Series] = []
     compared: list[_report.Compared] = []
     share = None
-    if recorded is not None and recorded.is_unchanged:
+    with ThreadPoolExecutor(1) as beside:
+        is_there = recorded is not None and recorded.is_unchanged
+        prediction = beside.submit(result.predicted_torque) if is_there else None
+        # Both may take as long as to identify: here they can be interrupted.
+        result.held_back()
+        _ = result.advice
+    if recorded is not None and prediction is not None:
         angle, torque = _report.names_of_channels(result.units)
-        _, *torques = result.predicted_torque()
+        _, *torques = prediction.result()
         compared = [_report.Compared(torque, *torques)]
         share = share_of(*torques)
         shown = [
             _report.series_of(result, name, of, values)
             for name, of, values in ((angle, "angle", recorded.given[0]), (torque, "torque", recorded.given[1]))
         ]
-    result.held_back()  # as long as to identify: here it can be interrupted
     page = _report.ShownResult(
         result,
         values={name: getattr(result, name) for name in COEFFICIENTS} | result.terms,

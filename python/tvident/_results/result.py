@@ -153,7 +153,8 @@ class Identification(Shown):
         docs/statuses.md, which is tested against this rule.
         """
         records = np.asarray(self.record_status)[..., np.newaxis]
-        trusted = (self.status & DOUBTFUL == 0) & (records & DOUBTFUL_RECORD == 0)
+        # NumPy takes a flag for a number of 64 bits.
+        trusted = (self.status & np.uint16(DOUBTFUL) == 0) & (records & DOUBTFUL_RECORD == 0)
         for values in (self.inertia, self.damping, self.stiffness, *self.terms.values()):
             trusted &= np.isfinite(values)
         return np.asarray(trusted)

@@ -157,7 +157,8 @@ def why_not(result: Any, sign: Callable[[], str | None], share: Callable[[], flo
 def negative(value: Any, error: Any) -> str | None:
     """Return how often something is negative that never is, in words; None where that may be chance."""
     there = np.isfinite(value) & np.isfinite(error)
-    below = float(np.mean(value[there] < -_BEYOND * error[there])) if there.any() else 0.0
+    count = int(np.count_nonzero(there))
+    below = np.count_nonzero(there & (value < -_BEYOND * error)) / count if count else 0.0
     if below <= _OFTEN:
         return None
     return "is negative" + ("" if below > 1 - _OFTEN else f" in {below:.0%} of the record")

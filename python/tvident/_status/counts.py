@@ -14,9 +14,9 @@ def describe(status: npt.NDArray[Any], record_status: npt.ArrayLike = 0) -> list
     """Return a line for every flag that occurs: how often, and what it means; then the names of those of the records."""
     if not status.size:
         return ["no samples"]
-    lines = [f"{float(np.mean(status == 0)):6.1%}  good"]
+    lines = [f"{np.count_nonzero(status == 0) / status.size:6.1%}  good"]
     there = int(np.bitwise_or.reduce(status, axis=None))
-    shares = {flag: float(np.mean(status & flag != 0)) for flag in Status if there & flag}
+    shares = {flag: np.count_nonzero(status & np.uint16(flag)) / status.size for flag in Status if there & flag}
     lines += [f"{share:6.1%}  {flag.name}: {flag.advice}" for flag, share in shares.items()]
     records = np.atleast_1d(np.asarray(record_status))
     counts = {flag: int(np.count_nonzero(records & flag)) for flag in Status}

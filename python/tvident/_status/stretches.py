@@ -17,5 +17,9 @@ def stretches_of(flag: npt.NDArray[np.bool_]) -> tuple[npt.NDArray[np.intp], npt
     >>> first.tolist(), end.tolist()
     ([0, 2], [1, 4])
     """
-    edges: Any = np.flatnonzero(np.diff(flag.astype(np.int8), prepend=0, append=0))
+    edges: Any = np.flatnonzero(flag[1:] != flag[:-1]) + 1
+    if flag.size and flag[0]:
+        edges = np.append(0, edges)
+    if flag.size and flag[-1]:
+        edges = np.append(edges, flag.size)
     return edges[::2], edges[1::2]
