@@ -182,8 +182,8 @@ class Told:
 
     def _inertias(self) -> list[float]:
         """Return the usual inertia of every record over the square of the sample period; 0 where none was found."""
-        found = self.batch.values["inertia"].reshape(self.data.records, -1) / self.data.period**2
-        medians = [percentiles(one[np.isfinite(one)], 50)[0] for one in found]
+        found = self.batch.values["inertia"].reshape(self.data.records, -1)
+        medians = [percentiles(one[np.isfinite(one)], 50)[0] / self.data.period**2 for one in found]
         return [0.0 if np.isnan(one) else one for one in medians]
 
     def _of_strong_form(self, settings: Mapping[str, Any]) -> ExplainedStrong:

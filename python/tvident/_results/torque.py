@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from tvident._derivatives import fit_local_polynomials
 from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET
-from tvident._results.response import Model, every_sample, without_gaps
+from tvident._results.response import Model, without_gaps
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -51,25 +51,38 @@ def compared(
         smooth, velocity, acceleration = np.asarray(fit.derivatives, np.float64)
         # Rows of the strong form need whole windows: off their centres, and across what is missing, derivatives are no measurement.
         touched = touched_by(~np.isfinite(angle), settings["window_length"] // 2)
-        predicted = _sum(model, (smooth, velocity, acceleration), lambda values: values, (smooth, velocity))
-        return on_time, np.where(touched, np.nan, predicted)
+        motion = dict(zip(COEFFICIENTS, (acceleration, velocity, smooth), strict=True))
+        predicted = _added(np.zeros(angle.size), model, motion, lambda values: values, (smooth, velocity))
+        predicted[touched] = np.nan
+        return on_time, predicted
     half = settings["window_length"] // 2
     kernels = kernels_of(half, settings["exponent"], model.period)
     missing = ~(np.isfinite(angle) & np.isfinite(on_time))
     touched = touched_by(missing, half)
-    filled = np.where(missing, 0.0, angle)
-    acceleration, velocity, smooth = correlated_with(filled, kernels)
+    filled: Array = np.asarray(angle, np.float64)
+    if missing.any():
+        filled, on_time = (np.where(missing, 0.0, one) for one in (filled, on_time))
+    # What is constant has one kernel together.
+    constant, changing = np.zeros((1, kernels.shape[1])), {}
+    for name, kernel in zip(COEFFICIENTS, kernels, strict=True):
+        if model.values[name].size == 1:
+            constant += model.values[name].item() * kernel
+        else:
+            changing[name] = kernel
+    together, *averages = correlated_with(filled, np.stack([*constant, *changing.values()]))
     # Terms are functions of the motion at the samples: an average of the angle, cubed, is no average of its cube.
     is_curved = bool(set(model.values) - {*COEFFICIENTS, OFFSET})
-    at_samples = _at_samples(filled, half, model.period) if is_curved else (smooth, velocity)
-    predicted = _sum(
+    predicted = _added(
+        together,
         model,
-        (smooth, velocity, acceleration),
+        dict(zip(changing, averages, strict=True)),
         lambda values: correlated_with(values, kernels[2:])[0],
-        at_samples,
+        _at_samples(filled, half, model.period) if is_curved else (filled, filled),
     )
-    (measured,) = correlated_with(np.where(missing, 0.0, on_time), kernels[2:])
-    return np.where(touched, np.nan, measured), np.where(touched, np.nan, predicted)
+    (measured,) = correlated_with(on_time, kernels[2:])
+    for one in (measured, predicted):
+        one[touched] = np.nan
+    return measured, predicted
 
 
 def _at_samples(angle: Array, half: int, period: float) -> tuple[Array, Array]:
@@ -79,33 +92,32 @@ def _at_samples(angle: Array, half: int, period: float) -> tuple[Array, Array]:
     return smooth, velocity
 
 
-def _sum(
+def _added(
+    total: Array,
     model: Model,
-    motion: tuple[Array, Array, Array],
+    motion: Mapping[str, Array],
     averaged: Callable[[Array], Array],
     at_samples: tuple[Array, Array],
 ) -> Array:
-    """Return the left-hand side of the equation of motion; terms are averages of functions of the motion at the samples."""
-    angle, velocity, acceleration = motion
-    known = {"inertia": acceleration, "damping": velocity, "stiffness": angle}
-    total = np.zeros(angle.size)
+    """Add to a part of the equation's left-hand side what changes with the motion, and terms: averages of functions at the samples."""
     for name, factor in model.values.items():
+        if name in COEFFICIENTS and name not in motion:
+            continue
         if name == OFFSET:
             regressor = np.ones(1)
-        elif name in known:
-            regressor = known[name]
+        elif name in motion:
+            regressor = motion[name]
         elif name in model.own:
             regressor = _where_known(
-                np.asarray(model.own[name].values(_times(model, angle.size), *(one.copy() for one in at_samples))),
+                np.asarray(model.own[name].values(_times(model, total.size), *(one.copy() for one in at_samples))),
                 averaged,
             )
         else:
             inner = model.stribeck[:1] if BUILT_IN[name].inner else ()
             regressor = averaged(BUILT_IN[name].function(np, *at_samples, *inner))
-        factors = np.broadcast_to(every_sample(factor, angle.size, 1), angle.shape)
-        regressors = np.broadcast_to(regressor, angle.shape)
+        factors, regressors = (np.broadcast_to(one, total.shape) for one in (factor, regressor))
         # Products of a whole record take longer to be put somewhere than to be computed.
-        for first in range(0, angle.size, _BLOCK):
+        for first in range(0, total.size, _BLOCK):
             some = slice(first, first + _BLOCK)
             total[some] += factors[some] * regressors[some]
     return total
@@ -156,9 +168,8 @@ def correlated_with(values: Array, kernels: Array) -> Array:
     length = max(_BLOCK, 1 << (4 * width).bit_length())
     reach = length - width + 1
     spectra = np.fft.rfft(kernels[:, ::-1], length)
-    centred = values - mean
     for first in range(0, values.size - width + 1, reach):
-        piece = centred[first : first + length]
+        piece = values[first : first + length] - mean
         found = np.fft.irfft(np.fft.rfft(piece, length) * spectra, length)[:, width - 1 : piece.size]
         place = first + width // 2
         result[:, place : place + found.shape[1]] = found + sums
