@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvident._arguments import percentiles
+from tvident._arguments import percentiles, told_once
 
 
 @pytest.mark.parametrize("count", [1, 2, 9, 1000])
@@ -37,3 +37,10 @@ def test_numbers_that_are_all_alike_are_their_percentiles() -> None:
 
 def test_no_numbers_have_none() -> None:
     assert np.isnan(percentiles(np.empty(0), 5, 50)).all()
+
+
+def test_one_number_for_all_samples_is_told_once() -> None:
+    one = np.broadcast_to(np.array([[1.0], [2.0]]), (2, 500))
+    assert told_once(one).tolist() == [[1.0], [2.0]]
+    every = np.ones((2, 500))
+    assert told_once(every) is every

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from tvident._arguments import told_once
 from tvident._results import Estimates, Words
 from tvident._units import ROTARY, Axis
 
@@ -114,7 +115,7 @@ class Plausible:
             return 0
         count = found.status.shape[-1]
         values, errors = (
-            np.broadcast_to(of[name], found.status.shape).reshape(-1, count)[record]
+            told_once(np.broadcast_to(of[name], found.status.shape).reshape(-1, count)[record])
             for of in (found.values, found.errors)
         )
         if name in found.factors:

@@ -16,7 +16,7 @@ from tvident._arguments.numbers import (
     whole_number,
 )
 from tvident._arguments.progress import Progress, reporter
-from tvident._arguments.ranges import percentiles
+from tvident._arguments.ranges import percentiles, told_once
 from tvident._arguments.sampling import check_power, check_window, length_given, sample_period, seconds, window_length
 from tvident._arguments.shown import nearest, shown
 from tvident._arguments.times import (
@@ -81,6 +81,7 @@ __all__ = [
     "time_axis",
     "times_of",
     "to_digits_of",
+    "told_once",
     "unwrapped",
     "weights",
     "whole_number",

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from tvident._arguments import told_once
 from tvident._results.curve import ExpandedParameter
 from tvident._results.estimates import Estimates
 from tvident._results.held_back import HeldBack
@@ -28,7 +29,7 @@ Array: TypeAlias = npt.NDArray[np.float64]
 @np.errstate(all="ignore")
 def _product(factor: Array, error: Array) -> Array:
     """Return standard errors times their variance-inflation factor."""
-    return np.asarray(factor * error)
+    return np.broadcast_to(factor * told_once(error), error.shape)
 
 
 class Identification(Shown):
@@ -156,7 +157,7 @@ class Identification(Shown):
         # NumPy takes a flag for a number of 64 bits.
         trusted = (self.status & np.uint16(DOUBTFUL) == 0) & (records & DOUBTFUL_RECORD == 0)
         for values in (self.inertia, self.damping, self.stiffness, *self.terms.values()):
-            trusted &= np.isfinite(values)
+            trusted &= np.isfinite(told_once(values))
         return np.asarray(trusted)
 
     @property

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tvident._arguments import own_digits, percentiles, to_digits_of
+from tvident._arguments import own_digits, percentiles, to_digits_of, told_once
 from tvident._files import aligned
 from tvident._results.verdict import CHANGING, verdict
 from tvident._status import describe
@@ -73,7 +73,7 @@ def row_of(
     name: str, kind: str, value: npt.NDArray[Any], error: npt.NDArray[Any], units: Mapping[str, str]
 ) -> tuple[str, ...]:
     """Return the cells of a parameter: median, range where it changes, and median standard error."""
-    finite, error = value[np.isfinite(value)], error[np.isfinite(error)]
+    finite, error = (one[np.isfinite(one)] for one in (told_once(value), told_once(error)))
     numbers = percentiles(finite, 50, 5, 95)
     (middle,) = percentiles(error, 50)
     shown = [to_digits_of(number, middle) for number in numbers]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tvident._arguments import explained_in_words, percent, percentiles, to_digits_of
+from tvident._arguments import explained_in_words, percent, percentiles, to_digits_of, told_once
 from tvident._results.words import BECOMES, OTHER_UNIT, TRIED
 from tvident._status import Status
 from tvident._units import in_words_of
@@ -156,6 +156,7 @@ def why_not(result: Any, sign: Callable[[], str | None], share: Callable[[], flo
 
 def negative(value: Any, error: Any) -> str | None:
     """Return how often something is negative that never is, in words; None where that may be chance."""
+    value, error = told_once(value), told_once(error)
     there = np.isfinite(value) & np.isfinite(error)
     count = int(np.count_nonzero(there))
     below = np.count_nonzero(there & (value < -_BEYOND * error)) / count if count else 0.0
@@ -181,12 +182,12 @@ def _sign(result: Any, name: str) -> str | None:
 
 def _errors(result: Any) -> str:
     """Return how well every unknown parameter is known, relative to itself."""
-    found = []
+    found, trusted = [], result.trusted
     for name, symbol in _SYMBOLS.items():
         kind = result.settings["kinds"][name]
         if kind == "known":
             continue
-        relative = relative_error(getattr(result, name), result.stderr[name], result.trusted)
+        relative = relative_error(getattr(result, name), result.stderr[name], trusted)
         if relative is not None:
             found.append((f"{symbol}(t)" if kind in CHANGING else symbol, relative))
     return known_to(found)
@@ -194,6 +195,9 @@ def _errors(result: Any) -> str:
 
 def relative_error(value: Any, error: Any, trusted: Any) -> float | None:
     """Return the median error of something over its median size, of several records the median of that; None where nothing is trusted."""
+    once = told_once(value), told_once(error)
+    if all(one.shape[-1:] == (1,) for one in once):
+        value, error, trusted = *once, trusted.any(axis=-1, keepdims=True)
     there = np.isfinite(value) & np.isfinite(error) & trusted
     if not there.any():
         return None
