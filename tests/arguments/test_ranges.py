@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvident._arguments import percentiles, told_once
+from tvident._arguments import finite, percentiles, told_once
 
 
 @pytest.mark.parametrize("count", [1, 2, 9, 1000])
@@ -44,3 +44,11 @@ def test_one_number_for_all_samples_is_told_once() -> None:
     assert told_once(one).tolist() == [[1.0], [2.0]]
     every = np.ones((2, 500))
     assert told_once(every) is every
+
+
+@pytest.mark.parametrize("lacking", [[], [0, 1, 99], [0, 50], list(range(100))])
+def test_finite_numbers_are_those_that_are_there(lacking: list[int]) -> None:
+    values = np.arange(100.0)
+    values[lacking] = np.nan
+    assert finite(values).tolist() == values[np.isfinite(values)].tolist()
+    assert np.shares_memory(finite(values), values) == (50 not in lacking)

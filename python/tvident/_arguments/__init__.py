@@ -16,7 +16,7 @@ from tvident._arguments.numbers import (
     whole_number,
 )
 from tvident._arguments.progress import Progress, reporter
-from tvident._arguments.ranges import percentiles, told_once
+from tvident._arguments.ranges import finite, percentiles, told_once
 from tvident._arguments.sampling import check_power, check_window, length_given, sample_period, seconds, window_length
 from tvident._arguments.shown import nearest, shown
 from tvident._arguments.times import (
@@ -53,6 +53,7 @@ __all__ = [
     "clock_changed",
     "explained_in_words",
     "fields_of",
+    "finite",
     "finite_number",
     "flag",
     "implied_times",

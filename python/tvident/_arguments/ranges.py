@@ -31,6 +31,16 @@ def told_once(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return values if values.ndim == 0 or values.strides[-1] else values[..., :1]
 
 
+def finite(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return the finite numbers of an array; without a copy where only the ends of a record have none."""
+    there = np.isfinite(values)
+    if values.ndim == 1 and there.any():
+        inner = slice(int(there.argmax()), there.size - int(there[::-1].argmax()))
+        if there[inner].all():
+            return np.asarray(values[inner])
+    return np.asarray(values[there])
+
+
 def percentiles(values: Numbers, *shares: float) -> list[float]:
     """Return percentiles of finite numbers, of which 50 is the median; NaN where there is no number."""
     if not values.size:

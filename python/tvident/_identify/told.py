@@ -22,7 +22,7 @@ from tvident._advice import (
     words_of_search,
     words_with_instrument,
 )
-from tvident._arguments import percentiles, told_once
+from tvident._arguments import finite, percentiles, told_once
 from tvident._equation import COEFFICIENTS, Unknown
 from tvident._identify.data import Data
 from tvident._identify.improved import is_doubted
@@ -183,7 +183,7 @@ class Told:
     def _inertias(self) -> list[float]:
         """Return the usual inertia of every record over the square of the sample period; 0 where none was found."""
         found = self.batch.values["inertia"].reshape(self.data.records, -1)
-        medians = [percentiles(one[np.isfinite(one)], 50)[0] / self.data.period**2 for one in map(told_once, found)]
+        medians = [percentiles(finite(told_once(one)), 50)[0] / self.data.period**2 for one in found]
         return [0.0 if np.isnan(one) else one for one in medians]
 
     def _of_strong_form(self, settings: Mapping[str, Any]) -> ExplainedStrong:

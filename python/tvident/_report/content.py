@@ -266,12 +266,7 @@ class _DrawnSeries:
 
 def _sum(values: Array, others: Array, times: float) -> Computed:
     """Return values and so many times others beside them."""
-
-    @np.errstate(all="ignore")
-    def part(some: slice) -> Array:
-        return values[some] + times * others[some]
-
-    return Computed(values.size, part)
+    return Computed(values.size, lambda some: values[some] + times * others[some])
 
 
 def title_of(name: str) -> str:
@@ -302,13 +297,13 @@ def _numbers(shown: ShownResult) -> list[dict[str, str]]:
             line["kind"] = "constant over the record"
             lines.append(line)
             continue
-        finite, error = (one[np.isfinite(one)] for one in (found, result.stderr[name]))
-        if not finite.size:
+        there, error = (arguments.finite(one) for one in (found, result.stderr[name]))
+        if not there.size:
             line["value"] = "no value"
-        elif kind == "known" and finite.min() == finite.max():
-            line |= {"value": f"{finite[0]:.5g}", "kind": "known: as given"}
+        elif kind == "known" and there.min() == there.max():
+            line |= {"value": f"{there[0]:.5g}", "kind": "known: as given"}
         else:
-            low, middle, high = arguments.percentiles(finite, 5, 50, 95)
+            low, middle, high = arguments.percentiles(there, 5, 50, 95)
             (typical,) = arguments.percentiles(error, 50)
             line["value"] = _apart(middle, typical)
             ends = " and ".join(arguments.to_digits_of(one, typical) for one in (low, high))

@@ -44,8 +44,8 @@ _CHUNK = 1 << 16
 _SHORT = 32
 """Samples of a row: NumPy looks for the extremes of many rows so short in half of the time if the rows lie side by side."""
 
-_LOOKED_AT = 256
-"""Blocks that tell how well a series compresses."""
+_LOOKED_AT, _EXTREMES_LOOKED_AT = 256, 64
+"""Blocks that tell how well a series compresses: of samples, and of extremes, for which many more samples are read."""
 
 _HUGE = 1e300
 """Numbers beyond are missing: their differences would overflow."""
@@ -59,7 +59,7 @@ class Computed:
     ----------
     size : int
     part : callable
-        Gives some of them.
+        Gives some of them; NumPy says nothing of what is no number.
     """
 
     size: int
@@ -180,11 +180,12 @@ def _width(merged: int) -> int:
     return BLOCK if merged == 1 else BLOCK // 2 * merged
 
 
+@np.errstate(all="ignore")
 def _some_blocks(series: Series, merged: int) -> Array:
     """Return blocks that tell how well a series compresses."""
     width = _width(merged)
     whole = max(1, series.values.size // width)
-    chosen = range(0, whole, max(1, whole // _LOOKED_AT))
+    chosen = range(0, whole, max(1, whole // (_LOOKED_AT if merged == 1 else _EXTREMES_LOOKED_AT)))
     samples = np.concatenate([_samples(series, width * one, width) for one in chosen])
     return _blocks(samples, merged)
 
@@ -252,6 +253,7 @@ def _entropy(levels: npt.NDArray[Any]) -> float:
     return total
 
 
+@np.errstate(all="ignore")
 def _packed(series: Series, top: int, merged: int) -> Packed:
     numbers, width = _count(series, merged), _width(merged)
     count = -(-numbers // BLOCK)

@@ -37,13 +37,13 @@ class Oscillator:
 
     @cached_property
     def natural_frequency(self) -> Array:
-        with np.errstate(all="ignore"):
-            return np.asarray(np.sqrt(self._stiffness / self._inertia) / (2 * np.pi))
+        inertia, stiffness = self._inertia, self._stiffness
+        return self._in_blocks(lambda some: np.sqrt(stiffness[some] / inertia[some]) / (2 * np.pi))
 
     @cached_property
     def damping_ratio(self) -> Array:
-        with np.errstate(all="ignore"):
-            return np.asarray(self._damping / (2 * np.sqrt(self._stiffness * self._inertia)))
+        inertia, damping, stiffness = self._inertia, self._damping, self._stiffness
+        return self._in_blocks(lambda some: damping[some] / (2 * np.sqrt(stiffness[some] * inertia[some])))
 
     def natural_frequency_error(self) -> Array:
         f, inertia, stiffness = self.natural_frequency, self._inertia, self._stiffness
@@ -64,19 +64,27 @@ class Oscillator:
             }
         )
 
-    @np.errstate(all="ignore")
     def _propagate(self, gradient: dict[str, Callable[[Any], Array]]) -> Array:
-        """Return the standard error of a function with the given gradient: the delta method, a block of samples at a time."""
+        """Return the standard error of a function with the given gradient: the delta method."""
         errors = {name: self._errors[name] for name in gradient}
         pairs = {pair: covariance for pair, covariance in self._covariances.items() if pair <= gradient.keys()}
-        result = np.empty(self._inertia.shape)
-        for first in range(0, self._inertia.shape[-1], _BLOCK):
-            some: Any = (..., slice(first, first + _BLOCK))
+
+        def error(some: Any) -> Array:
             slopes = {name: slope(some) for name, slope in gradient.items()}
             variance = sum((slope * errors[name][some]) ** 2 for name, slope in slopes.items())
             for pair, covariance in pairs.items():
                 one, other = pair
                 factor = self._factors.get(one, 1.0) * self._factors.get(other, 1.0)
                 variance = variance + 2 * slopes[one] * slopes[other] * factor * covariance[some]
-            result[some] = np.sqrt(variance)
+            return np.asarray(np.sqrt(variance))
+
+        return self._in_blocks(error)
+
+    @np.errstate(all="ignore")
+    def _in_blocks(self, function: Callable[[Any], Array]) -> Array:
+        """Return what a function gives of all samples, computed a block at a time."""
+        result = np.empty(self._inertia.shape)
+        for first in range(0, self._inertia.shape[-1], _BLOCK):
+            some: Any = (..., slice(first, first + _BLOCK))
+            result[some] = function(some)
         return result

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tvident._arguments import own_digits, percentiles, to_digits_of, told_once
+from tvident._arguments import finite, own_digits, percentiles, to_digits_of, told_once
 from tvident._files import aligned
 from tvident._results.verdict import CHANGING, verdict
 from tvident._status import describe
@@ -73,9 +73,9 @@ def row_of(
     name: str, kind: str, value: npt.NDArray[Any], error: npt.NDArray[Any], units: Mapping[str, str]
 ) -> tuple[str, ...]:
     """Return the cells of a parameter: median, range where it changes, and median standard error."""
-    finite, error = (one[np.isfinite(one)] for one in (told_once(value), told_once(error)))
-    numbers = percentiles(finite, 50, 5, 95)
-    (middle,) = percentiles(error, 50)
+    values, errors = (finite(told_once(one)) for one in (value, error))
+    numbers = percentiles(values, 50, 5, 95)
+    (middle,) = percentiles(errors, 50)
     shown = [to_digits_of(number, middle) for number in numbers]
     if kind not in CHANGING:
         shown[1] = shown[2] = ""
