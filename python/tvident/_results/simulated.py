@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any, TypeAlias
 
@@ -280,6 +279,8 @@ class Simulated:
 
     def _hold_back_of(self, ends: list[slice], length: int) -> HeldBack:
         """Return the same of ends of stretches of a long record. What is not windowed can hardly follow so few samples, and is known."""
+        from concurrent.futures import ThreadPoolExecutor  # noqa: PLC0415 - for long records alone
+
         recorded, model = self._recorded, self._model()
         assert recorded is not None  # noqa: S101 - asked before
         _, first, end = held_back_of(ends[0].stop - ends[0].start)
@@ -299,11 +300,10 @@ class Simulated:
             finally:
                 pool.shutdown(wait=False, cancel_futures=True)
         angle = np.concatenate([recorded.angles[some][first:end] for some in ends])
-        held = end - first
-        parts = [(start, start, start + held) for start in range(0, angle.size, held)]
+        parts = [(start, start, start + end - first) for start in range(0, angle.size, end - first)]
         told = judged(angle, simulated_and_predicted, parts)
-        stretch = stretch_of(length) * model.period
-        return told if told.why_not else replace(told, ahead=length * model.period, stretch=stretch)
+        ahead, stretch = length * model.period, stretch_of(length) * model.period
+        return told if told.why_not else replace(told, ahead=ahead, stretch=stretch)
 
     def _rest_of_stretch(self, some: slice, held: slice, model: Model) -> Model:
         """Return what is identified of a stretch without what is held back of it: what is windowed, and terms."""
