@@ -120,21 +120,25 @@ def _spoilt(share: float) -> Duel:
     return Duel([work(*kind) for kind in kinds], _unchecked, samples)
 
 
-def _irregular(share: float) -> Duel:
+def _irregular(most: int, **how: Any) -> Callable[[float], Duel]:
     """Pit times that scatter by 0.3 of a step against uniform ones."""
-    angle, torque = signals.recording(max(_LEAST, int(_FEW_MILLIONS * share)))
-    shift = 0.3 * np.random.default_rng(24).uniform(-0.5, 0.5, angle.size)
-    # Samples of the same motion at shifted times, but for what lines between samples of 1 kHz lose.
-    count = np.arange(angle.size, dtype=np.float64)
-    t, taken = (count + shift) / signals.RATE, [np.interp(count + shift, count, one) for one in (angle, torque)]
-    return Duel(
-        [
-            lambda: tvident.identify(*taken, t=t, workers=1),
-            lambda: tvident.identify(angle, torque, sample_rate=signals.RATE, workers=1),
-        ],
-        _unchecked,
-        angle.size,
-    )
+
+    def duel(share: float) -> Duel:
+        angle, torque = signals.recording(max(_LEAST, int(most * share)))
+        shift = 0.3 * np.random.default_rng(24).uniform(-0.5, 0.5, angle.size)
+        # Samples of the same motion at shifted times, but for what lines between samples of 1 kHz lose.
+        count = np.arange(angle.size, dtype=np.float64)
+        t, taken = (count + shift) / signals.RATE, [np.interp(count + shift, count, one) for one in (angle, torque)]
+        return Duel(
+            [
+                lambda: tvident.identify(*taken, t=t, workers=1, **how),
+                lambda: tvident.identify(angle, torque, sample_rate=signals.RATE, workers=1, **how),
+            ],
+            _unchecked,
+            angle.size,
+        )
+
+    return duel
 
 
 def _own_times(**how: Any) -> Callable[[float], Duel]:
@@ -219,7 +223,20 @@ CORNERS = [
             ("correlated-8", 'covariance="hac", eight regressors', _regression(8, covariance="hac")),
         )
     ),
-    Row("irregular", "`identify(t=)`, steps that scatter by 0.3 of a step", "uniform times", _irregular, most=6),
+    Row(
+        "irregular",
+        "`identify(t=)`, steps that scatter by 0.3 of a step",
+        "uniform times",
+        _irregular(_FEW_MILLIONS),
+        most=6,
+    ),
+    Row(
+        "irregular-paper",
+        '`identify(method="paper", t=)`, 100 000 samples, the same steps',
+        "uniform times",
+        _irregular(100_000, method="paper"),
+        most=6,
+    ),
     *(
         Row(
             f"own-times-{name}",

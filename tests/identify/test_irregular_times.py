@@ -13,7 +13,8 @@ from scipy.interpolate import make_interp_spline
 
 import tvident
 from parameters import long
-from tvident import Status
+from tvident import Status, _core
+from tvident._clocks import Passed
 
 Array = npt.NDArray[np.float64]
 
@@ -178,6 +179,24 @@ def test_stamps_that_jitter_by_a_whole_step_do_not_change_the_rate() -> None:
     assert abs(result.settings["sample_rate"] / RATE - 1) < 5 * 4e-7
     by_rate = tvident.identify(simulated.angle, simulated.torque, sample_rate=result.settings["sample_rate"])
     np.testing.assert_array_equal(result.stiffness, by_rate.stiffness)
+
+
+def test_only_who_weighs_by_noise_asks_what_a_grid_makes_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It takes as long as the paper's method, which sees the noise of the grid in its windows."""
+    asked: list[Passed] = []
+
+    def noise(passed: Passed) -> _core.PassedNoise:
+        asked.append(passed)
+        return passed.resampling.passed_noise()
+
+    monkeypatch.setattr(Passed, "noise", property(noise))
+    t = jittered(6, 0.3)
+    angle, torque = taken(6, t, (1e-3, 0.1))
+    paper = tvident.identify(angle, torque, t=t, method="paper")
+    assert not asked
+    assert np.isfinite(paper.stiffness).any()
+    tvident.identify(angle, torque, t=t, **CONSTANT)
+    assert asked
 
 
 @pytest.mark.parametrize("burst", [0, 300])

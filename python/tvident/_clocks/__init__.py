@@ -3,6 +3,18 @@
 from tvident._clocks.clock import Clock, Evened, clock_of
 from tvident._clocks.grid import Grid, grid_of
 from tvident._clocks.missing import Bridged, bridged
+from tvident._clocks.passed import Passed
 from tvident._clocks.two import TwoClocks, two_clocks
 
-__all__ = ["Bridged", "Clock", "Evened", "Grid", "TwoClocks", "bridged", "clock_of", "grid_of", "two_clocks"]
+__all__ = [
+    "Bridged",
+    "Clock",
+    "Evened",
+    "Grid",
+    "Passed",
+    "TwoClocks",
+    "bridged",
+    "clock_of",
+    "grid_of",
+    "two_clocks",
+]

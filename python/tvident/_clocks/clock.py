@@ -14,6 +14,7 @@ from tvident import _core
 from tvident._clocks.grid import Grid
 from tvident._clocks.missing import bridge_of
 from tvident._clocks.order import chosen_order, longest_bridged
+from tvident._clocks.passed import Passed
 
 Numbers = npt.NDArray[np.float64]
 
@@ -28,6 +29,10 @@ _AGAINST = 0.25
 
 _FEWEST, _COMPARED = 64, 1 << 15
 """Samples whose roughness is compared, at least and at most."""
+
+_APART, _OF_NOISE = 0.5, 1 << 13
+"""Where all steps are at least so many periods, so many samples of noise tell a ratio to some 5 %. Where samples lie closer, splines
+amplify noise so much there that few places make most of its variance."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +49,8 @@ class Clock:
         What was done.
     doubt : str
         What is wrong with the times; empty where nothing is.
-    passed : PassedNoise, optional
-        What white noise becomes on the grid, where that is known already.
+    passed : Passed, optional
+        What white noise becomes on the grid, where that has been asked for.
     """
 
     grid: Grid
@@ -53,7 +58,7 @@ class Clock:
     order: int
     words: str = ""
     doubt: str = ""
-    passed: _core.PassedNoise | None = field(default=None, repr=False, compare=False)
+    passed: Passed | None = field(default=None, repr=False, compare=False)
 
     @property
     def period(self) -> float:
@@ -74,7 +79,7 @@ class Clock:
         resampling = _core.Resampling(
             places, samples, order=1 if self.kind == "even" else self.order, bridged=bridged, propagate=propagate
         )
-        passed = None if self.kind == "even" else self.passed or resampling.passed_noise(workers=workers)
+        passed = None if self.kind == "even" else self.passed or Passed(resampling, workers)
         found = _together(resampling, channels, workers)
         return Evened(found, grid.start + self.period * np.arange(samples, dtype=np.float64), places, passed)
 
@@ -90,14 +95,14 @@ class Evened:
         In seconds.
     places : ndarray
         Where the record's samples lie, in periods.
-    passed : PassedNoise, optional
+    passed : Passed, optional
         What white noise became; None where samples stayed as they are.
     """
 
     channels: Mapping[str, Numbers]
     time: Numbers
     places: Numbers
-    passed: _core.PassedNoise | None
+    passed: Passed | None
 
     def known(self, values: Any) -> Any:
         """Return what is known at every sample on the grid, along straight lines; anything else as it is."""
@@ -243,7 +248,7 @@ def _gaps(grid: Grid) -> str:
 
 def _smoother(
     clock: Clock, channels: Mapping[str, npt.NDArray[np.number]], quantisation: float | None, workers: int | None
-) -> tuple[dict[str, float], _core.PassedNoise | None]:
+) -> tuple[dict[str, float], Passed | None]:
     """Return the variance of every channel's noise in time over that in sample number; and what white noise becomes, if that is all."""
     whole = clock.grid
     if whole.places.size < _FEWEST:
@@ -260,12 +265,13 @@ def _smoother(
     clock, numbers = replace(clock, grid=grid), Clock(grid, "even", 0)
     in_time = clock.evened(channels, propagate=False, workers=workers)
     in_number = numbers.evened(channels, propagate=False, workers=workers)
-    gain = 1.0 if in_time.passed is None else in_time.passed.gain
+    passed = _of_noise(clock, in_time.passed, workers)
+    gain = 1.0 if passed is None else passed.gain
     found = {}
     for name in channels:
         step = quantisation if name == "angle" else 0.0
         pairs = zip(
-            _core.noise(in_time.channels[name], step, in_time.passed),
+            _core.noise(in_time.channels[name], step, passed),
             _core.noise(in_number.channels[name], step),
             strict=True,
         )
@@ -274,3 +280,13 @@ def _smoother(
         if there:
             found[name] = float(np.median(there))
     return found, in_time.passed if is_all else None
+
+
+def _of_noise(clock: Clock, passed: Passed | None, workers: int | None) -> _core.PassedNoise | None:
+    """Return what becomes of white noise on a grid: of a part of it, where that tells what has twice the variance of something else."""
+    if passed is None or float(np.diff(clock.grid.places).min()) < _APART:
+        return None if passed is None else passed.noise
+    places = clock.grid.places[:_OF_NOISE]
+    part = replace(clock, grid=replace(clock.grid, places=places, samples=math.floor(places[-1]) + 1))
+    first = part.evened({}, propagate=False, workers=workers).passed
+    return None if first is None else first.in_short()

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._clocks.grid import Numbers
+from tvident._clocks.passed import Passed
 
 _ORDERS = (1, 3, 5)
 """What there is to choose from."""
@@ -126,7 +127,7 @@ class Bridged:
     Parameters
     ----------
     channels : mapping of str to ndarray
-    passed : mapping of str to PassedNoise
+    passed : mapping of str to Passed
         What white noise became, of channels with short gaps.
     settings : mapping
         What settings keep.
@@ -135,7 +136,7 @@ class Bridged:
     """
 
     channels: Mapping[str, npt.NDArray[np.number]]
-    passed: Mapping[str, _core.PassedNoise]
+    passed: Mapping[str, Passed]
     settings: dict[str, float | str]
     words: str
 
@@ -175,7 +176,7 @@ def bridged(
         # What noise becomes is said of all records, so that records which lack nothing stay as they are alone.
         if all(bridges) and _saved(rows[name][worst]) > 0:
             there = np.flatnonzero(np.isfinite(rows[name][worst])).astype(np.float64)
-            passed[name] = _resampling(there, values.shape[-1], bridges[worst]).passed_noise(workers=workers)
+            passed[name] = Passed(_resampling(there, values.shape[-1], bridges[worst]), workers)
     orders = " and ".join(str(order) for order in sorted({one.order for one in bridges if one is not None}))
     words = (
         f"{filled} of {lost} missing values lie in gaps of up to {math.floor(longest) - 1} samples, which were bridged by splines of order "

@@ -25,8 +25,8 @@ _FEW_LOST = 0.02
 _LOOKED_AT, _RECORDS = 1 << 13, 4
 """Samples of the middle of a record, and records, that decide."""
 
-_APART, _FINE = 8, 8
-"""Samples between those that are left out, for each of them; grid samples of a period that show what is there instead."""
+_APART = 8
+"""Samples between those that are left out, for each of them."""
 
 _EXPLAINED, _SEEN = 2.0, 1e-3
 """What splines may miss samples by: so many times the noise's variance, and this part of the channel's root mean square."""
@@ -65,8 +65,11 @@ def longest_bridged(grid: Grid, channels: Mapping[str, npt.NDArray[np.number]], 
     """Return the longest step in periods that a spline may go over: as long as it predicts samples that are left out there.
 
     Everywhere in the middle of the record some samples are left out, so that steps become as long. What they are missed by is compared with
-    what noise alone is.
+    what noise alone is. Where no step is longer than those that are no gaps anyway, and nothing is missing, nothing is asked.
     """
+    nothing_lost = all(np.isfinite(values).all() for values in channels.values())
+    if nothing_lost and float(np.diff(grid.places).max()) <= _LEAST_BRIDGED:
+        return _LEAST_BRIDGED
     middle = Middle.of(grid, channels)
     every = middle.resampled(order, grid.bridged)
     judge = middle.resampled(_JUDGE, grid.bridged)
@@ -83,15 +86,10 @@ def longest_bridged(grid: Grid, channels: Mapping[str, npt.NDArray[np.number]], 
 
 
 def _missed(holed: Middle, middle: Middle, kept: npt.NDArray[np.bool_], order: int) -> Numbers:
-    """Return by how much samples that are left out are missed: on a grid so fine that it has one near each."""
+    """Return by how much samples that are left out are missed."""
     without = ~kept & (middle.places >= holed.places[0]) & (middle.places <= holed.places[-1])
-    fine = _core.Resampling(holed.places * _FINE, middle.samples * _FINE, order=order, bridged=math.inf).onto_grid(
-        holed.rows, workers=1
-    )
-    wanted = middle.places[without] * _FINE
-    left = np.clip(wanted.astype(np.int64), 0, fine.shape[1] - 2)
-    share = wanted - left
-    return np.asarray(fine[:, left] * (1 - share) + fine[:, left + 1] * share - middle.rows[:, without])
+    found = holed.resampling(order, math.inf).at(holed.rows, middle.places[without])
+    return np.asarray(found - middle.rows[:, without])
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident import _core
 from tvident._clocks.grid import Grid, Numbers, grid_of
+from tvident._clocks.passed import Passed
 from tvident._units import times_in_seconds
 
 _ORDER = 5
@@ -60,7 +61,7 @@ class TwoClocks:
 
     def on_grid(
         self, own: Grid, values: npt.NDArray[np.number], late: tuple[float, float] = (0.0, 0.0), *, propagate: bool
-    ) -> tuple[Numbers, _core.PassedNoise | None]:
+    ) -> tuple[Numbers, Passed | None]:
         """Return a channel on the grid, and what that makes of noise.
 
         Parameters
@@ -82,7 +83,7 @@ class TwoClocks:
             places = whole
         bridged = own.bridged * own.period / self.period
         resampling = _core.Resampling(places, self.samples, order=_ORDER, bridged=bridged, propagate=propagate)
-        passed = None if places is whole and own.period / self.period < _GAP else resampling.passed_noise()
+        passed = None if places is whole and own.period / self.period < _GAP else Passed(resampling)
         return resampling.onto_grid(values), passed
 
 

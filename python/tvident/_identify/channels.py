@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
+from tvident._clocks import Passed
 from tvident._status import stretches_of
 
 _Numbers = npt.NDArray[np.float64]
@@ -100,7 +101,7 @@ def motion_channels(
     *,
     has_spring: bool,
     quantisation: float | None,
-    passed: _core.PassedNoise | None = None,
+    passed: Passed | None = None,
 ) -> MotionChannels:
     """Return one angle from what was measured of a motion.
 
@@ -114,7 +115,7 @@ def motion_channels(
         Whether the equation asks for the angle: then the mean of a velocity without an angle is its bias.
     quantisation : float, optional
         Step to which the angle was rounded.
-    passed : PassedNoise, optional
+    passed : Passed, optional
         What became of white noise where channels were resampled.
     """
     if list(given) == ["angle"]:
@@ -226,10 +227,11 @@ def _sums(values: _Numbers, period: float) -> _Numbers:
     return np.concatenate([[0.0], np.cumsum(steps)]) * period
 
 
-def _sigma(record: _Numbers, quantisation: float | None, passed: _core.PassedNoise | None) -> float:
+def _sigma(record: _Numbers, quantisation: float | None, passed: Passed | None) -> float:
     """Return the standard deviation of a channel's noise; 0 where nothing tells it."""
     try:
-        sigma = _core.noise(np.ascontiguousarray(record), quantisation, passed)[0].sigma
+        noise = None if passed is None else passed.noise
+        sigma = _core.noise(np.ascontiguousarray(record), quantisation, noise)[0].sigma
     except ValueError:  # the record is too short
         return 0.0
     return sigma if math.isfinite(sigma) else 0.0

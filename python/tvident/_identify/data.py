@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident import _core
+from tvident._clocks import Passed
 from tvident._equation import LINEAR_UNITS, UNITS
 from tvident._identify.channels import MotionChannels
 from tvident._identify.weighted import Weights
@@ -59,7 +59,7 @@ class Data:
         The part of the torque's samples of every record whose residual counts linearly; None for least squares.
     clock : Timed, optional
         How the channels were brought onto a uniform grid; None where their times are uniform.
-    passed : (PassedNoise, PassedNoise), optional
+    passed : (Passed, Passed), optional
         What that makes of white noise of angle and torque.
     weights : Weights, optional
         Those of samples, where they were given.
@@ -84,7 +84,7 @@ class Data:
     axis: Axis = field(default_factory=Axis)
     clipped: Sequence[float] | None = None
     clock: Timed | None = None
-    passed: tuple[_core.PassedNoise | None, _core.PassedNoise | None] = (None, None)
+    passed: tuple[Passed | None, Passed | None] = (None, None)
     weights: Weights | None = None
     moved: Sequence[Callable[[], npt.NDArray[np.float64]]] = ()
     wanted: tuple[int, int] | None = None
@@ -154,10 +154,17 @@ class Data:
         own = {} if self.clock is None else self.clock.settings
         return {**channels, "sample_rate": 1 / self.period, "step": self.step, **own}
 
-    @property
-    def noise(self) -> dict[str, Any]:
-        """What is known of the channels' noise, as the core asks for it."""
-        return {"noise": self.motion.noise, "passed": self.passed}
+    def measured(self, *, on_grid: bool) -> dict[str, Any]:
+        """Return what was measured of the motion, and what is known of the channels' noise, as the core asks for it.
+
+        Parameters
+        ----------
+        on_grid : bool
+            Whether what a grid makes of noise is asked for: windows of polynomials whose length is given see the noise themselves.
+        """
+        channels = [self.motion.recorded.get(name) for name in ("angle", "velocity", "acceleration")]
+        passed = [one.noise if one is not None and on_grid else None for one in self.passed]
+        return {"channels": channels, "noise": self.motion.noise, "passed": tuple(passed)}
 
     @property
     def units(self) -> Mapping[str, str]:

@@ -12,8 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident import _core
-from tvident._clocks import TwoClocks, two_clocks
+from tvident._clocks import Passed, TwoClocks, two_clocks
 from tvident._identify.aligned import Align, Aligned, Late, aligned
 from tvident._identify.data import Data
 from tvident._units import scaled
@@ -124,10 +123,10 @@ class OwnClocks:
         moved = [partial(change, move) for move in found.moves]
         return replace(final, motion=motion, doubts=doubts, clock=ClockAlignment(self.clocks, found.late), moved=moved)
 
-    def _angle(self) -> tuple[npt.NDArray[np.float64], _core.PassedNoise | None]:
+    def _angle(self) -> tuple[npt.NDArray[np.float64], Passed | None]:
         return self.clocks.on_grid(self.clocks.angle, self.recorded[0], propagate=self.propagate)
 
-    def _torque(self, late: Late) -> tuple[npt.NDArray[np.float64], _core.PassedNoise | None]:
+    def _torque(self, late: Late) -> tuple[npt.NDArray[np.float64], Passed | None]:
         return self.clocks.on_grid(self.clocks.torque, self.recorded[1], late, propagate=self.propagate)
 
 

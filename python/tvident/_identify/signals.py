@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident import _core
-from tvident._clocks import Bridged, Clock, Grid, bridged, clock_of
+from tvident._clocks import Bridged, Clock, Grid, Passed, bridged, clock_of
 from tvident._derivatives import quantisation_step
 from tvident._identify.settings import Request
 
@@ -35,7 +34,7 @@ class Signals:
         Seconds from one sample to the next.
     clock : Clock or Bridged, optional
         How they were brought onto a grid, or their short gaps bridged; None where neither was.
-    passed : mapping of str to PassedNoise
+    passed : mapping of str to Passed
         What that made of white noise, by channel.
     doubts : sequence of (int, str)
         What is wrong with the times, of every record.
@@ -48,7 +47,7 @@ class Signals:
     time: npt.NDArray[np.float64]
     period: float
     clock: Clock | Bridged | None = None
-    passed: Mapping[str, _core.PassedNoise] = field(default_factory=dict)
+    passed: Mapping[str, Passed] = field(default_factory=dict)
     doubts: Sequence[tuple[int, str]] = ()
 
     def on_grid(

@@ -283,7 +283,7 @@ class Task:
         """Compare windows of all lengths in strong form."""
         form, data = self._form(), self._data
         assert isinstance(form, _core.StrongForm)  # noqa: S101 - weak form compares test functions of all widths while it identifies
-        motions = self._motions(self.columns.samples(self._searched(None).values))
+        motions = self._motions(self.columns.samples(self._searched(None).values), scanned=True)
         kinds, lags = [one.kind for one in self._unknowns], [late or 0.0 for late in self._lags()]
         weights = data.weights_of_core
         found = form.scan(motions, kinds, lag=lags, masks=data.masks, weights=weights, workers=data.workers)
@@ -389,11 +389,11 @@ class Task:
         zeros = self._request.angle_zero
         return list(zeros) if zeros is not None and len(zeros) == self._data.records else [None] * self._data.records
 
-    def _motions(self, columns: list[npt.NDArray[np.number] | str]) -> _core.Motions:
+    def _motions(self, columns: list[npt.NDArray[np.number] | str], *, scanned: bool = False) -> _core.Motions:
         known = [self._known.get(name) for name in COEFFICIENTS]
-        data, motion = self._data, self._data.motion
-        recorded = [motion.recorded.get(name) for name in ("angle", "velocity", "acceleration")]
-        return _core.Motions(data.angles, data.torques, known, columns, channels=recorded, **data.noise)
+        data, is_weak = self._data, not isinstance(self._request.form, StrongForm)
+        measured = data.measured(on_grid=is_weak or scanned)
+        return _core.Motions(data.angles, data.torques, known, columns, **measured)
 
     def _settings(self, found: Sequence[_core.Identification], searched: Searched) -> dict[str, Any]:
         """Return inputs and choices."""

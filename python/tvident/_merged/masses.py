@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident import _core
+from tvident._clocks import Passed
 from tvident._equation import COEFFICIENTS
 from tvident._merged.call import AskedTogether, TermValues
 from tvident._merged.elements import Element, kind_or_number
@@ -110,7 +110,7 @@ class Masses:
         return [*self.angles, *self.momenta]
 
     def noise(
-        self, channels: Sequence[int], equations: Sequence[int], passed: _core.PassedNoise | None
+        self, channels: Sequence[int], equations: Sequence[int], passed: Passed | None
     ) -> tuple[list[float], list[float]] | None:
         """Return the variances of the noise of some channels and torques; None where they are to be estimated.
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
-from tvident._clocks import Clock, Grid, clock_of
+from tvident._clocks import Clock, Grid, Passed, clock_of
 
 Numbers = npt.NDArray[np.number]
 
@@ -27,7 +27,7 @@ class Sampling:
         Time of the first sample in seconds.
     clock : Clock, optional
         How channels are brought onto a grid; None where they are not.
-    passed : PassedNoise, optional
+    passed : Passed, optional
         What that makes of white noise.
     workers : int, optional
     """
@@ -35,7 +35,7 @@ class Sampling:
     period: float
     start: float = 0.0
     clock: Clock | None = None
-    passed: _core.PassedNoise | None = None
+    passed: Passed | None = None
     workers: int | None = None
 
     @classmethod
@@ -81,6 +81,7 @@ class Sampling:
         return mask if found is None else found
 
 
-def variances(channels: Sequence[Numbers], passed: _core.PassedNoise | None) -> list[float]:
+def variances(channels: Sequence[Numbers], passed: Passed | None) -> list[float]:
     """Return the variance of the noise of every channel."""
-    return [one.sigma**2 for channel in channels for one in _core.noise(np.asarray(channel), None, passed)]
+    noise = None if passed is None else passed.noise
+    return [one.sigma**2 for channel in channels for one in _core.noise(np.asarray(channel), None, noise)]

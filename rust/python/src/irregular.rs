@@ -2,11 +2,11 @@
 
 use std::num::NonZeroUsize;
 
-use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tvident::exec::workers as threads;
-use tvident::irregular::{Resampling as Core, gain, passed_noise};
+use tvident::irregular::{MOST_RECORDS, Resampling as Core, gain, passed_noise};
 use tvident::noise::PassedNoise as Passed;
 use tvident::record::Samples;
 use tvident::simd::Instructions;
@@ -94,6 +94,22 @@ impl Resampling {
         Ok(resampled)
     }
 
+    /// Channels along the last axis at any times, which increase: one row for each.
+    fn at<'py>(
+        &self,
+        samples: &Bound<'py, PyUntypedArray>,
+        wanted: &Bound<'py, PyUntypedArray>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let py = samples.py();
+        let records = records(samples)?;
+        if records.iter().any(|record| record.len() != self.core.times.len()) {
+            return Err(PyValueError::new_err("channels need one sample for each time"));
+        }
+        let (channels, wanted): (Vec<_>, _) = (records.iter().map(samples_of).collect(), values(wanted)?);
+        let slices: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
+        Ok(PyArray2::from_vec2(py, &py.detach(|| self.core.at(&slices, &wanted)))?)
+    }
+
     /// The density at low frequencies of white noise of variance one: one on a uniform grid.
     #[pyo3(signature = (*, workers=None))]
     fn gain(&self, py: Python<'_>, workers: Option<NonZeroUsize>) -> PyResult<f64> {
@@ -105,12 +121,12 @@ impl Resampling {
         Ok(found)
     }
 
-    /// What white noise of variance one becomes.
-    #[pyo3(signature = (*, workers=None))]
-    fn passed_noise(&self, py: Python<'_>, workers: Option<NonZeroUsize>) -> PyResult<PassedNoise> {
+    /// What white noise of variance one becomes: as few records of it tell that, and at most so many.
+    #[pyo3(signature = (*, records=MOST_RECORDS, workers=None))]
+    fn passed_noise(&self, py: Python<'_>, records: usize, workers: Option<NonZeroUsize>) -> PyResult<PassedNoise> {
         let mut found = None;
         watched(py, None, |watch| {
-            found = Some(passed_noise(&self.core, Instructions::current(), threads(workers), watch)?);
+            found = Some(passed_noise(&self.core, records, Instructions::current(), threads(workers), watch)?);
             Ok(())
         })?;
         found.map(PassedNoise).ok_or_else(|| PyValueError::new_err("no noise was passed"))

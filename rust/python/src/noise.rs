@@ -6,8 +6,8 @@ use pyo3::prelude::*;
 use tvident::Error;
 use tvident::exec::Watch;
 use tvident::noise::{
-    Beside, fuse as core_fuse, noise as core_noise, noise_coherence as core_coherence, quantisation_step as core_step,
-    searched, spike_counts as core_spike_counts, unread_counts as core_unread_counts, variance_after,
+    Beside, fuse as core_fuse, noise as core_noise, noise_after, noise_coherence as core_coherence,
+    quantisation_step as core_step, searched, spike_counts as core_spike_counts, unread_counts as core_unread_counts,
 };
 use tvident::record::Samples;
 use tvident::simd::Instructions;
@@ -40,12 +40,11 @@ pub(crate) fn noise(
     let mut noises = Vec::new();
     watched(samples.py(), None, |watch| {
         for (done, record) in records.iter().enumerate() {
-            let found = core_noise(record, quantisation, instructions)?;
-            let sigma = match passed {
-                Some(passed) => variance_after(Some(&passed.0), record, quantisation, instructions).sqrt(),
-                None => found.sigma,
+            let found = match passed {
+                Some(passed) => noise_after(&passed.0, record, quantisation, instructions)?,
+                None => core_noise(record, quantisation, instructions)?,
             };
-            noises.push(Noise { sigma, quantisation: found.quantisation });
+            noises.push(Noise { sigma: found.sigma, quantisation: found.quantisation });
             if !watch(done, records.len()) {
                 return Err(Error::Cancelled);
             }

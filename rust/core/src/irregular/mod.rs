@@ -14,7 +14,7 @@ pub(crate) mod window_estimates;
 pub(crate) mod window_fit;
 pub(crate) mod window_places;
 
-pub use passed_noise::{gain, passed_noise};
+pub use passed_noise::{MOST_RECORDS, gain, passed_noise};
 pub use resampling::Resampling;
 pub use window_estimates::{WindowFit, WindowFits};
 pub use window_fit::FEWEST;

@@ -19,22 +19,25 @@ use crate::noise::channel::shown;
 use crate::noise::passed::{PassedNoise, Shown};
 use crate::simd::instructions::Instructions;
 
-/// Samples of noise that tell what it shows to about one percent, and the most records of them.
+/// Samples of noise that tell what it shows to about one percent.
 const ENOUGH: usize = 1 << 17;
-const MOST_RECORDS: usize = 8;
 
-/// Takes white noise of variance one the way of a record's channels.
+/// The most records of noise that are taken the way of a record's channels.
+pub const MOST_RECORDS: usize = 8;
+
+/// Takes white noise of variance one the way of a record's channels: as many records as tell it well, and at most so many.
 ///
 /// # Errors
 /// If the watch cancels.
 pub fn passed_noise(
     resampling: &Resampling,
+    most: usize,
     instructions: Instructions,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<PassedNoise, Error> {
     let samples = resampling.times.len();
-    let records = (ENOUGH / samples.max(1)).clamp(1, MOST_RECORDS);
+    let records = (ENOUGH / samples.max(1)).min(most).clamp(1, MOST_RECORDS);
     let noises: Vec<Vec<f64>> = (0..records).map(|record| white(record, samples)).collect();
     let slices: Vec<&[f64]> = noises.iter().map(Vec::as_slice).collect();
     let passed = resampling.onto_grid(&slices, workers, watch)?;
@@ -97,7 +100,9 @@ mod tests {
         let times: Vec<f64> =
             shift.iter().enumerate().map(|(place, shift)| place as f64 + jitter * shift / 12.0_f64.sqrt()).collect();
         let resampling = Resampling { times, grid: 29_998, order, bridged: 3.0, propagate: false };
-        let passed = passed_noise(&resampling, Instructions::current(), NonZeroUsize::MIN, &mut |_, _| true).unwrap();
+        let passed =
+            passed_noise(&resampling, MOST_RECORDS, Instructions::current(), NonZeroUsize::MIN, &mut |_, _| true)
+                .unwrap();
         (resampling, passed)
     }
 

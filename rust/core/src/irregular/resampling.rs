@@ -62,6 +62,12 @@ impl Resampling {
         Ok(found)
     }
 
+    /// The channels at any times, which increase, NaN where nothing is known: of a short record, whose splines pass through all of it.
+    #[must_use]
+    pub fn at(&self, channels: &[&[f64]], wanted: &[f64]) -> Vec<Vec<f64>> {
+        self.around_block(&(0..self.times.len()), channels, wanted)
+    }
+
     /// Parts of the record that are interpolated one by one.
     pub(crate) fn blocks(&self) -> Vec<Piece<Range<usize>>> {
         let samples = self.times.len();
@@ -92,8 +98,14 @@ impl Resampling {
     }
 
     fn block(&self, samples: &Range<usize>, channels: &[&[f64]]) -> Block {
-        let (places, around) = (self.places(samples), self.around(samples));
-        let mut found = vec![vec![f64::NAN; places.len()]; channels.len()];
+        let places = self.places(samples);
+        let wanted: Vec<f64> = places.clone().map(|place| place as f64).collect();
+        Block { first: places.start, channels: self.around_block(&self.around(samples), channels, &wanted) }
+    }
+
+    /// The channels at some times, by splines through some samples.
+    fn around_block(&self, around: &Range<usize>, channels: &[&[f64]], wanted: &[f64]) -> Vec<Vec<f64>> {
+        let mut found = vec![vec![f64::NAN; wanted.len()]; channels.len()];
         let whole = |channel: &&[f64]| channel[around.clone()].iter().all(|&value| is_usable(value));
         let (together, alone): (Vec<usize>, Vec<usize>) =
             (0..channels.len()).partition(|&place| whole(&channels[place]));
@@ -101,10 +113,10 @@ impl Resampling {
         for group in groups.chain(alone.into_iter().map(|one| vec![one])) {
             let usable: Vec<usize> = around.clone().filter(|&sample| is_usable(channels[group[0]][sample])).collect();
             for part in self.parts(&usable) {
-                self.interpolate(&usable[part], &group, channels, &places, &mut found);
+                self.interpolate(&usable[part], &group, channels, wanted, &mut found);
             }
         }
-        Block { first: places.start, channels: found }
+        found
     }
 
     /// Parts of the samples that are there between which nothing is known.
@@ -124,13 +136,13 @@ impl Resampling {
         parts
     }
 
-    /// Fills the samples of the grid that lie between some samples.
+    /// Fills the times that lie between some samples.
     fn interpolate(
         &self,
         samples: &[usize],
         group: &[usize],
         channels: &[&[f64]],
-        places: &Range<usize>,
+        wanted: &[f64],
         found: &mut [Vec<f64>],
     ) {
         let (Some(&first), Some(&last)) = (samples.first(), samples.last()) else { return };
@@ -138,25 +150,26 @@ impl Resampling {
         let spline = Spline::new(&times, self.order);
         let values = |channel: &usize| samples.iter().map(|&sample| channels[*channel][sample]).collect::<Vec<f64>>();
         let (begin, end) = (self.times[first] - SAME, self.times[last] + SAME);
-        let wanted: Vec<usize> = places.clone().filter(|&place| (begin..=end).contains(&(place as f64))).collect();
+        let inside = wanted.partition_point(|&at| at < begin)..wanted.partition_point(|&at| at <= end);
+        let (before, wanted) = (inside.start, &wanted[inside]);
         if wanted.is_empty() {
             return;
         }
         let values: Vec<Vec<f64>> = group.iter().map(values).collect();
         let coefficients: Vec<Vec<f64>> = values.iter().map(|values| spline.coefficients(values)).collect();
-        let at = wanted.iter().map(|&place| (place as f64).clamp(times[0], times[times.len() - 1]));
+        let at = wanted.iter().map(|&at| at.clamp(times[0], times[times.len() - 1]));
         spline.values(&coefficients, at, |channel, place, value| {
-            found[group[channel]][wanted[place] - places.start] = value;
+            found[group[channel]][before + place] = value;
         });
-        // What was sampled at the grid's own times stays as it is, to the last bit.
+        // What was sampled at the wanted times stays as it is, to the last bit.
         let mut place = 0;
         for (sample, &time) in times.iter().enumerate() {
-            while place < wanted.len() && (wanted[place] as f64) < time - SAME {
+            while place < wanted.len() && wanted[place] < time - SAME {
                 place += 1;
             }
-            if let Some(&own) = wanted.get(place).filter(|&&own| (own as f64 - time).abs() <= SAME) {
+            if wanted.get(place).is_some_and(|own| (own - time).abs() <= SAME) {
                 for (channel, values) in group.iter().zip(&values) {
-                    found[*channel][own - places.start] = values[sample];
+                    found[*channel][before + place] = values[sample];
                 }
             }
         }
@@ -193,6 +206,20 @@ mod tests {
             for (one, other) in found.iter().zip(&expected) {
                 assert!((one - other).abs() < 1e-12, "order {order}: {one} {other}");
             }
+        }
+    }
+
+    #[test]
+    fn any_times_are_as_those_of_the_grid() {
+        let times = jittered(500);
+        let samples: Vec<f64> = times.iter().map(|time| (0.1 * time).sin()).collect();
+        let resampling = Resampling { times, grid: 499, order: 5, bridged: 3.0, propagate: false };
+        let quarters: Vec<f64> = (0..1992).map(|place| f64::from(place) / 4.0).collect();
+        let found = resampling.at(&[&samples], &quarters).remove(0);
+        let grid = resampled(&resampling, &samples, 1);
+        for (place, (value, time)) in found.iter().zip(&quarters).enumerate() {
+            assert!((value - (0.1 * time).sin()).abs() < 1e-6, "{time}: {value}");
+            assert!(place % 4 > 0 || value.to_bits() == grid[place / 4].to_bits(), "{time}: {value}");
         }
     }
 

@@ -32,8 +32,11 @@ impl<'a> Spline<'a> {
         }
         knots.extend(vec![last; order + 1]);
         let mut spline = Self { times, order, knots, band: Vec::new() };
-        if order > 1 {
-            spline.factor();
+        match order {
+            7 => spline.factor::<7>(),
+            5 => spline.factor::<5>(),
+            3 => spline.factor::<3>(),
+            _ => {}
         }
         spline
     }
@@ -43,15 +46,16 @@ impl<'a> Spline<'a> {
         self.order - 1
     }
 
-    fn factor(&mut self) {
-        let (reach, count) = (self.reach(), self.times.len());
+    /// Factors the equations of a spline of a known order, so that its loops have a known length.
+    fn factor<const ORDER: usize>(&mut self) {
+        let (reach, count) = (ORDER - 1, self.times.len());
         let width = 2 * reach + 1;
         self.band = vec![0.0; count * width];
-        let mut left = self.order;
+        let mut left = ORDER;
         for (row, &time) in self.times.iter().enumerate() {
             left = self.interval(time, left);
-            for (place, value) in self.basis(left, time)[..=self.order].iter().enumerate() {
-                let column = left - self.order + place;
+            for (place, value) in self.basis::<ORDER>(left, time)[..=ORDER].iter().enumerate() {
+                let column = left - ORDER + place;
                 // What falls outside of the band is zero: a B-spline at its end.
                 if column + reach >= row && column <= row + reach {
                     self.band[row * width + column + reach - row] = *value;
@@ -60,13 +64,13 @@ impl<'a> Spline<'a> {
         }
         for pivot in 0..count {
             let (above, below) = self.band.split_at_mut((pivot + 1) * width);
-            let pivots = &above[pivot * width + reach..];
+            let pivots = &above[pivot * width + reach..][..=reach];
             for (step, row) in below.chunks_exact_mut(width).take(reach).enumerate() {
                 let place = reach - step - 1;
                 let factor = row[place] / pivots[0];
                 row[place] = factor;
                 if factor != 0.0 {
-                    for (value, above) in row[place + 1..].iter_mut().zip(&pivots[1..]) {
+                    for (value, above) in row[place + 1..][..reach].iter_mut().zip(&pivots[1..]) {
                         *value -= factor * above;
                     }
                 }
@@ -128,15 +132,31 @@ impl<'a> Spline<'a> {
         &self,
         coefficients: &[Vec<f64>],
         at: impl Iterator<Item = f64>,
+        take: impl FnMut(usize, usize, f64),
+    ) {
+        match self.order {
+            7 => self.values_of::<7>(coefficients, at, take),
+            5 => self.values_of::<5>(coefficients, at, take),
+            3 => self.values_of::<3>(coefficients, at, take),
+            1 => self.values_of::<1>(coefficients, at, take),
+            _ => self.values_of::<0>(coefficients, at, take),
+        }
+    }
+
+    /// The same of a known order.
+    fn values_of<const ORDER: usize>(
+        &self,
+        coefficients: &[Vec<f64>],
+        at: impl Iterator<Item = f64>,
         mut take: impl FnMut(usize, usize, f64),
     ) {
-        let mut left = self.order;
+        let mut left = ORDER;
         for (place, time) in at.enumerate() {
             left = self.interval(time, left);
-            let basis = self.basis(left, time);
+            let basis = self.basis::<ORDER>(left, time);
             for (channel, coefficients) in coefficients.iter().enumerate() {
-                let near = &coefficients[left - self.order..=left];
-                take(channel, place, near.iter().zip(&basis).map(|(a, b)| a * b).sum());
+                let near = &coefficients[left - ORDER..=left];
+                take(channel, place, near.iter().zip(&basis[..=ORDER]).map(|(a, b)| a * b).sum());
             }
         }
     }
@@ -150,13 +170,14 @@ impl<'a> Spline<'a> {
     }
 
     /// The B-splines that are not zero right of a knot.
-    fn basis(&self, left: usize, time: f64) -> [f64; MOST] {
+    fn basis<const ORDER: usize>(&self, left: usize, time: f64) -> [f64; MOST] {
         let mut basis = [0.0; MOST];
         basis[0] = 1.0;
-        for order in 1..=self.order {
+        let near = &self.knots[left + 1 - ORDER..][..2 * ORDER];
+        for order in 1..=ORDER {
             let mut saved = 0.0;
             for (place, value) in basis[..order].iter_mut().enumerate() {
-                let (before, after) = (self.knots[left + 1 + place - order], self.knots[left + 1 + place]);
+                let (before, after) = (near[ORDER + place - order], near[ORDER + place]);
                 let share = *value / (after - before);
                 *value = saved + (after - time) * share;
                 saved = (time - before) * share;

@@ -129,6 +129,24 @@ pub fn variance_after(
     passed.gain * variance.max(quantisation * quantisation / 12.0).max((f64::EPSILON * largest(record)).powi(2))
 }
 
+/// The noise of a channel that was resampled: that of [`variance_after`], and its quantisation where that is not given.
+///
+/// # Errors
+/// If there are fewer than [`FEWEST_SAMPLES`].
+pub fn noise_after(
+    passed: &PassedNoise,
+    record: &dyn Samples,
+    quantisation: Option<f64>,
+    instructions: Instructions,
+) -> Result<Noise, Error> {
+    let samples = record.len();
+    if samples < FEWEST_SAMPLES {
+        return Err(Error::RecordTooShort { samples, least: FEWEST_SAMPLES });
+    }
+    let sigma = variance_after(Some(passed), record, quantisation, instructions).sqrt();
+    Ok(Noise { sigma, quantisation: quantisation.unwrap_or_else(|| quantisation_step(record)) })
+}
+
 /// What a channel shows where its signal does not reach, or hardly.
 pub(crate) fn shown(record: &dyn Samples, instructions: Instructions) -> Shown {
     let of = |half: usize| if 2 * half < record.len() { variance(record, half, None, instructions) } else { f64::NAN };

@@ -17,7 +17,7 @@ pub(crate) mod transform;
 pub(crate) mod unread;
 pub(crate) mod walk;
 
-pub use channel::{FEWEST_SAMPLES, noise, variance_after};
+pub use channel::{FEWEST_SAMPLES, noise, noise_after, variance_after};
 pub use coherence::{CORRELATED_NOISE, noise_coherence};
 pub use colour::coloured_noise;
 pub use correlated::CorrelatedNoise;
