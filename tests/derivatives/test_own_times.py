@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -10,7 +12,7 @@ from hypothesis import strategies as st
 
 import tvident
 from reference.own_times import fit, window_of
-from tvident import Status
+from tvident import Status, _core
 from tvident._huber import pseudo_values
 
 Array = npt.NDArray[np.float64]
@@ -129,6 +131,23 @@ def test_windows_are_chosen_at_irregular_times(seed: int, scatter: float, gap: b
     every = tvident.fit_local_polynomials(np.stack([y, y]), "auto", t=times, step=7)
     assert np.array_equal(every.derivatives[:, 1], found.derivatives[:, ::7])
     assert np.array_equal(every.stderr[:, 0], found.stderr[:, ::7])
+
+
+@pytest.mark.parametrize("order", [None, 4])
+def test_standard_errors_are_estimated_when_they_are_asked_for(order: int | None) -> None:
+    times, y = record(6, 3000)
+    how: dict[str, Any] = {"order": order, "max_order": 10, "criterion": "aicc"}
+    plan = _core.WindowFit(times - times[0], 51, derivatives=2, quantisation=0.0, **how)
+    without, with_errors = plan.estimate(y), plan.estimate(y, errors=True, workers=1)
+    assert without.stderr is None
+    assert with_errors.stderr is not None
+    for name in ("order", "status"):
+        assert np.array_equal(getattr(without.estimates, name), getattr(with_errors.estimates, name))
+    off = np.abs(without.estimates.derivatives - with_errors.estimates.derivatives)
+    assert (off <= 1e-7 * with_errors.stderr).all()
+    found = tvident.fit_local_polynomials(y, 51, t=times, quantisation=0, **how)
+    assert np.array_equal(found.derivatives, without.estimates.derivatives)
+    assert np.array_equal(found.stderr, with_errors.stderr)
 
 
 @pytest.mark.parametrize("window_length", [21, "0.12 s", "auto"])

@@ -109,6 +109,7 @@ class WindowFit:
         self,
         samples: npt.NDArray[np.number],
         *,
+        errors: bool = False,
         step: int = 1,
         workers: int | None = None,
         progress: Callable[[int, int], object] | None = None,
@@ -120,7 +121,7 @@ class WindowEstimates:
     @property
     def estimates(self) -> LocalEstimates: ...
     @property
-    def stderr(self) -> npt.NDArray[np.float64]: ...
+    def stderr(self) -> npt.NDArray[np.float64] | None: ...
 
 def estimate_automatically(
     samples: npt.NDArray[np.number],

@@ -117,8 +117,9 @@ class _TimedWindows:
         return found
 
     def _fitted(self, record: npt.NDArray[np.number], workers: int | None, **how: bool) -> _TimedEstimates:
-        fitted = self.plan(**how).estimate(record, workers=workers)
+        fitted = self.plan(**how).estimate(record, errors=True, workers=workers)
         found, last = fitted.estimates, self.derivative
+        assert fitted.stderr is not None  # noqa: S101 - asked for
         return _TimedEstimates(found.derivatives[last], fitted.stderr[last], found.order, found.status, found.sigma)
 
 

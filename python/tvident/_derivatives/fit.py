@@ -142,7 +142,8 @@ class LocalPolynomialFit(Tabular):
         If windows were chosen they contain the variance between all candidates and the bias estimated around each sample. Within half a
         window of the ends they are those of the order that was taken there.
 
-        The cost is about 300 ns a sample; that of the fit if the order is fixed; nothing if windows were chosen.
+        The cost is about 300 ns a sample; that of the fit if the order is fixed, and somewhat more where `t` is not uniform; nothing if
+        windows were chosen.
 
         See Also
         --------

@@ -156,8 +156,13 @@ class _Fit:
             length = self.length
             rows = length if isinstance(length, int) else max(1, round(length / float(np.median(np.diff(times)))))
             records = self._clipped(records, plan, rows)
-        fitted = plan.estimate(records, step=step, workers=self.workers, progress=report)
-        found, errors = fitted.estimates, fitted.stderr
+        found = plan.estimate(records, step=step, workers=self.workers, progress=report).estimates
+
+        def errors() -> npt.NDArray[np.float64]:
+            fitted = plan.estimate(records, errors=True, step=step, workers=self.workers)
+            assert fitted.stderr is not None  # noqa: S101 - asked for
+            return fitted.stderr
+
         return Found(
             derivatives=found.derivatives,
             order=found.order,
@@ -165,7 +170,7 @@ class _Fit:
             sigma=found.sigma,
             window_length=how["window_length"],
             settings=how,
-            errors=lambda: errors,
+            errors=errors,
             plan_of=lambda _: plan,
         )
 

@@ -2,7 +2,7 @@
 
 use std::num::NonZeroUsize;
 
-use numpy::{Element, IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tvident::exec::workers as threads;
@@ -19,8 +19,8 @@ use crate::watch::watched;
 #[pyclass(frozen, get_all, module = "tvident._core")]
 pub(crate) struct WindowEstimates {
     estimates: Py<LocalEstimates>,
-    /// Standard errors of the derivatives.
-    stderr: Py<PyArrayDyn<f64>>,
+    /// Standard errors of the derivatives, where they were asked for.
+    stderr: Option<Py<PyArrayDyn<f64>>>,
 }
 
 /// Windows of so many samples, or of so many seconds, around samples at given times.
@@ -55,11 +55,12 @@ impl WindowFit {
         Ok(Self { core: Core { times, span, order, derivatives, quantisation } })
     }
 
-    /// Estimates along the last axis, and the standard errors of the derivatives.
-    #[pyo3(signature = (samples, *, step=1, workers=None, progress=None))]
+    /// Estimates along the last axis, and the standard errors of the derivatives where they are asked for.
+    #[pyo3(signature = (samples, *, errors=false, step=1, workers=None, progress=None))]
     fn estimate(
         &self,
         samples: &Bound<'_, PyUntypedArray>,
+        errors: bool,
         step: usize,
         workers: Option<NonZeroUsize>,
         progress: Option<&Bound<'_, PyAny>>,
@@ -69,31 +70,51 @@ impl WindowFit {
         if records.iter().any(|record| tvident::record::Samples::len(record) != self.core.times.len()) {
             return Err(PyValueError::new_err("samples and times must be as many as each other"));
         }
-        let mut found: Vec<WindowFits> = Vec::new();
-        watched(py, progress, |watch| {
-            let (all, one) = (records.len(), self.core.times.len());
-            for (done, record) in records.iter().enumerate() {
-                let mut share = |now: usize, _: usize| watch(done * one + now * step, all * one);
-                found.push(self.core.fit(&samples_of(record), step, threads(workers), &mut share)?);
-            }
-            Ok(())
-        })?;
-        let count = self.core.times.len().div_ceil(step);
+        let (all, one) = (records.len(), self.core.times.len());
+        let count = one.div_ceil(step);
         let shape: Vec<usize> = samples.shape().iter().rev().skip(1).rev().copied().chain([count]).collect();
-        let by_derivative: Vec<usize> =
-            std::iter::once(self.core.derivatives + 1).chain(shape.iter().copied()).collect();
-        let derivatives = 0..=self.core.derivatives;
-        let rows = |of: fn(&WindowFits) -> &Vec<Vec<f64>>| {
-            let pairs = derivatives.clone().flat_map(|derivative| found.iter().map(move |one| (derivative, one)));
-            filled(py, &by_derivative, pairs.map(|(derivative, one)| of(one)[derivative].as_slice()))
-        };
+        let of_each: Vec<usize> = std::iter::once(self.core.derivatives + 1).chain(shape.iter().copied()).collect();
+        let derivatives = zeros::<f64>(py, &of_each)?;
+        let stderr = if errors { Some(zeros::<f64>(py, &of_each)?) } else { None };
+        let (order, status) = (zeros::<u8>(py, &shape)?, zeros::<u16>(py, &shape)?);
+        let sigma = zeros::<f64>(py, &shape)?;
+        {
+            let (mut derivatives, mut stderr) =
+                (derivatives.readwrite(), stderr.as_ref().map(PyArrayMethods::readwrite));
+            let (mut order, mut status, mut sigma) = (order.readwrite(), status.readwrite(), sigma.readwrite());
+            let mut estimates = by_record(derivatives.as_slice_mut()?, all, count);
+            let mut errors = match &mut stderr {
+                Some(stderr) => by_record(stderr.as_slice_mut()?, all, count),
+                None => (0..all).map(|_| Vec::new()).collect(),
+            };
+            let mut others = order
+                .as_slice_mut()?
+                .chunks_mut(count.max(1))
+                .zip(status.as_slice_mut()?.chunks_mut(count.max(1)))
+                .zip(sigma.as_slice_mut()?.chunks_mut(count.max(1)));
+            watched(py, progress, |watch| {
+                for (done, record) in records.iter().enumerate() {
+                    let mut share = |now: usize, _: usize| watch(done * one + now * step, all * one);
+                    let Some(((order, status), sigma)) = others.next() else { break };
+                    let fits = WindowFits {
+                        derivatives: std::mem::take(&mut estimates[done]),
+                        errors: std::mem::take(&mut errors[done]),
+                        order,
+                        status,
+                        sigma,
+                    };
+                    self.core.fit(&samples_of(record), step, fits, threads(workers), &mut share)?;
+                }
+                Ok(())
+            })?;
+        }
         let estimates = LocalEstimates {
-            derivatives: rows(|one| &one.derivatives)?.unbind(),
-            order: filled(py, &shape, found.iter().map(|one| one.order.as_slice()))?.unbind(),
-            status: filled(py, &shape, found.iter().map(|one| one.status.as_slice()))?.unbind(),
-            sigma: filled(py, &shape, found.iter().map(|one| one.sigma.as_slice()))?.unbind(),
+            derivatives: derivatives.unbind(),
+            order: order.unbind(),
+            status: status.unbind(),
+            sigma: sigma.unbind(),
         };
-        Ok(WindowEstimates { estimates: Py::new(py, estimates)?, stderr: rows(|one| &one.errors)?.unbind() })
+        Ok(WindowEstimates { estimates: Py::new(py, estimates)?, stderr: stderr.map(Bound::unbind) })
     }
 
     /// The criterion of every order in the window around a sample of a record.
@@ -102,21 +123,11 @@ impl WindowFit {
     }
 }
 
-/// An array of a shape, filled with one row after the other.
-fn filled<'py, 'a, T: Element + Copy + 'a>(
-    py: Python<'py>,
-    shape: &[usize],
-    rows: impl Iterator<Item = &'a [T]>,
-) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
-    let array = zeros::<T>(py, shape)?;
-    {
-        let mut all = array.readwrite();
-        let mut left = all.as_slice_mut()?;
-        for row in rows {
-            let (own, rest) = left.split_at_mut(row.len());
-            own.copy_from_slice(row);
-            left = rest;
-        }
+/// Rows of so many numbers, by derivative and then by record, as those of each record.
+fn by_record(values: &mut [f64], records: usize, count: usize) -> Vec<Vec<&mut [f64]>> {
+    let mut rows: Vec<Vec<&mut [f64]>> = (0..records).map(|_| Vec::new()).collect();
+    for (place, row) in values.chunks_mut(count.max(1)).enumerate() {
+        rows[place % records].push(row);
     }
-    Ok(array)
+    rows
 }

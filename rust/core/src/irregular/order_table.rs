@@ -37,7 +37,8 @@ impl OrderTable {
 #[derive(Clone, Debug)]
 pub(crate) struct TableColumns {
     lanes: usize,
-    lengths: [usize; MOST_LANES],
+    /// Samples of each lane's window.
+    pub(crate) lengths: [usize; MOST_LANES],
     pub(crate) weights: Aligned,
     /// One over the degrees of freedom of the residual, by order; NaN where there are none.
     pub(crate) freedom: Aligned,
@@ -65,9 +66,6 @@ impl TableColumns {
 
     /// Sets what a lane's window has.
     pub(crate) fn set(&mut self, lane: usize, table: &OrderTable) {
-        if self.lengths[lane] == table.length {
-            return;
-        }
         let (length, lanes) = (table.length, self.lanes);
         self.lengths[lane] = length;
         for (order, weight) in table.weights.iter().enumerate() {

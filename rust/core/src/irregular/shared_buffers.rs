@@ -121,9 +121,10 @@ impl GroupSamples {
             sums.add(simd, degrees, &times, &weights, &samples);
             at += AT_ONCE;
         }
-        factor.rows.0[degrees] = sums.products.0;
+        factor.set_below(degrees, 0, &sums.products.0);
         factor.decompose(simd, degrees, &sums.moments.0, 1);
-        let coefficients = factor.solution(simd, degrees, degrees);
+        let mut coefficients = OnLines(factor.rows.0[degrees]);
+        factor.solve(simd, degrees, &mut coefficients);
         let mut off = TakenOff::new(simd, coefficients);
         for at in (0..end).step_by(AT_ONCE) {
             let times = rows(simd, &self.times, at);

@@ -11,18 +11,40 @@ pub(crate) struct OrderResiduals<S: Lanes> {
     /// None below the floor, which residuals of rounding or quantisation have at least.
     residuals: OnLines<S::f64s, MOST>,
     floor: S::f64s,
-    degrees: usize,
+    pub(crate) degrees: usize,
 }
 
-/// The order of each window, and what every other order's share in its error is.
+/// The order of each window.
 pub(crate) struct SharedChoice<S: Lanes> {
     pub(crate) order: S::f64s,
     pub(crate) variance: S::f64s,
     pub(crate) exact: S::m64s,
+}
+
+/// What every order's share in the error of each window is.
+pub(crate) struct OrderShares<S: Lanes> {
     /// By order; their sum is one.
     shares: OnLines<S::f64s, MOST>,
     /// Whether an order has a share in any lane.
     counts: [bool; MOST],
+}
+
+impl<S: Lanes> SharedChoice<S> {
+    /// What of orthogonal polynomials is to be added to the one that was taken off: all of `own` up to the order, and above it minus what that has.
+    #[inline(always)]
+    pub(crate) fn left(
+        &self,
+        simd: S,
+        degrees: usize,
+        own: &[S::f64s; MOST],
+        off: &[S::f64s; MOST],
+        left: &mut [S::f64s; MOST],
+    ) {
+        for k in 0..degrees.min(MOST) {
+            let is_above = simd.less_than_f64s(self.order, simd.splat_f64s(k as f64));
+            left[k] = simd.select_f64s(is_above, simd.neg_f64s(off[k]), own[k]);
+        }
+    }
 }
 
 impl<S: Lanes> OrderResiduals<S> {
@@ -56,16 +78,13 @@ impl<S: Lanes> OrderResiduals<S> {
             order: simd.splat_f64s(order as f64),
             variance: simd.mul_f64s(residual, simd.load(&columns.freedom, order * S::F64_LANES)),
             exact: simd.less_than_or_equal_f64s(residual, self.floor),
-            shares: OnLines([simd.splat_f64s(0.0); MOST]),
-            counts: [false; MOST],
         }
     }
 
     /// The order of the least weighted residual, the lowest of equals.
     #[inline(always)]
     pub(crate) fn choose(&self, simd: S, columns: &TableColumns) -> SharedChoice<S> {
-        let (zero, one, lanes) = (simd.splat_f64s(0.0), simd.splat_f64s(1.0), S::F64_LANES);
-        let mut scores = OnLines([zero; MOST]);
+        let (zero, lanes) = (simd.splat_f64s(0.0), S::F64_LANES);
         let (mut least, mut order) = (simd.splat_f64s(f64::INFINITY), zero);
         let (mut variance, mut residual) = (zero, zero);
         for one in 0..self.degrees {
@@ -75,10 +94,23 @@ impl<S: Lanes> OrderResiduals<S> {
             order = simd.select_f64s(better, simd.splat_f64s(one as f64), order);
             residual = simd.select_f64s(better, self.residuals.0[one], residual);
             variance = simd.select_f64s(better, simd.load(&columns.freedom, one * lanes), variance);
-            // For a window of zeros, ratios must be numbers.
-            scores.0[one] = simd.max_f64s(score, simd.splat_f64s(f64::MIN_POSITIVE));
         }
-        let least = simd.max_f64s(least, simd.splat_f64s(f64::MIN_POSITIVE));
+        let exact = simd.less_than_or_equal_f64s(residual, self.floor);
+        SharedChoice { order, variance: simd.mul_f64s(variance, residual), exact }
+    }
+
+    /// The share of every order in what is known of each window.
+    #[inline(always)]
+    pub(crate) fn shares(&self, simd: S, columns: &TableColumns) -> OrderShares<S> {
+        let (zero, lanes) = (simd.splat_f64s(0.0), S::F64_LANES);
+        // For a window of zeros, ratios must be numbers.
+        let smallest = simd.splat_f64s(f64::MIN_POSITIVE);
+        let (mut scores, mut least) = (OnLines([zero; MOST]), simd.splat_f64s(f64::INFINITY));
+        for one in 0..self.degrees {
+            let score = simd.mul_f64s(self.residuals.0[one], simd.load(&columns.weights, one * lanes));
+            scores.0[one] = simd.max_f64s(score, smallest);
+            least = simd.min_f64s(least, scores.0[one]);
+        }
         let (mut shares, mut counts, mut total) = (OnLines([zero; MOST]), [false; MOST], zero);
         #[allow(clippy::needless_range_loop, reason = "three columns of one table")]
         for one in 0..self.degrees {
@@ -90,12 +122,11 @@ impl<S: Lanes> OrderResiduals<S> {
                 total = simd.add_f64s(total, shares.0[one]);
             }
         }
-        let scale = simd.div_f64s(one, total);
+        let scale = simd.div_f64s(simd.splat_f64s(1.0), total);
         for share in &mut shares.0[..self.degrees] {
             *share = simd.mul_f64s(*share, scale);
         }
-        let exact = simd.less_than_or_equal_f64s(residual, self.floor);
-        SharedChoice { order, variance: simd.mul_f64s(variance, residual), exact, shares, counts }
+        OrderShares { shares, counts }
     }
 
     /// A derivative and its standard error: `full` is that of the highest order, `polynomials` the row of the derivative below the factor.
@@ -104,7 +135,7 @@ impl<S: Lanes> OrderResiduals<S> {
         &self,
         simd: S,
         columns: &TableColumns,
-        choice: &SharedChoice<S>,
+        (choice, shares): (&SharedChoice<S>, Option<&OrderShares<S>>),
         parts: [&[S::f64s; MOST]; 3],
         full: S::f64s,
     ) -> (S::f64s, S::f64s) {
@@ -126,23 +157,21 @@ impl<S: Lanes> OrderResiduals<S> {
             taken = simd.select_f64s(is_taken, values.0[order], taken);
             of_taken = simd.select_f64s(is_taken, gain, of_taken);
         }
+        let Some(OrderShares { shares, counts }) = shares else {
+            return (taken, simd.sqrt_f64s(simd.mul_f64s(choice.variance, of_taken)));
+        };
         let mut error = zero;
-        let mut shared = false;
-        for order in 0..self.degrees {
-            if choice.counts[order] {
-                shared = true;
-                let free = simd.load(&columns.freedom, order * S::F64_LANES);
-                let variance = simd.mul_f64s(self.residuals.0[order], free);
-                let off = simd.sub_f64s(values.0[order], taken);
-                let square = simd.mul_add_f64s(off, off, simd.mul_f64s(variance, gains.0[order]));
-                let part = simd.mul_f64s(choice.shares.0[order], simd.sqrt_f64s(square));
-                // An order without a share in this lane may have no degrees of freedom: nothing times no number.
-                let has_share = simd.greater_than_f64s(choice.shares.0[order], zero);
-                error = simd.add_f64s(error, simd.select_f64s(has_share, part, zero));
-            }
+        for order in (0..self.degrees).filter(|order| counts[*order]) {
+            let free = simd.load(&columns.freedom, order * S::F64_LANES);
+            let variance = simd.mul_f64s(self.residuals.0[order], free);
+            let off = simd.sub_f64s(values.0[order], taken);
+            let square = simd.mul_add_f64s(off, off, simd.mul_f64s(variance, gains.0[order]));
+            let part = simd.mul_f64s(shares.0[order], simd.sqrt_f64s(square));
+            // An order without a share in this lane may have no degrees of freedom: nothing times no number.
+            let has_share = simd.greater_than_f64s(shares.0[order], zero);
+            error = simd.add_f64s(error, simd.select_f64s(has_share, part, zero));
         }
-        let plain = simd.sqrt_f64s(simd.mul_f64s(choice.variance, of_taken));
-        (taken, if shared { error } else { plain })
+        (taken, error)
     }
 }
 
@@ -185,15 +214,15 @@ pub(crate) fn turned<S: Lanes>(
     degrees: usize,
     factor: &SharedFactor<S>,
     coefficients: &[S::f64s; MOST],
-) -> OnLines<S::f64s, MOST> {
+    turned: &mut [S::f64s; MOST],
+) {
     let degrees = degrees.min(MOST);
-    let mut turned = OnLines([simd.splat_f64s(0.0); MOST]);
+    turned[..degrees].fill(simd.splat_f64s(0.0));
     for (row, coefficient) in
         factor.rows.0.iter().zip(coefficients).take(degrees).enumerate().map(|(n, pair)| (&pair.0[..=n], pair.1))
     {
-        for (turned, value) in turned.0.iter_mut().zip(row) {
+        for (turned, value) in turned.iter_mut().zip(row) {
             *turned = simd.mul_add_f64s(*value, *coefficient, *turned);
         }
     }
-    turned
 }

@@ -21,54 +21,63 @@ pub(crate) struct SharedFactor<S: Lanes> {
     pub(crate) inverse: OnLines<S::f64s, MOST>,
     /// The largest ratio of a diagonal to its pivot.
     pub(crate) weakest: S::f64s,
+    /// Halves of moments, and minus the row of a pivot over the pivots before.
+    halves: OnLines<S::f64s, { 2 * MOST }>,
+    factors: OnLines<S::f64s, MOST>,
 }
 
 impl<S: Lanes> SharedFactor<S> {
     #[inline(always)]
     pub(crate) fn zero(simd: S) -> Self {
         let zero = simd.splat_f64s(0.0);
-        Self { rows: OnLines([[zero; MOST]; ROWS]), inverse: OnLines([zero; MOST]), weakest: zero }
+        let (rows, inverse) = (OnLines([[zero; MOST]; ROWS]), OnLines([zero; MOST]));
+        let (halves, factors) = (OnLines([zero; 2 * MOST]), OnLines([zero; MOST]));
+        Self { rows, inverse, weakest: zero, halves, factors }
+    }
+
+    /// Sets a row below the matrix.
+    #[inline(always)]
+    pub(crate) fn set_below(&mut self, degrees: usize, row: usize, values: &[S::f64s; MOST]) {
+        let degrees = degrees.min(MOST);
+        for (own, value) in self.rows.0[degrees + row].iter_mut().zip(values).take(degrees) {
+            *own = *value;
+        }
     }
 
     /// Decomposes the matrix that moments make; so many rows below it hold what is to be solved for.
     #[inline(always)]
     pub(crate) fn decompose(&mut self, simd: S, degrees: usize, moments: &[S::f64s; 2 * MOST], below: usize) {
-        if below > 1 {
-            self.rows.0[degrees.min(MOST) + 1] = [simd.splat_f64s(0.0); MOST];
-        }
         let (degrees, half) = (degrees.min(MOST), simd.splat_f64s(0.5));
-        let mut halves = OnLines(*moments);
-        for value in &mut halves.0[..2 * degrees - 1] {
-            *value = simd.mul_f64s(*value, half);
+        if below > 1 {
+            self.rows.0[degrees + 1][..degrees].fill(simd.splat_f64s(0.0));
         }
-        for row in 0..degrees {
-            for column in 0..=row {
-                self.rows.0[row][column] = simd.add_f64s(halves.0[row + column], halves.0[row - column]);
-            }
+        for (value, moment) in self.halves.0.iter_mut().zip(moments).take(2 * degrees - 1) {
+            *value = simd.mul_f64s(*moment, half);
         }
         self.weakest = simd.splat_f64s(1.0);
         for column in 0..degrees {
-            let diagonal = self.rows.0[column][column];
-            let mut factors = [simd.splat_f64s(0.0); MOST];
+            let diagonal = simd.add_f64s(self.halves.0[2 * column], self.halves.0[0]);
             for (factor, (value, inverse)) in
-                factors.iter_mut().zip(self.rows.0[column].iter().zip(&self.inverse.0)).take(column)
+                self.factors.0.iter_mut().zip(self.rows.0[column].iter().zip(&self.inverse.0)).take(column)
             {
                 *factor = simd.neg_f64s(simd.mul_f64s(*value, *inverse));
             }
+            let (halves, factors) = (&self.halves.0, &self.factors.0);
+            let mut of = EliminatedColumn { simd, halves, factors, degrees, column, row: column };
             let (blocks, rest) = self.rows.0[column..degrees + below].as_chunks_mut::<8>();
             for block in blocks {
-                eliminate(simd, block, &factors, column);
+                of.eliminate(block);
             }
             let (blocks, rest) = rest.as_chunks_mut::<4>();
             for block in blocks {
-                eliminate(simd, block, &factors, column);
+                of.eliminate(block);
             }
             let (blocks, rest) = rest.as_chunks_mut::<2>();
             for block in blocks {
-                eliminate(simd, block, &factors, column);
+                of.eliminate(block);
             }
             for row in rest {
-                eliminate(simd, std::array::from_mut(row), &factors, column);
+                of.eliminate(std::array::from_mut(row));
             }
             if below > 1 {
                 let grown = &mut self.rows.0[degrees + 1][column];
@@ -86,41 +95,56 @@ impl<S: Lanes> SharedFactor<S> {
         }
     }
 
-    /// The solution `G⁻¹ b` of a row.
+    /// The solution `G⁻¹ b` of what stays of `b`, in its place.
     #[inline(always)]
-    pub(crate) fn solution(&self, simd: S, degrees: usize, row: usize) -> OnLines<S::f64s, MOST> {
-        let degrees = degrees.min(MOST);
-        let mut solution = OnLines(self.rows.0[row]);
-        for place in (0..degrees).rev() {
-            for later in place + 1..degrees {
-                let off = simd.mul_f64s(self.rows.0[later][place], solution.0[later]);
-                solution.0[place] = simd.sub_f64s(solution.0[place], off);
+    pub(crate) fn solve(&self, simd: S, degrees: usize, solution: &mut OnLines<S::f64s, MOST>) {
+        for place in (0..degrees.min(MOST)).rev() {
+            let scaled = simd.mul_f64s(solution.0[place], self.inverse.0[place]);
+            // A row of `L D` is a column of `D L'`, and what is on the other side has not been divided by `D` yet.
+            for (earlier, factor) in solution.0[..place].iter_mut().zip(&self.rows.0[place]) {
+                *earlier = simd.negate_mul_add_f64s(*factor, scaled, *earlier);
             }
-            solution.0[place] = simd.mul_f64s(solution.0[place], self.inverse.0[place]);
+            solution.0[place] = scaled;
         }
-        solution
     }
 }
 
-/// Takes the columns before off a column of some rows.
-#[inline(always)]
-fn eliminate<S: Lanes, const N: usize>(
+/// A column from which those before are taken off.
+struct EliminatedColumn<'a, S: Lanes> {
     simd: S,
-    rows: &mut [[S::f64s; MOST]; N],
-    factors: &[S::f64s; MOST],
+    /// Halves of moments, of which the matrix is made.
+    halves: &'a [S::f64s; 2 * MOST],
+    /// Minus the row of the pivot, over the pivots before.
+    factors: &'a [S::f64s; MOST],
+    /// Rows of the matrix.
+    degrees: usize,
     column: usize,
-) {
-    let column = column % MOST;
-    let mut sums = [factors[0]; N];
-    for n in 0..N {
-        sums[n] = rows[n][column];
-    }
-    for k in 0..column {
+    /// The row that is next.
+    row: usize,
+}
+
+impl<S: Lanes> EliminatedColumn<'_, S> {
+    /// Takes the columns before off this column of some rows.
+    #[inline(always)]
+    fn eliminate<const N: usize>(&mut self, rows: &mut [[S::f64s; MOST]; N]) {
+        let (simd, column) = (self.simd, self.column % MOST);
+        let mut sums = [self.factors[0]; N];
         for n in 0..N {
-            sums[n] = simd.mul_add_f64s(rows[n][k], factors[k], sums[n]);
+            let row = self.row + n;
+            sums[n] = if row < self.degrees {
+                simd.add_f64s(self.halves[(row + column) % (2 * MOST)], self.halves[(row - column) % (2 * MOST)])
+            } else {
+                rows[n][column]
+            };
         }
-    }
-    for n in 0..N {
-        rows[n][column] = sums[n];
+        for (k, factor) in self.factors.iter().enumerate().take(column) {
+            for n in 0..N {
+                sums[n] = simd.mul_add_f64s(rows[n][k], *factor, sums[n]);
+            }
+        }
+        for n in 0..N {
+            rows[n][column] = sums[n];
+        }
+        self.row += N;
     }
 }

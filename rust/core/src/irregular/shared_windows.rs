@@ -8,11 +8,11 @@ use std::array::from_fn;
 
 use crate::irregular::order_table::{OrderTable, TableColumns};
 use crate::irregular::shared_buffers::{GroupSamples, SlidSums};
-use crate::irregular::shared_choice::{OrderResiduals, sums, turned};
+use crate::irregular::shared_choice::{OrderResiduals, OrderShares, SharedChoice, sums, turned};
 use crate::irregular::shared_factor::{DERIVATIVES, SharedFactor};
 use crate::irregular::shared_sums::{MOST, at};
 use crate::irregular::window_estimates::{WindowFit, WindowFits};
-use crate::irregular::window_places::{PlacedWindow, WindowGroup};
+use crate::irregular::window_places::{Numbered, PlacedWindow, WindowGroup};
 use crate::local_polynomials::options::Order;
 use crate::local_polynomials::sliding_projection::ROUNDING;
 use crate::simd::aligned::OnLines;
@@ -30,26 +30,34 @@ pub(crate) fn can_share(degrees: usize, derivatives: usize) -> bool {
 }
 
 /// Groups of windows, and where their results go.
-pub(crate) struct WindowsAbreast<'a> {
+pub(crate) struct WindowsAbreast<'a, 'b> {
     pub(crate) fit: &'a WindowFit,
     pub(crate) record: &'a [f64],
-    /// Windows of a piece, the sample that each is for, and their tables.
+    /// Windows of a piece, the samples that they are for, and their tables.
     pub(crate) placed: &'a [PlacedWindow],
-    pub(crate) samples: &'a dyn Fn(usize) -> usize,
+    pub(crate) numbered: Numbered,
     pub(crate) tables: &'a dyn Fn(usize) -> &'a OrderTable,
     pub(crate) groups: &'a [WindowGroup],
     pub(crate) memory: &'a mut GroupSamples,
-    pub(crate) fits: &'a mut WindowFits,
+    pub(crate) fits: &'a mut WindowFits<'b>,
     /// Becomes true for windows that are done.
     pub(crate) done: &'a mut [bool],
 }
 
-impl Kernel for WindowsAbreast<'_> {
+impl Kernel for WindowsAbreast<'_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Lanes>(mut self, simd: S) {
-        let mut work = Workspace { columns: TableColumns::new(S::F64_LANES), factor: SharedFactor::zero(simd) };
+        let nothing = OnLines([simd.splat_f64s(0.0); MOST]);
+        let mut work = Workspace {
+            columns: TableColumns::new(S::F64_LANES),
+            factor: SharedFactor::zero(simd),
+            polynomials: OnLines([nothing.0; DERIVATIVES]),
+            off: nothing.clone(),
+            coefficients: nothing.clone(),
+            left: nothing,
+        };
         for same in self.groups.chunk_by(|one, other| one.degrees == other.degrees) {
             for groups in same.chunks(S::F64_LANES) {
                 self.batch(simd, groups, &mut work);
@@ -62,18 +70,27 @@ impl Kernel for WindowsAbreast<'_> {
 struct Workspace<S: Lanes> {
     columns: TableColumns,
     factor: SharedFactor<S>,
+    /// Shared polynomials and their derivatives at the samples that windows are for.
+    polynomials: OnLines<[S::f64s; MOST], DERIVATIVES>,
+    /// In the orthogonal polynomials of each window: what was taken off the samples, and with it what the window adds to that.
+    off: OnLines<S::f64s, MOST>,
+    coefficients: OnLines<S::f64s, MOST>,
+    /// What is to be added to what was taken off.
+    left: OnLines<S::f64s, MOST>,
 }
 
 /// Windows side by side: what the kernel knows of each lane's.
 struct Abreast {
     /// The number of each lane's window, where it has one.
     windows: [Option<usize>; MOST_LANES],
-    /// Time of the sample that it is for, in the group's time, and one over the half length of the group.
+    /// Time of the sample that it is for, in the group's time.
     time: [f64; MOST_LANES],
-    scale: [f64; MOST_LANES],
     /// What its own reference is above that of the group, and the reference of the group.
     above: [f64; MOST_LANES],
     reference: [f64; MOST_LANES],
+    /// The middle of the group, and one over its half length.
+    middle: [f64; MOST_LANES],
+    scale: [f64; MOST_LANES],
 }
 
 /// What was found in windows side by side.
@@ -81,19 +98,32 @@ struct FoundAbreast {
     values: [[f64; MOST_LANES]; DERIVATIVES],
     errors: [[f64; MOST_LANES]; DERIVATIVES],
     order: [f64; MOST_LANES],
-    variance: [f64; MOST_LANES],
+    sigma: [f64; MOST_LANES],
     /// Bits of lanes.
     exact: u32,
     good: u32,
 }
 
-impl WindowsAbreast<'_> {
+impl Abreast {
+    /// Groups side by side, before their first windows.
+    fn of(groups: &[WindowGroup], reference: [f64; MOST_LANES]) -> Self {
+        let nothing = [0.0; MOST_LANES];
+        let (mut middle, mut scale) = (nothing, [1.0; MOST_LANES]);
+        for ((middle, scale), group) in middle.iter_mut().zip(&mut scale).zip(groups) {
+            (*middle, *scale) = group.scale();
+        }
+        Self { windows: [None; MOST_LANES], time: nothing, above: nothing, reference, middle, scale }
+    }
+}
+
+impl WindowsAbreast<'_, '_> {
     /// Fits the windows of a group in each lane.
     #[inline(always)]
     fn batch<S: Lanes>(&mut self, simd: S, groups: &[WindowGroup], work: &mut Workspace<S>) {
         let degrees = groups[0].degrees;
         self.memory.read(S::F64_LANES, &self.fit.times, self.record, self.placed, groups);
         let mut sums = self.memory.begin(simd, degrees, &mut work.factor);
+        let mut abreast = Abreast::of(groups, self.memory.references);
         let longest = groups.iter().map(|group| group.windows.len()).max().unwrap_or(0);
         for step in 0..longest {
             if step > 0 {
@@ -106,34 +136,29 @@ impl WindowsAbreast<'_> {
                 }
                 sums.slide(simd, degrees, self.memory, &entering, &leaving);
             }
-            let abreast = self.abreast(groups, step, &mut work.columns);
+            self.step_to(&mut abreast, groups, step, &mut work.columns);
             let found = self.solve(simd, degrees, &abreast, &sums, work);
-            self.write(&abreast, &found);
+            self.write(degrees, &abreast, &found);
         }
     }
 
-    /// The window of each lane after so many steps.
-    fn abreast(&self, groups: &[WindowGroup], step: usize, columns: &mut TableColumns) -> Abreast {
-        let nothing = [0.0; MOST_LANES];
-        let mut all = Abreast {
-            windows: [None; MOST_LANES],
-            time: nothing,
-            scale: [1.0; MOST_LANES],
-            above: nothing,
-            reference: self.memory.references,
-        };
-        for (lane, group) in groups.iter().enumerate().filter(|(_, group)| step < group.windows.len()) {
+    /// Steps to a window of each group.
+    fn step_to(&self, abreast: &mut Abreast, groups: &[WindowGroup], step: usize, columns: &mut TableColumns) {
+        for (lane, group) in groups.iter().enumerate() {
             let number = group.windows.start + step;
-            let window = &self.placed[number];
-            let (middle, scale) = group.scale();
-            all.windows[lane] = Some(number);
-            all.time[lane] = (self.fit.times[(self.samples)(number)] - middle) * scale;
-            all.scale[lane] = scale;
-            let own = self.record[window.samples.start + window.samples.len() / 2];
-            all.above[lane] = own - all.reference[lane];
-            columns.set(lane, (self.tables)(window.samples.len()));
+            if number >= group.windows.end {
+                abreast.windows[lane] = None;
+                continue;
+            }
+            let samples = &self.placed[number].samples;
+            abreast.windows[lane] = Some(number);
+            let time = self.fit.times[self.numbered.sample(number)];
+            abreast.time[lane] = (time - abreast.middle[lane]) * abreast.scale[lane];
+            abreast.above[lane] = self.record[samples.start + samples.len() / 2] - abreast.reference[lane];
+            if columns.lengths[lane] != samples.len() {
+                columns.set(lane, (self.tables)(samples.len()));
+            }
         }
-        all
     }
 
     /// Decomposes the normal matrices of windows side by side, chooses their orders and estimates.
@@ -146,48 +171,48 @@ impl WindowsAbreast<'_> {
         window: &SlidSums<S>,
         work: &mut Workspace<S>,
     ) -> FoundAbreast {
-        let Workspace { columns, factor } = work;
+        let Workspace { columns, factor, polynomials, off, coefficients, left } = work;
+        let errors = !self.fits.errors.is_empty();
         let wanted = self.fit.derivatives + 1;
         let zero = simd.splat_f64s(0.0);
-        let below = degrees + 2..degrees + 2 + wanted;
-        factor.rows.0[degrees] = window.left.products.0;
-        at(simd, degrees, simd.load(&abreast.time, 0), &mut factor.rows.0[below.clone()]);
-        let before = sums(simd, degrees, &factor.rows.0[below], &window.coefficients.0);
-        factor.decompose(simd, degrees, &window.left.moments.0, 2 + wanted);
-        let own = OnLines(factor.rows.0[degrees]);
-        let mut coefficients = turned(simd, degrees, factor, &window.coefficients.0);
+        at(simd, degrees, simd.load(&abreast.time, 0), &mut polynomials.0[..wanted]);
+        let before = sums(simd, degrees, &polynomials.0[..wanted], &window.coefficients.0);
+        factor.set_below(degrees, 0, &window.left.products.0);
+        for (derivative, row) in polynomials.0.iter().take(if errors { wanted } else { 0 }).enumerate() {
+            factor.set_below(degrees, 2 + derivative, row);
+        }
+        factor.decompose(simd, degrees, &window.left.moments.0, if errors { 2 + wanted } else { 2 });
+        let own = &factor.rows.0[degrees];
         let (mut residual, mut far, mut rounded) = (window.square, zero, zero);
-        for k in 0..degrees {
-            let inverse = factor.inverse.0[k];
-            let (left, end) = (own.0[k], factor.rows.0[degrees + 1][k]);
+        for (k, (&left, &inverse)) in own.iter().zip(&factor.inverse.0).enumerate().take(degrees) {
+            let end = factor.rows.0[degrees + 1][k];
             residual = simd.negate_mul_add_f64s(simd.mul_f64s(left, left), inverse, residual);
             far = simd.mul_add_f64s(simd.mul_f64s(end, end), inverse, far);
             rounded = simd.mul_add_f64s(window.tails.0[k], inverse, rounded);
-            coefficients.0[k] = simd.add_f64s(coefficients.0[k], left);
         }
         let floor = self.floor(simd, abreast, columns, window);
         let good = is_good(simd, degrees, columns, [far, factor.weakest], [residual, floor, window.peak, rounded]);
-        let residuals = OrderResiduals::new(simd, degrees, residual, &coefficients.0, &factor.inverse.0, floor);
-        let choice = match self.fit.order {
-            Order::Fixed(_) => residuals.fixed(simd, columns),
-            Order::Chosen { .. } => residuals.choose(simd, columns),
-        };
-        let (mut values, mut errors) = ([[0.0; MOST_LANES]; DERIVATIVES], [[0.0; MOST_LANES]; DERIVATIVES]);
-        for derivative in 0..wanted {
-            let row = &factor.rows.0[degrees + 2 + derivative];
-            let mut full = before[derivative];
-            for ((polynomial, inverse), own) in row.iter().zip(&factor.inverse.0).zip(&own.0).take(degrees) {
-                full = simd.mul_add_f64s(simd.mul_f64s(*polynomial, *inverse), *own, full);
+        // What each order leaves asks for the polynomial that was taken off, too.
+        let is_fixed = matches!(self.fit.order, Order::Fixed(_));
+        if errors || !is_fixed {
+            turned(simd, degrees, factor, &window.coefficients.0, &mut off.0);
+            for (coefficient, (&off, &own)) in coefficients.0.iter_mut().zip(off.0.iter().zip(own)).take(degrees) {
+                *coefficient = simd.add_f64s(off, own);
             }
-            let parts = [row, &coefficients.0, &factor.inverse.0];
-            let (value, error) = residuals.estimate(simd, columns, &choice, parts, full);
-            simd.store(&mut values[derivative], 0, value);
-            simd.store(&mut errors[derivative], 0, error);
         }
-        let (mut order, mut variance) = ([0.0; MOST_LANES], [0.0; MOST_LANES]);
-        simd.store(&mut order, 0, choice.order);
-        simd.store(&mut variance, 0, choice.variance);
-        FoundAbreast { values, errors, order, variance, exact: simd.bits(choice.exact), good: simd.bits(good) }
+        let residuals = OrderResiduals::new(simd, degrees, residual, &coefficients.0, &factor.inverse.0, floor);
+        let choice = if is_fixed { residuals.fixed(simd, columns) } else { residuals.choose(simd, columns) };
+        let mut found = FoundAbreast::of(simd, &choice, good);
+        if errors {
+            let shares = if is_fixed { None } else { Some(residuals.shares(simd, columns)) };
+            let chosen = (&residuals, &choice, shares.as_ref(), &*columns);
+            found.estimate_with_errors(simd, chosen, factor, &coefficients.0, &before[..wanted]);
+        } else {
+            choice.left(simd, degrees, own, &off.0, &mut left.0);
+            factor.solve(simd, degrees, left);
+            found.estimate(simd, degrees, &left.0, &polynomials.0, &before[..wanted]);
+        }
+        found
     }
 
     /// What rounding or quantisation leaves of residuals at least, from the samples' squares about a sample of the window's own.
@@ -201,7 +226,7 @@ impl WindowsAbreast<'_> {
     }
 
     /// Writes what is good.
-    fn write(&mut self, abreast: &Abreast, found: &FoundAbreast) {
+    fn write(&mut self, degrees: usize, abreast: &Abreast, found: &FoundAbreast) {
         for (lane, window) in abreast.windows.iter().enumerate() {
             let Some(window) = *window else { continue };
             if found.good >> lane & 1 == 0 {
@@ -209,10 +234,12 @@ impl WindowsAbreast<'_> {
             }
             self.done[window] = true;
             let mut scale = 1.0;
-            for derivative in 0..=self.fit.derivatives {
+            for (derivative, row) in self.fits.derivatives.iter_mut().enumerate() {
                 let level = if derivative == 0 { abreast.reference[lane] } else { 0.0 };
-                self.fits.derivatives[derivative][window] = level + found.values[derivative][lane] * scale;
-                self.fits.errors[derivative][window] = found.errors[derivative][lane] * scale;
+                row[window] = level + found.values[derivative][lane] * scale;
+                if let Some(errors) = self.fits.errors.get_mut(derivative) {
+                    errors[window] = found.errors[derivative][lane] * scale;
+                }
                 scale *= abreast.scale[lane];
             }
             #[allow(
@@ -221,11 +248,70 @@ impl WindowsAbreast<'_> {
                 reason = "an order is a small whole number"
             )]
             let order = found.order[lane] as u8;
-            let degrees = (self.tables)(self.placed[window].samples.len()).degrees;
             self.fits.order[window] = order;
             let exact = found.exact >> lane & 1 == 1;
             self.fits.status[window] = self.fit.status(usize::from(order), degrees, false, exact).bits();
-            self.fits.sigma[window] = found.variance[lane].sqrt();
+            self.fits.sigma[window] = found.sigma[lane];
+        }
+    }
+}
+
+impl FoundAbreast {
+    /// What is chosen, before anything is estimated.
+    #[inline(always)]
+    fn of<S: Lanes>(simd: S, choice: &SharedChoice<S>, good: S::m64s) -> Self {
+        let nothing = [0.0; MOST_LANES];
+        let (values, errors) = ([nothing; DERIVATIVES], [nothing; DERIVATIVES]);
+        let (exact, good) = (simd.bits(choice.exact), simd.bits(good));
+        let mut found = Self { values, errors, order: nothing, sigma: nothing, exact, good };
+        simd.store(&mut found.order, 0, choice.order);
+        simd.store(&mut found.sigma, 0, simd.sqrt_f64s(choice.variance));
+        found
+    }
+
+    /// Estimates every derivative with its standard error.
+    #[inline(always)]
+    fn estimate_with_errors<S: Lanes>(
+        &mut self,
+        simd: S,
+        (residuals, choice, shares, columns): (
+            &OrderResiduals<S>,
+            &SharedChoice<S>,
+            Option<&OrderShares<S>>,
+            &TableColumns,
+        ),
+        factor: &SharedFactor<S>,
+        coefficients: &[S::f64s; MOST],
+        before: &[S::f64s],
+    ) {
+        let degrees = residuals.degrees;
+        let own = &factor.rows.0[degrees];
+        for (derivative, &before) in before.iter().enumerate() {
+            let row = &factor.rows.0[degrees + 2 + derivative];
+            let mut full = before;
+            for ((polynomial, inverse), own) in row.iter().zip(&factor.inverse.0).zip(own).take(degrees) {
+                full = simd.mul_add_f64s(simd.mul_f64s(*polynomial, *inverse), *own, full);
+            }
+            let parts = [row, coefficients, &factor.inverse.0];
+            let (value, error) = residuals.estimate(simd, columns, (choice, shares), parts, full);
+            simd.store(&mut self.values[derivative], 0, value);
+            simd.store(&mut self.errors[derivative], 0, error);
+        }
+    }
+
+    /// Estimates every derivative by one polynomial in the shared basis: what is left of the samples, and orders that were taken off too many.
+    #[inline(always)]
+    fn estimate<S: Lanes>(
+        &mut self,
+        simd: S,
+        degrees: usize,
+        left: &[S::f64s; MOST],
+        polynomials: &[[S::f64s; MOST]],
+        before: &[S::f64s],
+    ) {
+        let more = sums(simd, degrees, &polynomials[..before.len()], left);
+        for ((value, &before), more) in self.values.iter_mut().zip(before).zip(more) {
+            simd.store(value, 0, simd.add_f64s(before, more));
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What is asked of windows whose samples have times of their own, and what is found in them.
+//! What is asked of windows whose samples have times of their own, and where what is found in them goes.
 
 use crate::irregular::window_places::WindowSpan;
 use crate::local_polynomials::options::Order;
@@ -19,19 +19,19 @@ pub struct WindowFit {
     pub quantisation: f64,
 }
 
-/// What was found in some windows, one after the other.
-#[derive(Clone, Debug, Default)]
-pub struct WindowFits {
-    /// Derivatives from 0 on, and their standard errors.
-    pub derivatives: Vec<Vec<f64>>,
-    /// Standard errors of the derivatives.
-    pub errors: Vec<Vec<f64>>,
+/// Where what is found in some windows goes, one after the other.
+#[derive(Debug)]
+pub struct WindowFits<'a> {
+    /// Derivatives from 0 on.
+    pub derivatives: Vec<&'a mut [f64]>,
+    /// Their standard errors; empty where nobody asks for them.
+    pub errors: Vec<&'a mut [f64]>,
     /// Order of the window.
-    pub order: Vec<u8>,
+    pub order: &'a mut [u8],
     /// Bits of [`Status`].
-    pub status: Vec<u16>,
+    pub status: &'a mut [u16],
     /// Standard deviation of the noise.
-    pub sigma: Vec<f64>,
+    pub sigma: &'a mut [f64],
 }
 
 impl WindowFit {
@@ -53,24 +53,26 @@ impl WindowFit {
     }
 }
 
-impl WindowFits {
-    /// So many windows of which nothing is known.
-    pub(crate) fn new(derivatives: usize, windows: usize) -> Self {
-        let columns = vec![vec![f64::NAN; windows]; derivatives + 1];
+impl<'a> WindowFits<'a> {
+    /// Takes so many windows off the front; there must be as many.
+    pub(crate) fn take_first(&mut self, windows: usize) -> Self {
+        let rows = |rows: &mut Vec<&'a mut [f64]>| {
+            rows.iter_mut().map(|row| row.split_off_mut(..windows).unwrap_or_default()).collect()
+        };
         Self {
-            derivatives: columns.clone(),
-            errors: columns,
-            order: vec![0; windows],
-            status: vec![Status::INVALID.bits(); windows],
-            sigma: vec![f64::NAN; windows],
+            derivatives: rows(&mut self.derivatives),
+            errors: rows(&mut self.errors),
+            order: self.order.split_off_mut(..windows).unwrap_or_default(),
+            status: self.status.split_off_mut(..windows).unwrap_or_default(),
+            sigma: self.sigma.split_off_mut(..windows).unwrap_or_default(),
         }
     }
 
-    pub(crate) fn append(&mut self, mut other: Self) {
-        let pairs = self.derivatives.iter_mut().zip(&mut other.derivatives);
-        pairs.chain(self.errors.iter_mut().zip(&mut other.errors)).for_each(|(one, other)| one.append(other));
-        self.order.append(&mut other.order);
-        self.status.append(&mut other.status);
-        self.sigma.append(&mut other.sigma);
+    /// Says of a window that nothing is known.
+    pub(crate) fn invalidate(&mut self, window: usize) {
+        for row in self.derivatives.iter_mut().chain(&mut self.errors) {
+            row[window] = f64::NAN;
+        }
+        (self.order[window], self.status[window], self.sigma[window]) = (0, Status::INVALID.bits(), f64::NAN);
     }
 }

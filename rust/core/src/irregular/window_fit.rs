@@ -10,13 +10,14 @@ use std::num::NonZeroUsize;
 use std::ops::Range;
 
 use crate::error::Error;
-use crate::exec::pool::{Piece, Watch, map};
+use crate::exec::pool::{Piece, Watch, run};
+use crate::irregular::order_sums::OrderSums;
 use crate::irregular::order_table::{NEGLIGIBLE, OrderTable};
 use crate::irregular::own_basis::{OwnBasis, dot};
 use crate::irregular::shared_buffers::GroupSamples;
 use crate::irregular::shared_windows::{WindowsAbreast, can_share};
 use crate::irregular::window_estimates::{WindowFit, WindowFits};
-use crate::irregular::window_places::{PlacedWindow, WindowSpan, groups};
+use crate::irregular::window_places::{Numbered, PlacedWindow, WindowSpan, groups};
 use crate::local_polynomials::options::Order;
 use crate::local_polynomials::sliding_projection::ROUNDING;
 use crate::record::samples::is_usable;
@@ -52,7 +53,7 @@ struct FittedWindow {
 }
 
 impl WindowFit {
-    /// Fits the window around every `step`-th sample.
+    /// Fits the window around every `step`-th sample; `fits` has a place for each. Without standard errors a window costs half to two thirds.
     ///
     /// # Errors
     /// If the watch cancels.
@@ -60,25 +61,26 @@ impl WindowFit {
         &self,
         record: &[f64],
         step: usize,
+        mut fits: WindowFits<'_>,
         workers: NonZeroUsize,
         watch: &mut Watch<'_>,
-    ) -> Result<WindowFits, Error> {
+    ) -> Result<(), Error> {
         let count = record.len().div_ceil(step);
         let lengths = if can_share(1, self.derivatives) { LENGTHS } else { 0 };
         let usual = self.usual_length().max(1);
         let most = (MOST_SAMPLES / usual).min(count.div_ceil(PIECES));
         let at_once = WINDOWS.max((lengths * usual / step).min(most));
-        let pieces = (0..count).step_by(at_once).map(|first| first..count.min(first + at_once));
-        let pieces = pieces.map(|content| Piece { size: content.len(), content }).collect();
+        let ranges = (0..count).step_by(at_once).map(|first| first..count.min(first + at_once));
+        let piece = |windows: Range<usize>| Piece {
+            size: windows.len(),
+            content: (Numbered { first: windows.start, step }, fits.take_first(windows.len())),
+        };
+        let pieces = ranges.map(piece).collect();
         let instructions = Instructions::current();
-        let work =
-            |windows: Range<usize>, memory: &mut FitMemory| self.piece(record, windows, step, instructions, memory);
-        let parts = map(pieces, workers, FitMemory::default, work, watch)?;
-        let mut all = WindowFits::new(self.derivatives, 0);
-        for part in parts {
-            all.append(part);
-        }
-        Ok(all)
+        let work = |(numbered, fits): (Numbered, WindowFits<'_>), memory: &mut FitMemory| {
+            self.piece(record, numbered, fits, instructions, memory);
+        };
+        run(pieces, workers, FitMemory::default, work, watch)
     }
 
     /// Samples of a window, on average.
@@ -98,18 +100,15 @@ impl WindowFit {
     fn piece(
         &self,
         record: &[f64],
-        windows: Range<usize>,
-        step: usize,
+        numbered: Numbered,
+        mut fits: WindowFits<'_>,
         instructions: Instructions,
         memory: &mut FitMemory,
-    ) -> WindowFits {
-        let first = windows.start;
-        let placed = self.span.places(&self.times, windows, step);
-        let sample = |window: usize| (first + window) * step;
-        let mut fits = WindowFits::new(self.derivatives, placed.len());
-        let done = self.side_by_side(record, &placed, &sample, instructions, memory, &mut fits);
-        self.one_by_one(record, &placed, sample, &done, &mut memory.basis, &mut fits);
-        fits
+    ) {
+        let windows = numbered.first..numbered.first + fits.order.len();
+        let placed = self.span.places(&self.times, windows, numbered.step);
+        let done = self.side_by_side(record, &placed, numbered, instructions, memory, &mut fits);
+        self.one_by_one(record, &placed, numbered, &done, &mut memory.basis, &mut fits);
     }
 
     /// Fits the windows that share a basis and lose nothing by it; returns which do.
@@ -117,13 +116,14 @@ impl WindowFit {
         &self,
         record: &[f64],
         placed: &[PlacedWindow],
-        sample: &dyn Fn(usize) -> usize,
+        numbered: Numbered,
         instructions: Instructions,
         memory: &mut FitMemory,
-        fits: &mut WindowFits,
+        fits: &mut WindowFits<'_>,
     ) -> Vec<bool> {
         let FitMemory { shared, tables, .. } = memory;
-        for length in placed.iter().map(|window| window.samples.len()) {
+        for same in placed.chunk_by(|one, other| one.samples.len() == other.samples.len()) {
+            let length = same[0].samples.len();
             if length >= tables.len() {
                 tables.resize(length + 1, None);
             }
@@ -141,7 +141,7 @@ impl WindowFit {
             fit: self,
             record,
             placed,
-            samples: sample,
+            numbered,
             tables: &table,
             groups: &groups,
             memory: shared,
@@ -157,10 +157,10 @@ impl WindowFit {
         &self,
         record: &[f64],
         placed: &[PlacedWindow],
-        sample: impl Fn(usize) -> usize,
+        numbered: Numbered,
         done: &[bool],
         basis: &mut OwnBasis,
-        fits: &mut WindowFits,
+        fits: &mut WindowFits<'_>,
     ) {
         let mut last: Option<(&PlacedWindow, Option<FittedWindow>)> = None;
         for (place, window) in placed.iter().enumerate().filter(|(place, _)| !done[*place]) {
@@ -169,8 +169,9 @@ impl WindowFit {
                 Some((before, fitted)) if *before == window => fitted,
                 _ => &last.insert((window, self.fitted(record, window, basis))).1,
             };
-            if let Some(fitted) = fitted {
-                self.one(window, fitted, sample(place), basis, fits, place);
+            match fitted {
+                Some(fitted) => self.one(window, fitted, numbered.sample(place), basis, fits, place),
+                None => fits.invalidate(place),
             }
         }
     }
@@ -218,7 +219,7 @@ impl WindowFit {
         fitted: &FittedWindow,
         sample: usize,
         basis: &OwnBasis,
-        fits: &mut WindowFits,
+        fits: &mut WindowFits<'_>,
         place: usize,
     ) {
         let (length, degrees) = (window.samples.len(), fitted.coefficients.len());
@@ -248,64 +249,18 @@ impl WindowFit {
                 Some(_) if window.edge => sums.best(order, derivative, variance(order)),
                 _ => order,
             };
+            fits.derivatives[derivative][place] = level + sums.values[taken] * scale;
+            let Some(errors) = fits.errors.get_mut(derivative) else { continue };
             let error = match &shares {
                 Some(shares) if !window.edge => sums.error(taken, shares, variance),
                 _ => (variance(order) * sums.gains[taken]).sqrt(),
             };
-            fits.derivatives[derivative][place] = level + sums.values[taken] * scale;
-            fits.errors[derivative][place] = error * scale;
+            errors[place] = error * scale;
         }
         let exact = fitted.residuals[order] <= fitted.floor;
         fits.order[place] = u8::try_from(order).unwrap_or(u8::MAX);
         fits.status[place] = self.status(order, degrees, window.edge, exact).bits();
         fits.sigma[place] = variance(order).sqrt();
-    }
-}
-
-/// A derivative by every order, and its variance over that of the noise.
-struct OrderSums {
-    values: Vec<f64>,
-    gains: Vec<f64>,
-}
-
-impl OrderSums {
-    fn new(polynomials: &[f64], coefficients: &[f64]) -> Self {
-        let (mut value, mut gain) = (0.0, 0.0);
-        let mut sums = Self { values: Vec::new(), gains: Vec::new() };
-        for (polynomial, coefficient) in polynomials.iter().zip(coefficients) {
-            value += polynomial * coefficient;
-            gain += polynomial * polynomial;
-            sums.values.push(value);
-            sums.gains.push(gain);
-        }
-        sums
-    }
-
-    /// The order with the least estimated squared bias plus variance off the centre (see [`crate::local_polynomials`]).
-    fn best(&self, top: usize, lowest: usize, variance: f64) -> usize {
-        if variance.is_nan() {
-            return top;
-        }
-        let (mut best, mut least) = (top, variance * self.gains[top]);
-        for order in (lowest..top).rev() {
-            let chance = variance * (self.gains[top] - self.gains[order]);
-            let bias = ((self.values[order] - self.values[top]).powi(2) - chance).max(0.0);
-            let error = bias + variance * self.gains[order];
-            if error <= least {
-                (best, least) = (order, error);
-            }
-        }
-        best
-    }
-
-    /// The standard error of an order's estimate that knows of the choice (Burnham and Anderson 2002).
-    fn error(&self, taken: usize, shares: &[f64], variance: impl Fn(usize) -> f64) -> f64 {
-        let total: f64 = shares.iter().sum();
-        let of = |(order, share): (usize, &f64)| {
-            let off = self.values[order] - self.values[taken];
-            if *share > 0.0 { share / total * (variance(order) * self.gains[order] + off * off).sqrt() } else { 0.0 }
-        };
-        shares.iter().enumerate().map(of).sum()
     }
 }
 
@@ -348,17 +303,58 @@ mod tests {
         WindowFit { times, span, order, derivatives: 2, quantisation: 0.0 }
     }
 
+    /// What was found in windows.
+    struct FoundWindows {
+        derivatives: Vec<Vec<f64>>,
+        errors: Vec<Vec<f64>>,
+        order: Vec<u8>,
+        status: Vec<u16>,
+        sigma: Vec<f64>,
+    }
+
+    impl FoundWindows {
+        /// Windows of which nothing is known yet, and which have standard errors.
+        fn new(derivatives: usize, windows: usize) -> Self {
+            let columns = vec![vec![f64::NAN; windows]; derivatives + 1];
+            let (order, status, sigma) = (vec![0; windows], vec![0; windows], vec![f64::NAN; windows]);
+            Self { derivatives: columns.clone(), errors: columns, order, status, sigma }
+        }
+
+        fn fits(&mut self) -> WindowFits<'_> {
+            WindowFits {
+                derivatives: self.derivatives.iter_mut().map(Vec::as_mut_slice).collect(),
+                errors: self.errors.iter_mut().map(Vec::as_mut_slice).collect(),
+                order: &mut self.order,
+                status: &mut self.status,
+                sigma: &mut self.sigma,
+            }
+        }
+
+        /// All windows of a record, with their standard errors where they are asked for.
+        fn of(fit: &WindowFit, record: &[f64], errors: bool) -> Self {
+            let mut found = Self::new(fit.derivatives, record.len());
+            if !errors {
+                found.errors.clear();
+            }
+            fit.fit(record, 1, found.fits(), NonZeroUsize::MIN, &mut |_, _| true).expect("nothing cancels");
+            found
+        }
+    }
+
+    /// Which samples the windows of a whole record are around.
+    const EVERY: Numbered = Numbered { first: 0, step: 1 };
+
     /// What a QR decomposition of every so-many-th window finds; of others nothing is known.
-    fn one_by_one(fit: &WindowFit, record: &[f64], every: usize) -> WindowFits {
+    fn one_by_one(fit: &WindowFit, record: &[f64], every: usize) -> FoundWindows {
         let placed = fit.span.places(&fit.times, 0..record.len(), 1);
-        let mut fits = WindowFits::new(fit.derivatives, placed.len());
+        let mut found = FoundWindows::new(fit.derivatives, placed.len());
         let skipped: Vec<bool> = (0..placed.len()).map(|window| window % every > 0).collect();
-        fit.one_by_one(record, &placed, |window| window, &skipped, &mut OwnBasis::default(), &mut fits);
-        fits
+        fit.one_by_one(record, &placed, EVERY, &skipped, &mut OwnBasis::default(), &mut found.fits());
+        found
     }
 
     /// Compares windows in standard errors of their own. Where the noise is hardly above rounding, both are as far from the truth.
-    fn assert_same(found: &WindowFits, expected: &WindowFits, rounding: f64, what: &str) {
+    fn assert_same(found: &FoundWindows, expected: &FoundWindows, rounding: f64, what: &str) {
         for window in (0..found.order.len()).filter(|window| !expected.sigma[*window].is_nan()) {
             assert_eq!(found.order[window], expected.order[window], "{what}, order at {window}");
             assert_eq!(found.status[window], expected.status[window], "{what}, status at {window}");
@@ -367,7 +363,9 @@ mod tests {
             assert!(near(found.sigma[window], sigma, sigma), "{what}, noise at {window}");
             for derivative in 0..found.derivatives.len() {
                 let error = expected.errors[derivative][window];
-                assert!(near(found.errors[derivative][window], error, error), "{what}, error at {window}");
+                if let Some(errors) = found.errors.get(derivative) {
+                    assert!(near(errors[window], error, error), "{what}, error at {window}");
+                }
                 let [one, other] = [found, expected].map(|fits| fits.derivatives[derivative][window]);
                 let digits = 4.0 * f64::EPSILON * other.abs();
                 assert!(
@@ -400,8 +398,10 @@ mod tests {
                 let what = format!("steps {steps}, signal {signal}, {span:?}, {order:?}");
                 // Rounding of the samples is 1e-16, in 1e-10 of noise.
                 let rounding = if signal == 1 { 1e-4 } else { 0.0 };
-                let found = fit.fit(&record, 1, NonZeroUsize::MIN, &mut |_, _| true).expect("nothing cancels");
-                assert_same(&found, &one_by_one(&fit, &record, 5), rounding, &what);
+                let expected = one_by_one(&fit, &record, 5);
+                for errors in [true, false] {
+                    assert_same(&FoundWindows::of(&fit, &record, errors), &expected, rounding, &what);
+                }
             }
         }
     }
@@ -421,12 +421,12 @@ mod tests {
             let expected = one_by_one(&fit, &record, 10);
             for instructions in Instructions::available() {
                 let placed = fit.span.places(&fit.times, 0..record.len(), 1);
-                let mut found = WindowFits::new(fit.derivatives, placed.len());
+                let mut found = FoundWindows::new(fit.derivatives, placed.len());
                 let mut memory = FitMemory::default();
-                let done = fit.side_by_side(&record, &placed, &|window| window, instructions, &mut memory, &mut found);
+                let done = fit.side_by_side(&record, &placed, EVERY, instructions, &mut memory, &mut found.fits());
                 let missed = placed.iter().zip(&done).filter(|(window, done)| !window.edge && !**done).count();
                 assert!(missed * 50 < record.len(), "{missed} with {instructions:?}");
-                fit.one_by_one(&record, &placed, |window| window, &done, &mut OwnBasis::default(), &mut found);
+                fit.one_by_one(&record, &placed, EVERY, &done, &mut OwnBasis::default(), &mut found.fits());
                 assert_same(&found, &expected, 0.0, &format!("{instructions:?}"));
             }
         }

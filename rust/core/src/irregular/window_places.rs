@@ -30,6 +30,21 @@ pub(crate) struct PlacedWindow {
     pub(crate) edge: bool,
 }
 
+/// Which samples windows are around that follow each other.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Numbered {
+    /// The number of the first, and samples from one to the next.
+    pub(crate) first: usize,
+    pub(crate) step: usize,
+}
+
+impl Numbered {
+    /// The sample that a window is around.
+    pub(crate) fn sample(self, window: usize) -> usize {
+        (self.first + window) * self.step
+    }
+}
+
 /// Windows that follow each other and share a basis.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct WindowGroup {
@@ -110,6 +125,7 @@ pub(crate) fn groups(
     let mut groups: Vec<WindowGroup> = Vec::new();
     // Samples are usable from this one to the one before `seen`.
     let (mut usable, mut seen) = (0, 0);
+    let mut most = (usize::MAX, 0.0);
     for (number, window) in windows.iter().enumerate() {
         let new = seen.max(window.samples.start);
         if let Some(last) = record[new..window.samples.end.max(new)].iter().rposition(|&value| !is_usable(value)) {
@@ -124,7 +140,10 @@ pub(crate) fn groups(
         let length = to - from;
         if let Some(group) = groups.last_mut() {
             let shortest = group.shortest.min(length);
-            let near = to - group.from <= (1.0 + reach(degrees)) * shortest && to >= group.to;
+            if most.0 != degrees {
+                most = (degrees, 1.0 + reach(degrees));
+            }
+            let near = to - group.from <= most.1 * shortest && to >= group.to;
             if near && group.windows.end == number && group.degrees == degrees {
                 (group.windows.end, group.to, group.shortest) = (number + 1, to, shortest);
                 continue;
