@@ -45,7 +45,7 @@ class Sampling:
         """Return how channels whose times are not uniform are brought onto a grid."""
         channels = {"angle": np.stack(angles), "torque": np.stack(torques)}
         clock = clock_of(grid, channels, None, workers)
-        passed = clock.evened(channels, propagate=False, workers=workers).passed
+        passed = clock.evened({}, propagate=False, workers=workers).passed
         return cls(clock.period, grid.start, clock, passed, workers)
 
     @property
