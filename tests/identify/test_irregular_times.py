@@ -181,6 +181,19 @@ def test_stamps_that_jitter_by_a_whole_step_do_not_change_the_rate() -> None:
     np.testing.assert_array_equal(result.stiffness, by_rate.stiffness)
 
 
+def test_a_record_without_long_steps_says_nothing_of_those_of_another() -> None:
+    t = jittered(7, 0.3)
+    call = {"method": tvident.WeakForm(window_length=161, exponent=8), "terms": (), **CONSTANT}
+    whole = tvident.identify(*taken(7, t, (1e-3, 0.1)), t=t, **call)
+    assert whole.settings["bridged"] == 1.5
+    assert "gaps" not in whole.reasons[0]
+    lost = np.random.default_rng(7).random(t.size) > 0.01
+    angle, torque = (one[lost] for one in taken(8, t, (1e-3, 0.1)))
+    again = tvident.identify(angle, torque, t=t[lost], settings=whole.settings, **{**call, "method": "auto"})
+    alone = tvident.identify(angle, torque, t=t[lost], **call)
+    assert again.settings["bridged"] == alone.settings["bridged"] > 1.5
+
+
 def test_only_who_weighs_by_noise_asks_what_a_grid_makes_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """It takes as long as the paper's method, which sees the noise of the grid in its windows."""
     asked: list[Passed] = []

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._clocks.grid import Grid
-from tvident._clocks.missing import bridge_of
+from tvident._clocks.missing import LEAST_BRIDGED, bridge_of
 from tvident._clocks.order import chosen_order, longest_bridged
 from tvident._clocks.passed import Passed
 
@@ -171,7 +171,10 @@ def _splines(
         bridge = bridge_of({name: grid.with_missing(values) for name, values in channels.items()}, order)
         return replace(grid, bridged=bridged or bridge.longest), bridge.order
     order = order or chosen_order(grid, channels)
-    return replace(grid, bridged=bridged or longest_bridged(grid, channels, order)), order
+    # Where the earlier record had no longer steps, nothing is known of them.
+    if bridged is None or bridged <= LEAST_BRIDGED:
+        bridged = longest_bridged(grid, channels, order)
+    return replace(grid, bridged=bridged), order
 
 
 def _told(

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._clocks.grid import Grid, Numbers
+from tvident._clocks.missing import LEAST_BRIDGED
 
 _USUAL, _SMALL = 5, 0.31
 """Up to so much jitter a spline of fifth order costs no precision (measured), and hardly any bias."""
@@ -30,9 +31,6 @@ _APART = 8
 
 _EXPLAINED, _SEEN = 2.0, 1e-3
 """What splines may miss samples by: so many times the noise's variance, and this part of the channel's root mean square."""
-
-_LEAST_BRIDGED = 1.5
-"""Periods: steps up to this are no gaps, whatever the channels do."""
 
 _LEAST = 1e-24
 """Of the mean square of a channel: errors below this are rounding."""
@@ -68,8 +66,8 @@ def longest_bridged(grid: Grid, channels: Mapping[str, npt.NDArray[np.number]], 
     what noise alone is. Where no step is longer than those that are no gaps anyway, and nothing is missing, nothing is asked.
     """
     nothing_lost = all(np.isfinite(values).all() for values in channels.values())
-    if nothing_lost and float(np.diff(grid.places).max()) <= _LEAST_BRIDGED:
-        return _LEAST_BRIDGED
+    if nothing_lost and float(np.diff(grid.places).max()) <= LEAST_BRIDGED:
+        return LEAST_BRIDGED
     middle = Middle.of(grid, channels)
     every = middle.resampled(order, grid.bridged)
     judge = middle.resampled(_JUDGE, grid.bridged)
@@ -81,7 +79,7 @@ def longest_bridged(grid: Grid, channels: Mapping[str, npt.NDArray[np.number]], 
         holed = Middle(middle.places[kept], middle.samples, middle.rows[:, kept])
         wrong = np.nanmean(_missed(holed, middle, kept, order) ** 2, axis=1)
         if (wrong[:-1] > _EXPLAINED * noise * wrong[-1] + _SEEN**2 * squares).any():
-            return max(float(lost), _LEAST_BRIDGED)
+            return max(float(lost), LEAST_BRIDGED)
     return grid.bridged
 
 
