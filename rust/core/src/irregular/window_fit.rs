@@ -53,7 +53,7 @@ struct FittedWindow {
 }
 
 impl WindowFit {
-    /// Fits the window around every `step`-th sample; `fits` has a place for each. Without standard errors a window costs half to two thirds.
+    /// Fits the window around every `step`-th sample; `fits` has a place for each. Standard errors cost a fifth more.
     ///
     /// # Errors
     /// If the watch cancels.
