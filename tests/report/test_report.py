@@ -78,17 +78,18 @@ def test_a_spike_does_not_cost_what_is_beside_it() -> None:
 )
 def test_levels_have_as_many_bits_as_there_is_room_for(most_bytes: int, levels: int) -> None:
     generator = np.random.default_rng(0)
-    many = [Series(str(number), "", generator.standard_normal(100_000), 0.0, 1e-3) for number in range(4)]
-    many[1].values[500:700] = np.nan
+    values = [generator.standard_normal(100_000) for _ in range(4)]
+    values[1][500:700] = np.nan
+    many = [Series(str(number), "", one, 0.0, 1e-3) for number, one in enumerate(values)]
     parts = packed(many, most_bytes=most_bytes)
     assert sum(len(part.extremes) + len(part.levels) for part in parts) < 1.05 * 4 / 3 * most_bytes
-    for series, part in zip(many, parts, strict=True):
+    for one, part in zip(values, parts, strict=True):
         assert (part.about["top"] + 1, part.about["merged"]) == (levels, 1)
         found, half = unpacked(part)
-        assert np.nanmax(half) <= np.ptp(series.values[np.isfinite(series.values)]) / 2 / (levels - 1) * (1 + 1e-6)
-        np.testing.assert_array_equal(np.isnan(found), np.isnan(series.values))
+        assert np.nanmax(half) <= np.ptp(one[np.isfinite(one)]) / 2 / (levels - 1) * (1 + 1e-6)
+        np.testing.assert_array_equal(np.isnan(found), np.isnan(one))
         there = np.isfinite(found)
-        assert (np.abs(found - series.values)[there] <= half[there] + 1e-6).all()
+        assert (np.abs(found - one)[there] <= half[there] + 1e-6).all()
     assert f"one of {levels:,} levels".replace(",", " ") in in_words(parts)
     assert in_words(parts).startswith("Every sample is in this page")
 
@@ -112,8 +113,9 @@ def test_extremes_of_smooth_series_have_the_room_that_they_take() -> None:
 
 def test_what_does_not_fit_keeps_its_extremes() -> None:
     generator = np.random.default_rng(0)
-    many = [Series(str(number), "", generator.standard_normal(100_000), 0.0, 1e-3) for number in range(4)]
-    many[0].values[70_001] = 9.0
+    values = [generator.standard_normal(100_000) for _ in range(4)]
+    values[0][70_001] = 9.0
+    many = [Series(str(number), "", one, 0.0, 1e-3) for number, one in enumerate(values)]
     parts = packed(many, most_bytes=190_000)
     # As text three bytes are four; what is estimated from some blocks is known to some percent.
     assert sum(len(part.extremes) + len(part.levels) for part in parts) < 1.05 * 4 / 3 * 190_000
@@ -121,12 +123,12 @@ def test_what_does_not_fit_keeps_its_extremes() -> None:
     assert "of 4 of 4 series it has the least and the greatest of every few, each as one of 127 levels" in in_words(
         parts
     )
-    for series, part in zip(many, parts, strict=True):
+    for one, part in zip(values, parts, strict=True):
         found, half = unpacked(part)
-        pairs = series.values.reshape(-1, 4)
+        pairs = one.reshape(-1, 4)
         expected = np.stack([pairs.min(axis=1), pairs.max(axis=1)], axis=1).ravel()
         assert (np.abs(found - expected) <= half + 1e-6).all()
-        assert found.max() == pytest.approx(series.values.max(), rel=1e-6)
+        assert found.max() == pytest.approx(one.max(), rel=1e-6)
         assert part.about["period"] * part.about["count"] == pytest.approx(100)
 
 
