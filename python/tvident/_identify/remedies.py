@@ -11,6 +11,7 @@ import numpy as np
 
 from tvident._arguments import percent, with_error
 from tvident._equation import BUILT_IN, COEFFICIENTS
+from tvident._identify.growths import GROWTHS
 from tvident._results import BECOMES, TRIED, Identification, median_of, predicted_ahead
 from tvident._status import DOUBTFUL_RECORD, Status
 
@@ -322,7 +323,8 @@ class Trial:
         free = self.result if is_at_hand else self.identify(**kept, terms=call["terms"], lag=call["lag"])
         left, left_free = self._left_of(found), self._left_of(free)
         changing = [name for name in COEFFICIENTS if free.settings["kinds"][name] in {"windowed", "varying"}]
-        is_simple = bool(changing) and left.ratio <= _AS_GOOD * left_free.ratio
+        is_as_good = bool(changing) and left.ratio <= _AS_GOOD * left_free.ratio
+        is_simple = is_as_good and not self._follows_time(call, changing)
         best, of_best = (left, found) if is_simple else (left_free, free)
         if not (is_simple or chosen or is_none):
             return None
@@ -352,6 +354,27 @@ class Trial:
         is_more = bool(chosen) and not is_none
         distinguishes = is_more and _are_distinguished(flags if is_simple else free.record_status)
         return Remedy(best.ratio, said, distinguishes, is_settled=is_settled)
+
+    def _follows_time(self, call: Call, names: Sequence[str]) -> bool:
+        """Return whether coefficients that were found to change grow with time beyond chance, along a cubic, where all else is constant.
+
+        What is held back may be predicted as well without: windows may be too short for what they hold, as where a sweep passes a
+        resonance, and then constants are not right because windows are worse.
+        """
+        growing = {name: GROWTHS[name] for name in names if name in GROWTHS and call[name] == "constant"}
+        if not growing:
+            return False
+        try:
+            found = self._identified(
+                call | {"terms": [*call["terms"], *(one for each in growing.values() for one in each)]}
+            )
+        except ValueError:
+            return False
+        return any(
+            abs(growth.value) > max(BEYOND_CHANCE * growth.stderr, _MATTERS * abs(found.value(name).value))
+            for name, terms in growing.items()
+            for growth in (found.value(term.name) for term in terms)
+        )
 
     def _moved(self, found: Identification) -> str:
         """Return which parameters a better equation finds elsewhere, in words."""
