@@ -141,6 +141,9 @@ def test_an_offset_that_drifts_is_no_zero_and_is_named() -> None:
     drift = 0.3 * record.torque.std() * np.cos(np.pi * record.time / record.time[-1])
     result = tvident.identify(record.angle, record.torque + drift, sample_rate=1000)
     assert "angle_zero" not in result.constants
+    assert result.settings["kinds"]["offset"] == "windowed"
+    result = tvident.identify(record.angle, record.torque + drift, sample_rate=1000, terms=[("offset", "constant")])
+    assert "angle_zero" not in result.constants
     assert result.record_status & Status.KIND_CONTRADICTED
     assert any("('offset', 'windowed')" in line for line in result.advice)
 

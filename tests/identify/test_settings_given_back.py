@@ -173,9 +173,9 @@ def test_a_repeated_call_finds_and_says_the_same(name: str) -> None:
 def test_a_kind_that_is_given_beside_settings_is_not_decided_again() -> None:
     angle, torque = _of_two_that_change(2)
     settings = tvident.identify(angle, torque, sample_rate=1000).settings
-    assert settings["tested"] == ["damping", "inertia"]
+    assert settings["tested"] == ["damping", "inertia", "offset"]
     again = tvident.identify(angle, torque, sample_rate=1000, settings=settings, damping="constant")
-    assert again.settings["tested"] == ["inertia"]
+    assert again.settings["tested"] == ["inertia", "offset"]
     assert again.settings["kinds"]["damping"] == "constant"
 
 

@@ -309,6 +309,9 @@ class Explained:
                 f"{listed(untested)} constant: not tested, since single parts of the record do not determine {pronoun}"
             )
         freed = [name for name in self._changing() if name in self.tested and name != "stiffness"]
+        if OFFSET in freed and "stiffness" in self._changing():
+            freed.remove(OFFSET)
+            words.append("offset in windows: one that is free in every window predicts better than a constant one")
         if self.found.pooling is None and freed:
             words.append(
                 f"{listed(freed)} in windows: parts of the record differ by more than noise, and everything else is constant"

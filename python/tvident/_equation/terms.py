@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._choices import BUILT_IN, TERM_NAMES, Kind
+from tvident._choices import BUILT_IN, OFFSET, TERM_NAMES, Kind
 from tvident._equation.inner import InnerParameter, ranges
 from tvident._equation.names import name_of_term
 from tvident._expansion import Expansion
@@ -160,8 +160,8 @@ class Unknown:
     inner: tuple[InnerParameter, ...] = ()
 
 
-def all_terms(terms: Sequence[Any], default: Kind) -> list[Unknown]:
-    """Return every further term with its name and kind."""
+def all_terms(terms: Sequence[Any], default: Kind, of_offset: Kind | None = None) -> list[Unknown]:
+    """Return every further term with its name and kind: where that is not given the default, or that of an offset."""
     if isinstance(terms, str | Term):
         shown = arguments.shown(terms)
         raise TypeError(f"terms must be a sequence of terms; got {shown}; write ({shown},)")
@@ -170,9 +170,13 @@ def all_terms(terms: Sequence[Any], default: Kind) -> list[Unknown]:
     found: list[Unknown] = []
     for given in terms:
         pair = isinstance(given, tuple | list) and len(given) == 2  # noqa: PLR2004 - a term and its kind
-        term, kind = given if pair else (given, default)
-        arguments.one_of("the kind of a term", kind, ("windowed", "constant"))
+        term = given[0] if pair else given
         own = term if isinstance(term, Term) else None
+        is_offset = own is None and arguments.is_word(term, OFFSET)
+        usual = of_offset if is_offset and of_offset is not None else default
+        kind = given[1] if pair else usual
+        kinds = ("windowed", "constant", "auto") if is_offset else ("windowed", "constant")
+        arguments.one_of("the kind of an offset" if is_offset else "the kind of a term", kind, kinds)
         name = arguments.one_of("a term", term, TERM_NAMES) if own is None else own.name
         if any(name.casefold() == other.name.casefold() for other in found):
             raise ValueError(f"every term must have a name of its own; {name!r} comes twice; drop or rename one")

@@ -228,7 +228,9 @@ class Improvement(_AskedOfRecord):
         is_new = not (asked.by_record or asked.kept or asked.inner) and all(one is None for one in from_earlier)
         unknown = [kind for kind in self.given.values() if isinstance(kind, str)]
         # Without a kind a term is windowed where all parameters are.
-        is_usual = any(kind != "windowed" for kind in unknown) and all(one.kind == "constant" for one in self.terms)
+        is_usual = any(kind != "windowed" for kind in unknown) and all(
+            one.kind in {"auto", "constant"} for one in self.terms
+        )
         return is_new and is_usual and self.data.step == 1 and asked.lag != "auto" and asked.form == WeakForm()
 
     def _exchanged(self, result: Identification) -> str | None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from tvident import _arguments as arguments
-from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, Term
+from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, Kind, Term
 from tvident._identify.earlier import (
     angle_zero,
     arguments_of_result,
@@ -34,7 +34,7 @@ _OF_METHOD: dict[str, dict[str, Any]] = {
         "inertia": "auto",
         "damping": "auto",
         "stiffness": "windowed",
-        "terms": ((OFFSET, "constant"),),
+        "terms": (OFFSET,),
         "lag": 0.0,
         "quantisation": None,
         "period": None,
@@ -123,6 +123,15 @@ class Request:
         """Whether an earlier result chose this, and its choice stands."""
         is_open = name != "lag" and name not in self.by_record and getattr(self.form, name) == "auto"
         return name in self.kept and not is_open
+
+    def kinds_of_terms(self, kinds: Iterable[Kind], *, has_instrument: bool) -> tuple[Kind, Kind]:
+        """Return the kind of terms beside unknowns of these kinds where none is given, and that of an offset."""
+        if has_instrument:
+            return "constant", "constant"
+        if all(kind == "windowed" for kind in kinds):
+            return "windowed", "windowed"
+        # The weak form finds whether an offset is constant.
+        return "constant", "constant" if isinstance(self.form, StrongForm) else "auto"
 
     def asked(self, kinds: Mapping[str, Any]) -> dict[str, Any]:
         """Return the kinds as they were asked for, where an earlier result decided."""

@@ -51,9 +51,8 @@ class Task:
         shape = data.angles.shape
         self._parameters = {name: parameter(name, value, shape) for name, value in request.parameters.items()}
         kinds: dict[str, Kind] = {name: value for name, value in self._parameters.items() if isinstance(value, str)}
-        is_paper = data.instruments is None and all(kind == "windowed" for kind in kinds.values())
-        default: Kind = "windowed" if is_paper else "constant"
-        self._terms = all_terms(request.terms, default)
+        usual = request.kinds_of_terms(kinds.values(), has_instrument=data.instruments is not None)
+        self._terms = all_terms(request.terms, *usual)
         self._unknowns = [Unknown(name, kind) for name, kind in kinds.items()] + self._terms
         if not self._unknowns:
             raise ValueError(

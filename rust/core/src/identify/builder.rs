@@ -105,7 +105,7 @@ pub struct Identify<'a> {
 /// Identifies inertia, damping and stiffness from an angle in rad and a torque in N·m, sampled so many times a second.
 ///
 /// Unless more is said, the weak form is used and everything else is chosen from the record: inertia and damping are constant if the record
-/// does not contradict it, the stiffness has a value at every sample, and a constant offset of the torque is unknown, too.
+/// does not contradict it, the stiffness has a value at every sample, and an offset of the torque is unknown, too: constant unless the record says that it drifts.
 ///
 /// ```
 /// use tvident::identify::Kind;
@@ -131,7 +131,7 @@ pub fn identify<'a>(angle: &'a [f64], torque: &'a [f64], sample_rate: f64) -> Id
         torque,
         sample_rate,
         coefficients: [Kind::Automatic, Kind::Automatic, Kind::Windowed].map(Parameter::Unknown),
-        terms: vec![("offset", Kind::Constant)],
+        terms: vec![("offset", Kind::Automatic)],
         form: Form::Weak(WeakForm::default()),
         lag: Some(0.0),
         mask: None,

@@ -279,10 +279,12 @@ fn settled(
             channel_noise,
             scan: Scan::default(),
             free_offset: FreeOffset::default(),
+            windowed_offset: None,
             best_before: None,
             is_rough: false,
             stages,
         };
+        session.repeat_windowed_offset();
         let model = session.model();
         let mut chosen = session.choose(&model)?;
         if round < PULSE_ROUNDS {

@@ -7,6 +7,7 @@ use crate::exec::stages::Stages;
 use crate::identify::kinds::Kind;
 use crate::identify::scanned::Scan;
 use crate::identify::weak::angle_zero::outcome::FreeOffset;
+use crate::identify::weak::angle_zero::spring::STIFFNESS;
 use crate::identify::weak::options::WeakOptions;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
@@ -32,6 +33,8 @@ pub(crate) struct Session<'a, 'b, 'c> {
     pub(crate) scan: Scan,
     /// How much better an offset would predict that is free in every window, where the record contradicts a constant one.
     pub(crate) free_offset: FreeOffset,
+    /// The offset that the record was to decide upon and that is free in every window.
+    pub(crate) windowed_offset: Option<usize>,
     /// Samples of the windows that were best a step before, where little changed since: the best ones are near.
     pub(crate) best_before: Option<usize>,
     /// Whether few rows of many compare lengths of windows.
@@ -55,14 +58,45 @@ impl Session<'_, '_, '_> {
 
     /// Regressors of the unknowns of a kind.
     pub(crate) fn of_kind(&self, kind: Kind) -> Vec<usize> {
-        let unknowns = self.unknowns();
-        unknowns.iter().zip(&self.options.kinds).filter(|(_, one)| **one == kind).map(|(index, _)| *index).collect()
+        let each = self.unknowns().into_iter().zip(self.kinds());
+        each.filter(|(_, one)| *one == kind).map(|(unknown, _)| unknown).collect()
+    }
+
+    /// The kinds of the unknowns, as far as they are known by now.
+    fn kinds(&self) -> Vec<Kind> {
+        let of = |(unknown, &kind): (usize, &Kind)| {
+            if self.windowed_offset == Some(unknown) { Kind::Windowed } else { kind }
+        };
+        self.unknowns().into_iter().zip(&self.options.kinds).map(of).collect()
+    }
+
+    /// Regressors of the coefficients that the record is to decide upon.
+    pub(crate) fn undecided(&self) -> Vec<usize> {
+        self.open().filter(|&unknown| unknown < self.record.coefficients.len()).collect()
+    }
+
+    /// The regressor of the offset, if the record is to decide upon it.
+    pub(crate) fn undecided_offset(&self) -> Option<usize> {
+        self.offset().filter(|&offset| self.open().any(|unknown| unknown == offset))
+    }
+
+    /// The regressor of the offset, if there is one.
+    pub(crate) fn offset(&self) -> Option<usize> {
+        let place = self.record.terms.iter().position(|term| matches!(term, TermSamples::One))?;
+        Some(self.record.coefficients.len() + place)
     }
 
     /// Regressors of the unknowns that the record is to decide upon.
-    pub(crate) fn undecided(&self) -> Vec<usize> {
+    fn open(&self) -> impl Iterator<Item = usize> {
         let is_decided = |unknown: &usize| self.options.decided.iter().any(|(one, _)| one == unknown);
-        self.of_kind(Kind::Automatic).into_iter().filter(|unknown| !is_decided(unknown)).collect()
+        self.of_kind(Kind::Automatic).into_iter().filter(move |unknown| !is_decided(unknown))
+    }
+
+    /// Takes over that an identification which this one repeats found the offset free beside a windowed stiffness.
+    pub(crate) fn repeat_windowed_offset(&mut self) {
+        let decided = |offset: &usize| self.options.decided.contains(&(*offset, true));
+        self.windowed_offset =
+            self.offset().filter(decided).filter(|_| self.of_kind(Kind::Windowed).contains(&STIFFNESS));
     }
 
     /// Whether the lag of the torque is found in the record, here or by an identification that this one repeats.
@@ -71,7 +105,7 @@ impl Session<'_, '_, '_> {
     }
 
     pub(crate) fn model(&self) -> Model {
-        let windowed = self.options.kinds.iter().map(|kind| *kind == Kind::Windowed);
+        let windowed = self.kinds().into_iter().map(|kind| kind == Kind::Windowed);
         Model::new(&self.unknowns(), windowed, self.options.linear)
     }
 

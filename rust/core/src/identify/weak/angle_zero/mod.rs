@@ -5,3 +5,4 @@ pub(crate) mod first_guess;
 pub(crate) mod outcome;
 pub(crate) mod search;
 pub(crate) mod spring;
+pub(crate) mod windowed_offset;

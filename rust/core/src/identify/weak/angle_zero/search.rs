@@ -15,7 +15,6 @@ use crate::identify::weak::lag::Settled;
 use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::JudgedTerm;
 use crate::regression::model::Model;
-use crate::weak_form::weak_rows::TermSamples;
 
 /// Times that test function and windows are chosen again with the angle that was found.
 const CHOICES: usize = 3;
@@ -49,7 +48,8 @@ impl Session<'_, '_, '_> {
             chosen = self.choose(model)?;
         }
         let Some(offset) = offset else { return self.decide_and_choose_again(chosen, model) };
-        if self.options.angle_zero.is_some() {
+        let is_sought = self.options.angle_zero.is_none();
+        if !is_sought && self.undecided_offset().is_none() {
             if self.options.diagnose {
                 // An angle is looked for no more, but that a free offset would predict better is said again.
                 self.offset_is_missed(&mut chosen, model, offset)?;
@@ -58,17 +58,21 @@ impl Session<'_, '_, '_> {
         }
         // Before anything else follows what the offset may not: looking for parameters that vary and jump takes longest where nothing fits.
         let missed = self.offset_is_missed(&mut chosen, model, offset)?;
-        if missed && let Some(settled) = self.with_angle_zero(model, offset, Some(&mut chosen))? {
+        if is_sought
+            && missed
+            && let Some(settled) = self.with_angle_zero(model, offset, Some(&mut chosen))?
+        {
             return Ok(settled);
         }
         let first = self.decide_and_choose_again(chosen, model)?;
-        if !missed
+        if is_sought
+            && !missed
             && self.offset_is_contradicted(&first.0.weak, &first.1, offset)?
             && let Some(settled) = self.with_angle_zero(model, offset, None)?
         {
             return Ok(settled);
         }
-        Ok(first)
+        self.with_windowed_offset(model, offset, first, missed)
     }
 
     /// Chooses and decides with an angle at which the spring is relaxed; `None`, with everything as it was, if it does not predict better. Where
@@ -115,7 +119,7 @@ impl Session<'_, '_, '_> {
 
     /// The regressor of a constant offset beside a windowed stiffness, where such an angle may be looked for.
     fn offset_beside_changing_stiffness(&self, model: &Model) -> Option<usize> {
-        let offset = 3 + self.record.terms.iter().position(|term| matches!(term, TermSamples::One))?;
+        let offset = self.offset()?;
         let sought = model.windowed.contains(&STIFFNESS) && model.constant.contains(&offset);
         sought.then_some(offset)
     }

@@ -1,0 +1,79 @@
+//! An offset that the record is to decide upon, and that is not constant: free in every window.
+//!
+//! A zero of the torque that drifts is nothing that a windowed stiffness may follow, but it does: a drift of 5 % of the torque moves it by half
+//! a percent, one of 30 % by 1 to 26 %. Beside an offset that is free in every window it is as good as without a drift.
+
+use crate::error::Error;
+use crate::identify::weak::angle_zero::outcome::FreeOffset;
+use crate::identify::weak::choice::Chosen;
+use crate::identify::weak::lag::Settled;
+use crate::identify::weak::session::Session;
+use crate::inference::constancy::NO_CHANCE;
+use crate::regression::limits::NOISE_MODEL_FAILS;
+use crate::regression::model::Model;
+use crate::weak_form::test_function_choice::spectrum_length;
+
+/// It is found where it leaves at most so much of what a constant one does of the same rows, beside all that is set free there, and no more than
+/// what noise explains. Where parts of the record differ it need only leave less.
+const BETTER: f64 = 0.8;
+const EXPLAINED: f64 = 1.5;
+/// Typical cycles that a record must last: in less than one a part of it does not tell an offset from the motion, and parts are eight.
+const CYCLES: f64 = 8.0;
+
+impl Session<'_, '_, '_> {
+    /// Chooses and decides with an offset that is free in every window where the record is to decide upon it, and where parts of the record have
+    /// other offsets, or noise does not explain what a constant one leaves and one seems to be `missed`. Otherwise, or if it is no better, what was
+    /// found with a constant one.
+    pub(crate) fn with_windowed_offset(
+        &mut self,
+        model: &Model,
+        offset: usize,
+        constant: Settled,
+        missed: bool,
+    ) -> Result<Settled, Error> {
+        let differs = constant.1.tests.iter().any(|(one, test)| *one == offset && test.probability < NO_CHANCE);
+        let fails = missed && constant.1.error > NOISE_MODEL_FAILS;
+        if self.undecided_offset() != Some(offset) || !(differs || fails) {
+            return Ok(constant);
+        }
+        let samples = self.record.angle.len();
+        if (samples as f64) < CYCLES * self.evidence(spectrum_length(samples, 200))?.period() {
+            return Ok(constant);
+        }
+        let before = (self.scan.clone(), self.record.lag, self.noise);
+        self.windowed_offset = Some(offset);
+        let free = self.model();
+        let chosen = self.choose(&free)?;
+        let settled = self.decide_and_choose_again(chosen, &free)?;
+        self.windowed_offset = None;
+        let error = settled.1.error;
+        // Errors are compared on the same rows: those that were chosen beside a constant offset are long enough to hide what drifts. What else
+        // is missing, such as a lag, is followed in part by anything that is free; beside a drift that is gone nothing more varies.
+        let explains = error < EXPLAINED && settled.1.slow.len() <= constant.1.slow.len();
+        let is_possible = settled.1.fit.is_some() && (differs || explains);
+        let least = if differs { 1.0 } else { BETTER };
+        if is_possible && error < least * self.error_beside_constant(&settled.0, model, &constant)? {
+            self.windowed_offset = Some(offset);
+            self.free_offset = FreeOffset::default();
+            return Ok(settled);
+        }
+        (self.scan, self.record.lag, self.noise) = before;
+        Ok(constant)
+    }
+
+    /// The error of predicting rows beside a constant offset, with everything else that was set free there.
+    fn error_beside_constant(
+        &mut self,
+        chosen: &Chosen,
+        model: &Model,
+        (_, decided, _): &Settled,
+    ) -> Result<f64, Error> {
+        if decided.slow.is_empty() {
+            return self.error_of(chosen, model);
+        }
+        let weak = chosen.weak.clone();
+        let mut same = Chosen { weak, fitted: None, fitted_before: None, ..*chosen };
+        let found = self.decide(&mut same, model)?;
+        Ok(if found.fit.is_some() { found.error } else { f64::INFINITY })
+    }
+}
