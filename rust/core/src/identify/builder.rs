@@ -105,7 +105,8 @@ pub struct Identify<'a> {
 /// Identifies inertia, damping and stiffness from an angle in rad and a torque in N·m, sampled so many times a second.
 ///
 /// Unless more is said, the weak form is used and everything else is chosen from the record: inertia and damping are constant if the record
-/// does not contradict it, the stiffness has a value at every sample, and an offset of the torque is unknown, too: constant unless the record says that it drifts.
+/// does not contradict it, the stiffness has a value at every sample, and an offset of the torque is unknown, too: constant unless the record
+/// says that it drifts.
 ///
 /// ```
 /// use tvident::identify::Kind;

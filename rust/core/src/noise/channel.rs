@@ -62,6 +62,18 @@ pub fn noise(record: &dyn Samples, quantisation: Option<f64>, instructions: Inst
     noise_of(record, None, quantisation, instructions)
 }
 
+/// How many samples there are.
+///
+/// # Errors
+/// If there are fewer than [`FEWEST_SAMPLES`].
+fn enough_samples(record: &dyn Samples) -> Result<usize, Error> {
+    let samples = record.len();
+    if samples < FEWEST_SAMPLES {
+        return Err(Error::RecordTooShort { samples, least: FEWEST_SAMPLES });
+    }
+    Ok(samples)
+}
+
 /// The same of a sample of weight one, where the variance of every sample's noise is one over its weight.
 fn noise_of(
     record: &dyn Samples,
@@ -69,10 +81,7 @@ fn noise_of(
     quantisation: Option<f64>,
     instructions: Instructions,
 ) -> Result<Noise, Error> {
-    let samples = record.len();
-    if samples < FEWEST_SAMPLES {
-        return Err(Error::RecordTooShort { samples, least: FEWEST_SAMPLES });
-    }
+    let samples = enough_samples(record)?;
     let quantisation = quantisation.unwrap_or_else(|| quantisation_step(record));
     let halves = HALVES.iter().filter(|&half| 2 * half < samples);
     let variance = halves.map(|&half| variance(record, half, weights, instructions)).fold(f64::NAN, f64::min);
@@ -139,10 +148,7 @@ pub fn noise_after(
     quantisation: Option<f64>,
     instructions: Instructions,
 ) -> Result<Noise, Error> {
-    let samples = record.len();
-    if samples < FEWEST_SAMPLES {
-        return Err(Error::RecordTooShort { samples, least: FEWEST_SAMPLES });
-    }
+    enough_samples(record)?;
     let sigma = variance_after(Some(passed), record, quantisation, instructions).sqrt();
     Ok(Noise { sigma, quantisation: quantisation.unwrap_or_else(|| quantisation_step(record)) })
 }

@@ -6,7 +6,7 @@ use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::exec::stages::Stages;
 use crate::identify::weak::angle_zero::spring::SpringColumn;
-use crate::inference::constancy::Test;
+use crate::inference::constancy::{NO_CHANCE, Test};
 use crate::inference::jumps::jump::Jump;
 use crate::inference::slowly_varying;
 use crate::regression::constants::Expected;
@@ -70,6 +70,11 @@ impl Decided {
     /// Whether its windows are hardly longer than the test function of the rows: they follow anything as if it were motion.
     pub(crate) fn has_windows_of_a_function(&self, weak: &WeakRows) -> bool {
         self.fit.as_ref().is_some_and(|fit| fit.scale.is_some() && weak.follow_anything(fit.span))
+    }
+
+    /// Whether parts of the record have other values of a constant than noise explains.
+    pub(crate) fn differs(&self, unknown: usize) -> bool {
+        self.tests.iter().any(|(one, test)| *one == unknown && test.probability < NO_CHANCE)
     }
 
     /// Whether constants seem to vary and windows are the shortest of those that were tried.

@@ -7,7 +7,6 @@ use crate::identify::weak::angle_zero::spring::SpringColumn;
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
-use crate::inference::constancy::NO_CHANCE;
 use crate::regression::model::Model;
 use crate::regression::residuals::residuals;
 use crate::regression::subsample::are_many;
@@ -54,8 +53,7 @@ impl Session<'_, '_, '_> {
         decided: &Decided,
         offset: usize,
     ) -> Result<bool, Error> {
-        let differs = decided.tests.iter().any(|(one, test)| *one == offset && test.probability < NO_CHANCE);
-        Ok(differs || self.follows_stiffness(weak, decided)?)
+        Ok(decided.differs(offset) || self.follows_stiffness(weak, decided)?)
     }
 
     /// The error of predicting rows with a model in which everything that is not windowed is constant.

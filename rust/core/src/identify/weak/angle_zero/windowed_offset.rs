@@ -8,7 +8,6 @@ use crate::identify::weak::angle_zero::outcome::FreeOffset;
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::lag::Settled;
 use crate::identify::weak::session::Session;
-use crate::inference::constancy::NO_CHANCE;
 use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
 use crate::weak_form::test_function_choice::spectrum_length;
@@ -31,7 +30,7 @@ impl Session<'_, '_, '_> {
         constant: Settled,
         missed: bool,
     ) -> Result<Settled, Error> {
-        let differs = constant.1.tests.iter().any(|(one, test)| *one == offset && test.probability < NO_CHANCE);
+        let differs = constant.1.differs(offset);
         let fails = missed && constant.1.error > NOISE_MODEL_FAILS;
         if self.undecided_offset() != Some(offset) || !(differs || fails) {
             return Ok(constant);
