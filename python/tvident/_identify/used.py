@@ -21,7 +21,7 @@ def as_used(data: Data, found: Sequence[_core.Identification]) -> Data:
     found : sequence of _core.Identification
         Of every record.
     """
-    if not any(one.spikes or one.lost or one.limits or any(one.unread) for one in found):
+    if not any(one.spikes or one.lost or any(one.limits) or any(one.unread) for one in found):
         return data
     channels: list[Any] = [np.array(one, np.float64) for one in (data.angles, data.torques)]
     rows = [one.reshape(-1, one.shape[-1]) for one in channels]
@@ -30,9 +30,9 @@ def as_used(data: Data, found: Sequence[_core.Identification]) -> Data:
             rows[spike.channel][record, spike.sample] = spike.value
         for rows_of_one, places in zip(rows, one.unread, strict=True):
             rows_of_one[record, places] = np.nan
-        angle = rows[0][record]
-        angle[one.lost] = np.nan
-        if one.limits:
-            least, most = one.limits
-            angle[(angle <= least) | (angle >= most)] = np.nan
+        rows[0][record, one.lost] = np.nan
+        for rows_of_one, limits in zip(rows, one.limits, strict=True):
+            if limits:
+                channel, (least, most) = rows_of_one[record], limits
+                channel[(channel <= least) | (channel >= most)] = np.nan
     return replace(data, angles=channels[0], torques=channels[1])

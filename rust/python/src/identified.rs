@@ -196,7 +196,7 @@ pub(crate) struct Identification {
     pulses: Vec<(usize, usize)>,
     spikes: Vec<ChannelSpike>,
     lost: Vec<usize>,
-    limits: Option<[f64; 2]>,
+    limits: [Option<[f64; 2]>; 2],
     unread: [Vec<usize>; 2],
     scan: Option<Py<Scan>>,
     outside_mask: Option<Py<OutsideMask>>,
@@ -273,7 +273,7 @@ impl Identification {
             pulses: weak.map_or_else(Vec::new, |weak| weak.pulses.iter().map(|one| (one.start, one.end)).collect()),
             spikes: weak.map(spikes).unwrap_or_default(),
             lost: weak.map_or_else(Vec::new, |weak| weak.lost.clone()),
-            limits: weak.and_then(|weak| weak.limits),
+            limits: weak.map_or([None; 2], |weak| weak.limits),
             unread: weak.map_or_else(Default::default, |weak| weak.unread.clone()),
             scan: weak.map(|weak| Scan::new(py, &weak.scan)).transpose()?,
             outside_mask: found

@@ -126,8 +126,8 @@ pub struct WeakDetails {
     pub spikes: Vec<(usize, usize, f64)>,
     /// Samples before which some were lost: they count as missing.
     pub lost: Vec<usize>,
-    /// Values at which the angle is clipped, where samples there count as missing: the smallest and the largest.
-    pub limits: Option<[f64; 2]>,
+    /// Values at which angle and torque are clipped, where samples there count as missing: the smallest and the largest.
+    pub limits: [Option<[f64; 2]>; 2],
     /// Samples of angle and torque at which they hold one value in place of a reading: they count as missing.
     pub unread: [Vec<usize>; 2],
     /// Estimates by the width of the test function.

@@ -12,6 +12,7 @@ use crate::identify::scanned::Scan;
 use crate::identify::weak::angle_zero::outcome::FreeOffset;
 use crate::identify::weak::angle_zero::spring::STIFFNESS;
 use crate::identify::weak::choice::Chosen;
+use crate::identify::weak::decide::{BADLY, BETTER};
 use crate::identify::weak::found::WeakIdentified;
 use crate::identify::weak::friction::FrictionDirection;
 use crate::identify::weak::options::WeakOptions;
@@ -86,28 +87,60 @@ pub(crate) fn identify_weak(
     })
 }
 
-/// Identifies one record without some samples of its torque, and without what a recorder spoilt.
+/// Identifies one record without some samples of its torque, and without what a recorder spoilt. A torque that stays at a limit is what a drive does, and
+/// counts: unless rows are predicted badly or widths disagree with such samples and not without them. Then the recorder had the limit.
 ///
 /// # Errors
 /// If the record is too short, its rows do not determine what is constant, or the watch cancels.
 fn without(
     motion: &Motion<'_>,
     left_out: &[usize],
+    counted: Counted<'_>,
+    options: &WeakOptions,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<WeakIdentified, Error> {
+    let whole = without_limits(motion, (left_out, None), counted, options, workers, watch)?;
+    let disagrees = whole.record_status.contains(Status::SCALES_DISAGREE);
+    if whole.prediction_error < BADLY && !disagrees {
+        return Ok(whole);
+    }
+    let Some(limits) = defects(motion.torque).iter().find_map(limits_of) else { return Ok(whole) };
+    let within = without_limits(motion, (left_out, Some(limits)), counted, options, workers, watch);
+    let within = match within {
+        Ok(within) if !within.record_status.contains(Status::RANK_DEFICIENT) => within,
+        Err(Error::Cancelled) => return Err(Error::Cancelled),
+        _ => return Ok(whole),
+    };
+    let agrees = disagrees && !within.record_status.contains(Status::SCALES_DISAGREE);
+    let is_better = within.prediction_error < BETTER * whole.prediction_error;
+    Ok(if is_better || agrees && within.prediction_error <= whole.prediction_error { within } else { whole })
+}
+
+/// Identifies one record without some samples of its torque and those at its limits, where these are the recorder's, and without what a recorder spoilt.
+///
+/// # Errors
+/// If the record is too short, its rows do not determine what is constant, or the watch cancels.
+fn without_limits(
+    motion: &Motion<'_>,
+    (left_out, of_torque): (&[usize], Option<[f64; 2]>),
     (mask, weights): Counted<'_>,
     options: &WeakOptions,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<WeakIdentified, Error> {
     let lag = options.lag.unwrap_or(0.0);
-    let mut defects = defects_of_motion(motion);
+    let mut defects = defects_of_motion(motion, of_torque.is_some());
     let lost = lost_samples(motion, &defects, watch)?;
-    let limits = clipped_at(motion, &defects);
-    let within = Within { channel: motion.angle, limits: limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]) };
-    let angle = Broken { channel: &within, places: &lost };
+    let limits = [clipped_at(motion, &defects), of_torque];
+    let [angle, torque] = limits.map(|limits| limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]));
+    let angle = Within { channel: motion.angle, limits: angle };
+    let torque = Within { channel: motion.torque, limits: torque };
+    let angle = Broken { channel: &angle, places: &lost };
     let mut places = [&lost, left_out].concat();
     places.sort_unstable();
-    let torque = Broken { channel: motion.torque, places: &places };
-    let is_whole = limits.is_none() && places.is_empty();
+    let torque = Broken { channel: &torque, places: &places };
+    let is_whole = limits == [None; 2] && places.is_empty();
     let whole = if is_whole { None } else { Some(Motion { angle: &angle, torque: &torque, ..motion.clone() }) };
     let motion = whole.as_ref().unwrap_or(motion);
     let found = with_record(
@@ -122,8 +155,8 @@ fn without(
         },
     );
     found.map(|(found, resting)| {
-        if limits.is_some() {
-            defects[0].iter_mut().for_each(Defect::leave_out);
+        for (defects, _) in defects.iter_mut().zip(limits).filter(|(_, limits)| limits.is_some()) {
+            defects.iter_mut().for_each(Defect::leave_out);
         }
         defects[0].extend((!lost.is_empty()).then_some(Defect::Broken(lost.len())));
         // Unless something else was done to it.
@@ -136,13 +169,14 @@ fn without(
     })
 }
 
-/// What was done to every channel: angle and torque, then velocity and acceleration.
-fn defects_of_motion(motion: &Motion<'_>) -> Vec<Vec<Defect>> {
+/// What was done to every channel: angle and torque, then velocity and acceleration. Limits of the torque are the recorder's or the drive's.
+fn defects_of_motion(motion: &Motion<'_>, recorder_limits_torque: bool) -> Vec<Vec<Defect>> {
     let [angle, rates @ ..] = motion.measured.channels;
     let of_angle =
         if is_alone(&motion.measured) { defects(motion.angle) } else { angle.map_or_else(Vec::new, defects) };
     let rates = rates.map(|rate| rate.map_or_else(Vec::new, defects_of_rate));
-    let mut found: Vec<Vec<Defect>> = [of_angle, defects_of_torque(motion.torque)].into_iter().chain(rates).collect();
+    let of_torque = defects_of_torque(motion.torque, recorder_limits_torque);
+    let mut found: Vec<Vec<Defect>> = [of_angle, of_torque].into_iter().chain(rates).collect();
     let interpolated = |one: &Defect| matches!(one, Defect::Interpolated(_));
     let alike = found[0].iter().find(|one| interpolated(one)).is_some_and(|one| found[1].contains(one));
     for (channel, defects) in found.iter_mut().enumerate() {
@@ -160,11 +194,15 @@ fn lost_samples(motion: &Motion<'_>, defects: &[Vec<Defect>], watch: &mut Watch<
 
 /// The limits at which an angle that was measured alone is clipped.
 fn clipped_at(motion: &Motion<'_>, defects: &[Vec<Defect>]) -> Option<[f64; 2]> {
-    let limits = |defect: &Defect| match defect {
+    defects[0].iter().find_map(limits_of).filter(|_| is_alone(&motion.measured))
+}
+
+/// The limits that a defect is about.
+fn limits_of(defect: &Defect) -> Option<[f64; 2]> {
+    match defect {
         Defect::Clipped { limits, .. } => Some(*limits),
         _ => None,
-    };
-    defects[0].iter().find_map(limits).filter(|_| is_alone(&motion.measured))
+    }
 }
 
 /// Whether the angle is what was measured, and nothing else was.
@@ -339,7 +377,12 @@ fn defects_of_rate(rate: &dyn Samples) -> Vec<Defect> {
     defects(rate).into_iter().filter(|defect| !matches!(defect, Defect::Wrapped(_))).collect()
 }
 
-/// What was done to the torque. One that stays at a limit is what the drive does, and wrapping is for angles.
-fn defects_of_torque(torque: &dyn Samples) -> Vec<Defect> {
-    defects(torque).into_iter().filter(|defect| matches!(defect, Defect::Held(_) | Defect::Interpolated(_))).collect()
+/// What was done to the torque. One that stays at a limit is what the drive does if that is not known to be the recorder's, and wrapping is for angles.
+fn defects_of_torque(torque: &dyn Samples, recorder_limits: bool) -> Vec<Defect> {
+    let is_done = |defect: &Defect| match defect {
+        Defect::Held(_) | Defect::Interpolated(_) => true,
+        Defect::Clipped { .. } => recorder_limits,
+        _ => false,
+    };
+    defects(torque).into_iter().filter(is_done).collect()
 }

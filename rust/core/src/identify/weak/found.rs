@@ -75,9 +75,9 @@ pub(crate) struct WeakIdentified {
     pub(crate) pulses: Vec<Range<usize>>,
     /// Samples that stand out of their neighbours: the channel, the sample, and what took its place, NaN where it was left out.
     pub(crate) spikes: Vec<(usize, usize, f64)>,
-    /// Samples before which some were lost, and values at which the angle is clipped: such samples count as missing.
+    /// Samples before which some were lost, and values at which angle and torque are clipped: such samples count as missing.
     pub(crate) lost: Vec<usize>,
-    pub(crate) limits: Option<[f64; 2]>,
+    pub(crate) limits: [Option<[f64; 2]>; 2],
     /// Samples of angle and torque at which they were not read: they count as missing.
     pub(crate) unread: [Vec<usize>; 2],
     /// Estimates by the width of the test function.

@@ -197,7 +197,7 @@ impl Session<'_, '_, '_> {
             pulses: Vec::new(),
             spikes: Vec::new(),
             lost: Vec::new(),
-            limits: None,
+            limits: [None; 2],
             unread: [const { Vec::new() }; 2],
             scan: Scan::default(),
             resting: 0.0,
