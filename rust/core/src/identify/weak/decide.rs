@@ -25,6 +25,8 @@ pub(crate) const BADLY: f64 = 1.5;
 pub(crate) const BETTER: f64 = 0.8;
 /// The same where no test of parts says that anything changes.
 const FAR_BETTER: f64 = 0.5;
+/// The same where rows are predicted well and another changes: of constants that are set free beside it for nothing .96 is left at least.
+const A_LITTLE_BETTER: f64 = 0.9;
 
 /// Where constants jump, those that do not change in between stand unless others predict so much better.
 const SIMPLER: f64 = 0.98;
@@ -247,17 +249,18 @@ impl Session<'_, '_, '_> {
         Ok(is_better)
     }
 
-    /// Sets all that was tested free where one of them changes and yet the rows are predicted badly: a parameter that varies beside one that is held
-    /// constant needs windows so short that a test sees nothing.
+    /// Sets all that was tested free where one of them changes, if rows are predicted better then: a parameter that varies beside one that is held
+    /// constant needs windows so short that a test sees little, if anything.
     fn set_others_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided) -> Result<(), Error> {
         let others: Vec<usize> = self.undecided().into_iter().filter(|one| !decided.slow.contains(one)).collect();
-        if decided.slow.is_empty() || others.is_empty() || decided.error < BADLY {
+        if decided.slow.is_empty() || others.is_empty() {
             return Ok(());
         }
         let mut free = decided.clone();
         free.slow.extend(others);
         self.set_free(rows, model, &mut free)?;
-        if free.fit.is_some() && free.error < BETTER * decided.error {
+        let least = if decided.error < BADLY { A_LITTLE_BETTER } else { BETTER };
+        if free.fit.is_some() && free.error < least * decided.error {
             *decided = free;
         }
         Ok(())
