@@ -8,9 +8,10 @@ from tvident._advice.instrument import fed_back_in_records, words_with_instrumen
 from tvident._advice.plausible import Plausible
 from tvident._advice.search import FoundBySearch, words_of_search
 from tvident._advice.strong import ExplainedStrong
-from tvident._advice.weak import Explained
+from tvident._advice.weak import FREE_OFFSET, Explained
 
 __all__ = [
+    "FREE_OFFSET",
     "NOT_DISTINGUISHED",
     "Explained",
     "ExplainedStrong",

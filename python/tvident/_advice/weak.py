@@ -48,6 +48,8 @@ def _period(jump: float) -> float:
     return min(near, key=lambda one: abs(one - jump), default=jump)
 
 
+FREE_OFFSET = "an offset that is free in every window predicts better"
+
 _BESIDE = " beside the lag that is given"
 _BEGIN = "begin with the first of these: the others may then disappear"
 
@@ -404,7 +406,7 @@ class Explained:
         errors = self.found.free_offset
         others = [name for name in self.names if name not in {*COEFFICIENTS, OFFSET}]
         words = (
-            f"an offset that is free in every window predicts better: its cross-validation error is {errors.free:.2f} times the variance "
+            f"{FREE_OFFSET}: its cross-validation error is {errors.free:.2f} times the variance "
             f"of the noise, not {errors.used:.2f}: give terms={[*others, (OFFSET, 'windowed')]}"
         )
         return [words]

@@ -14,6 +14,7 @@ from tvident._advice import NOT_DISTINGUISHED, Explained
 from tvident._arguments import percent
 from tvident._equation import BUILT_IN, COEFFICIENTS, FRICTION, OFFSET, Unknown
 from tvident._identify.data import Data, cut
+from tvident._identify.free_offset import without_worse_offset
 from tvident._identify.methods import StrongForm, WeakForm
 from tvident._identify.remedies import BEYOND_CHANCE, NEXT_TO_NOTHING, Trial, unexplained
 from tvident._identify.settings import Request, resolve
@@ -58,9 +59,15 @@ def is_to_be_tried(data: Data, request: Request, found: Sequence[_core.Identific
     if flags & Status.RANK_DEFICIENT:
         # What is missing may hide what the motion explains.
         return found[0].unexplained
-    # Inertia and damping that change take the place of what is missing.
-    changing = any(one.kind == "varying" for one in found[0].unknowns)
-    return bool(flags & _DOUBTED) or changing
+    return found[0].free_offset is not None or _is_contradicted(found[0])
+
+
+def _is_contradicted(found: _core.Identification) -> bool:
+    """Return whether something contradicts the model, or may hide what does.
+
+    Inertia and damping that change take the place of what is missing.
+    """
+    return bool(found.record_status & _DOUBTED) or any(one.kind == "varying" for one in found.unknowns)
 
 
 def is_told_by_weak_form(data: Data, request: Request) -> bool:
@@ -181,11 +188,16 @@ class Improvement(_AskedOfRecord):
 
     def words(self, result: Identification, words: Words) -> Words:
         """Return words that begin with what to change, without what was tried in vain."""
+        if not (_is_contradicted(self.found) or self.found.record_status & Status.RANK_DEFICIENT):
+            return self._without_worse_offset(result, words)
         trial = self._trial(result)
         remedy = trial.remedy()
         advice, suspects = self._exchanged(result) if remedy is None else remedy.words, self._suspects
         if advice is None and (undoubted := trial.undoubted([one.name for one in self._explained.suspects])):
             suspects, advice = [undoubted[0]], undoubted[1]
+        if advice is None:
+            # Beside other advice this comes later.
+            words = self._without_worse_offset(result, words)
         useless, given_well = ([], []) if advice is not None else trial.useless()
         dropped = self._explained.suspicions(suspects if advice is not None else useless)
         starts = tuple(f"{name} was given as constant" for name in given_well)
@@ -201,6 +213,11 @@ class Improvement(_AskedOfRecord):
         # What is tried differs little from what it is compared with where unknowns cannot be distinguished.
         before = next((place + 1 for place, line in enumerate(rest) if NOT_DISTINGUISHED in line), 0)
         return replace(words, advice=(*rest[:before], *([] if advice is None else [advice]), *rest[before:]))
+
+    def _without_worse_offset(self, result: Identification, words: Words) -> Words:
+        terms = [*(term for term in self.asked_terms if term != OFFSET), (OFFSET, "windowed")]
+        with_offset = partial(self._identify, self.data, **self.given, terms=terms, lag=self.request.lag)
+        return without_worse_offset(words, result, with_offset) if self.data.time.size < 2 * _PART else words
 
     def _trial(self, result: Identification) -> Trial:
         """Return the trial of the record, or of its busiest part where that tells as much."""
