@@ -12,6 +12,8 @@ Array = npt.NDArray[np.float64]
 
 FINER = 1
 """Steps of the integration within a sample."""
+PIECE = 2000
+"""Steps that are prepared at once."""
 
 
 @dataclass(frozen=True)
@@ -32,19 +34,38 @@ def drive(rng: np.random.Generator, channels: int, times: Array, highest: float 
     return np.stack([np.sin(2 * np.pi * np.outer(times, frequencies) + one).sum(axis=1) for one in phases]) * 0.05
 
 
-def integrated(slope: Callable[[Array, int], Array], state: Array, samples: int, step: float) -> Array:
-    """Give the states at every sample; a slope takes the state and the half step."""
-    states = np.empty((samples, *state.shape))
-    for sample in range(samples):
-        states[sample] = state
-        for finer in range(FINER):
-            half = 2 * (sample * FINER + finer)
-            one = slope(state, half)
-            two = slope(state + step / 2 * one, half + 1)
-            three = slope(state + step / 2 * two, half + 1)
-            four = slope(state + step * three, half + 2)
-            state = state + step / 6 * (one + 2 * two + 2 * three + four)
-    return states
+def integrated(stiffness: Array, damping: Array, inverse: Array, forces: Array, state: Array, step: float) -> Array:
+    """Give angles (masses, trials, n) of masses: stiffness (masses, masses) and forces (masses, trials) at half steps, the last axis.
+
+    The equation is linear, so that a step of Runge and Kutta is a matrix times the state and what the forces add, for all steps at once.
+    """
+    masses, trials, halves = forces.shape
+    steps = halves // 2
+    places = np.empty((steps + 1, 2 * masses, trials))
+    places[0] = state
+    for first in range(0, steps, PIECE):
+        last = min(first + PIECE, steps)
+        part = slice(2 * first, 2 * last + 1)
+        slope = np.zeros((2 * (last - first) + 1, 2 * masses, 2 * masses))
+        slope[:, :masses, masses:] = np.eye(masses)
+        slope[:, masses:, :masses] = -inverse @ np.moveaxis(stiffness[:, :, part], 2, 0)
+        slope[:, masses:, masses:] = -inverse @ damping
+        pushed = np.zeros((len(slope), 2 * masses, trials))
+        pushed[:, masses:] = inverse @ np.moveaxis(forces[:, :, part], 2, 0)
+        now, half, then = slope[:-1:2], slope[1::2], slope[2::2]
+        # The slopes of the method as they follow from a state, and from forces.
+        two = half + step / 2 * half @ now
+        three = half + step / 2 * half @ two
+        four = then + step * then @ three
+        by_forces = [pushed[:-1:2]]
+        by_forces.append(pushed[1::2] + step / 2 * half @ by_forces[0])
+        by_forces.append(pushed[1::2] + step / 2 * half @ by_forces[1])
+        by_forces.append(pushed[2::2] + step * then @ by_forces[2])
+        turned = np.eye(2 * masses) + step / 6 * (now + 2 * two + 2 * three + four)
+        added = step / 6 * (by_forces[0] + 2 * by_forces[1] + 2 * by_forces[2] + by_forces[3])
+        for place, (turn, more) in enumerate(zip(turned, added, strict=True), first):
+            places[place + 1] = turn @ places[place] + more
+    return np.moveaxis(places[:steps:FINER, :masses], 0, -1)
 
 
 def noisy(rng: np.random.Generator, clean: Array, part: float) -> Array:
@@ -61,12 +82,10 @@ def simulated(
     torque, spring = drive(rng, trials, times), np.asarray(stiffness(times))
     inertia, damping = Trials.inertia, Trials.damping
 
-    def slope(state: Array, half: int) -> Array:
-        angle, velocity = state
-        return np.stack([velocity, (torque[:, half] - damping * velocity - spring[half] * angle) / inertia])
-
     state = np.stack([rng.normal(0, 0.02, trials), rng.normal(0, 0.5, trials)])
-    angle = integrated(slope, state, samples, step)[:, 0].T
+    one = np.ones((1, 1))
+    springs = np.broadcast_to(spring, (1, 1, times.size))
+    (angle,) = integrated(springs, damping * one, one / inertia, torque[np.newaxis], state, step)
     whole = slice(0, 2 * FINER * samples, 2 * FINER)
     return Trials(noisy(rng, angle, angle_noise), noisy(rng, torque[:, whole], 0.1), spring[whole])
 
@@ -106,14 +125,14 @@ def chain(
     road = 0.01 * drive(rng, 1, times, 4.0)[0] if base else np.zeros(times.size)
     speed = np.gradient(road, step / 2)
 
-    def slope(state: Array, half: int) -> Array:
-        angle, velocity = state
-        stretched = np.diff(angle, prepend=road[half])
-        faster = np.diff(velocity, prepend=speed[half])
-        pull = springs[:, half] * stretched + damping * faster
-        return np.stack([velocity, (forces[:, half] - pull + np.append(pull[1:], 0.0)) / inertia])
-
-    angle = integrated(slope, np.zeros((2, masses)), samples, step)[:, 0].T
+    pushed = forces[:, np.newaxis].copy()
+    pushed[0, 0] += springs[0] * road + damping[0] * speed
+    # How much each spring and damper is stretched by each angle.
+    stretched = np.eye(masses) - np.eye(masses, k=-1)
+    matrix = np.einsum("ki,kt,kj->ijt", stretched, springs, stretched)
+    resisting = stretched.T @ np.diag(damping) @ stretched
+    still = np.zeros((2 * masses, 1))
+    angle = integrated(matrix, resisting, np.diag(1 / inertia), pushed, still, step)[:, 0]
     whole = slice(0, 2 * FINER * samples, 2 * FINER)
     return Masses(
         noisy(rng, angle, angle_noise),
@@ -159,17 +178,13 @@ def coupled(
     forces = np.stack([drive(rng, masses, times, highest) for _ in range(trials)], axis=1)
     if driven is not None:
         forces[[mass for mass in range(masses) if mass not in driven]] = 0.0
-    inverse = np.linalg.inv(inertia)
+    inverse = np.asarray(np.linalg.inv(inertia), np.float64)
     pulled = np.zeros((masses, times.size))
     if base is not None:
         pulled = matrix.sum(axis=1) * base[0] + np.outer(damping.sum(axis=1), base[1])
 
-    def slope(state: Array, half: int) -> Array:
-        angle, velocity = state
-        pull = matrix[:, :, half] @ angle + damping @ velocity - pulled[:, half, np.newaxis]
-        return np.stack([velocity, inverse @ (forces[:, :, half] - pull)])
-
-    angle = np.moveaxis(integrated(slope, np.zeros((2, masses, trials)), samples, step)[:, 0], 0, -1).swapaxes(0, 1)
+    pushed = forces + pulled[:, np.newaxis]
+    angle = integrated(matrix, damping, inverse, pushed, np.zeros((2 * masses, trials)), step).swapaxes(0, 1)
     whole = slice(0, 2 * FINER * samples, 2 * FINER)
     torque = forces[:, :, whole].swapaxes(0, 1)
     return Coupled(noisy(rng, angle, angle_noise), noisy(rng, torque, 0.1), matrix[:, :, whole])
