@@ -10,10 +10,14 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+LONG = os.environ.get("TVIDENT_TESTS") == "long"
+"""Whether this is `make test-long`."""
+
 # A slow machine is no failure; the seed is fixed, so that a green run stays green. `make soak` looks further.
-settings.register_profile("check", deadline=None, derandomize=True, print_blob=True)
+settings.register_profile("short", deadline=None, max_examples=25, derandomize=True, print_blob=True)
+settings.register_profile("long", deadline=None, max_examples=100, derandomize=True, print_blob=True)
 settings.register_profile("soak", deadline=None, max_examples=2000, print_blob=True)
-settings.load_profile(os.environ.get("TVIDENT_HYPOTHESIS", "check"))
+settings.load_profile(os.environ.get("TVIDENT_HYPOTHESIS", "long" if LONG else "short"))
 
 
 NO_RECORDINGS, A_MISSING_RECORDING = "no recordings at", "the recording "
@@ -33,12 +37,12 @@ def is_long(item: pytest.Item, cases: Counter[str]) -> bool:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what takes long, or with `TVIDENT_TESTS=long` everything else: each test is run by one of the two."""
-    wanted = os.environ.get("TVIDENT_TESTS") == "long"
+    """Leave out what takes long, or with `TVIDENT_TESTS=long` everything else: each test is run by one of the two, a property by both."""
     parted: dict[bool, list[pytest.Item]] = {True: [], False: []}
     cases: Counter[str] = Counter()
     for one in items:
-        parted[is_long(one, cases) == wanted].append(one)
+        of_more_examples = LONG and getattr(getattr(one, "obj", None), "is_hypothesis_test", False)
+        parted[of_more_examples or is_long(one, cases) == LONG].append(one)
     items[:] = parted[True]
     config.hook.pytest_deselected(items=parted[False])
 

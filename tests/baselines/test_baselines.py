@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import tvident
 from commands import run
+from parameters import examples
 from tvident import baselines
 
 ROUNDING = 1e-6
@@ -22,7 +23,7 @@ def problem(seed: int, rows: int) -> tuple[Any, Any]:
     return regressors, regressors @ [2.0, 0.03] + 0.1 * generator.standard_normal(rows)
 
 
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 @given(seed=st.integers(0, 1000), rows=st.integers(8, 60), forgetting=st.floats(0.8, 1.0))
 def test_recursive_least_squares_are_weighted_least_squares_of_the_past(
     seed: int, rows: int, forgetting: float
@@ -35,7 +36,7 @@ def test_recursive_least_squares_are_weighted_least_squares_of_the_past(
     assert np.all(found.stderr[-1] > 0)
 
 
-@settings(max_examples=10)
+@settings(max_examples=examples(10))
 @given(seed=st.integers(0, 1000), rows=st.integers(5, 25))
 def test_the_smoother_is_least_squares_with_steps(seed: int, rows: int) -> None:
     regressors, rhs = problem(seed, rows)

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import tvident
 import tvident.dask
-from parameters import long
+from parameters import examples, long
 from tvident import Status
 
 SAMPLES = 60_000
@@ -55,7 +55,7 @@ def assert_same_bits(found: tvident.dask.DaskIdentification, whole: tvident.Iden
 cuts = st.lists(st.integers(1, 20_000), min_size=1, max_size=12)
 
 
-@settings(max_examples=8)
+@settings(max_examples=examples(8))
 @given(cuts=cuts, step=st.sampled_from([1, 3, 250]), half=st.integers(3, 150), rows=st.integers(5, 400))
 def test_chunks_of_any_size_have_the_bits_of_one_call(cuts: list[int], step: int, half: int, rows: int) -> None:
     generator = np.random.default_rng(sum(cuts))
@@ -75,7 +75,7 @@ def test_chunks_of_any_size_have_the_bits_of_one_call(cuts: list[int], step: int
         assert_same_bits(found, tvident.identify(angle, torque, **options))
 
 
-@settings(max_examples=8)
+@settings(max_examples=examples(8))
 @given(
     cuts=cuts,
     step=st.sampled_from([1, 4, 90]),

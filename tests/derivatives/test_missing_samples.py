@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import tvident
+from parameters import examples
 from tvident import Status
 from tvident._huber import pseudo_values
 
@@ -164,7 +165,7 @@ def test_weights_say_how_much_samples_count() -> None:
     np.testing.assert_allclose(weighted.derivatives[:, 680:720], omitted.derivatives[:, 680:720], rtol=1e-9)
 
 
-@settings(max_examples=5)
+@settings(max_examples=examples(5))
 @given(seed=st.integers(0, 10_000), missing=st.sampled_from([(0.01, 1), (0.05, 1), (0.3, 1), (0.05, 8)]))
 def test_windows_are_chosen_as_if_nothing_were_missing(seed: int, missing: tuple[float, int]) -> None:
     lost, burst = missing

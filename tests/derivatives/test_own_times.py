@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import tvident
+from parameters import examples
 from reference.own_times import fit, window_of
 from tvident import Status, _core
 from tvident._huber import pseudo_values
@@ -31,7 +32,7 @@ def record(seed: int, samples: int) -> tuple[Array, Array]:
     return times, np.asarray(waves + 0.02 * generator.standard_normal(samples))
 
 
-@settings(max_examples=15)
+@settings(max_examples=examples(15))
 @given(
     seed=st.integers(0, 10_000),
     samples=st.integers(60, 150),
@@ -101,7 +102,7 @@ def test_polynomials_are_exact_and_results_are_at_their_own_times() -> None:
     assert np.isfinite(beside.derivatives[0, :190]).all()
 
 
-@settings(max_examples=6)
+@settings(max_examples=examples(6))
 @given(seed=st.integers(0, 10_000), scatter=st.floats(0.05, 0.9), gap=st.booleans())
 def test_windows_are_chosen_at_irregular_times(seed: int, scatter: float, gap: bool) -> None:
     generator = np.random.default_rng(seed)

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
+from parameters import examples
 from reference.expansion import generalised, product_column
 from tvident._expansion import Basis, Coordinate, ExpandedRecord, ExpandedUnknown, Linearised
 from tvident._expansion.covariance import RIDGE, Whitening
@@ -36,7 +37,7 @@ def of_time(family: str, size: int, samples: int) -> Basis:
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("role", "parts"), [("inertia", 2), ("damping", 1), ("stiffness", 0)])
-@settings(max_examples=8)
+@settings(max_examples=examples(8))
 @given(seed=st.integers(0, 1000), half=st.integers(14, 25), exponent=st.integers(5, 8), size=st.integers(1, 4))
 def test_columns_are_the_integrals_of_products(
     role: str, parts: int, seed: int, half: int, exponent: int, size: int
@@ -78,7 +79,7 @@ def test_momentum_is_inertia_and_its_rate() -> None:
     )
 
 
-@settings(max_examples=25)
+@settings(max_examples=examples(25))
 @given(seed=st.integers(0, 1000), rows=st.integers(1, 120), lags=st.integers(2, 12), lost=st.integers(0, 5))
 def test_whitening_is_that_of_the_dense_covariance(seed: int, rows: int, lags: int, lost: int) -> None:
     generator = np.random.default_rng(seed)
@@ -146,7 +147,7 @@ def test_derivatives_of_families_are_those_of_their_values(name: str) -> None:
         assert np.abs((after - before) / (2 * step) - found).max() < 1e-6 * max(1, np.abs(found).max())
 
 
-@settings(max_examples=10)
+@settings(max_examples=examples(10))
 @given(seed=st.integers(0, 1000), sizes=st.tuples(st.integers(1, 5), st.integers(1, 4)), same=st.booleans())
 def test_blocks_are_summed_and_sizes_compared_as_if_each_were_solved(
     seed: int, sizes: tuple[int, int], *, same: bool

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import tvident
 from calls import paper
+from parameters import examples
 from reference.exact import Window, gains
 from signals import signal
 from tvident import Status, _core
@@ -101,7 +102,7 @@ WORKS: dict[str, Work] = {
 
 @pytest.mark.first(1)
 @pytest.mark.parametrize("name", list(WORKS))
-@settings(max_examples=15)
+@settings(max_examples=examples(15))
 @given(
     seed=st.integers(0, 2**32),
     n=st.one_of(st.integers(500, 2000), st.integers(30_000, 80_000)),
@@ -116,7 +117,7 @@ def test_any_number_of_workers_gives_the_same_bits(
     assert_same_bits(WORKS[name](y, 2 * half + 1, 1), WORKS[name](y, 2 * half + 1, workers))
 
 
-@settings(max_examples=10)
+@settings(max_examples=examples(10))
 @given(seed=st.integers(0, 2**32), n=st.integers(30_000, 80_000), length=st.integers(5, 300), workers=st.integers(2, 9))
 def test_the_filter_gives_the_same_bits_on_any_number_of_workers(seed: int, n: int, length: int, workers: int) -> None:
     y = with_bad_samples(signal(seed, n), seed, 3)
@@ -130,7 +131,7 @@ def test_the_filter_gives_the_same_bits_on_any_number_of_workers(seed: int, n: i
 
 
 @given(seed=st.integers(0, 2**32), records=st.integers(1, 6), n=st.integers(60, 30_000), workers=st.integers(1, 9))
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 def test_a_record_has_the_same_bits_in_any_company(seed: int, records: int, n: int, workers: int) -> None:
     y = np.array([signal(seed + k, n) for k in range(records)])
     together = tvident.fit_local_polynomials(y, 51, workers=workers)
@@ -164,7 +165,7 @@ def norms(y: Array, half: int) -> Array:
     noise=st.sampled_from([1e-6, 1e-2, 1.0]),
     order=st.sampled_from([None, 0, 3, 7, 15]),
 )
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_every_path_has_the_same_orders_and_derivatives(
     seed: int, half: int, more: int, noise: float, order: int | None
 ) -> None:
@@ -209,7 +210,7 @@ def test_every_path_filters_alike(seed: int, length: int, order: int, deriv: int
 
 
 @given(seed=st.integers(0, 2**32), half=st.integers(10, 60), equations=st.integers(60, 200))
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 def test_every_path_identifies_alike(seed: int, half: int, equations: int) -> None:
     angle = signal(seed, 2000, 1e-3)
     velocity = np.gradient(angle, 1e-3)

@@ -7,6 +7,7 @@ import numpy.typing as npt
 import pytest
 
 import tvident
+from parameters import long
 
 Array = npt.NDArray[np.float64]
 
@@ -34,22 +35,22 @@ def errors(result: tvident.Identification, rig: tvident.TorsionalRecording) -> t
     return inertia, stiffness
 
 
-def test_spikes_of_the_torque_move_parameters_by_little() -> None:
-    for seed, size in ((1, 5.0), (2, 100.0)):
-        rig = tvident.simulate_torsional_rig(8.0, seed=seed)
-        torque = spoilt(rig, 40, size)
-        _, alone = errors(tvident.identify(rig.angle, rig.torque, sample_rate=rig.sample_rate), rig)
-        _, squares = errors(tvident.identify(rig.angle, torque, sample_rate=rig.sample_rate), rig)
-        result = tvident.identify(rig.angle, torque, sample_rate=rig.sample_rate, loss="huber")
-        inertia, stiffness = errors(result, rig)
-        assert stiffness < LOSS * alone < squares
-        assert inertia < CONSTANT
-        assert result.settings["loss"] == "huber"
-        assert any("Huber" in reason for reason in result.reasons)
-        again = tvident.identify(rig.angle, torque, sample_rate=rig.sample_rate, settings=result.settings)
-        assert again.settings["loss"] == "huber"
-        # Rounds end where what is clipped moves by a fiftieth of its scale; beyond the last windows that is carried on.
-        np.testing.assert_allclose(again.stiffness[INSIDE], result.stiffness[INSIDE], rtol=5e-3)
+@pytest.mark.parametrize(("seed", "size"), [*long((1, 5.0)), (2, 100.0)])
+def test_spikes_of_the_torque_move_parameters_by_little(seed: int, size: float) -> None:
+    rig = tvident.simulate_torsional_rig(8.0, seed=seed)
+    torque = spoilt(rig, 40, size)
+    _, alone = errors(tvident.identify(rig.angle, rig.torque, sample_rate=rig.sample_rate), rig)
+    _, squares = errors(tvident.identify(rig.angle, torque, sample_rate=rig.sample_rate), rig)
+    result = tvident.identify(rig.angle, torque, sample_rate=rig.sample_rate, loss="huber")
+    inertia, stiffness = errors(result, rig)
+    assert stiffness < LOSS * alone < squares
+    assert inertia < CONSTANT
+    assert result.settings["loss"] == "huber"
+    assert any("Huber" in reason for reason in result.reasons)
+    again = tvident.identify(rig.angle, torque, sample_rate=rig.sample_rate, settings=result.settings)
+    assert again.settings["loss"] == "huber"
+    # Rounds end where what is clipped moves by a fiftieth of its scale; beyond the last windows that is carried on.
+    np.testing.assert_allclose(again.stiffness[INSIDE], result.stiffness[INSIDE], rtol=5e-3)
 
 
 def test_the_loss_is_chosen_by_the_tails() -> None:

@@ -12,6 +12,7 @@ import pytest
 from scipy.signal import savgol_filter
 
 import tvident
+from parameters import long
 from reference.local_polynomials import fit_window
 from tvident import Status
 
@@ -161,10 +162,11 @@ def test_a_glitch_leaves_with_its_sample() -> None:
     assert (np.abs(fit.derivatives - other.derivatives) <= bound)[:, without].all()
 
 
-def test_ten_million_samples_take_a_filters_time_and_the_last_are_as_good_as_the_first() -> None:
+# Ten million samples, and less than a third of them.
+@pytest.mark.parametrize("repeats", [50, *long(167)])
+def test_millions_of_samples_take_a_filters_time_and_the_last_are_as_good_as_the_first(repeats: int) -> None:
     # The same minute again and again: the truth of the last is the result for the first.
     minute = 60_000
-    repeats = 167
     once = waves(np.arange(minute) / minute, fastest=100.0)[0]
     y = np.tile(once + 0.01 * np.random.default_rng(4).standard_normal(minute), repeats)
     ratios = []
@@ -178,7 +180,6 @@ def test_ten_million_samples_take_a_filters_time_and_the_last_are_as_good_as_the
         ratios.append((time.process_time() - filtered) / (filtered - started))
         if ratios[-1] < AS_LONG_AS_A_FILTER:
             break
-    assert y.size > 10_000_000
     assert min(ratios) < AS_LONG_AS_A_FILTER
     first, last = slice(200, minute - 200), slice(y.size - minute + 200, y.size - 200)
     same = fit.order[first] == fit.order[last]

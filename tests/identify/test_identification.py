@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import tvident
 from calls import paper
+from parameters import examples
 from reference.identification import derivatives, windowed
 from reference.regression import solve
 from reference.scatter import scatter, variance_inflation
@@ -35,7 +36,7 @@ def system(seed: int, n: int, rate: float = 1000.0) -> tuple[Array, Array]:
     return angle + 1e-4 * generator.standard_normal(n), torque + 0.5 * generator.standard_normal(n)
 
 
-@settings(max_examples=settings().max_examples // 4)
+@settings(max_examples=examples(25))
 @given(
     seed=st.integers(0, 2**32),
     half=st.integers(5, 40),
@@ -132,7 +133,7 @@ def test_natural_frequency_and_damping_ratio_come_with_their_errors() -> None:
 
 
 @given(seed=st.integers(0, 2**32))
-@settings(max_examples=settings().max_examples // 10)
+@settings(max_examples=examples(10))
 def test_constant_parameters_are_one_least_squares_over_the_record(seed: int) -> None:
     angle, torque = system(seed, 700)
     angle[300] = np.nan  # costs its own windows, and no others
@@ -205,7 +206,7 @@ def test_a_step_gives_every_so_manieth_result(step: int) -> None:
 
 
 @given(workers=st.integers(2, 6), equations=st.integers(50, 3000))
-@settings(max_examples=settings().max_examples // 10)
+@settings(max_examples=examples(10))
 def test_the_numbers_do_not_depend_on_the_number_of_workers(workers: int, equations: int) -> None:
     angle, torque = system(4, 60_000)
     one = tvident.identify(angle, torque, sample_rate=1000, **paper(regression_window=equations, workers=1))

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import tvident
 from calls import plain_weak, weak
-from parameters import long
+from parameters import examples, long
 from reference.weak_form import profile, roots, rows
 from tvident import Status
 
@@ -75,7 +75,7 @@ def test_millions_of_samples_with_a_drift_lose_no_digits(n: int) -> None:
     assert abs(found.constants["inertia"][0] / SYSTEM["inertia"] - 1) < 1e-4
 
 
-@settings(max_examples=15)
+@settings(max_examples=examples(15))
 @given(
     seed=st.integers(0, 2**32),
     half=st.integers(5, 60),

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import tvident
 from merged.simulated import Masses, chain
-from parameters import long
+from parameters import examples, long
 from reference import merged as reference
 
 Array = npt.NDArray[np.float64]
@@ -55,7 +55,7 @@ def rms(found: Array, true: Array) -> float:
     return float(np.sqrt(np.nanmean((found - true) ** 2)) / np.mean(np.abs(true)))
 
 
-@settings(max_examples=5)
+@settings(max_examples=examples(5))
 @given(seed=st.integers(0, 2**31), half=st.integers(20, 40), angle_noise=st.sampled_from([1e-3, 1e-2]))
 def test_constants_of_a_chain_are_those_of_all_equations_together(seed: int, half: int, angle_noise: float) -> None:
     masses = chain([constant(12.0), constant(18.0)], 3000, seed=seed, angle_noise=angle_noise)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import tvident
 from merged.simulated import chain, simulated
+from parameters import examples
 
 identify: Any = tvident.identify
 """Its type is that of a single record."""
@@ -32,7 +33,7 @@ def assert_alike(found: Any, again: Any) -> None:
         np.testing.assert_allclose(again.elements[name], values, rtol=1e-9, atol=1e-3 * float(error.max()))
 
 
-@settings(max_examples=5)
+@settings(max_examples=examples(5))
 @given(
     seed=st.integers(0, 2**31),
     kinds=st.fixed_dictionaries(

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import tvident
 from merged.simulated import Trials, coupled, simulated
-from parameters import long
+from parameters import examples, long
 from reference import merged as reference
 
 Array = npt.NDArray[np.float64]
@@ -23,7 +23,7 @@ identify: Any = tvident.identify
 OPTIONS: dict[str, Any] = {"sample_rate": 1000, "ensemble_axis": 0}
 
 
-@settings(max_examples=8)
+@settings(max_examples=examples(8))
 @given(
     seed=st.integers(0, 2**31),
     lengths=st.lists(st.integers(300, 700), min_size=2, max_size=4),

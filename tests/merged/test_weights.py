@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import tvident
 from merged.simulated import chain, noisy, simulated
-from parameters import long
+from parameters import examples, long
 from reference import merged as reference
 
 Array = npt.NDArray[np.float64]
@@ -24,7 +24,7 @@ OPTIONS: dict[str, Any] = {"sample_rate": 1000, "ensemble_axis": 0}
 CONSTANT = dict.fromkeys(("inertia", "damping", "stiffness"), "constant")
 
 
-@settings(max_examples=8)
+@settings(max_examples=examples(8))
 @given(
     seed=st.integers(0, 2**31),
     lengths=st.lists(st.integers(300, 700), min_size=1, max_size=3),

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
+from parameters import examples
 from reference.noise_correction import Column, Rows, fit, row_covariance, window
 from reference.weak_form import companion_kernels, kernels
 from tvident import Status, _core
@@ -181,7 +182,7 @@ def parameters_of(case: Case, rows: Rows, found: Any) -> Array:
     return np.array([values["inertia"], max(values["damping"], 0.0), values["stiffness"]])
 
 
-@settings(max_examples=settings().max_examples // 4)
+@settings(max_examples=examples(25))
 @given(drawn=cases)
 @example(
     drawn={

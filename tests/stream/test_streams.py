@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import tvident
+from parameters import examples
 from signals import signal
 from tvident import Status, StrongForm
 from tvident._regression import Alignment
@@ -54,7 +55,7 @@ def streamed(
     return [*outs, stream.finish()]
 
 
-@settings(max_examples=6)
+@settings(max_examples=examples(6))
 @given(
     PIECES,
     st.sampled_from([21, 101, 201]),
@@ -77,7 +78,7 @@ def test_derivatives_are_those_of_the_batch(
     assert np.allclose(joined(outs, "time"), np.arange(0, y.size, step) / 100)
 
 
-@settings(max_examples=12)
+@settings(max_examples=examples(12))
 @given(
     PIECES,
     st.integers(1, 5),
@@ -114,7 +115,7 @@ def test_windows_of_rows_are_those_of_the_batch(
     assert np.array_equal(np.concatenate([out.row for out in outs]), np.arange(0, 1000, step))
 
 
-@settings(max_examples=4)
+@settings(max_examples=examples(4))
 @given(PIECES, st.sampled_from([(201, 200), (51, 301), (301, 64)]), st.sampled_from([1, 5]), st.sampled_from([0, 7]))
 def test_windowed_parameters_are_those_of_the_batch(
     lengths: list[int], windows: tuple[int, int], step: int, resume: int
@@ -176,7 +177,7 @@ def test_the_delay_is_what_it_is_said_to_be() -> None:
 _TO_ROUNDING = 1e3 * np.finfo(float).eps
 
 
-@settings(max_examples=2)
+@settings(max_examples=examples(2))
 @given(PIECES, st.sampled_from([0, 7]))
 def test_constants_end_where_the_batch_does(lengths: list[int], resume: int) -> None:
     more: dict[str, Any] = {

@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import tvident
+from parameters import examples
 from tvident import IdentificationStream, Status
 from tvident._pieces import Given
 
@@ -51,7 +52,7 @@ def streamed(stream: IdentificationStream, samples: int, lengths: Sequence[int],
     return [*outs, stream.finish()]
 
 
-@settings(max_examples=4)
+@settings(max_examples=examples(4))
 @given(
     st.lists(st.sampled_from([1, 3, 100, 465, 466, BLOCK, 2000]), min_size=1, max_size=4),
     st.sampled_from([1, 7]),
