@@ -236,6 +236,16 @@ def test_the_equation_at_hand_is_not_tried_again(tried: list[dict[str, object]])
     assert (["offset"], "auto") in windowed
 
 
+def test_reasons_do_not_wait_for_what_advice_tries(tried: list[dict[str, object]]) -> None:
+    rig = tvident.simulate_torsional_rig(6.0, pattern="constant", seed=300)
+    found = tvident.identify(rig.angle[3:], rig.torque[:-3], sample_rate=RATE)
+    reasons = found.reasons
+    assert not tried
+    assert found.advice
+    assert tried
+    assert found.reasons == reasons
+
+
 def test_what_is_held_back_is_identified_once_for_all_distances(monkeypatch: pytest.MonkeyPatch) -> None:
     rig = tvident.simulate_torsional_rig(seed=1)
     found = tvident.identify(rig.angle, rig.torque, sample_rate=RATE, method="auto")

@@ -196,8 +196,12 @@ class Identification(Shown):
 
     # What to say is found when it is asked for: a short record is identified in less time than that takes.
     @cached_property
+    def _chosen(self) -> Words:
+        return self._words if isinstance(self._words, Words) else self._words()
+
+    @cached_property
     def _told(self) -> Words:
-        words = self._words if isinstance(self._words, Words) else self._words()
+        words = self._chosen
         recorded = self._recorded
         if recorded is None or recorded.improve is None or not recorded.is_unchanged:
             return words

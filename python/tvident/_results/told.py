@@ -25,6 +25,11 @@ class Telling:
         raise NotImplementedError
 
     @property
+    def _chosen(self) -> Words:
+        """What was chosen, which stands before what would be better is looked for."""
+        return self._told
+
+    @property
     def reasons(self) -> tuple[str, ...]:
         """What was chosen, and why: a tuple of sentences.
 
@@ -33,7 +38,7 @@ class Telling:
         advice : what to do.
         summary : both, with the numbers.
         """
-        return self._in_own_words(self._told.reasons)
+        return self._in_own_words(self._chosen.reasons)
 
     @property
     def advice(self) -> tuple[str, ...]:
