@@ -57,7 +57,7 @@ def long_recording(folder: Path, samples: int) -> None:
 
 
 def test_progress_is_shown_on_a_terminal_and_not_in_a_pipe(tmp_path: Path) -> None:
-    long_recording(tmp_path, 400_000)
+    long_recording(tmp_path, 150_000)
     command = [TVIDENT, "identify", "--angle", "a.npy", "--torque", "t.npy", "--sample-rate", "1000"]
     command += ["--angle-unit", "rad", "--torque-unit", "N m"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import tvident
+from parameters import long
 
 MIB = 2**20
 HOUR = 3_600_000
@@ -63,8 +64,9 @@ def test_the_automatic_method_needs_little_beside_inputs_and_results() -> None:
     assert risen_by("the automatic method", HOUR, 0, workers=1) < (OF_RESULTS + BESIDE_RESULTS) * HOUR
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-@pytest.mark.parametrize("window", [201, 3000, LONGEST])
+@pytest.mark.parametrize(
+    ("window", "workers"), [(3000, 2), (LONGEST, 1), *long((201, 1), (201, 2), (3000, 1), (LONGEST, 2))]
+)
 @pytest.mark.parametrize(
     "name", ["fit_local_polynomials", "rolling_least_squares", "identify, window", "identify, regression window"]
 )
@@ -72,6 +74,6 @@ def test_scratch_of_a_thread_stays_small(name: str, window: int, workers: int) -
     samples = 320_000  # four rounds of 10 000 windows in the lanes of the widest vectors: work for two threads
     # The time of every sample is a result; it is computed from their numbers.
     in_numpy = 2 * 8 * samples if name.startswith("identify") else 0
-    # The allocator may hold a few hundred kilobytes more from one run to the next, never less than is needed: the least counts.
-    risen = min(risen_by(name, samples, window, workers) for _ in range(3 if window == LONGEST else 1))
-    assert risen - in_numpy < workers * SCRATCH
+    # The allocator may hold a few hundred kilobytes more from one run to the next, never less than is needed: one of few runs counts.
+    runs = range(3 if window == LONGEST else 1)
+    assert any(risen_by(name, samples, window, workers) - in_numpy < workers * SCRATCH for _ in runs)

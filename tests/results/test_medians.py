@@ -9,6 +9,7 @@ import numpy.typing as npt
 import pytest
 
 import tvident
+from parameters import long
 from tvident._results.medians import error_of_median, median_of
 
 Array = npt.NDArray[np.float64]
@@ -30,7 +31,7 @@ def scatter_and_error(truth: Array, own: float, common: float) -> tuple[float, f
     return float(np.std(medians)), float(np.mean(errors))
 
 
-@pytest.mark.parametrize("common", [0.0, 0.05, 0.3])
+@pytest.mark.parametrize("common", [0.05, *long(0.0, 0.3)])
 @pytest.mark.parametrize(
     "truth",
     [np.full(SAMPLES, 5.0), 5 + TIME, 5 + 20 * TIME, 5 + np.sin(2 * np.pi * 3 * TIME), 5 + 10 * (TIME > 0.3)],

@@ -242,7 +242,7 @@ ALIKE = 1.0
 
 
 @pytest.mark.first(1)
-@pytest.mark.parametrize("stiffness", ["windowed", "constant"])
+@pytest.mark.parametrize("stiffness", ["constant", "windowed"])
 def test_a_long_record_is_told_by_stretches_of_it(stiffness: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     long = tvident.simulate_torsional_rig(660.0, pattern="ramp" if stiffness == "windowed" else "constant", seed=5)
     result = tvident.identify(long.angle, long.torque, sample_rate=1000, stiffness=stiffness)
