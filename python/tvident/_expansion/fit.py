@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from typing import TypeAlias
 
 import numpy as np
@@ -207,6 +208,12 @@ class Linearised:
             white, before = self.whitening.whiten(design, some.start, before)
             yield white
 
+    def _scores(self, unknowns: Sequence[ExpandedUnknown], fitted: Fitted) -> Iterator[Array]:
+        """Give pieces of whitened rows times their residuals; times the root, columns are orthonormal, however hard to tell apart."""
+        for white in self.whitened(unknowns):
+            left = white[:, -1] - white[:, :-1] @ fitted.values
+            yield white[:, :-1] @ fitted.root * left[:, np.newaxis]
+
     def root_of_residuals(self, unknowns: Sequence[ExpandedUnknown], fitted: Fitted) -> Array:
         """Return a root of the covariance that follows from whitened residuals and their correlation (Newey and West), not from noise."""
         record = self.record
@@ -214,18 +221,12 @@ class Linearised:
         middle = np.zeros((fitted.values.size, fitted.values.size))
         if fitted.beside is not None:
             middle += _products(fitted.beside[:, :-1] @ fitted.root)
-        last = np.zeros((0, fitted.values.size))
-        for white in self.whitened(unknowns):
-            # Times the root columns are orthonormal, however hard they are to tell apart.
-            left = white[:, -1] - white[:, :-1] @ fitted.values
-            scores = white[:, :-1] @ fitted.root * left[:, np.newaxis]
-            chain, new = np.concatenate([last, scores]), len(scores)
-            for lag in range(reach + 1):
-                late = chain[max(lag, len(chain) - new) :]
-                product = late.T @ chain[len(chain) - len(late) - lag : len(chain) - lag]
-                weight = 1 - lag / (reach + 1)
-                middle += product if lag == 0 else weight * (product + product.T)
-            last = chain[-reach:]
+        nothing = last = np.zeros((reach, fitted.values.size))
+        for scores in chain(self._scores(unknowns, fitted), [nothing]):
+            # Weights that fall linearly with the lag are how often both rows lie in one of all windows of so many rows.
+            sums = np.cumsum(np.concatenate([nothing[:1], last, scores]), axis=0)
+            middle += _products(sums[reach + 1 :] - sums[: -reach - 1]) / (reach + 1)
+            last = np.concatenate([last, scores])[-reach:]
         if not np.isfinite(middle).all():
             return np.full_like(fitted.root, np.nan)
         squares, axes = np.linalg.eigh(middle)
