@@ -20,7 +20,7 @@ ANGLE, TORQUE, N = RIG.angle, RIG.torque, RIG.angle.size
 DEGREES, MILLI = np.rad2deg(ANGLE), 1000 * TORQUE
 GIVEN: dict[str, Any] = {"inertia": 0.0123, "method": tvident.WeakForm(window_length=33, exponent=9)}
 PLAIN = tvident.identify(ANGLE, TORQUE, sample_rate=1000, **GIVEN)
-UNIT = pint.UnitRegistry()
+UNIT = pint.application_registry
 
 
 def assert_is_plain(angle: Any, torque: Any, **options: Any) -> None:

@@ -13,7 +13,7 @@ from tvident import Channel
 from tvident._units import LINEAR, ROTARY, factor_to, is_unit, named_unit, unit_of
 from tvident._units.symbols import SYMBOLS
 
-PINT: Any = pint.UnitRegistry()
+PINT: Any = pint.application_registry
 INTO = ("kg", "m", "s", "rad", "V", "A", "K", "count")
 """What the powers of a dimension are of."""
 
