@@ -19,22 +19,24 @@ OFF = 0.02
 class Recorded(NamedTuple):
     """Channels, and the inertia that they were made with."""
 
-    angle: npt.NDArray[np.float64]
-    torque: npt.NDArray[np.float64]
-    inertia: npt.NDArray[np.float64]
+    angle: npt.NDArray[np.floating]
+    torque: npt.NDArray[np.floating]
+    inertia: npt.NDArray[np.floating]
 
 
-def told(rng: np.random.Generator, time: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def told(rng: np.random.Generator, time: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
     """Return moves from rest to rest, with pauses, of a standard deviation of one."""
     natural = np.sqrt(STIFFNESS / INERTIA) / (2 * np.pi)
-    moves, at, before = np.zeros(time.size), 0.0, 0.0
+    moves: npt.NDArray[np.float64] = np.zeros(time.size)
+    at, before = 0.0, 0.0
     while at < SECONDS:
         lasts, after = rng.uniform(0.5, 2) / natural, rng.uniform(-1, 1)
         during = (time >= at) & (time < at + lasts)
         part = np.clip(1.5 * (time[during] - at) / lasts, 0, 1)
         moves[during] = before + (after - before) * (10 * part**3 - 15 * part**4 + 6 * part**5)
         at, before = at + lasts, after
-    return moves / moves.std()
+    moves /= moves.std()
+    return moves
 
 
 @cache
