@@ -5,6 +5,7 @@ use crate::identify::weak::angle_zero::first_guess::with_free_offset;
 use crate::identify::weak::angle_zero::outcome::FreeOffset;
 use crate::identify::weak::angle_zero::spring::SpringColumn;
 use crate::identify::weak::choice::Chosen;
+use crate::identify::weak::decide::BADLY;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
 use crate::regression::model::Model;
@@ -14,9 +15,6 @@ use crate::weak_form::weak_rows::WeakRows;
 
 /// What is left of rows follows the stiffness beyond so many standard errors, as a term is suspected.
 const CONSPICUOUS: f64 = 5.0;
-
-/// The mean squared error of predicting rows, over the noise's, from which on more is tried.
-const BADLY: f64 = 1.5;
 
 impl Session<'_, '_, '_> {
     /// Whether a record whose rows are predicted badly, in the shortest windows only, or with more noise than its channels show, is predicted better with an offset that is free in

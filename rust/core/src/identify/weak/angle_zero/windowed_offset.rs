@@ -6,23 +6,21 @@
 use crate::error::Error;
 use crate::identify::weak::angle_zero::outcome::FreeOffset;
 use crate::identify::weak::choice::Chosen;
+use crate::identify::weak::decide::{BADLY, BETTER};
 use crate::identify::weak::lag::Settled;
 use crate::identify::weak::session::Session;
 use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
 use crate::weak_form::test_function_choice::spectrum_length;
 
-/// It is found where it leaves at most so much of what a constant one does of the same rows, beside all that is set free there, and no more than
-/// what noise explains. Where parts of the record differ it need only leave less.
-const BETTER: f64 = 0.8;
-const EXPLAINED: f64 = 1.5;
 /// Typical cycles that a record must last: in less than one a part of it does not tell an offset from the motion, and parts are eight.
 const CYCLES: f64 = 8.0;
 
 impl Session<'_, '_, '_> {
     /// Chooses and decides with an offset that is free in every window where the record is to decide upon it, and where parts of the record have
     /// other offsets, or noise does not explain what a constant one leaves and one seems to be `missed`. Otherwise, or if it is no better, what was
-    /// found with a constant one.
+    /// found with a constant one: of the same rows, beside all that is set free there, it must leave far less, and rows that are not predicted badly.
+    /// Where parts of the record differ it need only leave less.
     pub(crate) fn with_windowed_offset(
         &mut self,
         model: &Model,
@@ -48,7 +46,7 @@ impl Session<'_, '_, '_> {
         let error = settled.1.error;
         // Errors are compared on the same rows: those that were chosen beside a constant offset are long enough to hide what drifts. What else
         // is missing, such as a lag, is followed in part by anything that is free; beside a drift that is gone nothing more varies.
-        let explains = error < EXPLAINED && settled.1.slow.len() <= constant.1.slow.len();
+        let explains = error < BADLY && settled.1.slow.len() <= constant.1.slow.len();
         let is_possible = settled.1.fit.is_some() && (differs || explains);
         let least = if differs { 1.0 } else { BETTER };
         if is_possible && error < least * self.error_beside_constant(&settled.0, model, &constant)? {
