@@ -160,6 +160,11 @@ class Unknown:
     inner: tuple[InnerParameter, ...] = ()
 
 
+def has_kind(given: Any) -> bool:
+    """Return whether a term is given as a pair with its kind."""
+    return isinstance(given, tuple | list) and len(given) == 2  # noqa: PLR2004 - a pair
+
+
 def all_terms(terms: Sequence[Any], default: Kind, of_offset: Kind | None = None) -> list[Unknown]:
     """Return every further term with its name and kind: where that is not given the default, or that of an offset."""
     if isinstance(terms, str | Term):
@@ -169,7 +174,7 @@ def all_terms(terms: Sequence[Any], default: Kind, of_offset: Kind | None = None
         raise TypeError(f"terms must be a sequence of terms; got {arguments.shown(terms)}; write ('offset',), say")
     found: list[Unknown] = []
     for given in terms:
-        pair = isinstance(given, tuple | list) and len(given) == 2  # noqa: PLR2004 - a term and its kind
+        pair = has_kind(given)
         term = given[0] if pair else given
         own = term if isinstance(term, Term) else None
         is_offset = own is None and arguments.is_word(term, OFFSET)

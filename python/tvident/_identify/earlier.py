@@ -8,7 +8,7 @@ from dataclasses import fields
 from typing import Any
 
 from tvident import _arguments as arguments
-from tvident._equation import COEFFICIENTS, OFFSET, Term
+from tvident._equation import COEFFICIENTS, OFFSET, Term, has_kind
 from tvident._identify.methods import Form, StrongForm, WeakForm
 
 _FORMS: dict[str, type[Form]] = {"weak": WeakForm, "strong": StrongForm}
@@ -56,9 +56,6 @@ _BESIDE_FORM = frozenset(
 )
 """What settings of results hold beside those of their form."""
 
-_PAIR = 2
-"""A term and its kind."""
-
 
 def kept(earlier: Mapping[str, Any], given: Mapping[str, Any], *, has_form: bool) -> Sequence[str]:
     """Return what an earlier result chose that neither an argument nor a form replaces."""
@@ -69,7 +66,7 @@ def tested(earlier: Mapping[str, Any], given: Mapping[str, Any]) -> Sequence[str
     """Return the coefficients, and the offset, that an earlier result decided upon and no argument gives."""
     kinds = dict(earlier["terms"])
     # Terms that are given have the kinds that they had unless others are given with them.
-    pairs = [one for one in given.get("terms", ()) if isinstance(one, tuple | list) and len(one) == _PAIR]
+    pairs = [one for one in given.get("terms", ()) if has_kind(one)]
     terms = {name: kind for name, kind in pairs if isinstance(name, str)} if "terms" in given else kinds
     stand = {name for name, kind in kinds.items() if name == OFFSET and terms.get(name) == kind}
     return [

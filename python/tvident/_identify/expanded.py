@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._advice import FoundExpansion, words_of_expansions
-from tvident._equation import Term
+from tvident._equation import Term, has_kind
 from tvident._expansion import DERIVATIVES, Expansion, SizeSearch
 from tvident._identify.data import Data
 from tvident._identify.expanded_inputs import ExpandedInputs, role_of
@@ -22,16 +22,13 @@ from tvident._identify.task import Task
 from tvident._results import ExpandedParameter, Identification, Recorded
 from tvident._status import Status
 
-_PAIR = 2
-"""A term and its kind."""
-
 
 def expansions_of(request: Request) -> dict[str, Expansion]:
     """Return the expansions that are asked for, by the names of parameters and terms."""
     found = {name: one for name, one in request.parameters.items() if isinstance(one, Expansion)}
     terms = request.terms if isinstance(request.terms, tuple | list) else ()
     for term in terms:
-        if isinstance(term, tuple | list) and len(term) == _PAIR and isinstance(term[1], Expansion):
+        if has_kind(term) and isinstance(term[1], Expansion):
             found[term[0].name if isinstance(term[0], Term) else str(term[0])] = term[1]
     return found
 
@@ -129,9 +126,7 @@ class ExpandedTask:
             for name, one in given.items()
         }
         terms = [
-            (term[0], "windowed")
-            if isinstance(term, tuple | list) and len(term) == _PAIR and isinstance(term[1], Expansion)
-            else term
+            (term[0], "windowed") if has_kind(term) and isinstance(term[1], Expansion) else term
             for term in self._request.terms
         ]
         # Without a windowed parameter terms without a kind are constant, as they are beside an expansion.
@@ -194,7 +189,7 @@ def with_expansions(request: Request, expansions: Mapping[str, Expansion]) -> Re
     parameters = {name: expansions.get(name, one) for name, one in request.parameters.items()}
     terms = []
     for term in request.terms:
-        pair = isinstance(term, tuple | list) and len(term) == _PAIR
+        pair = has_kind(term)
         name = getattr(term[0], "name", term[0]) if pair else term
         terms.append((term[0], expansions[name]) if pair and name in expansions else term)
     return replace(request, parameters=parameters, terms=terms)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tvident import _arguments as arguments
-from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, Kind, Term
+from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, Kind, Term, has_kind
 from tvident._identify.earlier import (
     angle_zero,
     arguments_of_result,
@@ -287,7 +287,7 @@ def _with_instrument(asked: dict[str, Any], given: Mapping[str, Any]) -> dict[st
         raise ValueError("with an instrument the lag must be known; got 'auto'; give lag= in seconds")
     terms = asked["terms"]
     for term in () if isinstance(terms, str | Term) else terms:
-        own, kind = term if isinstance(term, tuple | list) and len(term) == 2 else (term, "constant")  # noqa: PLR2004
+        own, kind = term if has_kind(term) else (term, "constant")
         if isinstance(own, Term):
             raise ValueError(  # noqa: TRY004 - a term, but not one that will do
                 f"with an instrument terms must be built-in; got {own.name!r}, whose samples hold the angle's noise; use 'coulomb', "
