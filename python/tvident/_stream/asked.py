@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -64,10 +65,15 @@ class Equation:
     known: list[float | None]
     terms: list[str]
 
-    @property
+    @cached_property
     def names(self) -> list[str]:
         """Unknowns in the order of the core."""
         return [name for name, value in zip(COEFFICIENTS, self.known, strict=True) if value is None] + self.terms
+
+    @cached_property
+    def held(self) -> list[tuple[str, float]]:
+        """Names and values of what is known."""
+        return [(name, value) for name, value in zip(COEFFICIENTS, self.known, strict=True) if value is not None]
 
 
 class Asked(Protocol):

@@ -343,11 +343,11 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
 
     def _given(self, found: Any) -> StreamedIdentification:
         count = found.status.size
-        values = dict(zip(self._asked.equation.names, found.values, strict=True))
-        errors = dict(zip(self._asked.equation.names, found.stderr, strict=True))
-        for name, known in zip(COEFFICIENTS, self._asked.equation.known, strict=True):
-            if known is not None:
-                values[name], errors[name] = np.full(count, known), np.zeros(count)
+        equation = self._asked.equation
+        values = dict(zip(equation.names, found.values, strict=True))
+        errors = dict(zip(equation.names, found.stderr, strict=True))
+        for name, known in equation.held:
+            values[name], errors[name] = np.full(count, known), np.zeros(count)
         return StreamedIdentification(
             self._times(found.first, count),
             values,

@@ -126,8 +126,7 @@ class SampleStream(Stream[Out]):
 
     def _times(self, first: int, count: int) -> npt.NDArray[np.float64]:
         """Return the times of some samples, every so many of them."""
-        numbers = np.arange(first, first + count * self._step, self._step)
-        times = numbers.astype(np.float64) * self._period
+        times = np.float64(self._period) * np.arange(first, first + count * self._step, self._step)
         return times if self._start == 0 else times + self._start
 
 

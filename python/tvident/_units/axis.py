@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident._units.channel import in_its_unit, unit_named, unit_said
 from tvident._units.quantities import LINEAR, ROTARY, System, UnitError, factor_to, is_convertible, system_of
+
+# What has no place to say a unit: the only ones that come a thousand times a second.
+_WITHOUT_UNIT: Final = frozenset((np.ndarray, float))
 
 
 @dataclass(frozen=True)
@@ -78,6 +81,8 @@ def factor_said(system: System, name: str, values: Any) -> float:
     UnitError
         If it cannot be converted, or only a name says it.
     """
+    if type(values) in _WITHOUT_UNIT:
+        return 1.0
     unit = unit_said(values)
     if unit:
         return factor_to(system, name, unit, name=f"the {name}")
