@@ -28,9 +28,6 @@ const TURNS: usize = 3;
 /// The largest part of the rows that may be over pulses: what happens more often is no event.
 const MOST: f64 = 0.3;
 
-/// More stretches of rows than this that stand out are compared with what stands out by chance in a long record, before anything is fitted again.
-const MANY: usize = 100;
-
 /// The least change of the stiffness that is a pulse, as a part of it: the bend of a ramp looks like a smaller one. And the largest part of a
 /// pulse by which the stiffness may differ before and after it: what does not come back is a jump.
 const LEAST: f64 = 0.1;
@@ -101,7 +98,7 @@ impl Session<'_, '_, '_> {
         left.add(&added);
         let search = self.search(&chosen.weak, expected, &left);
         let mut over = search.conspicuous();
-        if over.len() > MANY && search.is_chance(&over) {
+        if search.is_chance(&over) {
             return Ok(Vec::new());
         }
         let turns = if known.is_empty() { TURNS } else { 0 };
