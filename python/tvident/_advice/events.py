@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._advice.lists import listed
+from tvident._arguments import ordinal
 from tvident._status import Status, stretches_of
 
 _SHOWN = 6
@@ -130,9 +131,9 @@ def comes_late(found: _core.Identification, defect: tuple[str, str, float], peri
             "their errors say: pass the other channel through the same filter and give no lag, or record without a filter"
         )
     if name in {"velocity", "acceleration"}:
-        return f"holds every value for {amount:.0f} samples: keep every {amount:.0f}th sample of all channels"
+        return f"holds every value for {amount:.0f} samples: keep every {ordinal(amount)} sample of all channels"
     cure = (
-        f"holds every value for {amount:.0f} samples, which makes it late by half of that: keep every {amount:.0f}th sample of "
+        f"holds every value for {amount:.0f} samples, which makes it late by half of that: keep every {ordinal(amount)} sample of "
         "both channels"
     )
     # The steps of an angle are motion for the equation, whatever its lag; and channels that both hold are late alike.

@@ -25,6 +25,7 @@ from tvident._advice.instrument import fed_back
 from tvident._advice.lists import listed
 from tvident._advice.scales import disagreement, scales_compared
 from tvident._advice.torque import OF_TORQUE, told_by_torque
+from tvident._arguments import ordinal
 from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, UNITS
 from tvident._results import Words
 from tvident._status import Status
@@ -207,8 +208,8 @@ class Explained:
                 )
             elif defect == "interpolated":
                 cure = (
-                    f"lies on straight lines between every {amount:.0f}th sample, which weakens its fast motion: keep every "
-                    f"{amount:.0f}th sample of both channels, or give what was recorded with times of its own, t=(…, …)"
+                    f"lies on straight lines between every {ordinal(amount)} sample, which weakens its fast motion: keep every "
+                    f"{ordinal(amount)} sample of both channels, or give what was recorded with times of its own, t=(…, …)"
                 )
             elif defect in {"held", "filtered"}:
                 cure = comes_late(

@@ -3,7 +3,7 @@
 from tvident._arguments.arrays import along_axis, any_array, check_nan, mask, real_array, weights
 from tvident._arguments.channels import as_record, channel, channels
 from tvident._arguments.containers import fields_of, is_table, package_of, plain, time_axis
-from tvident._arguments.digits import explained_in_words, own_digits, percent, to_digits_of, with_error
+from tvident._arguments.digits import explained_in_words, ordinal, own_digits, percent, to_digits_of, with_error
 from tvident._arguments.labels import Labels, labels_in, labels_of, labels_out
 from tvident._arguments.numbers import (
     LARGEST,
@@ -66,6 +66,7 @@ __all__ = [
     "mask",
     "nearest",
     "one_of",
+    "ordinal",
     "own_digits",
     "package_of",
     "percent",

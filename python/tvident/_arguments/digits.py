@@ -66,3 +66,10 @@ def own_digits(error: float) -> str:
         return f"{error:.1e}".replace("e-0", "e-").replace("e+0", "e+") if error else "0"
     places = decimals(error)
     return f"{round(error, places):.{max(0, places)}f}"
+
+
+def ordinal(count: float) -> str:
+    """Return a whole number as the place of one among others: 2nd, 5th."""
+    number = round(count)
+    ending = "th" if number % 100 in {11, 12, 13} else {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
+    return f"{number}{ending}"

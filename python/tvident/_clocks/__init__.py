@@ -2,6 +2,7 @@
 
 from tvident._clocks.clock import Clock, Evened, clock_of
 from tvident._clocks.grid import Grid, grid_of
+from tvident._clocks.held import Unheld, unheld
 from tvident._clocks.missing import Bridged, bridged
 from tvident._clocks.passed import Passed
 from tvident._clocks.two import TwoClocks, two_clocks
@@ -13,8 +14,10 @@ __all__ = [
     "Grid",
     "Passed",
     "TwoClocks",
+    "Unheld",
     "bridged",
     "clock_of",
     "grid_of",
     "two_clocks",
+    "unheld",
 ]

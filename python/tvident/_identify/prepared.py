@@ -108,6 +108,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
             grid, request, call["settings"], propagate=propagate, workers=call["workers"]
         )
     elif clocks is None and not propagate and isinstance(request.form, WeakForm):
+        signals, request = signals.over_holds(request, workers=call["workers"])
         signals, request = signals.over_gaps(request, call["settings"], workers=call["workers"])
     moving = motion_channels(
         signals.channels,

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._clocks import Bridged, Clock, Grid, Passed, bridged, clock_of
+from tvident._clocks import Bridged, Clock, Grid, Passed, Unheld, bridged, clock_of, unheld
 from tvident._derivatives import quantisation_step
 from tvident._identify.settings import Request
 
@@ -32,8 +32,8 @@ class Signals:
         Seconds.
     period : float
         Seconds from one sample to the next.
-    clock : Clock or Bridged, optional
-        How they were brought onto a grid, or their short gaps bridged; None where neither was.
+    clock : Clock, Unheld or Bridged, optional
+        How they were brought onto a grid, what was held replaced, or short gaps bridged; None where nothing was.
     passed : mapping of str to Passed
         What that made of white noise, by channel.
     doubts : sequence of (int, str)
@@ -46,7 +46,7 @@ class Signals:
     mask: npt.NDArray[np.bool_] | None
     time: npt.NDArray[np.float64]
     period: float
-    clock: Clock | Bridged | None = None
+    clock: Clock | Unheld | Bridged | None = None
     passed: Mapping[str, Passed] = field(default_factory=dict)
     doubts: Sequence[tuple[int, str]] = ()
 
@@ -79,6 +79,19 @@ class Signals:
         known = {name: evened.known(value) for name, value in request.parameters.items()}
         return signals, replace(request, parameters=known)
 
+    def over_holds(self, request: Request, *, workers: int | None) -> tuple[Signals, Request]:
+        """Return the same without the steps of an angle that holds its readings, and the request with what cannot be found any more."""
+        if self.channels.keys() != {"angle"}:
+            return self, request
+        found = unheld(self._recorded, self.period, workers)
+        if found is None:
+            return self, request
+        request = with_own_step(request, self.channels)
+        signals = replace(self, channels={"angle": found.channels["angle"]}, torques=found.channels["torque"])
+        records = int(np.prod(self.torques.shape[:-1], dtype=int))
+        doubts = [*self.doubts, *((record, found.doubt) for record in range(records))]
+        return replace(signals, clock=found, passed=found.passed, doubts=doubts), request
+
     def over_gaps(
         self, request: Request, earlier: Mapping[str, Any] | None, *, workers: int | None
     ) -> tuple[Signals, Request]:
@@ -90,7 +103,9 @@ class Signals:
         channels = {name: found.channels[name] for name in self.channels}
         instruments = found.channels.get("instrument")
         signals = replace(self, channels=channels, torques=found.channels["torque"], instruments=instruments)
-        return replace(signals, clock=found, passed=found.passed), request
+        if self.clock is not None:
+            found = replace(found, words=f"{self.clock.words}; {found.words}")
+        return replace(signals, clock=found, passed={**self.passed, **found.passed}), request
 
     @property
     def _recorded(self) -> dict[str, npt.NDArray[np.number]]:

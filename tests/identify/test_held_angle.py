@@ -1,0 +1,125 @@
+"""An angle that its recorder holds from reading to reading is as good as one that has a clock of its own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import tvident
+from tvident import Status
+from tvident._clocks.held import readings_of
+
+Array = npt.NDArray[np.float64]
+
+RATE = 1000.0
+INSIDE = slice(500, -500)
+STIFFNESS, INERTIA = 1.3, 0.3e-2
+"""Error of K(t), over that with an angle at every sample; and of the inertia, which was -100 % off."""
+COVERAGE = 0.85
+"""Of nominal 95 % intervals of K(t) in one record, whose windows hold some ten independent values."""
+
+
+def held(channel: Array, hold: int, first: int = 0) -> Array:
+    """Return a channel that is read once in `hold` samples, at first at sample `first`."""
+    places = np.arange(channel.size)
+    return np.asarray(channel[np.maximum((places - first) // hold * hold + first, 0)])
+
+
+def shown(channel: Array, read: Array) -> Array:
+    """Return a channel that shows the latest of what was read at some places, between samples too."""
+    samples = np.arange(channel.size)
+    last = np.maximum(np.searchsorted(read, samples, side="right") - 1, 0)
+    return np.asarray(np.interp(read, samples, channel)[last])
+
+
+def error(result: tvident.Identification, rig: tvident.Recording) -> float:
+    off = (result.stiffness / rig.stiffness - 1)[INSIDE]
+    assert np.isfinite(off).all()
+    return float(np.sqrt(np.mean(off**2)))
+
+
+@pytest.mark.first(2)
+@pytest.mark.parametrize(
+    ("hold", "pattern"), [(5, "slider"), (2, "constant"), (2, "slider"), (10, "slider"), (20, "constant")]
+)
+def test_an_angle_that_is_held_is_taken_from_its_readings(hold: int, pattern: Any) -> None:
+    rig = tvident.simulate_torsional_rig(20.0, seed=3, pattern=pattern, angle_noise=1e-3)
+    ordinary = tvident.identify(rig.angle, rig.torque, sample_rate=RATE)
+    result = tvident.identify(held(rig.angle, hold, first=1), rig.torque, sample_rate=RATE)
+    assert error(result, rig) < STIFFNESS * error(ordinary, rig)
+    assert abs(result.inertia[0] / rig.inertia[0] - 1) < INERTIA
+    covered = np.abs(result.stiffness - rig.stiffness) < 1.96 * result.stderr["stiffness"]
+    assert np.mean(covered[INSIDE]) > COVERAGE
+    assert result.trusted[INSIDE].all()
+    # It is said, for times of readings are only known as well as the recorder tells them.
+    assert result.record_status == Status.CHANNEL_SUSPECTED
+    assert result.advice[0].startswith(f"the angle holds every value for {hold} samples")
+    assert f"as where it was read at {RATE / hold:g} Hz" in result.reasons[0]
+    assert "do not trust" not in result.summary()
+
+
+def test_readings_of_both_channels_at_once_are_those_of_a_slower_recorder() -> None:
+    rig = tvident.simulate_torsional_rig(20.0, seed=4, angle_noise=1e-3)
+    both = tvident.identify(held(rig.angle, 5), held(rig.torque, 5), sample_rate=RATE)
+    slower = tvident.identify(rig.angle[::5], rig.torque[::5], sample_rate=RATE / 5)
+    assert both.advice[0].startswith("both channels hold every value for 5 samples")
+    assert abs(both.inertia[0] / slower.inertia[0] - 1) < INERTIA
+    assert not both.record_status & Status.LAG_SUSPECTED
+
+
+def test_a_torque_that_is_held_may_act_so() -> None:
+    rig = tvident.simulate_torsional_rig(10.0, seed=5, angle_noise=1e-3)
+    result = tvident.identify(rig.angle, held(rig.torque, 5), sample_rate=RATE)
+    assert all("splines between its readings" not in advice for advice in result.advice)
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("scatter", [0.0, 0.4])
+def test_readings_need_not_come_every_so_many_samples(scatter: float) -> None:
+    rig = tvident.simulate_torsional_rig(20.0, seed=7, pattern="constant", angle_noise=1e-3)
+    steps = 4.17 + scatter * np.random.default_rng(7).uniform(-1, 1, rig.angle.size // 4)
+    read = np.cumsum(steps)
+    result = tvident.identify(shown(rig.angle, read[read < rig.angle.size - 1]), rig.torque, sample_rate=RATE)
+    assert abs(result.inertia[0] / rig.inertia[0] - 1) < INERTIA
+    assert abs(result.stiffness[0] / rig.stiffness[0] - 1) < INERTIA
+    assert "for 4.17 samples" in result.advice[0]
+    assert "give it times of its own" in result.advice[0]
+    assert not result.record_status & Status.LAG_SUSPECTED
+
+
+def test_a_sample_that_is_lost_between_readings_moves_those_that_follow() -> None:
+    rig = tvident.simulate_torsional_rig(10.0, seed=6, angle_noise=1e-3)
+    angle = np.concatenate([held(rig.angle[:5000], 4), held(rig.angle[5001:], 4)])
+    result = tvident.identify(angle, np.delete(rig.torque, 5000), sample_rate=RATE)
+    assert abs(result.inertia[0] / rig.inertia[0] - 1) < 2 * INERTIA
+
+
+def test_an_angle_that_was_rounded_is_not_held() -> None:
+    """Where it turns steadily a coarse angle changes as regularly as one that is held: by one step at a time."""
+    turns, noise = np.arange(20_000) * 0.24, np.random.default_rng(1).standard_normal(20_000)
+    for spread in (0.0, 0.1, 0.5):
+        assert readings_of(np.round(turns + spread * noise)) is None
+    assert readings_of(np.round(turns[:4] * 0.24)) is None
+    assert readings_of(np.zeros(20_000)) is None
+
+
+def test_held_angles_with_missing_readings_and_of_several_records() -> None:
+    rig = tvident.simulate_torsional_rig(10.0, seed=6, angle_noise=1e-3)
+    angle, torque = held(rig.angle, 4), rig.torque.copy()
+    angle[4000:4200], torque[30::60] = np.nan, np.nan
+    result = tvident.identify(angle, torque, sample_rate=RATE)
+    assert abs(result.inertia[0] / rig.inertia[0] - 1) < 2 * INERTIA
+    assert (result.status[4000:4200] != 0).all()
+    for words in ("go from reading to reading", "bridged by splines"):
+        assert words in result.reasons[0]
+    several = tvident.identify(np.stack([angle, angle]), np.stack([torque, torque]), sample_rate=RATE)
+    np.testing.assert_array_equal(several.stiffness[1], result.stiffness)
+    # Records that were read at other times are left as they are.
+    other = held(rig.angle, 5)
+    apart = tvident.identify(
+        np.stack([held(rig.angle, 4), other]), np.stack([rig.torque, rig.torque]), sample_rate=RATE
+    )
+    assert (apart.record_status & Status.CHANNEL_SUSPECTED != 0).all()
