@@ -97,6 +97,14 @@ def test_a_sample_that_is_lost_between_readings_moves_those_that_follow() -> Non
     assert abs(result.inertia[0] / rig.inertia[0] - 1) < 2 * INERTIA
 
 
+def test_the_strong_form_says_what_would_take_its_steps_out() -> None:
+    """The paper's method does as it is told: its inertia was late by two samples without a word."""
+    rig = tvident.simulate_torsional_rig(5.0, seed=8, angle_noise=1e-3)
+    result = tvident.identify(held(rig.angle, 5), rig.torque, sample_rate=RATE, method="paper")
+    assert result.advice[0].startswith("the angle holds every value for 5 samples")
+    assert "use method='auto'" in result.advice[0]
+
+
 def test_an_angle_that_was_rounded_is_not_held() -> None:
     """Where it turns steadily a coarse angle changes as regularly as one that is held: by one step at a time."""
     turns, noise = np.arange(20_000) * 0.24, np.random.default_rng(1).standard_normal(20_000)

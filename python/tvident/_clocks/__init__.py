@@ -2,7 +2,7 @@
 
 from tvident._clocks.clock import Clock, Evened, clock_of
 from tvident._clocks.grid import Grid, grid_of
-from tvident._clocks.held import Unheld, unheld
+from tvident._clocks.held import Unheld, holds_that_stay, unheld
 from tvident._clocks.missing import Bridged, bridged
 from tvident._clocks.passed import Passed
 from tvident._clocks.two import TwoClocks, two_clocks
@@ -18,6 +18,7 @@ __all__ = [
     "bridged",
     "clock_of",
     "grid_of",
+    "holds_that_stay",
     "two_clocks",
     "unheld",
 ]

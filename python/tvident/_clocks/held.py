@@ -106,6 +106,18 @@ def unheld(channels: Mapping[str, npt.NDArray[np.number]], period: float, worker
     return Unheld({**channels, **even}, dict.fromkeys(names, Passed(resampling, workers)), words, doubt)
 
 
+def holds_that_stay(angles: npt.NDArray[np.number]) -> list[tuple[int, str]]:
+    """Return what to do about angles that hold their readings, by record, where nothing replaced what they hold."""
+    found = ((record, readings_of(row)) for record, row in enumerate(angles.reshape(-1, angles.shape[-1])))
+    holds = {record: float(np.diff(one[1]).mean()) for record, one in found if one is not None}
+    what = "which makes it late by half of that, and its steps are no motion"
+    cure = "use method='auto', which takes its readings and splines between them, or give it times of its own, t=(…, …)"
+    return [
+        (record, f"the angle holds every value for {hold:.3g} samples, {what}: {cure}")
+        for record, hold in holds.items()
+    ]
+
+
 def _between(resampling: _core.Resampling, readings: npt.NDArray[np.number], workers: int | None) -> Numbers:
     """Return a channel at every sample, from its readings."""
     rows = np.array(readings.reshape(-1, readings.shape[-1]), dtype=np.float64)

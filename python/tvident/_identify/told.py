@@ -23,6 +23,7 @@ from tvident._advice import (
     words_with_instrument,
 )
 from tvident._arguments import finite, percentiles, told_once
+from tvident._clocks import holds_that_stay
 from tvident._equation import COEFFICIENTS, Unknown
 from tvident._identify.data import Data
 from tvident._identify.improved import is_doubted
@@ -80,7 +81,7 @@ class Told:
             words = self._of_strong_form(settings).words()
             words = replace(words + (of_batch(more) if several else more[0]), each=words.each)
             words = plausible.before(words, data.angles, self.batch)
-            doubts = events_that_stay(data.angles, data.torques)
+            doubts = [*holds_that_stay(data.angles), *events_that_stay(data.angles, data.torques)]
             if not data.motion.recorded:
                 # What was made of several channels, or integrated, has no noise above the motion that would be the angle's alone.
                 doubts = [
