@@ -116,6 +116,7 @@ BUILT_IN = {
             "the magnitude of the velocity: viscous friction that differs between the directions",
             "viscous friction seems to differ between the directions, by {amount}",
             lambda numpy, _, velocity: numpy.abs(velocity),
+            is_sought=True,
         ),
         BuiltIn(
             "stribeck",

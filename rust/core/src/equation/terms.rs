@@ -47,7 +47,7 @@ pub static BUILT_IN_TERMS: [BuiltInTerm; 5] = [
     BuiltInTerm {
         name: "viscous_asymmetric",
         function: TermFunction::OfVelocity(|velocity| each(velocity, f64::abs)),
-        looked_for: false,
+        looked_for: true,
     },
 ];
 
