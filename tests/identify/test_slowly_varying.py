@@ -94,3 +94,23 @@ def test_what_is_constant_and_said_to_vary_stays_where_it_is() -> None:
     # It is no better known than a constant, which takes all of the record.
     _, errors = identified(rig, 1e-3, records=4).constants["inertia"]
     assert (np.median(result.stderr["inertia"][:4], axis=1) > errors).all()
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize(("seed", "late"), [(0, 0), (3, 2), *long((1, 0), (4, 3))])
+def test_a_lag_is_not_found_in_damping_that_grows_along_a_sweep(seed: int, late: int) -> None:
+    """Damping that follows the sweep does what a lag does: lags were 5 samples off, 200 and more standard errors."""
+    rig = tvident.simulate_torsional_rig(
+        10.0,
+        seed=seed,
+        pattern="constant",
+        excitation="chirp",
+        damping=lambda t: 0.8 * (1 + 0.05 * t),
+        torque_snr_db=30,
+    )
+    size = rig.angle.size - late
+    found = tvident.identify(rig.angle[late:], rig.torque[:size], sample_rate=1000, lag="auto")
+    lag, error = found.settings["lag"], found.settings["lag_stderr"]
+    is_said = any("does not separate a lag" in reason for reason in found.reasons)
+    assert lag == 0 if error is None else abs(lag - 1e-3 * late) <= 4 * error
+    assert is_said == (error is None)

@@ -6,13 +6,14 @@
 //!
 //! Only the inertia separates the lag from the damping: with motion at a single frequency the lag is not determined.
 
-use crate::equation::rows::Rows;
+use crate::equation::rows::{Regressor, Rows};
 use crate::error::Error;
+use crate::identify::kinds::Kind;
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::session::Session;
-use crate::inference::missing_terms::JudgedTerm;
+use crate::inference::missing_terms::{CONSPICUOUS, JudgedTerm};
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
@@ -39,6 +40,10 @@ const UNKNOWN: f64 = 0.5;
 const ABOUT: f64 = 0.1;
 const MOST_HALVES: f64 = 2.0;
 const LARGE: f64 = 0.25;
+
+/// Powers of time by which what changes slowly may change once more beside a lag: what was found of it with another lag holds a part of that, since a
+/// damping that follows a sweep does what a lag does.
+const GROWTHS: i32 = 3;
 
 /// By how many samples the torque comes late.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,8 +80,13 @@ impl Session<'_, '_, '_> {
             if settled || choice == CHOICES {
                 // The rows at hand stand: they differ from those of the last step by less than can be told. Where they have not settled, the last step is a
                 // part of the error.
-                self.record.lag = before;
                 let error = if settled { found.error } else { found.error.hypot(found.value - before) };
+                // What changes slowly and the lag make room for each other: a lag that does not settle, and may be none, is not determined.
+                if !settled && !decided.slow.is_empty() && before.abs() <= CONSPICUOUS * error {
+                    lag = None;
+                    break;
+                }
+                self.record.lag = before;
                 return Ok((chosen, decided, Some(Lag { value: before, error })));
             }
             self.record.lag = found.value;
@@ -101,13 +111,17 @@ impl Session<'_, '_, '_> {
         let function = TestFunction::new(half, chosen.weak.function.exponent(), self.options.delta)?;
         let constant = self.unknowns().into_iter().chain([self.rate()]).collect();
         let model = Model { windowed: Vec::new(), constant, linear: self.options.linear };
+        let (rate, may_change) = (model.constant.len() - 1, self.may_change());
         let start = self.record.lag;
         let mut lag = start;
         for _ in 0..STEPS {
             self.record.lag = lag;
             let weak = self.rows(function);
             self.record.lag = start;
-            let weak = weak?;
+            let mut weak = weak?;
+            let growths = growing(&mut weak.rows, &may_change);
+            let mut model = model.clone();
+            model.constant.splice(rate..rate, growths);
             let problem = model.problem(&weak.rows, &weak.rows.rhs, self.noise[0], None);
             let fit = Fit::new(&problem, None, Expected::UNKNOWN, self.options.instructions, &mut self.stages)?;
             let step = fit.and_then(|fit| fit.pooled.values.last().map(|left| -left / self.options.delta));
@@ -172,9 +186,10 @@ impl Session<'_, '_, '_> {
         let (before, without) = (&chosen.weak.rows.rhs, decided.rhs(&chosen.weak.rows));
         let slow = before.iter().zip(without).map(|(rhs, without)| rhs - without);
         let rhs = weak.rows.rhs.iter().zip(slow).map(|(rhs, slow)| rhs - slow).collect();
-        let rows = decided.as_white(Rows { rhs, ..weak.rows.clone() }, &mut self.stages)?;
+        let mut rows = decided.as_white(Rows { rhs, ..weak.rows.clone() }, &mut self.stages)?;
         let correlated = decided.model.correlated(&rows, &decided.covariance, &mut self.stages)?;
-        let model = decided.ordered();
+        let mut model = decided.ordered();
+        model.constant.extend(growing(&mut rows, &decided.slow));
         let judged = JudgedTerm {
             rows: &rows,
             model: &model,
@@ -190,6 +205,13 @@ impl Session<'_, '_, '_> {
         let found = judged.factor(self.rate(), &mut self.stages)?;
         let period = self.options.delta;
         Ok(found.map(|(value, error)| (-value / period, error / period)))
+    }
+
+    /// Which of inertia and damping may change along the record.
+    fn may_change(&self) -> Vec<usize> {
+        let undecided = self.undecided();
+        let all = [undecided, self.of_kind(Kind::Varying), self.of_kind(Kind::Windowed)].concat();
+        (0..2).filter(|unknown| all.contains(unknown)).collect()
     }
 
     /// Which regressor the torque's rate is.
@@ -209,15 +231,34 @@ impl Session<'_, '_, '_> {
         if !self.finds_lag() {
             return Ok(None);
         }
-        let (mut model, rows) = (decided.ordered(), decided.rows(&weak.rows));
+        let (mut model, mut rows) = (decided.ordered(), decided.rows(&weak.rows).clone());
+        let wanted = model.constant.len();
+        let rhs = decided.rhs(&rows).to_vec();
+        model.constant.extend(growing(&mut rows, &decided.slow));
         model.constant.push(self.rate());
-        let problem = model.problem(rows, decided.rhs(rows), self.noise[0], problem.correlated.as_ref());
+        let problem = model.problem(&rows, &rhs, self.noise[0], problem.correlated.as_ref());
         let Some(all) = fit.again(&problem, errors.expected, self.options.instructions, &mut self.stages)? else {
             return Ok(None);
         };
         let both = all.covariance(&problem, &errors.covariance, &mut self.stages)?;
         let count = problem.layout.constant;
-        let rows = both.chunks_exact(count).take(count - 1);
-        Ok(Some(rows.flat_map(|row| row[..count - 1].to_vec()).collect()))
+        let rows = both.chunks_exact(count).take(wanted);
+        Ok(Some(rows.flat_map(|row| row[..wanted].to_vec()).collect()))
     }
+}
+
+/// Adds regressors times powers of time to rows, from the middle of the record on, and returns which they are.
+fn growing(rows: &mut Rows, regressors: &[usize]) -> Vec<usize> {
+    let first = rows.regressors.len();
+    let half = (0.5 * (rows.len() as f64 - 1.0)).max(1.0);
+    for &regressor in regressors {
+        for power in 1..=GROWTHS {
+            let at = |(row, value): (usize, &f64)| value * ((row as f64 - half) / half).powi(power);
+            let of = |column: &[f64]| column.iter().enumerate().map(at).collect();
+            let Regressor { value, companion, .. } = &rows.regressors[regressor];
+            let more = Regressor { value: of(value), companion: of(companion), ..Regressor::default() };
+            rows.regressors.push(more);
+        }
+    }
+    (first..rows.regressors.len()).collect()
 }
