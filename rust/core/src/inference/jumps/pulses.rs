@@ -380,6 +380,9 @@ mod tests {
             assert_eq!(over.len(), 19);
             (search.is_chance(&over), search.is_chance(&over[5..6]))
         };
-        assert_eq!([is_chance(&[]), is_chance(&[300]), is_chance(&[100, 500])], [(true, true), (false, false), (false, true)]);
+        assert_eq!(
+            [is_chance(&[]), is_chance(&[300]), is_chance(&[100, 500])],
+            [(true, true), (false, false), (false, true)]
+        );
     }
 }
