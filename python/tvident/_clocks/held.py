@@ -1,9 +1,9 @@
-"""An angle that a recorder holds: it was read more slowly than its samples say, and splines go from reading to reading."""
+"""Channels that a recorder holds, or draws in lines, from reading to reading: splines go from one to the next instead."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,7 @@ from tvident import _core
 from tvident._arguments import ordinal
 from tvident._clocks.grid import Numbers
 from tvident._clocks.passed import Passed
+from tvident._clocks.readings import Read, knots_of, readings_of
 
 _ORDER = 5
 """Of the splines, as for channels on clocks of their own."""
@@ -21,26 +22,7 @@ _ORDER = 5
 _GAP = 1.5
 """Readings beyond which a step is a gap."""
 
-_LOOKED_AT, _STILL = 1 << 12, 1 / 3
-"""Samples at the beginning, of which at least this part repeats the one before where a channel is held."""
-
-_LEAST, _MOST = 2, 50
-"""Samples that hold a reading."""
-
-_FEWEST, _OFTEN, _IN_BEAT = 50, 0.5, 0.99
-"""Changes that tell a beat, the part of the readings that must change something, and the part of the changes that must come in the beat."""
-
-_JITTER = 0.4
-"""By which part of the usual step, or a sample, readings may come early or late."""
-
-_OFF = 0.1
-"""Samples by which readings may be seen elsewhere than those of an even clock are, which is known no better."""
-
-_STEPS = 2.0
-"""A channel that was rounded changes by one step at a time where it changes seldom; one that is held by at least so many, mostly."""
-
-_SAME = 1e-6
-"""Samples by which a reading may seem to come after the sample that shows it, by rounding."""
+_Channels = Mapping[str, npt.NDArray[np.number]]
 
 
 @dataclass(frozen=True)
@@ -54,24 +36,25 @@ class Unheld:
         What white noise of the readings became, of the channels that were held.
     words, doubt : str
         What was done, and what to do.
+    settings : mapping
+        What settings keep: what a record does not show.
     """
 
     channels: Mapping[str, npt.NDArray[np.number]]
     passed: Mapping[str, Passed]
     words: str
     doubt: str
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """What settings keep: nothing, for every record shows how it was read."""
-        return {}
+    settings: dict[str, Any]
 
 
-def unheld(channels: Mapping[str, npt.NDArray[np.number]], period: float, workers: int | None) -> Unheld | None:
-    """Return channels without the steps of an angle that holds its readings; None where it does not.
+def unheld(
+    channels: Mapping[str, npt.NDArray[np.number]], period: float, workers: int | None, *, of_torque: bool = False
+) -> Unheld | None:
+    """Return channels without what a recorder made between two readings; None where it made nothing.
 
     A machine moves between two readings, so what an angle holds there is its recorder's. A torque that is held may be what acts, as that of
-    a digital controller, and stays as it is, unless both channels were read at once.
+    a digital controller, and stays as it is, unless both channels were read at once, or `of_torque` says that it was read. Nothing acts or
+    moves along straight lines from reading to reading; but what was done to both channels alike changes no equation.
 
     Parameters
     ----------
@@ -80,30 +63,84 @@ def unheld(channels: Mapping[str, npt.NDArray[np.number]], period: float, worker
     period : float
         Seconds from one sample to the next.
     workers : int, optional
+    of_torque : bool
     """
-    found = _readings(channels["angle"])
-    if found is None:
+    both = {name: channels[name] for name in ("angle", "torque")}
+    held, drawn = _of_both(readings_of, both), _of_both(knots_of, both)
+    if not (of_torque or _are_alike(held)):
+        held.pop("torque", None)
+    if _are_alike(drawn):
+        drawn = {}
+    if not held and not drawn:
         return None
-    samples, places = found
-    of_torque = _readings(channels["torque"])
-    names = ["angle", *(["torque"] if of_torque is not None and np.array_equal(of_torque[0], samples) else [])]
-    between = np.diff(places)
+    seen, passed = dict(channels), {}
+    for name, (samples, places) in {**held, **drawn}.items():
+        bridged = _GAP * math.ceil(np.diff(places).mean())
+        resampling = _core.Resampling(places, both[name].shape[-1], order=_ORDER, bridged=bridged)
+        seen[name] = _between(resampling, both[name][..., samples], workers)
+        passed[name] = Passed(resampling, workers)
+    recorded = [*_recorded("hold", held, period), *_recorded("lie", drawn, period)]
+    chosen = {"torque_readings": True} if of_torque and "torque" in held else {}
+    return Unheld(
+        seen, passed, "; ".join(one.words for one in recorded), "; ".join(one.doubt for one in recorded), chosen
+    )
+
+
+def _of_both(of_row: Callable[[npt.NDArray[np.number]], Read | None], both: _Channels) -> dict[str, Read]:
+    """Return readings of the channels that have some."""
+    found = {name: _of_all(of_row, values) for name, values in both.items()}
+    return {name: one for name, one in found.items() if one is not None}
+
+
+def _are_alike(read: Mapping[str, Read]) -> bool:
+    """Return whether both channels were read at the same samples."""
+    return len(read) > 1 and np.array_equal(read["angle"][0], read["torque"][0])
+
+
+@dataclass(frozen=True)
+class _Recorded:
+    """What a recorder did to channels, in words.
+
+    Parameters
+    ----------
+    what : str
+    between : ndarray
+        Samples from reading to reading.
+    rate : float
+        Readings in a second.
+    """
+
+    what: str
+    between: Numbers
+    rate: float
+
+    @property
+    def words(self) -> str:
+        """What was done."""
+        return f"{self.what}, as where it was read at {self.rate:.4g} Hz: splines of order {_ORDER} go from reading to reading"
+
+    @property
+    def doubt(self) -> str:
+        """What to do."""
+        hold = float(self.between.mean())
+        is_even = hold == round(hold) and float(np.ptp(self.between)) == 0
+        own = "give it times of its own, t=(…, …)"
+        cure = f"{own}, or keep every {ordinal(hold)} sample of both channels" if is_even else f"or {own}"
+        return f"{self.what}: splines between its readings were taken instead; better record it as it is read, {cure}"
+
+
+def _recorded(verb: str, read: Mapping[str, Read], period: float) -> list[_Recorded]:
+    """Return what a recorder did: held values, or drew lines."""
+    if not read:
+        return []
+    between = np.diff(next(iter(read.values()))[1])
     hold = float(between.mean())
-    resampling = _core.Resampling(places, channels["angle"].shape[-1], order=_ORDER, bridged=_GAP * math.ceil(hold))
-    even = {name: _between(resampling, np.asarray(channels[name])[..., samples], workers) for name in names}
-    whose = "both channels hold every value" if len(names) > 1 else "the angle holds every value"
-    whose = f"{whose} for {hold:.3g} samples"
-    words = (
-        f"{whose}, as where it was read at {1 / (period * hold):.4g} Hz: the first of them is the reading, and splines of order {_ORDER} "
-        "go from reading to reading"
-    )
-    own = (
-        f"keep every {ordinal(hold)} sample of both channels"
-        if hold == round(hold) and float(np.ptp(between)) == 0
-        else "give it times of its own, t=(…, …)"
-    )
-    doubt = f"{whose}: splines between its readings were taken instead; better record it as it is read, or {own}"
-    return Unheld({**channels, **even}, dict.fromkeys(names, Passed(resampling, workers)), words, doubt)
+    names, ending = ("both channels", "") if len(read) > 1 else (f"the {next(iter(read))}", "s")
+    if verb == "hold":
+        what = f"{names} hold{ending} every value for {hold:.3g} samples"
+    else:
+        what = f"{names} lie{ending} on straight lines between every {ordinal(hold)} sample"
+    return [_Recorded(what, between, 1 / (period * hold))]
 
 
 def holds_that_stay(angles: npt.NDArray[np.number]) -> list[tuple[int, str]]:
@@ -126,65 +163,14 @@ def _between(resampling: _core.Resampling, readings: npt.NDArray[np.number], wor
     return found.reshape(*readings.shape[:-1], found.shape[-1])
 
 
-def _readings(channel: npt.NDArray[np.number]) -> tuple[npt.NDArray[np.int64], Numbers] | None:
-    """Return the samples that are readings and when they were read, where all records of a channel have the same; None elsewhere."""
+def _of_all(of_row: Callable[[npt.NDArray[np.number]], Read | None], channel: npt.NDArray[np.number]) -> Read | None:
+    """Return readings of a channel, where those of all records are at the same samples; None elsewhere."""
     rows = channel.reshape(-1, channel.shape[-1])
-    first = readings_of(rows[0]) if rows.size else None
+    first = of_row(rows[0]) if rows.size else None
     if first is None:
         return None
     for row in rows[1:]:
-        other = readings_of(row)
+        other = of_row(row)
         if other is None or not np.array_equal(other[0], first[0]):
             return None
     return first
-
-
-def readings_of(row: npt.NDArray[np.number]) -> tuple[npt.NDArray[np.int64], Numbers] | None:
-    """Return the samples of a record that are readings, and the places in it where they were read; None where it holds none.
-
-    A reading is seen at the first sample after it: half a sample after it on average, unless all come in one beat with the samples. Where
-    they are seen when those of an even clock are, they are the clock's.
-    """
-    beginning = row[:_LOOKED_AT]
-    if np.count_nonzero(beginning[1:] == beginning[:-1]) < _STILL * (beginning.size - 1):
-        return None
-    steps = np.diff(row)
-    changes = np.flatnonzero(np.isfinite(steps) & (steps != 0)) + 1
-    if changes.size < _FEWEST:
-        return None
-    sizes = np.abs(steps[changes - 1].astype(np.float64))
-    runs = np.diff(changes)
-    usual = float(np.median(runs))
-    if not _LEAST <= usual <= _MOST or np.median(sizes) < _STEPS * sizes.min():
-        return None
-    hold = float(runs[np.abs(runs - usual) <= 1].mean())
-    counts = np.maximum(np.rint(runs / hold).astype(np.int64), 1)
-    in_beat = np.abs(runs - hold * counts) < max(1.0, _JITTER * hold)
-    if in_beat.mean() < _IN_BEAT or changes.size < _OFTEN * row.size / hold:
-        return None
-    numbers = np.concatenate([[0], np.cumsum(counts)])
-    own = _clock(changes, numbers)
-    # What stays the same is read all the same.
-    every = np.arange(numbers[-1] + 1)
-    last = np.searchsorted(numbers, every, side="right") - 1
-    if own is None:
-        is_exact = np.mean(runs == round(hold) * counts) >= _IN_BEAT
-        samples = changes[last] + np.rint(hold * (every - numbers[last])).astype(np.int64)
-        return samples, samples - (0.0 if is_exact else 0.5)
-    start, hold = own
-    places = start + hold * every
-    return np.ceil(places - _SAME).astype(np.int64), places
-
-
-def _clock(changes: npt.NDArray[np.int64], numbers: npt.NDArray[np.int64]) -> tuple[float, float] | None:
-    """Return the place of the first reading and samples from one to the next, if an even clock explains where changes are seen."""
-    hold = float(changes[-1] - changes[0]) / float(numbers[-1])
-    whole = round(hold)
-    # Over the whole record a clock that is off by less than a sample is even.
-    if np.array_equal(changes - changes[0], whole * numbers):
-        return float(changes[0]), float(whole)
-    fitted = np.polynomial.Polynomial.fit(numbers, changes, 1)
-    hold = float(fitted.deriv()(0.0))
-    begins = changes - hold * numbers
-    earliest, latest = float(begins.max()) - 1, float(begins.min())
-    return ((earliest + latest) / 2, hold) if earliest <= latest + _OFF else None

@@ -49,6 +49,7 @@ _BESIDE_FORM = frozenset(
             "times",
             "spline_order",
             "bridged",
+            "torque_readings",
             "clock_offset",
             "clock_drift",
         ),

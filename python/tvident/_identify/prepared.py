@@ -18,6 +18,7 @@ from tvident._identify.data import Data
 from tvident._identify.expanded import ExpandedTask, expansions_of
 from tvident._identify.methods import StrongForm, WeakForm
 from tvident._identify.own_clocks import check_every_sample, lag_found, own_clocks
+from tvident._identify.read_torque import with_read_torque
 from tvident._identify.robust import loss_of, with_clipped_torque
 from tvident._identify.settings import Request, resolve
 from tvident._identify.signals import Signals, channels_of_motion, even_times, instrument_of, with_own_step
@@ -108,7 +109,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
             grid, request, call["settings"], propagate=propagate, workers=call["workers"]
         )
     elif clocks is None and not propagate and isinstance(request.form, WeakForm):
-        signals, request = signals.over_holds(request, workers=call["workers"])
+        signals, request = signals.over_holds(request, call["settings"], workers=call["workers"])
         signals, request = signals.over_gaps(request, call["settings"], workers=call["workers"])
     moving = motion_channels(
         signals.channels,
@@ -139,6 +140,9 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
     if clocks is not None:
         data = clocks.finished(data, axis.torque, call["settings"], partial(_lag_left, request))
     task = ExpandedTask if expansions_of(request) else Task
+    is_even = grid is None and clocks is None and not propagate and isinstance(request.form, WeakForm)
+    if is_even and call["settings"] is None and request.lag == 0:
+        data = with_read_torque(data, lambda some: task(some, request).run(None))
     data = with_clipped_torque(data, asked, lambda some: task(some, request).run(None))
     return task(data, request)
 

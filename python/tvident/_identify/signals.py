@@ -79,11 +79,14 @@ class Signals:
         known = {name: evened.known(value) for name, value in request.parameters.items()}
         return signals, replace(request, parameters=known)
 
-    def over_holds(self, request: Request, *, workers: int | None) -> tuple[Signals, Request]:
-        """Return the same without the steps of an angle that holds its readings, and the request with what cannot be found any more."""
+    def over_holds(
+        self, request: Request, earlier: Mapping[str, Any] | None, *, workers: int | None
+    ) -> tuple[Signals, Request]:
+        """Return the same with splines between what was read, and the request with what cannot be found any more."""
         if self.channels.keys() != {"angle"}:
             return self, request
-        found = unheld(self._recorded, self.period, workers)
+        of_torque = bool((earlier or {}).get("torque_readings"))
+        found = unheld(self._recorded, self.period, workers, of_torque=of_torque)
         if found is None:
             return self, request
         request = with_own_step(request, self.channels)

@@ -14,7 +14,16 @@ from tvident._merged.merging import Merging
 
 _LENGTHS = ("window_length", "exponent", "regression_window")
 _OTHERS = ("form", "sample_rate", "trials", "masses", "kinds", "known", "terms", "own_terms", "chosen", "step")
-_OF_TIMES = ("noise", "prediction_error", "times", "spline_order", "bridged", "clock_offset", "clock_drift")
+_OF_TIMES = (
+    "noise",
+    "prediction_error",
+    "times",
+    "spline_order",
+    "bridged",
+    "torque_readings",
+    "clock_offset",
+    "clock_drift",
+)
 """Found, not chosen: nothing of it is used again."""
 _UNKNOWN = "unknown"
 

@@ -1,0 +1,132 @@
+"""The samples of a channel that were read, where a recorder holds each reading or draws lines from one to the next."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._clocks.grid import Numbers
+
+_LOOKED_AT, _STILL = 1 << 12, 1 / 3
+"""Samples at the beginning, of which at least this part repeats the one before where a channel is held."""
+
+_LEAST, _MOST = 2, 50
+"""Samples that hold a reading."""
+
+_FEWEST, _OFTEN, _IN_BEAT = 50, 0.5, 0.99
+"""Changes that tell a beat, the part of the readings that must change something, and the part of the changes that must come in the beat."""
+
+_JITTER = 0.4
+"""By which part of the usual step, or a sample, readings may come early or late."""
+
+_OFF = 0.1
+"""Samples by which readings may be seen elsewhere than those of an even clock are, which is known no better."""
+
+_STEPS = 2.0
+"""A channel that was rounded changes by one step at a time where it changes seldom; one that is held by at least so many, mostly."""
+
+_SAME = 1e-6
+"""Samples by which a reading may seem to come after the sample that shows it, by rounding."""
+
+_STRAIGHT = 16 * np.finfo(float).eps
+"""Samples lie on a straight line if they bend by no more than this part of the largest value."""
+
+Read = tuple[npt.NDArray[np.int64], Numbers]
+"""The samples that are readings, and the places at which they were read."""
+
+
+def readings_of(row: npt.NDArray[np.number]) -> Read | None:
+    """Return the samples of a record that are readings, and the places in it where they were read; None where it holds none.
+
+    A reading is seen at the first sample after it: half a sample after it on average, unless all come in one beat with the samples. Where
+    they are seen when those of an even clock are, they are the clock's.
+    """
+    beginning = row[:_LOOKED_AT]
+    if np.count_nonzero(beginning[1:] == beginning[:-1]) < _STILL * (beginning.size - 1):
+        return None
+    steps = np.diff(row)
+    changes = np.flatnonzero(np.isfinite(steps) & (steps != 0)) + 1
+    if not changes.size:
+        return None
+    sizes = np.abs(steps[changes - 1].astype(np.float64))
+    if np.median(sizes) < _STEPS * sizes.min():
+        return None
+    beat = _beat(changes, row.size)
+    if beat is None:
+        return None
+    hold, counts, is_exact = beat
+    numbers = np.concatenate([[0], np.cumsum(counts)])
+    own = _clock(changes, numbers)
+    if own is None:
+        samples = _with_those_between(changes, counts, hold)
+        return samples, samples.astype(np.float64) - (0.0 if is_exact else 0.5)
+    start, hold = own
+    places = start + hold * np.arange(numbers[-1] + 1)
+    return np.ceil(places - _SAME).astype(np.int64), places
+
+
+def knots_of(row: npt.NDArray[np.number]) -> Read | None:
+    """Return the samples of a record between which it is straight, as readings; None where these keep no beat of whole samples."""
+    if row.dtype.kind != "f":
+        return None
+    finite = np.abs(row[np.isfinite(row)])
+    rounding = _STRAIGHT * float(finite.max(initial=0.0))
+    beginning = row[:_LOOKED_AT]
+    if np.count_nonzero(_is_straight(beginning, rounding)) < _STILL * beginning.size:
+        return None
+    bends = np.diff(row, 2)
+    knots = np.flatnonzero(np.isfinite(bends) & (np.abs(bends) > rounding)) + 1
+    beat = _beat(knots, row.size)
+    if beat is None or not beat[2]:
+        return None
+    samples = _with_those_between(knots, beat[1], beat[0])
+    return samples, samples.astype(np.float64)
+
+
+def _is_straight(row: npt.NDArray[np.number], rounding: float) -> npt.NDArray[np.bool_]:
+    """Return where samples move and do not bend."""
+    return np.asarray((np.abs(np.diff(row)[1:]) > rounding) & (np.abs(np.diff(row, 2)) <= rounding))
+
+
+def _beat(changes: npt.NDArray[np.int64], samples: int) -> tuple[float, npt.NDArray[np.int64], bool] | None:
+    """Return the samples from reading to reading, the readings from change to change, and whether they keep whole samples.
+
+    None where changes keep no beat.
+    """
+    if changes.size < _FEWEST:
+        return None
+    runs = np.diff(changes)
+    usual = float(np.median(runs))
+    if not _LEAST <= usual <= _MOST:
+        return None
+    hold = float(runs[np.abs(runs - usual) <= 1].mean())
+    counts = np.maximum(np.rint(runs / hold).astype(np.int64), 1)
+    in_beat = np.abs(runs - hold * counts) < max(1.0, _JITTER * hold)
+    if in_beat.mean() < _IN_BEAT or changes.size < _OFTEN * samples / hold:
+        return None
+    is_exact = bool(np.mean(runs == round(hold) * counts) >= _IN_BEAT)
+    return float(round(hold)) if is_exact else hold, counts, is_exact
+
+
+def _with_those_between(
+    changes: npt.NDArray[np.int64], counts: npt.NDArray[np.int64], hold: float
+) -> npt.NDArray[np.int64]:
+    """Return readings with those that changed nothing."""
+    numbers = np.concatenate([[0], np.cumsum(counts)])
+    every = np.arange(numbers[-1] + 1)
+    last = np.searchsorted(numbers, every, side="right") - 1
+    return np.asarray(changes[last] + np.rint(hold * (every - numbers[last])).astype(np.int64))
+
+
+def _clock(changes: npt.NDArray[np.int64], numbers: npt.NDArray[np.int64]) -> tuple[float, float] | None:
+    """Return the place of the first reading and samples from one to the next, if an even clock explains where changes are seen."""
+    hold = float(changes[-1] - changes[0]) / float(numbers[-1])
+    whole = round(hold)
+    # Over the whole record a clock that is off by less than a sample is even.
+    if np.array_equal(changes - changes[0], whole * numbers):
+        return float(changes[0]), float(whole)
+    fitted = np.polynomial.Polynomial.fit(numbers, changes, 1)
+    hold = float(fitted.deriv()(0.0))
+    begins = changes - hold * numbers
+    earliest, latest = float(begins.max()) - 1, float(begins.min())
+    return ((earliest + latest) / 2, hold) if earliest <= latest + _OFF else None
