@@ -32,10 +32,8 @@ const STRETCH: usize = BLOCKS;
 
 /// Rounds of estimating the slow coefficients, each starting from the last one's result.
 const ROUNDS: usize = 3;
-/// So many bandwidths in a row that are no better end the search for better ones: from the shortest on, and around the last round's.
-const NO_BETTER: [usize; 2] = [4, 2];
-/// The part of its error that a round must change by, where neither windows nor bandwidth do, to be worth another.
-const SETTLED: f64 = 1e-3;
+/// So many bandwidths in a row that are no better end the search for better ones around the last round's.
+const NO_BETTER: usize = 2;
 
 /// The slow coefficients found.
 #[derive(Clone, Debug)]
@@ -71,8 +69,6 @@ pub(crate) struct SlowSearch<'a> {
     pub(crate) breaks: &'a [usize],
     /// What errors of constants between jumps are multiplied by, in comparison with those of curves.
     pub(crate) simpler: f64,
-    /// The error after the first round above which it is not worth going on.
-    pub(crate) hopeless: f64,
     pub(crate) instructions: Instructions,
 }
 
@@ -112,14 +108,13 @@ impl SlowSearch<'_> {
     }
 }
 
-/// Estimates slow coefficients, or returns `None` if they are not determined or hopeless. `first` is the length of windows to begin with.
+/// Estimates slow coefficients, or returns `None` if they are not determined. `first` is the length of windows to begin with.
 pub(crate) fn find(
     search: &SlowSearch<'_>,
     first: Scale,
     stages: &mut Stages<'_, '_>,
 ) -> Result<Option<SlowCoefficients>, Error> {
-    let &SlowSearch { rows, model, coefficients, noise, expected, scales, breaks, simpler, hopeless, instructions } =
-        search;
+    let &SlowSearch { rows, model, coefficients, noise, expected, scales, breaks, simpler, instructions } = search;
     let slow = &model.constant[..coefficients];
     let rest = Model { constant: model.constant[coefficients..].to_vec(), ..model.clone() };
     let whole = rows.len() as f64;
@@ -177,7 +172,6 @@ pub(crate) fn find(
             consider(1, 2.0 * whole);
         }
         let Some((terms, [leave_gap_out, varying], reach)) = best else { return Ok(None) };
-        let before = last;
         last = (terms > 1).then_some(reach);
         if last.is_some() && last == reaches.first().copied() {
             // Shorter bandwidths need shorter windows.
@@ -186,17 +180,8 @@ pub(crate) fn find(
         let rhs = without(rows, slow, &varying);
         let problem = rest.problem(rows, &rhs, noise, None);
         let Some((best, error)) = search.best_length(&problem, &rest, &mut few, stages)? else { return Ok(None) };
-        if error > hopeless {
-            return Ok(None);
-        }
-        let is_settled = found.as_ref().is_some_and(|found| {
-            let stays =
-                found.equations_of.span() == scale.span() && found.scale.span() == best.span() && before == last;
-            stays && (found.error - error).abs() <= SETTLED * error
-        });
-        let is_last = round == ROUNDS || is_settled;
         let mut predicted = error;
-        if is_last && !rows.jumps.is_empty() {
+        if round == ROUNDS && !rows.jumps.is_empty() {
             let rhs = without(rows, slow, &leave_gap_out);
             let problem = rest.problem(rows, &rhs, noise, None);
             let fit = Fit::with_leave_gap_out(&problem, best, expected, instructions, stages)?;
@@ -205,18 +190,15 @@ pub(crate) fn find(
         }
         let reach = reach.min(whole / 2.0);
         found = Some(SlowCoefficients { varying, rhs, scale: best, equations_of: scale, error, predicted, reach });
-        if is_last {
-            break;
-        }
         scale = shortened(best, most);
     }
     Ok(found)
 }
 
-/// Tries bandwidths in ascending order, or outward from the last round's in both directions, until they get no better.
+/// Tries bandwidths in ascending order, or outward from the last round's in both directions until they get no better.
 fn outward(reaches: &[f64], last: Option<f64>, mut is_better: impl FnMut(f64) -> bool) {
     let last = last.unwrap_or(f64::NEG_INFINITY);
-    let most = NO_BETTER[usize::from(last.is_finite())];
+    let most = if last.is_finite() { NO_BETTER } else { usize::MAX };
     let (below, above) = reaches.split_at(reaches.partition_point(|&reach| reach < last));
     let mut walk = |reaches: &mut dyn Iterator<Item = &f64>| {
         let mut worse = 0;
@@ -278,7 +260,6 @@ mod tests {
             scales,
             breaks: &[],
             simpler: 1.0,
-            hopeless: f64::INFINITY,
             instructions: Instructions::Scalar,
         };
         staged(|stages| find(&search, first, stages))

@@ -28,9 +28,6 @@ const FAR_BETTER: f64 = 0.5;
 /// The same where rows are predicted well and another changes: of constants that are set free beside it for nothing .96 is left at least.
 const A_LITTLE_BETTER: f64 = 0.9;
 
-/// The same after the first round of estimating them: what is no better then will not be.
-const HOPELESS: f64 = 1.1;
-
 /// Where constants jump, those that do not change in between stand unless others predict so much better.
 const SIMPLER: f64 = 0.98;
 
@@ -129,7 +126,7 @@ impl Session<'_, '_, '_> {
         let (mut model, mut is_free) = (Cow::Borrowed(model), false);
         loop {
             if !decided.slow.is_empty() && !std::mem::take(&mut is_free) {
-                self.set_free(rows, &model, f64::INFINITY, &mut decided)?;
+                self.set_free(rows, &model, &mut decided)?;
             }
             let worst = self.test(rows, &mut decided)?;
             let Some(worst) = changing.next().or(worst) else {
@@ -244,7 +241,7 @@ impl Session<'_, '_, '_> {
         let Some((most, _)) = growing.max_by(|a, b| a.1.excess().total_cmp(&b.1.excess())) else { return Ok(false) };
         let mut free = decided.clone();
         free.slow.push(most);
-        self.set_free(rows, model, HOPELESS * decided.error, &mut free)?;
+        self.set_free(rows, model, &mut free)?;
         let is_better = free.fit.is_some() && free.error < FAR_BETTER * decided.error;
         if is_better {
             *decided = free;
@@ -261,7 +258,7 @@ impl Session<'_, '_, '_> {
         }
         let mut free = decided.clone();
         free.slow.extend(others);
-        self.set_free(rows, model, HOPELESS * decided.error, &mut free)?;
+        self.set_free(rows, model, &mut free)?;
         let least = if decided.error < BADLY { A_LITTLE_BETTER } else { BETTER };
         if free.fit.is_some() && free.error < least * decided.error {
             *decided = free;
@@ -269,8 +266,8 @@ impl Session<'_, '_, '_> {
         Ok(())
     }
 
-    /// Estimates what varies slowly, and the other constants beside it; nothing if its error is hopeless.
-    fn set_free(&mut self, rows: &Rows, model: &Model, hopeless: f64, decided: &mut Decided) -> Result<(), Error> {
+    /// Estimates what varies slowly, and the other constants beside it.
+    fn set_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided) -> Result<(), Error> {
         let instructions = self.options.instructions;
         let Some(first) = decided.first else { return Ok(()) };
         let rest = model.constant.iter().copied().filter(|one| !decided.slow.contains(one)).collect();
@@ -286,7 +283,6 @@ impl Session<'_, '_, '_> {
             scales: &decided.scales,
             breaks: &[],
             simpler: 1.0,
-            hopeless,
             instructions,
         };
         let mut found = slowly_varying::find(&search, first, &mut self.stages)?;
