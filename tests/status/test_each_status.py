@@ -260,8 +260,8 @@ CASES: list[tuple[Status, str, Callable[[], Shown], Callable[[], Shown]]] = [
     ),
     (
         Status.SCALES_DISAGREE,
-        "an angle that holds its values",
-        lambda: identified(np.repeat(rig().angle[::5], 5), rig().torque),
+        "an angle that holds its values, which stay",
+        lambda: identified(np.repeat(rig().angle[::5], 5), rig().torque, nan_policy="propagate"),
         of_rig,
     ),
     (

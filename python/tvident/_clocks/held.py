@@ -98,7 +98,7 @@ def _are_alike(read: Mapping[str, Read]) -> bool:
 
 
 @dataclass(frozen=True)
-class _Recorded:
+class _Repeated:
     """What a recorder did to channels, in words.
 
     Parameters
@@ -129,7 +129,7 @@ class _Recorded:
         return f"{self.what}: splines between its readings were taken instead; better record it as it is read, {cure}"
 
 
-def _recorded(verb: str, read: Mapping[str, Read], period: float) -> list[_Recorded]:
+def _recorded(verb: str, read: Mapping[str, Read], period: float) -> list[_Repeated]:
     """Return what a recorder did: held values, or drew lines."""
     if not read:
         return []
@@ -140,7 +140,7 @@ def _recorded(verb: str, read: Mapping[str, Read], period: float) -> list[_Recor
         what = f"{names} hold{ending} every value for {hold:.3g} samples"
     else:
         what = f"{names} lie{ending} on straight lines between every {ordinal(hold)} sample"
-    return [_Recorded(what, between, 1 / (period * hold))]
+    return [_Repeated(what, between, 1 / (period * hold))]
 
 
 def holds_that_stay(angles: npt.NDArray[np.number]) -> list[tuple[int, str]]:

@@ -35,6 +35,8 @@ Read = tuple[npt.NDArray[np.int64], Numbers]
 """The samples that are readings, and the places at which they were read."""
 
 
+# What is infinite is missing.
+@np.errstate(invalid="ignore", over="ignore")
 def readings_of(row: npt.NDArray[np.number]) -> Read | None:
     """Return the samples of a record that are readings, and the places in it where they were read; None where it holds none.
 
@@ -65,6 +67,7 @@ def readings_of(row: npt.NDArray[np.number]) -> Read | None:
     return np.ceil(places - _SAME).astype(np.int64), places
 
 
+@np.errstate(invalid="ignore", over="ignore")
 def knots_of(row: npt.NDArray[np.number]) -> Read | None:
     """Return the samples of a record between which it is straight, as readings; None where these keep no beat of whole samples."""
     if row.dtype.kind != "f":
