@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -79,12 +80,16 @@ def test_a_torque_that_comes_late_by_half_of_what_it_holds_was_read(hold: int) -
     rig = tvident.simulate_torsional_rig(20.0, seed=0, angle_noise=1e-3)
     torque = held(rig.torque, hold)
     result = tvident.identify(rig.angle, torque, sample_rate=RATE)
-    assert result.advice[0].startswith(f"the torque holds every value for {hold} samples: splines between its readings")
+    assert result.advice[0].startswith(f"the torque holds every value for {hold} samples: splines between readings")
     assert not result.record_status & Status.LAG_SUSPECTED
     assert abs(result.inertia[0] / rig.inertia[0] - 1) < 1.5 * INERTIA
     again = tvident.identify(rig.angle, torque, sample_rate=RATE, settings=json.loads(json.dumps(result.settings)))
     np.testing.assert_array_equal(again.stiffness, result.stiffness)
     assert again.advice == result.advice
+    # A stream has no reading to go to.
+    with pytest.raises(ValueError, match="torque holds its readings"):
+        tvident.IdentificationStream(sample_rate=RATE, settings=result.settings)
+    assert np.isfinite(result.simulate(torque)).any()
 
 
 def test_a_torque_that_acts_in_steps_stays() -> None:
@@ -99,21 +104,50 @@ def test_a_torque_that_acts_in_steps_stays() -> None:
         state = step @ state + pushed[:, 0] * acts
     angle += 1e-3 * angle.std() * np.random.default_rng(5).standard_normal(angle.size)
     result = tvident.identify(angle, torque, sample_rate=RATE)
-    assert all("splines between its readings" not in advice for advice in result.advice)
+    assert all("splines between readings" not in advice for advice in result.advice)
     assert abs(result.inertia[0] / inertia - 1) < INERTIA
 
 
-@pytest.mark.first(1)
-@pytest.mark.parametrize("of_torque", [False, True])
-def test_lines_from_reading_to_reading_become_splines(of_torque: bool) -> None:
-    """Lines of 10 samples made the inertia 1.5 % too large, or zero."""
+def test_lines_of_an_angle_become_splines() -> None:
+    """Lines of 10 samples made the inertia 1.5 % too large, or zero. A torque may act along lines, and stays."""
     rig = tvident.simulate_torsional_rig(20.0, seed=1, angle_noise=1e-3)
-    channels = {"angle": rig.angle, "torque": rig.torque}
-    name = "torque" if of_torque else "angle"
     samples = np.arange(rig.angle.size)
-    channels[name] = np.interp(samples, samples[::10], channels[name][::10])
-    result = tvident.identify(channels["angle"], channels["torque"], sample_rate=RATE)
-    assert result.advice[0].startswith(f"the {name} lies on straight lines between every 10th sample: splines between")
+    drawn = [np.interp(samples, samples[::10], channel[::10]) for channel in (rig.angle, rig.torque)]
+    result = tvident.identify(drawn[0], rig.torque, sample_rate=RATE)
+    assert result.advice[0].startswith("the angle lies on straight lines between every 10th sample: splines between")
+    assert abs(result.inertia[0] / rig.inertia[0] - 1) < INERTIA
+    of_torque = tvident.identify(rig.angle, drawn[1], sample_rate=RATE)
+    assert all("splines between readings" not in advice for advice in of_torque.advice)
+
+
+def _stale(angle: Array) -> None:
+    angle[6003] = angle[5990]
+
+
+def _late(angle: Array) -> None:
+    angle[6000:6015] = angle[5999]
+
+
+def _stuck(angle: Array) -> None:
+    angle[2000:3000] = angle[2000]
+
+
+@pytest.mark.first(2)
+@pytest.mark.parametrize("spoil", [_late, _stuck, _stale])
+def test_readings_that_are_none_concern_their_neighbours_alone(spoil: Callable[[Array], None]) -> None:
+    """Splines through them rang over the whole record, and no number was left."""
+    rig = tvident.simulate_torsional_rig(20.0, seed=3, angle_noise=1e-3)
+    angle = held(rig.angle, 20)
+    spoil(angle)
+    result = tvident.identify(angle, rig.torque, sample_rate=RATE)
+    assert abs(result.inertia[0] / rig.inertia[0] - 1) < 2 * INERTIA
+    assert np.mean(result.trusted) > 0.9
+
+
+def test_an_angle_that_is_clipped_and_held_lacks_what_is_clipped() -> None:
+    rig = tvident.simulate_torsional_rig(20.0, seed=3, angle_noise=1e-3)
+    angle = np.clip(held(rig.angle, 5), *(np.array([-1.5, 1.5]) * rig.angle.std()))
+    result = tvident.identify(angle, rig.torque, sample_rate=RATE)
     assert abs(result.inertia[0] / rig.inertia[0] - 1) < INERTIA
 
 
@@ -153,6 +187,9 @@ def test_an_angle_that_was_rounded_is_not_held() -> None:
         assert readings_of(np.round(turns + spread * noise)) is None
     assert readings_of(np.round(turns[:4] * 0.24)) is None
     assert readings_of(np.zeros(20_000)) is None
+    # Nor is one that wraps at no multiple of its step, or was written with few digits.
+    assert readings_of(np.unwrap(np.round(np.mod(turns / 100, 2 * np.pi), 2))) is None
+    assert readings_of(np.round(np.round(turns) * 0.00157, 3)) is None
 
 
 def test_held_angles_with_missing_readings_and_of_several_records() -> None:

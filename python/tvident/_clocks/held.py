@@ -22,6 +22,9 @@ _ORDER = 5
 _GAP = 1.5
 """Readings beyond which a step is a gap."""
 
+_JITTER = 0.45
+"""By which part of the usual step steps differ that are no gaps."""
+
 _Channels = Mapping[str, npt.NDArray[np.number]]
 
 
@@ -53,8 +56,8 @@ def unheld(
     """Return channels without what a recorder made between two readings; None where it made nothing.
 
     A machine moves between two readings, so what an angle holds there is its recorder's. A torque that is held may be what acts, as that of
-    a digital controller, and stays as it is, unless both channels were read at once, or `of_torque` says that it was read. Nothing acts or
-    moves along straight lines from reading to reading; but what was done to both channels alike changes no equation.
+    a digital controller, and stays as it is, unless both channels were read at once, or `of_torque` says that it was read. No mass moves
+    along straight lines from reading to reading; but what was done to both channels alike changes no equation.
 
     Parameters
     ----------
@@ -69,15 +72,15 @@ def unheld(
     held, drawn = _of_both(readings_of, both), _of_both(knots_of, both)
     if not (of_torque or _are_alike(held)):
         held.pop("torque", None)
-    if _are_alike(drawn):
-        drawn = {}
+    is_drawn_alike = _are_alike(drawn)
+    drawn = {name: read for name, read in drawn.items() if name == "angle" and not is_drawn_alike}
     if not held and not drawn:
         return None
     seen, passed = dict(channels), {}
-    for name, (samples, places) in {**held, **drawn}.items():
-        bridged = _GAP * math.ceil(np.diff(places).mean())
-        resampling = _core.Resampling(places, both[name].shape[-1], order=_ORDER, bridged=bridged)
-        seen[name] = _between(resampling, both[name][..., samples], workers)
+    for name, read in {**held, **drawn}.items():
+        bridged = _GAP * math.ceil(np.median(np.diff(read.places)))
+        resampling = _core.Resampling(read.places, both[name].shape[-1], order=_ORDER, bridged=bridged)
+        seen[name] = _between(resampling, both[name][..., read.samples], read.known, workers)
         passed[name] = Passed(resampling, workers)
     recorded = [*_recorded("hold", held, period), *_recorded("lie", drawn, period)]
     chosen = {"torque_readings": True} if of_torque and "torque" in held else {}
@@ -94,7 +97,7 @@ def _of_both(of_row: Callable[[npt.NDArray[np.number]], Read | None], both: _Cha
 
 def _are_alike(read: Mapping[str, Read]) -> bool:
     """Return whether both channels were read at the same samples."""
-    return len(read) > 1 and np.array_equal(read["angle"][0], read["torque"][0])
+    return len(read) > 1 and np.array_equal(read["angle"].samples, read["torque"].samples)
 
 
 @dataclass(frozen=True)
@@ -122,19 +125,21 @@ class _Repeated:
     @property
     def doubt(self) -> str:
         """What to do."""
-        hold = float(self.between.mean())
+        hold = _usual(self.between)
         is_even = hold == round(hold) and float(np.ptp(self.between)) == 0
         own = "give it times of its own, t=(…, …)"
         cure = f"{own}, or keep every {ordinal(hold)} sample of both channels" if is_even else f"or {own}"
-        return f"{self.what}: splines between its readings were taken instead; better record it as it is read, {cure}"
+        return (
+            f"{self.what}: splines between readings were taken instead; better record what is read as it comes, {cure}"
+        )
 
 
 def _recorded(verb: str, read: Mapping[str, Read], period: float) -> list[_Repeated]:
     """Return what a recorder did: held values, or drew lines."""
     if not read:
         return []
-    between = np.diff(next(iter(read.values()))[1])
-    hold = float(between.mean())
+    between = np.diff(next(iter(read.values())).places)
+    hold = _usual(between)
     names, ending = ("both channels", "") if len(read) > 1 else (f"the {next(iter(read))}", "s")
     if verb == "hold":
         what = f"{names} hold{ending} every value for {hold:.3g} samples"
@@ -146,7 +151,7 @@ def _recorded(verb: str, read: Mapping[str, Read], period: float) -> list[_Repea
 def holds_that_stay(angles: npt.NDArray[np.number]) -> list[tuple[int, str]]:
     """Return what to do about angles that hold their readings, by record, where nothing replaced what they hold."""
     found = ((record, readings_of(row)) for record, row in enumerate(angles.reshape(-1, angles.shape[-1])))
-    holds = {record: float(np.diff(one[1]).mean()) for record, one in found if one is not None}
+    holds = {record: _usual(np.diff(one.places)) for record, one in found if one is not None}
     what = "which makes it late by half of that, and its steps are no motion"
     cure = "use method='auto', which takes its readings and splines between them, or give it times of its own, t=(…, …)"
     return [
@@ -155,22 +160,28 @@ def holds_that_stay(angles: npt.NDArray[np.number]) -> list[tuple[int, str]]:
     ]
 
 
-def _between(resampling: _core.Resampling, readings: npt.NDArray[np.number], workers: int | None) -> Numbers:
-    """Return a channel at every sample, from its readings."""
+def _usual(between: Numbers) -> float:
+    """Return the mean of the usual steps from reading to reading."""
+    median = float(np.median(between))
+    return float(between[np.abs(between - median) < _JITTER * median].mean())
+
+
+def _between(
+    resampling: _core.Resampling, readings: npt.NDArray[np.number], known: npt.NDArray[np.bool_], workers: int | None
+) -> Numbers:
+    """Return a channel at every sample, from its readings and whether they are known."""
     rows = np.array(readings.reshape(-1, readings.shape[-1]), dtype=np.float64)
-    rows[~np.isfinite(rows)] = np.nan
+    rows[~(np.isfinite(rows) & known)] = np.nan
     found = resampling.onto_grid(rows, workers=workers)
     return found.reshape(*readings.shape[:-1], found.shape[-1])
 
 
 def _of_all(of_row: Callable[[npt.NDArray[np.number]], Read | None], channel: npt.NDArray[np.number]) -> Read | None:
     """Return readings of a channel, where those of all records are at the same samples; None elsewhere."""
-    rows = channel.reshape(-1, channel.shape[-1])
-    first = of_row(rows[0]) if rows.size else None
-    if first is None:
-        return None
-    for row in rows[1:]:
-        other = of_row(row)
-        if other is None or not np.array_equal(other[0], first[0]):
+    found: list[Read] = []
+    for row in channel.reshape(-1, channel.shape[-1]):
+        read = of_row(row)
+        if read is None or (found and not np.array_equal(read.samples, found[0].samples)):
             return None
-    return first
+        found.append(read)
+    return found[0]._replace(known=np.stack([read.known for read in found])) if found else None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -22,8 +24,17 @@ _JITTER = 0.4
 _OFF = 0.1
 """Samples by which readings may be seen elsewhere than those of an even clock are, which is known no better."""
 
-_STEPS = 2.0
-"""A channel that was rounded changes by one step at a time where it changes seldom; one that is held by at least so many, mostly."""
+_STEPS, _SMALL = 3.0, 0.05
+"""A channel that was rounded changes by one step at a time where it changes seldom; one that is held by at least so many, mostly.
+
+The smallest of so large a part of the changes are taken for a step: where an angle wraps, or was written with few digits, steps differ.
+"""
+
+_REPEATED = 4
+"""Readings in a row that may change nothing: where there are more, a channel rests or is stuck, and nothing is known."""
+
+_CLIPPED, _FEWEST_CLIPPED = 1.5, 3
+"""Holds that an angle stays at its largest or smallest value where it is clipped, and how often it must."""
 
 _SAME = 1e-6
 """Samples by which a reading may seem to come after the sample that shows it, by rounding."""
@@ -31,8 +42,13 @@ _SAME = 1e-6
 _STRAIGHT = 16 * np.finfo(float).eps
 """Samples lie on a straight line if they bend by no more than this part of the largest value."""
 
-Read = tuple[npt.NDArray[np.int64], Numbers]
-"""The samples that are readings, and the places at which they were read."""
+
+class Read(NamedTuple):
+    """What was read of a record: samples that show it, the places in the record where it was read, and whether its value is known."""
+
+    samples: npt.NDArray[np.int64]
+    places: Numbers
+    known: npt.NDArray[np.bool_]
 
 
 # What is infinite is missing.
@@ -51,20 +67,40 @@ def readings_of(row: npt.NDArray[np.number]) -> Read | None:
     if not changes.size:
         return None
     sizes = np.abs(steps[changes - 1].astype(np.float64))
-    if np.median(sizes) < _STEPS * sizes.min():
+    if np.median(sizes) < _STEPS * np.quantile(sizes, _SMALL):
         return None
     beat = _beat(changes, row.size)
     if beat is None:
         return None
-    hold, counts, is_exact = beat
-    numbers = np.concatenate([[0], np.cumsum(counts)])
+    numbers = np.concatenate([[0], np.cumsum(beat.counts)])
+    samples, known = _with_those_between(changes, beat)
+    places = samples - (0.0 if beat.is_exact else 0.5)
     own = _clock(changes, numbers)
-    if own is None:
-        samples = _with_those_between(changes, counts, hold)
-        return samples, samples.astype(np.float64) - (0.0 if is_exact else 0.5)
-    start, hold = own
-    places = start + hold * np.arange(numbers[-1] + 1)
-    return np.ceil(places - _SAME).astype(np.int64), places
+    if own is not None:
+        places = own[0] + own[1] * np.arange(samples.size)
+        samples = np.ceil(places - _SAME).astype(np.int64)
+    begin = samples[0] - round(beat.hold)
+    if begin >= 0 and places[0] >= beat.hold - _SAME:
+        # What is held at first was read as well.
+        samples = np.concatenate([[begin], samples])
+        places = np.concatenate([[places[0] - beat.hold], places])
+        known = np.concatenate([[True], known])
+    # What changes between two readings, as where one is stale or late, is none.
+    apart = np.concatenate([[True], np.diff(places) >= beat.hold / 2])
+    found = Read(samples[apart], places[apart], known[apart])
+    return found._replace(known=found.known & ~_is_clipped(row, beat.hold)[found.samples])
+
+
+def _is_clipped(row: npt.NDArray[np.number], hold: float) -> npt.NDArray[np.bool_]:
+    """Return where a record that is held stays at its largest or smallest value."""
+    clipped = np.zeros(row.size, bool)
+    for extreme in (np.nanmin(row), np.nanmax(row)):
+        at = row == extreme
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], at, [False]])))
+        stays = np.diff(edges)[::2] > _CLIPPED * hold
+        if np.count_nonzero(stays) >= _FEWEST_CLIPPED:
+            clipped |= at
+    return clipped
 
 
 @np.errstate(invalid="ignore", over="ignore")
@@ -80,10 +116,10 @@ def knots_of(row: npt.NDArray[np.number]) -> Read | None:
     bends = np.diff(row, 2)
     knots = np.flatnonzero(np.isfinite(bends) & (np.abs(bends) > rounding)) + 1
     beat = _beat(knots, row.size)
-    if beat is None or not beat[2]:
+    if beat is None or not beat.is_exact:
         return None
-    samples = _with_those_between(knots, beat[1], beat[0])
-    return samples, samples.astype(np.float64)
+    samples, known = _with_those_between(knots, beat)
+    return Read(samples, samples.astype(np.float64), known)
 
 
 def _is_straight(row: npt.NDArray[np.number], rounding: float) -> npt.NDArray[np.bool_]:
@@ -91,11 +127,17 @@ def _is_straight(row: npt.NDArray[np.number], rounding: float) -> npt.NDArray[np
     return np.asarray((np.abs(np.diff(row)[1:]) > rounding) & (np.abs(np.diff(row, 2)) <= rounding))
 
 
-def _beat(changes: npt.NDArray[np.int64], samples: int) -> tuple[float, npt.NDArray[np.int64], bool] | None:
-    """Return the samples from reading to reading, the readings from change to change, and whether they keep whole samples.
+class _Beat(NamedTuple):
+    """Samples from reading to reading, how many readings there are from each change to the next, and whether these and all come in beat."""
 
-    None where changes keep no beat.
-    """
+    hold: float
+    counts: npt.NDArray[np.int64]
+    in_beat: npt.NDArray[np.bool_]
+    is_exact: bool
+
+
+def _beat(changes: npt.NDArray[np.int64], samples: int) -> _Beat | None:
+    """Return the beat that changes keep; None where they keep none."""
     if changes.size < _FEWEST:
         return None
     runs = np.diff(changes)
@@ -108,17 +150,20 @@ def _beat(changes: npt.NDArray[np.int64], samples: int) -> tuple[float, npt.NDAr
     if in_beat.mean() < _IN_BEAT or changes.size < _OFTEN * samples / hold:
         return None
     is_exact = bool(np.mean(runs == round(hold) * counts) >= _IN_BEAT)
-    return float(round(hold)) if is_exact else hold, counts, is_exact
+    return _Beat(float(round(hold)) if is_exact else hold, counts, in_beat, is_exact)
 
 
 def _with_those_between(
-    changes: npt.NDArray[np.int64], counts: npt.NDArray[np.int64], hold: float
-) -> npt.NDArray[np.int64]:
-    """Return readings with those that changed nothing."""
-    numbers = np.concatenate([[0], np.cumsum(counts)])
+    changes: npt.NDArray[np.int64], beat: _Beat
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
+    """Return readings with those that changed nothing, and whether their values are known: a few in beat are."""
+    numbers = np.concatenate([[0], np.cumsum(beat.counts)])
     every = np.arange(numbers[-1] + 1)
     last = np.searchsorted(numbers, every, side="right") - 1
-    return np.asarray(changes[last] + np.rint(hold * (every - numbers[last])).astype(np.int64))
+    after = every - numbers[last]
+    is_known = np.concatenate([beat.in_beat & (beat.counts <= _REPEATED), [True]])
+    samples = changes[last] + np.rint(beat.hold * after).astype(np.int64)
+    return samples, (after == 0) | is_known[last]
 
 
 def _clock(changes: npt.NDArray[np.int64], numbers: npt.NDArray[np.int64]) -> tuple[float, float] | None:

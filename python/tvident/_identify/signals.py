@@ -85,7 +85,7 @@ class Signals:
         """Return the same with splines between what was read, and the request with what cannot be found any more."""
         if self.channels.keys() != {"angle"}:
             return self, request
-        of_torque = bool((earlier or {}).get("torque_readings"))
+        of_torque = (earlier or {}).get("torque_readings") is True
         found = unheld(self._recorded, self.period, workers, of_torque=of_torque)
         if found is None:
             return self, request

@@ -169,6 +169,11 @@ def asked_of(
             "nan_policy must be 'propagate' or 'raise' in a stream of the strong form; got 'omit', which needs the whole record; use one "
             "of these"
         )
+    if (given.settings or {}).get("torque_readings") is True:
+        raise ValueError(
+            "a stream takes samples as they come; got settings of a recording whose torque holds its readings, with splines between them; "
+            "push a torque that is sampled as the angle is, or push both channels once a reading, with settings of such a recording"
+        )
     _check_request(request)
     equation = _equation(request)
     if half_life is not None and "constant" not in equation.kinds:
