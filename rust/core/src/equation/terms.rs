@@ -36,18 +36,31 @@ pub struct BuiltInTerm {
     pub(crate) function: TermFunction,
     /// Whether a record is searched for it where it is left out.
     pub(crate) looked_for: bool,
+    /// Whether what the torque tells is told beside it: a damping that differs between directions leaves hardly anything of that where windows are short.
+    pub(crate) beside_torque: bool,
 }
 
 /// Every built-in term. A new one is a row here and nothing else in the core.
 pub static BUILT_IN_TERMS: [BuiltInTerm; 5] = [
-    BuiltInTerm { name: "offset", function: TermFunction::One, looked_for: true },
-    BuiltInTerm { name: "coulomb", function: TermFunction::Direction, looked_for: true },
-    BuiltInTerm { name: "cubic", function: TermFunction::OfAngle(|angle| each(angle, cube)), looked_for: true },
-    BuiltInTerm { name: "gravity", function: TermFunction::OfAngle(|angle| each(angle, f64::sin)), looked_for: false },
+    BuiltInTerm { name: "offset", function: TermFunction::One, looked_for: true, beside_torque: true },
+    BuiltInTerm { name: "coulomb", function: TermFunction::Direction, looked_for: true, beside_torque: true },
+    BuiltInTerm {
+        name: "cubic",
+        function: TermFunction::OfAngle(|angle| each(angle, cube)),
+        looked_for: true,
+        beside_torque: true,
+    },
+    BuiltInTerm {
+        name: "gravity",
+        function: TermFunction::OfAngle(|angle| each(angle, f64::sin)),
+        looked_for: false,
+        beside_torque: true,
+    },
     BuiltInTerm {
         name: "viscous_asymmetric",
         function: TermFunction::OfVelocity(|velocity| each(velocity, f64::abs)),
         looked_for: true,
+        beside_torque: false,
     },
 ];
 

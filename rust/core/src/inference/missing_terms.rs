@@ -67,6 +67,11 @@ impl Missing {
         matches!(self, Self::Resonance | Self::TorqueSquare | Self::TorqueCube)
     }
 
+    /// Whether what the torque tells is told beside it.
+    pub(crate) fn is_beside_torque(&self) -> bool {
+        if let Self::Term(term) = self { term.beside_torque } else { true }
+    }
+
     /// The samples of a term or of a power of the torque, `None` if they are one everywhere or it is none.
     pub(crate) fn samples<'a>(
         self,

@@ -42,8 +42,9 @@ impl Session<'_, '_, '_> {
         let regressors = first..weak.rows.regressors.len();
         // What the torque tells is told beside a lag that may be missing, not beside one that was found; another record's may be another.
         let found_lag = usize::from(self.options.found_lag && candidates.last() == Some(&Missing::Lag));
+        let apart = candidates.iter().take_while(|missing| !missing.is_beside_torque()).count();
         let (beside, regressors) =
-            (&candidates[..candidates.len() - found_lag], regressors.start..regressors.end - found_lag);
+            (&candidates[apart..candidates.len() - found_lag], regressors.start + apart..regressors.end - found_lag);
         let mut suspects = self.of_torque(weak, decided, (fit, &rhs, errors.error), regressors, beside)?;
         if decided.white.is_some() {
             weak.rows = decided.as_white(std::mem::take(&mut weak.rows), &mut self.stages)?;
@@ -106,7 +107,7 @@ impl Session<'_, '_, '_> {
         Ok(more.rows.regressors.into_iter().skip(3).collect())
     }
 
-    /// What may be missing: what the equation does not hold already.
+    /// What may be missing: what the equation does not hold already, first that beside which the torque tells nothing.
     fn candidates(&self) -> Vec<Missing> {
         let terms = BUILT_IN_TERMS.iter().filter(|term| term.looked_for).map(Missing::Term);
         // Rows of derivatives reach out of a mask, beside which other equations hold; behind a lag a filter is looked for. Noise of an angle that was fused
@@ -115,7 +116,9 @@ impl Session<'_, '_, '_> {
         let of_torque =
             resonance.then_some(Missing::Resonance).into_iter().chain([Missing::TorqueSquare, Missing::TorqueCube]);
         let all = terms.chain(of_torque).chain(std::iter::once(Missing::Lag));
-        all.filter(|missing| !self.options.not_missing.contains(missing)).collect()
+        let mut all: Vec<_> = all.filter(|missing| !self.options.not_missing.contains(missing)).collect();
+        all.sort_by_key(Missing::is_beside_torque);
+        all
     }
 }
 
