@@ -92,6 +92,22 @@ def test_a_torque_that_comes_late_by_half_of_what_it_holds_was_read(hold: int) -
     assert np.isfinite(result.simulate(torque)).any()
 
 
+def test_settings_repeat_what_was_done_to_two_holds_and_gaps() -> None:
+    """Settings of gaps hid that the torque was read; and one sentence told both channels of the angle's holds."""
+    rig = tvident.simulate_torsional_rig(10.0, seed=3, angle_noise=1e-3)
+    angle, torque = held(rig.angle, 5), held(rig.torque, 20)
+    angle[3:900:4] = np.nan
+    first = tvident.identify(angle, torque, sample_rate=RATE)
+    assert first.settings["torque_readings"]
+    again = tvident.identify(angle, torque, sample_rate=RATE, settings=json.loads(json.dumps(first.settings)))
+    np.testing.assert_array_equal(again.stiffness, first.stiffness)
+    assert again.advice == first.advice
+    assert again.reasons[0] == first.reasons[0]
+    assert again.settings == first.settings
+    for name, hold in (("angle", 5), ("torque", 20)):
+        assert f"the {name} holds every value for {hold} samples" in first.reasons[0]
+
+
 def test_a_torque_that_acts_in_steps_stays() -> None:
     inertia, damping, stiffness = 0.0123, 0.01, 15.0
     drive = tvident.simulate_torsional_rig(20.0, seed=5).torque

@@ -2,19 +2,21 @@
 
 from tvident._clocks.clock import Clock, Evened, clock_of
 from tvident._clocks.grid import Grid, grid_of
-from tvident._clocks.held import Unheld, holds_that_stay, unheld
+from tvident._clocks.held import holds_that_stay, unheld
 from tvident._clocks.missing import Bridged, bridged
 from tvident._clocks.passed import Passed
+from tvident._clocks.timed import SETTINGS_OF_TIMES, Timed
 from tvident._clocks.two import TwoClocks, two_clocks
 
 __all__ = [
+    "SETTINGS_OF_TIMES",
     "Bridged",
     "Clock",
     "Evened",
     "Grid",
     "Passed",
+    "Timed",
     "TwoClocks",
-    "Unheld",
     "bridged",
     "clock_of",
     "grid_of",

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +11,7 @@ import numpy.typing as npt
 from tvident import _core
 from tvident._arguments import ordinal
 from tvident._clocks.grid import Numbers
+from tvident._clocks.missing import Bridged
 from tvident._clocks.passed import Passed
 from tvident._clocks.readings import Read, knots_of, readings_of
 
@@ -22,37 +21,10 @@ _ORDER = 5
 _GAP = 1.5
 """Readings beyond which a step is a gap."""
 
-_JITTER = 0.45
-"""By which part of the usual step steps differ that are no gaps."""
-
 _Channels = Mapping[str, npt.NDArray[np.number]]
 
 
-@dataclass(frozen=True)
-class Unheld:
-    """Channels with what was held between readings replaced.
-
-    Parameters
-    ----------
-    channels : mapping of str to ndarray
-    passed : mapping of str to Passed
-        What white noise of the readings became, of the channels that were held.
-    words, doubt : str
-        What was done, and what to do.
-    settings : mapping
-        What settings keep: what a record does not show.
-    """
-
-    channels: Mapping[str, npt.NDArray[np.number]]
-    passed: Mapping[str, Passed]
-    words: str
-    doubt: str
-    settings: dict[str, Any]
-
-
-def unheld(
-    channels: Mapping[str, npt.NDArray[np.number]], period: float, workers: int | None, *, of_torque: bool = False
-) -> Unheld | None:
+def unheld(channels: _Channels, period: float, workers: int | None, *, of_torque: bool = False) -> Bridged | None:
     """Return channels without what a recorder made between two readings; None where it made nothing.
 
     A machine moves between two readings, so what an angle holds there is its recorder's. A torque that is held may be what acts, as that of
@@ -62,37 +34,42 @@ def unheld(
     Parameters
     ----------
     channels : mapping of str to ndarray, shape (*, n)
-        The angle and the torque among them.
+        The angle, the torque or both among them.
     period : float
         Seconds from one sample to the next.
     workers : int, optional
     of_torque : bool
     """
-    both = {name: channels[name] for name in ("angle", "torque")}
-    held, drawn = _of_both(readings_of, both), _of_both(knots_of, both)
-    if not (of_torque or _are_alike(held)):
+    held = _of_all(readings_of, channels, ("angle", "torque"))
+    both = _are_alike(held)
+    if not (of_torque or both):
         held.pop("torque", None)
-    is_drawn_alike = _are_alike(drawn)
-    drawn = {name: read for name, read in drawn.items() if name == "angle" and not is_drawn_alike}
-    if not held and not drawn:
+    drawn = _of_all(knots_of, channels, ("angle",))
+    if drawn and _are_alike({**drawn, **_of_all(knots_of, channels, ("torque",))}):
+        drawn = {}
+    read = {**held, **drawn}
+    if not read:
         return None
-    seen, passed = dict(channels), {}
-    for name, read in {**held, **drawn}.items():
-        bridged = _GAP * math.ceil(np.median(np.diff(read.places)))
-        resampling = _core.Resampling(read.places, both[name].shape[-1], order=_ORDER, bridged=bridged)
-        seen[name] = _between(resampling, both[name][..., read.samples], read.known, workers)
+    found, passed = dict(channels), {}
+    for name, one in read.items():
+        bridged = _GAP * math.ceil(np.median(np.diff(one.places)))
+        resampling = _core.Resampling(one.places, channels[name].shape[-1], order=_ORDER, bridged=bridged)
+        found[name] = _between(resampling, channels[name][..., one.samples], one.known, workers)
         passed[name] = Passed(resampling, workers)
-    recorded = [*_recorded("hold", held, period), *_recorded("lie", drawn, period)]
-    chosen = {"torque_readings": True} if of_torque and "torque" in held else {}
-    return Unheld(
-        seen, passed, "; ".join(one.words for one in recorded), "; ".join(one.doubt for one in recorded), chosen
+    seen = {"both channels hold": held["angle"]} if both else {f"the {name} holds": one for name, one in held.items()}
+    recorded = [(f"{who} every value for {one.hold:.3g} samples", one) for who, one in seen.items()]
+    lines = [
+        (f"the {name} lies on straight lines between every {ordinal(one.hold)} sample", one)
+        for name, one in drawn.items()
+    ]
+    recorded += lines
+    return Bridged(
+        found,
+        passed,
+        {"torque_readings": True} if of_torque and "torque" in held else {},
+        "; ".join(_words(what, one, period) for what, one in recorded),
+        [_doubt(what, one) for what, one in recorded],
     )
-
-
-def _of_both(of_row: Callable[[npt.NDArray[np.number]], Read | None], both: _Channels) -> dict[str, Read]:
-    """Return readings of the channels that have some."""
-    found = {name: _of_all(of_row, values) for name, values in both.items()}
-    return {name: one for name, one in found.items() if one is not None}
 
 
 def _are_alike(read: Mapping[str, Read]) -> bool:
@@ -100,70 +77,29 @@ def _are_alike(read: Mapping[str, Read]) -> bool:
     return len(read) > 1 and np.array_equal(read["angle"].samples, read["torque"].samples)
 
 
-@dataclass(frozen=True)
-class _Repeated:
-    """What a recorder did to channels, in words.
-
-    Parameters
-    ----------
-    what : str
-    between : ndarray
-        Samples from reading to reading.
-    rate : float
-        Readings in a second.
-    """
-
-    what: str
-    between: Numbers
-    rate: float
-
-    @property
-    def words(self) -> str:
-        """What was done."""
-        return f"{self.what}, as where it was read at {self.rate:.4g} Hz: splines of order {_ORDER} go from reading to reading"
-
-    @property
-    def doubt(self) -> str:
-        """What to do."""
-        hold = _usual(self.between)
-        is_even = hold == round(hold) and float(np.ptp(self.between)) == 0
-        own = "give it times of its own, t=(…, …)"
-        cure = f"{own}, or keep every {ordinal(hold)} sample of both channels" if is_even else f"or {own}"
-        return (
-            f"{self.what}: splines between readings were taken instead; better record what is read as it comes, {cure}"
-        )
+def _words(what: str, read: Read, period: float) -> str:
+    """Return what was done about what a recorder did."""
+    rate = 1 / (period * read.hold)
+    return f"{what}, as where it was read at {rate:.4g} Hz: splines of order {_ORDER} go from reading to reading"
 
 
-def _recorded(verb: str, read: Mapping[str, Read], period: float) -> list[_Repeated]:
-    """Return what a recorder did: held values, or drew lines."""
-    if not read:
-        return []
-    between = np.diff(next(iter(read.values())).places)
-    hold = _usual(between)
-    names, ending = ("both channels", "") if len(read) > 1 else (f"the {next(iter(read))}", "s")
-    if verb == "hold":
-        what = f"{names} hold{ending} every value for {hold:.3g} samples"
-    else:
-        what = f"{names} lie{ending} on straight lines between every {ordinal(hold)} sample"
-    return [_Repeated(what, between, 1 / (period * hold))]
+def _doubt(what: str, read: Read) -> str:
+    """Return what to do about what a recorder did."""
+    own = "give it times of its own, t=(…, …)"
+    cure = f"{own}, or keep every {ordinal(read.hold)} sample of both channels" if read.is_even else f"or {own}"
+    return f"{what}: splines between readings were taken instead; better record what is read as it comes, {cure}"
 
 
 def holds_that_stay(angles: npt.NDArray[np.number]) -> list[tuple[int, str]]:
     """Return what to do about angles that hold their readings, by record, where nothing replaced what they hold."""
     found = ((record, readings_of(row)) for record, row in enumerate(angles.reshape(-1, angles.shape[-1])))
-    holds = {record: _usual(np.diff(one.places)) for record, one in found if one is not None}
+    holds = {record: one.hold for record, one in found if one is not None}
     what = "which makes it late by half of that, and its steps are no motion"
     cure = "use method='auto', which takes its readings and splines between them, or give it times of its own, t=(…, …)"
     return [
         (record, f"the angle holds every value for {hold:.3g} samples, {what}: {cure}")
         for record, hold in holds.items()
     ]
-
-
-def _usual(between: Numbers) -> float:
-    """Return the mean of the usual steps from reading to reading."""
-    median = float(np.median(between))
-    return float(between[np.abs(between - median) < _JITTER * median].mean())
 
 
 def _between(
@@ -176,12 +112,18 @@ def _between(
     return found.reshape(*readings.shape[:-1], found.shape[-1])
 
 
-def _of_all(of_row: Callable[[npt.NDArray[np.number]], Read | None], channel: npt.NDArray[np.number]) -> Read | None:
-    """Return readings of a channel, where those of all records are at the same samples; None elsewhere."""
-    found: list[Read] = []
-    for row in channel.reshape(-1, channel.shape[-1]):
-        read = of_row(row)
-        if read is None or (found and not np.array_equal(read.samples, found[0].samples)):
-            return None
-        found.append(read)
-    return found[0]._replace(known=np.stack([read.known for read in found])) if found else None
+def _of_all(
+    of_row: Callable[[npt.NDArray[np.number]], Read | None], channels: _Channels, names: Sequence[str]
+) -> dict[str, Read]:
+    """Return readings of those of some channels that have some, at the same samples of all records."""
+    found = {}
+    for name in names:
+        rows = channels[name].reshape(-1, channels[name].shape[-1]) if name in channels else ()
+        read = [of_row(row) for row in rows]
+        first = read[0] if read else None
+        if first is None:
+            continue
+        alike = [one for one in read if one is not None and np.array_equal(one.samples, first.samples)]
+        if len(alike) == len(read):
+            found[name] = first._replace(known=np.stack([one.known for one in alike]))
+    return found

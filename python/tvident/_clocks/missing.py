@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,7 @@ import numpy.typing as npt
 from tvident import _core
 from tvident._clocks.grid import Numbers
 from tvident._clocks.passed import Passed
+from tvident._clocks.timed import Timed
 
 _ORDERS = (1, 3, 5)
 """What there is to choose from."""
@@ -122,23 +124,32 @@ def _mean(values: Numbers) -> float:
 
 @dataclass(frozen=True)
 class Bridged:
-    """Channels whose short gaps are bridged.
+    """Channels whose gaps are bridged: short ones, or those between readings that a recorder holds.
 
     Parameters
     ----------
     channels : mapping of str to ndarray
     passed : mapping of str to Passed
-        What white noise became, of channels with short gaps.
+        What white noise became, of channels with such gaps.
     settings : mapping
         What settings keep.
     words : str
         What was done.
+    doubts : sequence of str
+        What to do.
     """
 
     channels: Mapping[str, npt.NDArray[np.number]]
     passed: Mapping[str, Passed]
-    settings: dict[str, float | str]
+    settings: dict[str, Any]
     words: str
+    doubts: Sequence[str] = ()
+
+    def after(self, before: Timed | None) -> Bridged:
+        """Return the same with the words and settings of what was done before."""
+        if before is None:
+            return self
+        return replace(self, settings={**before.settings, **self.settings}, words=f"{before.words}; {self.words}")
 
 
 def bridged(
@@ -184,7 +195,7 @@ def bridged(
     )
     # Every record of a batch has its own.
     own = bridges[0] if records == 1 else None
-    settings: dict[str, float | str] = {} if own is None else {"spline_order": own.order, "bridged": own.longest}
+    settings = {} if own is None else {"spline_order": own.order, "bridged": own.longest}
     return Bridged(found, passed, settings, words)
 
 

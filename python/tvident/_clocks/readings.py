@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,9 @@ _FEWEST, _OFTEN, _IN_BEAT = 50, 0.5, 0.99
 
 _JITTER = 0.4
 """By which part of the usual step, or a sample, readings may come early or late."""
+
+_USUAL = 0.45
+"""By which part of the usual step steps differ that are no gaps."""
 
 _OFF = 0.1
 """Samples by which readings may be seen elsewhere than those of an even clock are, which is known no better."""
@@ -50,6 +54,18 @@ class Read(NamedTuple):
     places: Numbers
     known: npt.NDArray[np.bool_]
 
+    @property
+    def hold(self) -> float:
+        """Usual samples from reading to reading, which gaps are not."""
+        between = np.diff(self.places)
+        usual = float(np.median(between))
+        return float(between[np.abs(between - usual) < _USUAL * usual].mean())
+
+    @property
+    def is_even(self) -> bool:
+        """Whether readings come every so many samples, a whole number."""
+        return self.hold == round(self.hold) and float(np.ptp(np.diff(self.places))) == 0
+
 
 # What is infinite is missing.
 @np.errstate(invalid="ignore", over="ignore")
@@ -72,10 +88,9 @@ def readings_of(row: npt.NDArray[np.number]) -> Read | None:
     beat = _beat(changes, row.size)
     if beat is None:
         return None
-    numbers = np.concatenate([[0], np.cumsum(beat.counts)])
     samples, known = _with_those_between(changes, beat)
     places = samples - (0.0 if beat.is_exact else 0.5)
-    own = _clock(changes, numbers)
+    own = _clock(changes, beat.numbers)
     if own is not None:
         places = own[0] + own[1] * np.arange(samples.size)
         samples = np.ceil(places - _SAME).astype(np.int64)
@@ -108,8 +123,7 @@ def knots_of(row: npt.NDArray[np.number]) -> Read | None:
     """Return the samples of a record between which it is straight, as readings; None where these keep no beat of whole samples."""
     if row.dtype.kind != "f":
         return None
-    finite = np.abs(row[np.isfinite(row)])
-    rounding = _STRAIGHT * float(finite.max(initial=0.0))
+    rounding = _STRAIGHT * _largest(row)
     beginning = row[:_LOOKED_AT]
     if np.count_nonzero(_is_straight(beginning, rounding)) < _STILL * beginning.size:
         return None
@@ -120,6 +134,13 @@ def knots_of(row: npt.NDArray[np.number]) -> Read | None:
         return None
     samples, known = _with_those_between(knots, beat)
     return Read(samples, samples.astype(np.float64), known)
+
+
+def _largest(row: npt.NDArray[np.number]) -> float:
+    """Return the largest magnitude of what is finite; zero where nothing is."""
+    largest = max(abs(float(np.fmax.reduce(row))), abs(float(np.fmin.reduce(row)))) if row.size else math.nan
+    # A copy of a long record is made only where it holds what is infinite.
+    return largest if math.isfinite(largest) else float(np.abs(row[np.isfinite(row)]).max(initial=0.0))
 
 
 def _is_straight(row: npt.NDArray[np.number], rounding: float) -> npt.NDArray[np.bool_]:
@@ -134,6 +155,11 @@ class _Beat(NamedTuple):
     counts: npt.NDArray[np.int64]
     in_beat: npt.NDArray[np.bool_]
     is_exact: bool
+
+    @property
+    def numbers(self) -> npt.NDArray[np.int64]:
+        """The number of the reading at each change."""
+        return np.concatenate([[0], np.cumsum(self.counts)])
 
 
 def _beat(changes: npt.NDArray[np.int64], samples: int) -> _Beat | None:
@@ -157,7 +183,7 @@ def _with_those_between(
     changes: npt.NDArray[np.int64], beat: _Beat
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
     """Return readings with those that changed nothing, and whether their values are known: a few in beat are."""
-    numbers = np.concatenate([[0], np.cumsum(beat.counts)])
+    numbers = beat.numbers
     every = np.arange(numbers[-1] + 1)
     last = np.searchsorted(numbers, every, side="right") - 1
     after = every - numbers[last]

@@ -5,29 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._clocks import Passed
+from tvident._clocks import Passed, Timed
 from tvident._equation import LINEAR_UNITS, UNITS
 from tvident._identify.channels import MotionChannels
 from tvident._identify.weighted import Weights
 from tvident._units import ROTARY, Axis
-
-
-class Timed(Protocol):
-    """How channels were brought onto a uniform grid."""
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """What settings keep."""
-
-    @property
-    def words(self) -> str:
-        """What was done."""
 
 
 @dataclass(frozen=True)

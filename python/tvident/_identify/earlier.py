@@ -8,6 +8,7 @@ from dataclasses import fields
 from typing import Any
 
 from tvident import _arguments as arguments
+from tvident._clocks import SETTINGS_OF_TIMES
 from tvident._equation import COEFFICIENTS, OFFSET, Term, has_kind
 from tvident._identify.methods import Form, StrongForm, WeakForm
 
@@ -46,13 +47,9 @@ _BESIDE_FORM = frozenset(
             "weights",
             "sample_rate",
             "step",
-            "times",
-            "spline_order",
-            "bridged",
             "torque_readings",
-            "clock_offset",
-            "clock_drift",
         ),
+        *SETTINGS_OF_TIMES,
     )
 )
 """What settings of results hold beside those of their form."""

@@ -108,7 +108,8 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         signals, request = signals.on_grid(
             grid, request, call["settings"], propagate=propagate, workers=call["workers"]
         )
-    elif clocks is None and not propagate and isinstance(request.form, WeakForm):
+    is_bridged = grid is None and clocks is None and not propagate and isinstance(request.form, WeakForm)
+    if is_bridged:
         signals, request = signals.over_holds(request, call["settings"], workers=call["workers"])
         signals, request = signals.over_gaps(request, call["settings"], workers=call["workers"])
     moving = motion_channels(
@@ -140,8 +141,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
     if clocks is not None:
         data = clocks.finished(data, axis.torque, call["settings"], partial(_lag_left, request))
     task = ExpandedTask if expansions_of(request) else Task
-    is_even = grid is None and clocks is None and not propagate and isinstance(request.form, WeakForm)
-    if is_even and call["settings"] is None and request.lag == 0:
+    if is_bridged and call["settings"] is None and request.lag == 0:
         data = with_read_torque(data, lambda some: task(some, request).run(None))
     data = with_clipped_torque(data, asked, lambda some: task(some, request).run(None))
     return task(data, request)

@@ -24,19 +24,14 @@ def with_read_torque(data: Data, identified: Callable[[Data], Identification]) -
     """
     if data.batch or data.motion.recorded or data.instruments is not None or not data.time.size:
         return data
-    channels = {"angle": data.angles, "torque": data.torques}
-    read = unheld(channels, data.period, data.workers, of_torque=True)
-    if read is None or not read.settings or not identified(data).record_status & Status.LAG_SUSPECTED:
+    read = unheld({"torque": data.torques}, data.period, data.workers, of_torque=True)
+    if read is None or not identified(data).record_status & Status.LAG_SUSPECTED:
         return data
-    clock = read
-    if data.clock is not None:
-        settings = {**data.clock.settings, **read.settings}
-        clock = replace(read, words=f"{data.clock.words}; {read.words}", settings=settings)
     other = replace(
         data,
         torques=read.channels["torque"],
         passed=(data.passed[0], read.passed["torque"]),
-        clock=clock,
-        doubts=[*data.doubts, (0, read.doubt)],
+        clock=read.after(data.clock),
+        doubts=[*data.doubts, *((0, doubt) for doubt in read.doubts)],
     )
     return data if identified(other).record_status & Status.LAG_SUSPECTED else other

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._clocks import Bridged, Clock, Grid, Passed, Unheld, bridged, clock_of, unheld
+from tvident._clocks import Bridged, Grid, Passed, Timed, bridged, clock_of, unheld
 from tvident._derivatives import quantisation_step
 from tvident._identify.settings import Request
 
@@ -32,8 +32,8 @@ class Signals:
         Seconds.
     period : float
         Seconds from one sample to the next.
-    clock : Clock, Unheld or Bridged, optional
-        How they were brought onto a grid, what was held replaced, or short gaps bridged; None where nothing was.
+    clock : Timed, optional
+        How they were brought onto a grid, or their gaps bridged; None where neither was.
     passed : mapping of str to Passed
         What that made of white noise, by channel.
     doubts : sequence of (int, str)
@@ -46,7 +46,7 @@ class Signals:
     mask: npt.NDArray[np.bool_] | None
     time: npt.NDArray[np.float64]
     period: float
-    clock: Clock | Unheld | Bridged | None = None
+    clock: Timed | None = None
     passed: Mapping[str, Passed] = field(default_factory=dict)
     doubts: Sequence[tuple[int, str]] = ()
 
@@ -86,29 +86,30 @@ class Signals:
         if self.channels.keys() != {"angle"}:
             return self, request
         of_torque = (earlier or {}).get("torque_readings") is True
-        found = unheld(self._recorded, self.period, workers, of_torque=of_torque)
-        if found is None:
-            return self, request
-        request = with_own_step(request, self.channels)
-        signals = replace(self, channels={"angle": found.channels["angle"]}, torques=found.channels["torque"])
-        records = int(np.prod(self.torques.shape[:-1], dtype=int))
-        doubts = [*self.doubts, *((record, found.doubt) for record in range(records))]
-        return replace(signals, clock=found, passed=found.passed, doubts=doubts), request
+        return self._over(unheld(self._recorded, self.period, workers, of_torque=of_torque), request)
 
     def over_gaps(
         self, request: Request, earlier: Mapping[str, Any] | None, *, workers: int | None
     ) -> tuple[Signals, Request]:
         """Return the same with short gaps bridged, and the request with what cannot be found any more."""
-        found = bridged(self._recorded, earlier, workers)
+        return self._over(bridged(self._recorded, earlier, workers), request)
+
+    def _over(self, found: Bridged | None, request: Request) -> tuple[Signals, Request]:
+        """Return the same with gaps that were bridged, if any were."""
         if found is None:
             return self, request
         request = with_own_step(request, self.channels)
-        channels = {name: found.channels[name] for name in self.channels}
-        instruments = found.channels.get("instrument")
-        signals = replace(self, channels=channels, torques=found.channels["torque"], instruments=instruments)
-        if self.clock is not None:
-            found = replace(found, words=f"{self.clock.words}; {found.words}")
-        return replace(signals, clock=found, passed={**self.passed, **found.passed}), request
+        records = int(np.prod(self.torques.shape[:-1], dtype=int))
+        signals = replace(
+            self,
+            channels={name: found.channels[name] for name in self.channels},
+            torques=found.channels["torque"],
+            instruments=found.channels.get("instrument"),
+            clock=found.after(self.clock),
+            passed={**self.passed, **found.passed},
+            doubts=[*self.doubts, *((record, doubt) for record in range(records) for doubt in found.doubts)],
+        )
+        return signals, request
 
     @property
     def _recorded(self) -> dict[str, npt.NDArray[np.number]]:

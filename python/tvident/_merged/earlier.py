@@ -8,22 +8,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from tvident import _arguments as arguments
+from tvident._clocks import SETTINGS_OF_TIMES
 from tvident._equation import Kind
 from tvident._merged.elements import Element, kind_or_number
 from tvident._merged.merging import Merging
 
 _LENGTHS = ("window_length", "exponent", "regression_window")
 _OTHERS = ("form", "sample_rate", "trials", "masses", "kinds", "known", "terms", "own_terms", "chosen", "step")
-_OF_TIMES = (
-    "noise",
-    "prediction_error",
-    "times",
-    "spline_order",
-    "bridged",
-    "torque_readings",
-    "clock_offset",
-    "clock_drift",
-)
+_FOUND = ("noise", "prediction_error", *SETTINGS_OF_TIMES)
 """Found, not chosen: nothing of it is used again."""
 _UNKNOWN = "unknown"
 
@@ -69,7 +61,7 @@ class Earlier:
     @classmethod
     def _read(cls, settings: Mapping[str, Any]) -> Earlier:
         # What is misspelled would be ignored.
-        if not {*_LENGTHS, *_OTHERS} <= set(settings) <= {*_LENGTHS, *_OTHERS, *_OF_TIMES}:
+        if not {*_LENGTHS, *_OTHERS} <= set(settings) <= {*_LENGTHS, *_OTHERS, *_FOUND}:
             raise KeyError
         known = {str(name): _number(value) for name, value in settings["known"].items()}
         values: dict[str, Kind | float] = {}
