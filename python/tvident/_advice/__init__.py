@@ -1,5 +1,6 @@
 """Puts into words what was chosen, why, and what to do next."""
 
+from tvident._advice.channels import held, spoilt
 from tvident._advice.collinear import NOT_DISTINGUISHED
 from tvident._advice.events import events_that_stay, without_numbers
 from tvident._advice.expansion import FoundExpansion, words_of_expansions
@@ -21,6 +22,8 @@ __all__ = [
     "changes_of_gain",
     "events_that_stay",
     "fed_back_in_records",
+    "held",
+    "spoilt",
     "without_numbers",
     "words_of_expansions",
     "words_of_search",

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
+from tvident._advice.channels import held
 from tvident._advice.lists import listed
 from tvident._arguments import ordinal
 from tvident._status import Status, stretches_of
@@ -132,10 +133,7 @@ def comes_late(found: _core.Identification, defect: tuple[str, str, float], peri
         )
     if name in {"velocity", "acceleration"}:
         return f"holds every value for {amount:.0f} samples: keep every {ordinal(amount)} sample of all channels"
-    cure = (
-        f"holds every value for {amount:.0f} samples, which makes it late by half of that: keep every {ordinal(amount)} sample of "
-        "both channels"
-    )
+    cure = held(amount, "both")
     # The steps of an angle are motion for the equation, whatever its lag; and channels that both hold are late alike.
     alone = name == "torque" and not any(one.channel == 0 and one.name == "held" for one in found.defects)
     return f"{cure}, or give lag={(amount - 1) / 2 * period:.3g} (seconds)" if alone else cure

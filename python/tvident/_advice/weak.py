@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tvident import _core
+from tvident._advice.channels import spoilt
 from tvident._advice.collinear import collinear
 from tvident._advice.events import (
     comes_late,
@@ -25,7 +26,6 @@ from tvident._advice.instrument import fed_back
 from tvident._advice.lists import listed
 from tvident._advice.scales import disagreement, scales_compared
 from tvident._advice.torque import OF_TORQUE, told_by_torque
-from tvident._arguments import ordinal
 from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, UNITS
 from tvident._results import Words
 from tvident._status import Status
@@ -35,19 +35,6 @@ _SHOWN = 6
 
 _BEYOND_CHANCE = 4.0
 """A parameter jumps where it differs by more than so many standard errors of the difference: one of 16 000 does so by chance."""
-
-_PERIODS = (2 * math.pi, math.pi, 360.0, 180.0, 1.0, *(2.0**bits for bits in range(8, 25)))
-"""Periods of wrapped angles: a turn or half of one in rad, degrees and turns, and encoders' counts."""
-
-_NEAR = 0.1
-"""A wrapped angle jumps by its period less what it moves in one sample, which is at most this part of the period."""
-
-
-def _period(jump: float) -> float:
-    """Return the period of an angle that jumps so far."""
-    near = (one for one in _PERIODS if (1 - _NEAR) * one <= jump <= (1 + _NEAR / 2) * one)
-    return min(near, key=lambda one: abs(one - jump), default=jump)
-
 
 FREE_OFFSET = "an offset that is free in every window predicts better"
 
@@ -196,27 +183,12 @@ class Explained:
             if defect == "broken":
                 continue
             name = ("angle", "torque", "velocity", "acceleration")[one.channel]
-            if defect == "clipped":
-                cure = (
-                    f"is clipped: {amount:.1%} of its samples lie at its largest or smallest value: make these NaN, or record with a "
-                    "larger range"
-                )
-            elif defect == "left out":
-                cure = (
-                    f"is clipped: {amount:.1%} of its samples lie at its largest or smallest value: they count as missing; record with a "
-                    "larger range"
-                )
-            elif defect == "interpolated":
-                cure = (
-                    f"lies on straight lines between every {ordinal(amount)} sample, which weakens its fast motion: keep every "
-                    f"{ordinal(amount)} sample of both channels, or give what was recorded with times of its own, t=(…, …)"
-                )
-            elif defect in {"held", "filtered"}:
+            if defect in {"held", "filtered"}:
                 cure = comes_late(
                     self.found, (name, defect, amount), self.period, late=bool(self.lag or self.found.lag)
                 )
             else:
-                cure = f"jumps by {amount:.4g} rad: it is wrapped, give period={_period(amount):.8g}, or the period that it has"
+                cure = spoilt(defect, amount)
             words.append(f"the {name} {cure}")
         return words
 

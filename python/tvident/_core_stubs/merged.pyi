@@ -6,7 +6,7 @@ from typing import final
 import numpy as np
 import numpy.typing as npt
 
-from tvident._core_stubs.identification import ConstancyTest, Estimate, Scan, TriedLength
+from tvident._core_stubs.identification import ChannelDefect, ConstancyTest, Estimate, Scan, TriedLength
 
 @final
 class MergedElement:
@@ -63,6 +63,10 @@ class MergedIdentification:
     def jumps(self) -> list[int]: ...
     @property
     def scan(self) -> Scan: ...
+    @property
+    def defects(self) -> list[ChannelDefect]: ...
+    @property
+    def late(self) -> list[tuple[int, Estimate]]: ...
 
 def identify_merged(
     trials: Sequence[

@@ -35,6 +35,10 @@ _NAMED = 2
 """Other elements that a reason names."""
 
 
+_LEAST = 1e-12
+"""The variance of the noise of an equation, over that of another, below which it is none: the core's bound."""
+
+
 @dataclass(frozen=True)
 class _WindowsOfPart:
     """Sums over windows, constants last."""
@@ -88,6 +92,11 @@ def undetermined(part: Part, period: float) -> dict[str, str]:
     return reasons
 
 
+def _median(values: Array) -> float:
+    there = values[np.isfinite(values)]
+    return float(np.median(there)) if there.size else float("nan")
+
+
 def _stride(part: Part) -> int:
     return max(part.found.window_length // 2 // _OVERLAP, 1)
 
@@ -105,13 +114,14 @@ def _rows(part: Part, names: list[str], period: float) -> tuple[list[Array], Arr
         for equation, of, channel, factor in one.entries:
             if of is not None:
                 enters[one.name][equation, channel, of] += factor
-    values = {part.names[one.element]: float(np.nanmedian(one.values)) for one in found.elements}
+    values = {part.names[one.element]: _median(one.values) for one in found.elements}
     values |= {one.name: float(one.value) for one in equations.elements if one.is_known}
     mixed = sum(
         (value * enters[name] for name, value in values.items() if np.isfinite(value)), np.zeros((count, channels, 3))
     )
     of_rows = torques * gram[2, 2] + np.einsum("c,eci,ij,ecj->e", angles, mixed, gram, mixed)
-    weights = 1 / np.sqrt(np.maximum(of_rows, np.finfo(float).tiny))
+    # Parameters that are drawn to zero where no force acts leave no noise of their equation.
+    weights = 1 / np.sqrt(np.maximum(of_rows, max(_LEAST * of_rows.max(initial=0.0), np.finfo(float).tiny)))
     each = np.stack([enters[name] for name in names]) * weights[:, np.newaxis, np.newaxis]
     noises = np.einsum("c,aeci,ij,becj->eab", angles, each, gram, each)
     rows, stride = [], _stride(part)

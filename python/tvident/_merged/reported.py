@@ -214,7 +214,7 @@ class Reported(MergedSimulated, Telling, Tabular):
 
     @cached_property
     def _told(self) -> Words:
-        return words_of(self, self._merging.sampling, [part.found for part in self._merging.parts], self._scatter)
+        return words_of(self, self._merging, self._scatter)
 
     def summary(self) -> str:
         """Return the verdict, a table of the elements, and in words what was chosen and what to do.

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from tvident import _core
+from tvident._advice import held, spoilt
 from tvident._files import aligned
-from tvident._merged.sampling import Sampling
+from tvident._merged.merging import Merging, Part
 from tvident._results import COLUMNS, Words, row_of, sentences_of
 from tvident._status import Status, describe
 from tvident._units import in_words_of
@@ -27,15 +28,16 @@ _SILENT = (
 )
 
 
-def words_of(
-    result: Any, sampling: Sampling, found: Sequence[_core.MergedIdentification], scatter: Mapping[str, float]
-) -> Words:
+def words_of(result: Any, merging: Merging, scatter: Mapping[str, float]) -> Words:
     """Return reasons and advice."""
+    sampling = merging.sampling
     reasons, advice = ([one] if one else [] for one in (sampling.words, sampling.doubt))
-    for one in found:
+    for part in merging.parts:
+        one = part.found
         reasons += _reasons_of(one)
         advice += [words for flag, words in _DOUBTS.items() if one.record_status & flag]
         advice += [_SILENT] if one.misfit > 1 else []
+        advice += _channels_of(part, merging.masses, sampling.period)
     advice += _changing(result)
     for name, probability in result.tests.items():
         kind = result.kinds[name]
@@ -57,6 +59,31 @@ def words_of(
         if not verdict:
             advice.append(f"{name} cannot be known: {verdict.reason}")
     return Words(tuple(dict.fromkeys(reasons)), tuple(dict.fromkeys(advice)))
+
+
+def _channels_of(part: Part, masses: int, period: float) -> list[str]:
+    """Return what to do about channels that a recorder spoilt, and about torques that are late."""
+    numbers, found = part.equations.numbers, part.found
+    angles = [*numbers, *(one for one in range(len(found.noise[0])) if one not in numbers)]
+    words = []
+    for one in found.defects:
+        is_angle = one.channel < len(angles)
+        number = angles[one.channel] if is_angle else numbers[one.channel - len(angles)]
+        cure = held(one.amount, "all") if one.name == "held" else spoilt(one.name, one.amount)
+        words.append(f"the {'angle' if is_angle else 'torque'}{_of(number, masses)} {cure}")
+    for equation, late in found.late:
+        by = f"{late.value:.3g} ± {late.stderr:.1g} samples ({late.value * period:.3g} s)"
+        words.append(
+            f"the torque{_of(numbers[equation], masses)} seems to be late by {by}: shift it by as much, or record it with the angles"
+        )
+    return words
+
+
+def _of(number: int, masses: int) -> str:
+    """Return whose channel it is, in words."""
+    if masses == 0:
+        return ""
+    return " of the base" if number >= masses else f" of mass {number}"
 
 
 def _changing(result: Any) -> list[str]:

@@ -69,6 +69,12 @@ pub(crate) struct ChannelDefect {
     pub(crate) amount: f64,
 }
 
+impl ChannelDefect {
+    pub(crate) fn new(channel: usize, defect: &Defect) -> Self {
+        Self { channel, name: defect.name(), amount: defect.amount() }
+    }
+}
+
 /// A sample that stands out of its neighbours, and what they say is its value.
 #[pyclass(frozen, get_all, module = "tvident._core")]
 #[derive(Clone, Copy)]
@@ -334,8 +340,7 @@ pub(crate) fn tried(lengths: &[(usize, f64)]) -> Vec<TriedLength> {
 /// What was done to each channel.
 fn defects(weak: &WeakDetails) -> Vec<ChannelDefect> {
     let of = |(channel, defects): (usize, &Vec<Defect>)| {
-        let named = move |defect: &Defect| ChannelDefect { channel, name: defect.name(), amount: defect.amount() };
-        defects.iter().map(named).collect::<Vec<_>>()
+        defects.iter().map(move |defect| ChannelDefect::new(channel, defect)).collect::<Vec<_>>()
     };
     weak.defects.iter().enumerate().flat_map(of).collect()
 }

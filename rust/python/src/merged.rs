@@ -15,7 +15,7 @@ use tvident::identify::{
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
-use crate::identified::{ConstancyTest, Estimate, Scan, TriedLength, kind, name, tried};
+use crate::identified::{ChannelDefect, ConstancyTest, Estimate, Scan, TriedLength, kind, name, tried};
 use crate::records::{StridedSamples, flags, records};
 use crate::watch::watched;
 
@@ -52,6 +52,8 @@ pub(crate) struct MergedIdentification {
     record_status: u16,
     jumps: Vec<usize>,
     scan: Py<Scan>,
+    defects: Vec<ChannelDefect>,
+    late: Vec<(usize, Estimate)>,
 }
 
 /// One trial: angles, torques and terms, one of each a row, a mask, positions in the result, and weights.
@@ -210,5 +212,11 @@ pub(crate) fn identify_merged<'py>(
         record_status: found.record_status.bits(),
         jumps: found.jumps,
         scan: Scan::new(py, &found.scan)?,
+        defects: found.defects.iter().map(|(channel, defect)| ChannelDefect::new(*channel, defect)).collect(),
+        late: found
+            .late
+            .iter()
+            .map(|(equation, late)| (*equation, Estimate { value: late.value, stderr: late.error }))
+            .collect(),
     })
 }

@@ -121,6 +121,14 @@ pub(crate) fn beside_lines(tests: &mut [Option<Test>], trends: &[Option<Trend>],
 }
 
 impl Test {
+    /// What it says of a constant that rows are predicted with errors so many times as large as where windows follow it, with these `values`.
+    pub(crate) fn of_prediction(ratio: f64, independent: f64, values: &[f64]) -> Self {
+        let probability = FisherSnedecor::new(independent, independent).map_or(1.0, |chance| chance.sf(ratio));
+        let (count, mean) = (values.len() as f64, values.iter().sum::<f64>() / values.len() as f64);
+        let deviation = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt();
+        Self { probability, spread: deviation / mean.abs(), deviation, squares: ratio, freedom: 1 }
+    }
+
     /// How much more the parts differ than noise explains: the mean of their squared differences over the variances.
     pub(crate) fn excess(&self) -> f64 {
         self.squares

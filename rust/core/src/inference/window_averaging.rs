@@ -51,6 +51,13 @@ impl Averages {
         Self { values: columns(windowed), slopes: columns(windowed), errors: columns(windowed) }
     }
 
+    /// Makes an unknown no number in a row.
+    pub(crate) fn forget(&mut self, unknown: usize, row: usize) {
+        for column in [&mut self.values, &mut self.slopes, &mut self.errors] {
+            column[unknown][row] = f64::NAN;
+        }
+    }
+
     fn columns(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
         self.values.iter_mut().chain(&mut self.slopes).chain(&mut self.errors)
     }

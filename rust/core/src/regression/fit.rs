@@ -223,12 +223,17 @@ impl Fit {
 
     /// The median of a windowed unknown over all windows.
     pub(crate) fn median(&self, unknown: usize) -> f64 {
-        let windows = (0..self.full.len()).filter(|&window| is_determined(&self.full, window));
-        let mut values: Vec<f64> = windows
-            .map(|window| local(&self.full, window, &self.pooled.values, unknown))
-            .filter(|v| v.is_finite())
-            .collect();
+        let mut values = self.values(unknown);
         median(&mut values).unwrap_or(0.0)
+    }
+
+    /// A windowed unknown in all windows that determine it.
+    pub(crate) fn values(&self, unknown: usize) -> Vec<f64> {
+        let windows = (0..self.full.len()).filter(|&window| is_determined(&self.full, window));
+        windows
+            .map(|window| local(&self.full, window, &self.pooled.values, unknown))
+            .filter(|value| value.is_finite())
+            .collect()
     }
 }
 

@@ -6,6 +6,7 @@ use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::identify::kinds::Kind;
 use crate::identify::merged::session::MergedSession;
+use crate::identify::merged::shown::{MORE, NoiseOfRows};
 use crate::inference::constancy::{self, NoiseFrom, Test, TestNoise};
 use crate::inference::cross_validation::{Validated, best, validate};
 use crate::inference::jumps::jump::Jump;
@@ -25,14 +26,28 @@ const OVERLAP: usize = 2;
 const BETTER: f64 = 0.98;
 /// What no test shows to change is windowed only if rows are predicted so much better: it is what the equations lack.
 const LACKING: f64 = 0.5;
+/// Where equations leave more than the noise of the channels and that may be noise, what windows follow must pay by more than chance.
+const SHOWN: f64 = 0.8;
+/// So many times the noise of the channels is hardly noise.
+const NO_NOISE: f64 = 50.0;
 
 /// Rounds of looking for jumps and fitting again with windows that end there.
 const JUMP_ROUNDS: usize = 4;
 /// Constants that differ between parts of the record which are set free for a trial, those that differ most.
 const TRIED: usize = 3;
 
+/// Mean squared error of predicting a row, over the noise's, up to which nothing else changes.
+const WELL: f64 = 1.3;
+
 /// The elements' values and the equations' misfits that weights are made of.
 type Guess = (Vec<f64>, Vec<f64>);
+
+/// A constant that windows follow, and what weights are made of beside it.
+struct Freed {
+    one: usize,
+    found: MergedFit,
+    guess: Guess,
+}
 
 /// What was decided, and the fit it rests on.
 #[derive(Clone)]
@@ -52,13 +67,34 @@ pub(crate) struct MergedFit {
     pub(crate) tests: Vec<(usize, Test)>,
     /// Whether a constant that differs between parts of the record stayed one.
     pub(crate) contradicted: bool,
+    /// Those that a search in what is left found, and whether there was one.
     pub(crate) jumps: Vec<Jump>,
+    pub(crate) searched: bool,
 }
 
 impl MergedFit {
     /// Whether its windows are the shortest of those that were tried.
     pub(crate) fn has_shortest_windows(&self) -> bool {
         self.scales.len() > 1 && self.fit.scale.is_some() && self.scales.first().copied() == self.fit.scale
+    }
+
+    /// Takes tests of its constants; those of what is windowed stand as they were.
+    fn take_tests(&mut self, found: Vec<(usize, Test)>) {
+        self.contradicted = found.iter().any(|(_, test)| test.probability < constancy::NO_CHANCE);
+        self.tests.retain(|(one, _)| self.model.windowed.contains(one));
+        self.tests.extend(found);
+    }
+
+    /// Says of a constant that rows are predicted far better where windows follow it, as another fit does, unless its parts said so.
+    fn contradict(&mut self, one: usize, followed: &MergedFit, rows: usize) {
+        self.contradicted = true;
+        let is_said = |(tested, test): &(usize, Test)| *tested == one && test.probability < constancy::NO_CHANCE;
+        let place = followed.model.windowed.iter().position(|&other| other == one);
+        let Some(place) = place.filter(|_| !self.tests.iter().any(is_said)) else { return };
+        let independent = rows as f64 / self.expected.variance_inflation;
+        let test = Test::of_prediction(self.error / followed.error, independent, &followed.fit.values(place));
+        self.tests.retain(|(tested, _)| *tested != one);
+        self.tests.push((one, test));
     }
 }
 
@@ -125,6 +161,7 @@ impl MergedSession<'_, '_, '_> {
             tests: Vec::new(),
             contradicted: false,
             jumps: Vec::new(),
+            searched: false,
         }))
     }
 
@@ -157,9 +194,8 @@ impl MergedSession<'_, '_, '_> {
     /// Decides, finds jumps and decides again with windows that end there, until no jump is new.
     pub(crate) fn settle(&mut self, model: &Model) -> Result<Option<MergedFit>, Error> {
         let Some(mut fitted) = self.decide(model)? else { return Ok(None) };
-        let samples = |jumps: &[Jump]| jumps.iter().map(|jump| jump.sample).collect::<Vec<_>>();
         for _ in 0..JUMP_ROUNDS {
-            let found = self.find_jumps(&fitted)?;
+            let found = if fitted.searched { fitted.jumps.clone() } else { self.find_jumps(&fitted)? };
             if samples(&found) == samples(&self.jumps) {
                 break;
             }
@@ -180,39 +216,27 @@ impl MergedSession<'_, '_, '_> {
     pub(crate) fn decide(&mut self, model: &Model) -> Result<Option<MergedFit>, Error> {
         let Some(mut fitted) = self.fitted(model)? else { return Ok(None) };
         loop {
-            let tests = self.tests(&fitted)?;
-            let of_constants = fitted.model.constant.iter().copied().zip(tests);
-            let found: Vec<(usize, Test)> = of_constants.filter_map(|(one, test)| Some((one, test?))).collect();
-            fitted.tests.retain(|(one, _)| fitted.model.windowed.contains(one));
-            fitted.tests.extend(found.clone());
-            fitted.contradicted = found.iter().any(|(_, test)| test.probability < constancy::NO_CHANCE);
+            let found = self.tests(&fitted, NoiseFrom::Channels)?;
+            let tried = different(&found);
+            fitted.take_tests(found);
             // What constants leave may be so much that no part of the record differs by more, though one of them changes.
-            let hidden = !fitted.contradicted && fitted.error > NOISE_MODEL_FAILS;
+            let hidden = tried.is_empty() && fitted.error > MORE;
             let before = (self.parameters.clone(), self.misfits.clone());
-            let tried = if hidden { self.suspects(&fitted.model)? } else { self.different(found) };
-            // An unknown that varies makes others seem to vary, too: the one that explains most is set free.
-            let mut best: Option<(MergedFit, Guess)> = None;
-            for one in tried.into_iter().take(TRIED) {
-                (self.parameters, self.misfits) = before.clone();
-                let freer = without(&fitted.model, one);
-                if hidden {
-                    self.begin_with(&freer)?;
-                }
-                let Some(found) = self.fitted(&freer)? else { continue };
-                if best.as_ref().is_none_or(|(best, _)| found.error < best.error) {
-                    best = Some((found, (self.parameters.clone(), self.misfits.clone())));
-                }
-            }
-            let most = if hidden { LACKING } else { BETTER };
-            let free = fitted.model.windowed.is_empty() && !hidden;
-            let better = |found: &MergedFit| free || found.error < most * fitted.error;
-            let Some((found, after)) = best.filter(|(found, _)| better(found)) else {
+            let Some(Freed { one, found, guess }) = self.freed(&fitted, tried, hidden)? else {
                 (self.parameters, self.misfits) = before;
                 self.fill();
-                return Ok(Some(fitted));
+                return self.told_by_what_is_left(fitted).map(Some);
             };
+            if !self.is_open(one) {
+                // What it is asked to be stands, and nothing else is to follow what it does.
+                (self.parameters, self.misfits) = before;
+                self.fill();
+                let mut fitted = self.told_by_what_is_left(fitted)?;
+                fitted.contradict(one, &found, self.all.rows.len());
+                return Ok(Some(fitted));
+            }
             // Windows were compared with weights of parameters that were wrong while this one was held constant.
-            (self.parameters, self.misfits) = after;
+            (self.parameters, self.misfits) = guess;
             self.fill();
             let again = if hidden && self.jumps.is_empty() {
                 // So was the test function.
@@ -223,22 +247,88 @@ impl MergedSession<'_, '_, '_> {
             } else {
                 self.fitted(&found.model)?.unwrap_or(found)
             };
+            let again = self.beside_jumps(again)?;
+            let again = if hidden { again } else { self.or_another(&fitted, again)? };
             fitted = MergedFit { tests: std::mem::take(&mut fitted.tests), ..again };
         }
     }
 
-    /// Constants that nobody asked for and that differ between parts of the record, those first that differ most.
-    fn different(&self, mut found: Vec<(usize, Test)>) -> Vec<usize> {
-        found.retain(|(one, test)| test.probability < constancy::NO_CHANCE && self.is_open(*one));
-        found.sort_by(|a, b| b.1.excess().total_cmp(&a.1.excess()));
-        found.into_iter().map(|(one, _)| one).collect()
+    /// The constant that explains most where windows follow it, if that is worth it: of those that differ between parts of the record, or of all
+    /// where no part can.
+    fn freed(&mut self, fitted: &MergedFit, mut tried: Vec<usize>, hidden: bool) -> Result<Option<Freed>, Error> {
+        let before = (self.parameters.clone(), self.misfits.clone());
+        if hidden {
+            tried = self.suspects(&fitted.model)?;
+        }
+        tried.truncate(TRIED);
+        let mut best: Option<Freed> = None;
+        for one in tried {
+            (self.parameters, self.misfits) = before.clone();
+            let freer = without(&fitted.model, one);
+            if hidden {
+                self.begin_with(&freer)?;
+            }
+            let Some(found) = self.fitted(&freer)? else { continue };
+            if best.as_ref().is_none_or(|best| found.error < best.found.error) {
+                best = Some(Freed { one, found, guess: (self.parameters.clone(), self.misfits.clone()) });
+            }
+        }
+        let may_be_noise = (MORE..NO_NOISE).contains(&fitted.error);
+        let most = match (hidden, may_be_noise) {
+            (true, _) if fitted.error > NOISE_MODEL_FAILS => LACKING,
+            (true, _) | (false, true) => SHOWN,
+            (false, false) => BETTER,
+        };
+        // Where nothing but the noise of the channels is left, or what no noise is, what a test says is enough.
+        let enough = fitted.model.windowed.is_empty() && !hidden && !may_be_noise;
+        let better = |best: &Freed| enough && self.is_open(best.one) || best.found.error < most * fitted.error;
+        Ok(best.filter(better))
     }
 
-    /// Constants that nobody asked for, those first that leave least where short windows follow them.
+    /// A fit beside which an element was set free, or one with another in its place that explains far more: parts hardly differ in what swings
+    /// many times in each, and more in what follows a little of it.
+    fn or_another(&mut self, before: &MergedFit, free: MergedFit) -> Result<MergedFit, Error> {
+        if free.error <= WELL || free.error > MORE {
+            return Ok(free);
+        }
+        let guess = (self.parameters.clone(), self.misfits.clone());
+        let most = self.suspects(&before.model)?.into_iter().next();
+        if let Some(one) = most.filter(|&one| self.is_open(one) && !free.model.windowed.contains(&one)) {
+            (self.parameters, self.misfits) = guess.clone();
+            self.fill();
+            if let Some(found) =
+                self.fitted(&without(&before.model, one))?.filter(|found| found.error < SHOWN * free.error)
+            {
+                return Ok(found);
+            }
+        }
+        (self.parameters, self.misfits) = guess;
+        self.fill();
+        Ok(free)
+    }
+
+    /// A fit whose windows end at jumps, if there are any and it predicts better so: what windows cannot follow makes others seem to vary.
+    fn beside_jumps(&mut self, mut fitted: MergedFit) -> Result<MergedFit, Error> {
+        let found = self.find_jumps(&fitted)?;
+        if samples(&found) != samples(&self.jumps) {
+            let before = (self.jumps.clone(), self.parameters.clone(), self.misfits.clone());
+            self.jumps.clone_from(&found);
+            self.fill();
+            let again = self.fitted(&fitted.model)?;
+            if let Some(again) = again.filter(|again| again.error < fitted.error) {
+                return Ok(again);
+            }
+            (self.jumps, self.parameters, self.misfits) = before;
+            self.fill();
+        }
+        (fitted.jumps, fitted.searched) = (found, true);
+        Ok(fitted)
+    }
+
+    /// Constants, those first that leave least where short windows follow them.
     fn suspects(&mut self, model: &Model) -> Result<Vec<usize>, Error> {
-        let open: Vec<usize> = model.constant.iter().copied().filter(|&one| self.is_open(one)).collect();
         let mut left = Vec::new();
-        for one in open {
+        for one in model.constant.clone() {
             left.extend(self.begin_with(&without(model, one))?.map(|left| (one, left)));
         }
         left.sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -250,23 +340,49 @@ impl MergedSession<'_, '_, '_> {
         self.merged.elements[element].kind == Kind::Automatic
     }
 
-    /// Whether each constant is the same in all parts of the record.
-    fn tests(&mut self, fitted: &MergedFit) -> Result<Vec<Option<Test>>, Error> {
+    /// A fit with tests that rest on what is left, where that is more than the noise of the channels: that may be coloured.
+    fn told_by_what_is_left(&mut self, mut fitted: MergedFit) -> Result<MergedFit, Error> {
+        if fitted.error > MORE {
+            let found = self.tests(&fitted, NoiseFrom::Equations)?;
+            fitted.take_tests(found);
+        }
+        Ok(fitted)
+    }
+
+    /// Whether each constant is the same in all parts of the record, beside the noise of the channels or what is left.
+    fn tests(&mut self, fitted: &MergedFit, from: NoiseFrom) -> Result<Vec<(usize, Test)>, Error> {
         if self.asks_for_constants() && fitted.error > NOISE_MODEL_FAILS {
             // By how much constants may differ is not known where the noise that is left is not.
-            return Ok(vec![None; fitted.model.constant.len()]);
+            return Ok(Vec::new());
         }
-        let rows = &self.all.rows;
-        let problem = fitted.model.problem(rows, &rows.rhs, 1.0, Some(&fitted.correlated));
-        let noise = TestNoise {
-            expected: fitted.expected,
-            covariance: &fitted.covariance,
-            inflation: fitted.error.max(1.0),
-            from: NoiseFrom::Channels,
-            equations: self.merged.equations(),
+        let NoiseOfRows { covariance, expected, inflation, from } = match from {
+            NoiseFrom::Channels => NoiseOfRows::of_channels(fitted),
+            NoiseFrom::Equations => self.noise_of_rows(fitted)?,
         };
-        constancy::test(&problem, &fitted.fit, noise, self.options.instructions, &mut self.stages)
+        let rows = &self.all.rows;
+        let shown = match from {
+            NoiseFrom::Channels => None,
+            NoiseFrom::Equations => Some(fitted.model.correlated(rows, &covariance, &mut self.stages)?),
+        };
+        let correlated = shown.as_ref().unwrap_or(&fitted.correlated);
+        let problem = fitted.model.problem(rows, &rows.rhs, 1.0, Some(correlated));
+        let equations = self.merged.equations();
+        let noise = TestNoise { expected, covariance: &covariance, inflation, from, equations };
+        let tests = constancy::test(&problem, &fitted.fit, noise, self.options.instructions, &mut self.stages)?;
+        let of_constants = fitted.model.constant.iter().copied().zip(tests);
+        Ok(of_constants.filter_map(|(one, test)| Some((one, test?))).collect())
     }
+}
+
+/// Constants that differ between parts of the record, those first that differ most.
+fn different(found: &[(usize, Test)]) -> Vec<usize> {
+    let mut found: Vec<_> = found.iter().filter(|(_, test)| test.probability < constancy::NO_CHANCE).collect();
+    found.sort_by(|a, b| b.1.excess().total_cmp(&a.1.excess()));
+    found.into_iter().map(|(one, _)| *one).collect()
+}
+
+fn samples(jumps: &[Jump]) -> Vec<usize> {
+    jumps.iter().map(|jump| jump.sample).collect()
 }
 
 /// A model with one constant less, which is windowed.

@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::exec::pool::Watch;
 use crate::exec::stages::Stages;
 use crate::identify::merged::choice::noise_of;
+use crate::identify::merged::defects::within_limits;
 use crate::identify::merged::fading::colours_of;
 use crate::identify::merged::found::MergedFound;
 use crate::identify::merged::interleaved::{Interleaved, Weights};
@@ -24,6 +25,16 @@ const FADINGS: usize = 3;
 /// # Errors
 /// If records are too short, settings are impossible, or the watch cancels.
 pub fn identify_merged(
+    merged: &Merged<'_>,
+    options: &MergedOptions,
+    workers: NonZeroUsize,
+    watch: &mut Watch<'_>,
+) -> Result<MergedFound, Error> {
+    within_limits(merged, |merged| identify_within(merged, options, workers, watch))
+}
+
+/// Identifies what trials and masses share where samples that a recorder spoilt are missing.
+fn identify_within(
     merged: &Merged<'_>,
     options: &MergedOptions,
     workers: NonZeroUsize,

@@ -4,6 +4,8 @@ use crate::identify::kinds::Kind;
 use crate::identify::results::{Constant, SampleResults};
 use crate::identify::scanned::Scan;
 use crate::inference::constancy::Test;
+use crate::inference::missing_terms::Suspect;
+use crate::noise::defects::Defect;
 use crate::status::Status;
 
 /// What was found of one unknown element.
@@ -67,6 +69,10 @@ pub struct MergedFound {
     pub jumps: Vec<usize>,
     /// Estimates by the width of the test function; empty where something is windowed or the width was given.
     pub scan: Scan,
+    /// What was done to channels, angles before torques.
+    pub defects: Vec<(usize, Defect)>,
+    /// Equations whose torque seems to be late, and by how many samples.
+    pub late: Vec<(usize, Suspect)>,
 }
 
 impl MergedFound {

@@ -2,15 +2,18 @@
 
 pub(crate) mod choice;
 pub(crate) mod colour;
+pub(crate) mod defects;
 pub(crate) mod fading;
 pub(crate) mod fitted;
 pub(crate) mod form;
 pub(crate) mod found;
 pub(crate) mod interleaved;
 pub(crate) mod jumps;
+pub(crate) mod lags;
 pub(crate) mod report;
 pub(crate) mod scan;
 pub(crate) mod session;
+pub(crate) mod shown;
 pub(crate) mod silent;
 pub(crate) mod spread;
 pub(crate) mod system;

@@ -1,6 +1,7 @@
 //! Values, standard errors and flags from merged rows.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use crate::error::Error;
 use crate::identify::kinds::Kind;
@@ -9,13 +10,15 @@ use crate::identify::merged::found::{FoundElement, MergedFound};
 use crate::identify::merged::session::MergedSession;
 use crate::identify::results::{RowResults, SampleResults};
 use crate::identify::scanned::Scan;
+use crate::inference::constancy::NoiseFrom;
 use crate::inference::identifiability::is_mostly_noise;
 use crate::inference::window_averaging::{Averages, average};
-use crate::regression::constants::weakest;
+use crate::regression::constants::{Expected, weakest};
 use crate::regression::limits::{HARDLY_TOLD_APART, NOISE_MODEL_FAILS};
 use crate::regression::magnitudes::Magnitudes;
 use crate::regression::model::Model;
 use crate::regression::predictor::without_constants;
+use crate::regression::problem::Correlated;
 use crate::regression::residuals::residuals;
 use crate::regression::sandwich::joint_covariance;
 use crate::regression::solved::sensitivity;
@@ -34,10 +37,15 @@ impl MergedSession<'_, '_, '_> {
     /// What there is to say of everything; the numbers at the rows are left to be put at the samples.
     pub(crate) fn report(&mut self, fitted: &MergedFit) -> Result<(MergedFound, RowResults), Error> {
         let (model, fit) = (&fitted.model, &fitted.fit);
-        let inflation = fitted.error.max(1.0);
+        let noise = self.noise_of_rows(fitted)?;
+        let inflation = noise.inflation;
         let rows = &self.all.rows;
-        let problem = model.problem(rows, &rows.rhs, 1.0, Some(&fitted.correlated));
-        let mut covariance = fit.covariance(&problem, &fitted.covariance, &mut self.stages)?;
+        let correlated = match noise.from {
+            NoiseFrom::Channels => Arc::clone(&fitted.correlated),
+            NoiseFrom::Equations => model.correlated(rows, &noise.covariance, &mut self.stages)?,
+        };
+        let problem = model.problem(rows, &rows.rhs, 1.0, Some(&correlated));
+        let mut covariance = fit.covariance(&problem, &noise.covariance, &mut self.stages)?;
         for entry in &mut covariance {
             *entry *= inflation;
         }
@@ -48,9 +56,9 @@ impl MergedSession<'_, '_, '_> {
         }
         let weakest = weakest(&fit.full, &fit.pooled.weights);
         let mostly_noise = is_mostly_noise(&problem, rows, model, fit, &weakest, 1.0, &mut self.stages)?;
-        let averages = self.averages(fitted)?;
+        let averages = self.averages(fitted, &correlated, noise.expected)?;
         let AtRows { status, errors, covariances, pairs } = self.at_rows(fitted, &averages, &covariance, inflation);
-        let spread = self.spread(fitted, &averages.values, inflation);
+        let spread = self.spread(fitted, &averages.values, &noise);
         let count = model.constant.len();
         let kind = |place: usize| if place < model.windowed.len() { Kind::Windowed } else { Kind::Constant };
         let elements = model.windowed.iter().chain(&model.constant).enumerate().zip(spread);
@@ -80,6 +88,8 @@ impl MergedSession<'_, '_, '_> {
         }
         found.scan = std::mem::take(&mut self.scan);
         found.record_status |= found.scan.status(&found.constants_found());
+        found.late = self.late_torques(fitted, &noise, &correlated)?;
+        found.record_status |= if found.late.is_empty() { Status::GOOD } else { Status::LAG_SUSPECTED };
         let deviation = self.deviation(fitted)?;
         let ([first, stride], period) = (self.all.samples(), self.all.rows.period);
         let results = RowResults {
@@ -98,14 +108,19 @@ impl MergedSession<'_, '_, '_> {
     }
 
     /// Windowed elements at every row.
-    fn averages(&mut self, fitted: &MergedFit) -> Result<Averages, Error> {
+    fn averages(
+        &mut self,
+        fitted: &MergedFit,
+        correlated: &Arc<Correlated>,
+        expected: Expected,
+    ) -> Result<Averages, Error> {
         let (model, fit) = (&fitted.model, &fitted.fit);
         if model.windowed.is_empty() {
             return Ok(Averages::default());
         }
         let rows = &self.all.rows;
         let constants = &fit.pooled.values;
-        let whole = model.problem(rows, &rows.rhs, 1.0, Some(&fitted.correlated));
+        let whole = model.problem(rows, &rows.rhs, 1.0, Some(correlated));
         let rhs = without_constants(&whole, constants);
         let rest = model.without_constants(rows, &whole, &rhs, constants, 1.0);
         let thinned = stretches_of_rows(rows.len()).map(|stretches| thinned_rows(rows, &stretches));
@@ -115,8 +130,27 @@ impl MergedSession<'_, '_, '_> {
             .as_ref()
             .zip(of_thinned.as_ref())
             .map(|(rows, problem)| model.without_constants(rows, problem, &thinned_rhs, constants, 1.0));
-        let judged = (fitted.expected, fit.span, 0..rows.len());
-        average(&rest, of_thinned.as_ref(), &fitted.scales, judged, self.options.instructions, &mut self.stages)
+        let judged = (expected, fit.span, 0..rows.len());
+        let instructions = self.options.instructions;
+        let mut averages = average(&rest, of_thinned.as_ref(), &fitted.scales, judged, instructions, &mut self.stages)?;
+        self.forget_untold(model, &mut averages);
+        Ok(averages)
+    }
+
+    /// Makes an element no number at times at which equations without it hold and none with it: to a solver it is zero there, without an error.
+    fn forget_untold(&self, model: &Model, averages: &mut Averages) {
+        let (rows, group, equations) = (&self.all.rows, self.all.group, self.merged.equations());
+        let usable = &self.whole.as_ref().unwrap_or(rows).usable;
+        for (place, &element) in model.windowed.iter().enumerate() {
+            let entries = &self.merged.elements[element].entries;
+            let is_of = |row: usize| entries.iter().any(|entry| entry.equation == row % equations);
+            for (time, usable) in usable.chunks(group).enumerate() {
+                let is_told = (0..usable.len()).any(|row| usable[row] && is_of(row));
+                if !is_told && usable.iter().any(|usable| *usable) {
+                    (time * group..time * group + usable.len()).for_each(|row| averages.forget(place, row));
+                }
+            }
+        }
     }
 
     /// Flags and standard errors of windowed elements, by row.
@@ -127,8 +161,11 @@ impl MergedSession<'_, '_, '_> {
         let mut status = vec![0; rows.len()];
         let usable = &self.whole.as_ref().unwrap_or(rows).usable;
         for (time, usable) in usable.chunks(group).enumerate() {
-            // What one trial misses others have.
-            let gap = if usable.iter().any(|usable| *usable) { Status::GOOD } else { Status::GAP };
+            // What one trial misses others have; an element that is in none of the others' equations has no number.
+            let lacks = || averages.values.iter().any(|column| column[time * group].is_nan());
+            let is_whole = usable.iter().all(|usable| *usable);
+            let gap =
+                if is_whole || usable.iter().any(|usable| *usable) && !lacks() { Status::GOOD } else { Status::GAP };
             for row in time * group..time * group + usable.len() {
                 let mut here = gap;
                 if averages.values.iter().any(|column| !column[row].is_finite()) {
@@ -259,6 +296,8 @@ impl MergedSession<'_, '_, '_> {
             record_status: Status::GOOD,
             jumps: Vec::new(),
             scan: Scan::default(),
+            defects: Vec::new(),
+            late: Vec::new(),
         }
     }
 

@@ -13,7 +13,7 @@ use crate::regression::residuals::{residuals, usual_variance};
 
 impl MergedSession<'_, '_, '_> {
     /// Whether no torque acts on a mass.
-    fn is_silent(&self, equation: usize) -> bool {
+    pub(crate) fn is_silent(&self, equation: usize) -> bool {
         self.noise[1].get(equation) == Some(&0.0) && self.trials.iter().all(|trial| trial.mean_square(equation) == 0.0)
     }
 

@@ -8,6 +8,7 @@ use faer::linalg::solvers::{DenseSolveCore, Llt};
 
 use crate::identify::merged::fitted::MergedFit;
 use crate::identify::merged::session::MergedSession;
+use crate::identify::merged::shown::NoiseOfRows;
 use crate::regression::predictor::without_constants;
 use crate::regression::row_covariance::RowCovariance;
 
@@ -17,7 +18,7 @@ const ROWS_OF_AN_ELEMENT: usize = 4;
 impl MergedSession<'_, '_, '_> {
     /// By how much every element of each trial differs from that of all trials, with its standard error: by the element, constants last, then
     /// by trial. Not numbers where a trial does not tell.
-    pub(crate) fn spread(&self, fitted: &MergedFit, tracks: &[Vec<f64>], inflation: f64) -> Vec<Vec<(f64, f64)>> {
+    pub(crate) fn spread(&self, fitted: &MergedFit, tracks: &[Vec<f64>], noise: &NoiseOfRows) -> Vec<Vec<(f64, f64)>> {
         let (trials, equations, group) = (self.merged.trials.len(), self.merged.equations(), self.all.group);
         let model = &fitted.model;
         let elements: Vec<usize> = model.windowed.iter().chain(&model.constant).copied().collect();
@@ -58,7 +59,7 @@ impl MergedSession<'_, '_, '_> {
                 for &row in &rows {
                     moved[row] = (0..size).map(|i| inverse[(place, i)] * at(i, row)).sum();
                 }
-                let error = (inflation * quadratic(&moved, &fitted.covariance)).max(0.0).sqrt();
+                let error = (noise.inflation * quadratic(&moved, &noise.covariance)).max(0.0).sqrt();
                 spread[trial] = (value / scale[place], error / scale[place]);
             }
         }

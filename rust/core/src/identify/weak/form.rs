@@ -198,7 +198,7 @@ fn clipped_at(motion: &Motion<'_>, defects: &[Vec<Defect>]) -> Option<[f64; 2]> 
 }
 
 /// The limits that a defect is about.
-fn limits_of(defect: &Defect) -> Option<[f64; 2]> {
+pub(crate) fn limits_of(defect: &Defect) -> Option<[f64; 2]> {
     match defect {
         Defect::Clipped { limits, .. } => Some(*limits),
         _ => None,
@@ -378,7 +378,7 @@ fn defects_of_rate(rate: &dyn Samples) -> Vec<Defect> {
 }
 
 /// What was done to the torque. One that stays at a limit is what the drive does if that is not known to be the recorder's, and wrapping is for angles.
-fn defects_of_torque(torque: &dyn Samples, recorder_limits: bool) -> Vec<Defect> {
+pub(crate) fn defects_of_torque(torque: &dyn Samples, recorder_limits: bool) -> Vec<Defect> {
     let is_done = |defect: &Defect| match defect {
         Defect::Held(_) | Defect::Interpolated(_) => true,
         Defect::Clipped { .. } => recorder_limits,

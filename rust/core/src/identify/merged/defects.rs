@@ -1,0 +1,121 @@
+//! What a recorder did to the channels of trials and masses.
+//!
+//! An angle at its limits is missing there. A torque that stays at a limit is what a drive does, and counts, unless rows are predicted badly
+//! with such samples and better without them: then the recorder had the limit.
+
+use crate::error::Error;
+use crate::identify::merged::found::MergedFound;
+use crate::identify::merged::system::{Merged, Trial};
+use crate::identify::weak::decide::{BADLY, BETTER};
+use crate::identify::weak::form::{defects_of_torque, limits_of};
+use crate::noise::defects::{Defect, Within, defects};
+use crate::record::samples::Samples;
+use crate::status::Status;
+
+/// What was done to every channel of every trial, angles before torques.
+type OfChannels = Vec<Vec<Vec<Defect>>>;
+
+/// Identifies without what a recorder spoilt, and says what that was.
+///
+/// # Errors
+/// If the work fails.
+pub(crate) fn within_limits(
+    merged: &Merged<'_>,
+    mut identify: impl FnMut(&Merged<'_>) -> Result<MergedFound, Error>,
+) -> Result<MergedFound, Error> {
+    let angles = merged.channels();
+    let of_channels = |trial: &Trial<'_>| -> Vec<Vec<Defect>> {
+        let of_angles = trial.angles.iter().map(|angle| defects(*angle));
+        of_angles.chain(trial.torques.iter().map(|torque| defects_of_torque(*torque, true))).collect()
+    };
+    let mut spoilt: OfChannels = merged.trials.iter().map(of_channels).collect();
+    without_common_lines(&mut spoilt);
+    let whole = with_limits(merged, &spoilt, |channel| channel < angles, &mut identify)?;
+    let disagrees = whole.record_status.contains(Status::SCALES_DISAGREE);
+    let is_bad = whole.prediction_error >= BADLY || disagrees;
+    let at_limits = |one: &Vec<Defect>| one.iter().any(|defect| limits_of(defect).is_some());
+    let has_limits = spoilt.iter().any(|trial| trial[angles..].iter().any(at_limits));
+    if is_bad && has_limits {
+        let within = match with_limits(merged, &spoilt, |_| true, &mut identify) {
+            Err(Error::Cancelled) => return Err(Error::Cancelled),
+            Ok(within) if !within.record_status.contains(Status::RANK_DEFICIENT) => Some(within),
+            _ => None,
+        };
+        let is_better = |within: &MergedFound| {
+            let agrees = disagrees && !within.record_status.contains(Status::SCALES_DISAGREE);
+            within.prediction_error < BETTER * whole.prediction_error
+                || agrees && within.prediction_error <= whole.prediction_error
+        };
+        if let Some(within) = within.filter(is_better) {
+            return Ok(told(within, spoilt, |_| true));
+        }
+    }
+    Ok(told(whole, spoilt, |channel| channel < angles))
+}
+
+/// Forgets lines between readings that all channels have: these change no equation.
+fn without_common_lines(spoilt: &mut OfChannels) {
+    let is_line = |one: &Defect| matches!(one, Defect::Interpolated(_));
+    let all = spoilt.iter().flatten().all(|channel| channel.iter().any(is_line));
+    if all {
+        spoilt.iter_mut().flatten().for_each(|channel| channel.retain(|one| !is_line(one)));
+    }
+}
+
+/// Identifies with samples at the limits of some channels missing.
+fn with_limits(
+    merged: &Merged<'_>,
+    spoilt: &OfChannels,
+    of: impl Fn(usize) -> bool,
+    identify: &mut impl FnMut(&Merged<'_>) -> Result<MergedFound, Error>,
+) -> Result<MergedFound, Error> {
+    let limits_of_channel = |(channel, defects): (usize, &Vec<Defect>)| {
+        let limits = defects.iter().find_map(limits_of).filter(|_| of(channel));
+        limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])
+    };
+    let limits: Vec<Vec<[f64; 2]>> =
+        spoilt.iter().map(|trial| trial.iter().enumerate().map(limits_of_channel).collect()).collect();
+    if limits.iter().flatten().all(|limits| limits[0].is_infinite()) {
+        return identify(merged);
+    }
+    let channels: Vec<Vec<Within<'_>>> =
+        merged.trials.iter().zip(&limits).map(|(trial, limits)| bounded(trial, limits)).collect();
+    let trials = merged.trials.iter().zip(&channels).map(|(trial, channels)| {
+        let (angles, torques) = channels.split_at(trial.angles.len());
+        Trial { angles: read(angles), torques: read(torques), ..trial.clone() }
+    });
+    identify(&Merged { trials: trials.collect(), elements: merged.elements.clone(), samples: merged.samples })
+}
+
+/// The channels of a trial, each within its limits.
+fn bounded<'a>(trial: &Trial<'a>, limits: &[[f64; 2]]) -> Vec<Within<'a>> {
+    let channels = trial.angles.iter().chain(&trial.torques).zip(limits);
+    channels.map(|(&channel, &limits)| Within { channel, limits }).collect()
+}
+
+fn read<'a>(channels: &'a [Within<'a>]) -> Vec<&'a dyn Samples> {
+    channels.iter().map(|one| one as &dyn Samples).collect()
+}
+
+/// Says what was done to channels: of trials what the first one with it has. Limits count where samples at them are missing.
+fn told(mut found: MergedFound, spoilt: OfChannels, left_out: impl Fn(usize) -> bool) -> MergedFound {
+    for trial in spoilt {
+        for (channel, defects) in trial.into_iter().enumerate() {
+            for mut defect in defects {
+                if limits_of(&defect).is_some() {
+                    if !left_out(channel) {
+                        continue;
+                    }
+                    defect.leave_out();
+                }
+                if !found.defects.iter().any(|(other, one)| *other == channel && one.name() == defect.name()) {
+                    found.defects.push((channel, defect));
+                }
+            }
+        }
+    }
+    if found.defects.iter().any(|(_, defect)| defect.is_doubtful()) {
+        found.record_status |= Status::CHANNEL_SUSPECTED;
+    }
+    found
+}
