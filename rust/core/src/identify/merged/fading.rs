@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::exec::pool::Piece;
-use crate::identify::merged::fitted::MergedFit;
+use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::MergedSession;
 use crate::noise::colour::coloured_noise;
 use crate::noise::correlated::CorrelatedNoise;

@@ -1,22 +1,18 @@
 //! Decisions from merged rows: the length of windows, and which elements are constant.
 
-use std::sync::Arc;
-
 use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::identify::kinds::Kind;
+use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::MergedSession;
 use crate::identify::merged::shown::{MORE, NoiseOfRows};
 use crate::inference::constancy::{self, NoiseFrom, Test, TestNoise};
 use crate::inference::cross_validation::{Validated, best, validate};
 use crate::inference::jumps::jump::Jump;
-use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
-use crate::regression::problem::Correlated;
 use crate::regression::residuals::residuals;
-use crate::regression::row_covariance::RowCovariance;
 use crate::regression::subsample::{holds, stretches_of_rows, thinned_rows};
 use crate::regression::window_length::Scale;
 
@@ -47,55 +43,6 @@ struct Freed {
     one: usize,
     found: MergedFit,
     guess: Guess,
-}
-
-/// What was decided, and the fit it rests on.
-#[derive(Clone)]
-pub(crate) struct MergedFit {
-    pub(crate) model: Model,
-    pub(crate) fit: Fit,
-    pub(crate) covariance: RowCovariance,
-    pub(crate) correlated: Arc<Correlated>,
-    pub(crate) expected: Expected,
-    /// Mean squared error of predicting a row from others, over the noise's.
-    pub(crate) error: f64,
-    /// The largest misfit of an equation without a torque; 1 where all are explained.
-    pub(crate) misfit: f64,
-    pub(crate) scales: Vec<Scale>,
-    /// Lengths that were tried, in samples, and the error of each.
-    pub(crate) lengths: Vec<(usize, f64)>,
-    pub(crate) tests: Vec<(usize, Test)>,
-    /// Whether a constant that differs between parts of the record stayed one.
-    pub(crate) contradicted: bool,
-    /// Those that a search in what is left found, and whether there was one.
-    pub(crate) jumps: Vec<Jump>,
-    pub(crate) searched: bool,
-}
-
-impl MergedFit {
-    /// Whether its windows are the shortest of those that were tried.
-    pub(crate) fn has_shortest_windows(&self) -> bool {
-        self.scales.len() > 1 && self.fit.scale.is_some() && self.scales.first().copied() == self.fit.scale
-    }
-
-    /// Takes tests of its constants; those of what is windowed stand as they were.
-    fn take_tests(&mut self, found: Vec<(usize, Test)>) {
-        self.contradicted = found.iter().any(|(_, test)| test.probability < constancy::NO_CHANCE);
-        self.tests.retain(|(one, _)| self.model.windowed.contains(one));
-        self.tests.extend(found);
-    }
-
-    /// Says of a constant that rows are predicted far better where windows follow it, as another fit does, unless its parts said so.
-    fn contradict(&mut self, one: usize, followed: &MergedFit, rows: usize) {
-        self.contradicted = true;
-        let is_said = |(tested, test): &(usize, Test)| *tested == one && test.probability < constancy::NO_CHANCE;
-        let place = followed.model.windowed.iter().position(|&other| other == one);
-        let Some(place) = place.filter(|_| !self.tests.iter().any(is_said)) else { return };
-        let independent = rows as f64 / self.expected.variance_inflation;
-        let test = Test::of_prediction(self.error / followed.error, independent, &followed.fit.values(place));
-        self.tests.retain(|(tested, _)| *tested != one);
-        self.tests.push((one, test));
-    }
 }
 
 impl MergedSession<'_, '_, '_> {

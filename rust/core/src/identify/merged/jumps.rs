@@ -2,7 +2,7 @@
 
 use crate::equation::rows::Rows;
 use crate::error::Error;
-use crate::identify::merged::fitted::MergedFit;
+use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::MergedSession;
 use crate::identify::merged::system::Multiplied;
 use crate::inference::jumps::jump::{Jump, JumpSearch};

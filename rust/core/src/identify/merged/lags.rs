@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::equation::motion::Coefficient;
 use crate::equation::rows::Regressor;
 use crate::error::Error;
-use crate::identify::merged::fitted::MergedFit;
+use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::MergedSession;
 use crate::identify::merged::shown::NoiseOfRows;
 use crate::inference::missing_terms::{JudgedTerm, Missing, Suspect};

@@ -2,6 +2,7 @@
 
 pub(crate) mod choice;
 pub(crate) mod colour;
+pub(crate) mod decided;
 pub(crate) mod defects;
 pub(crate) mod fading;
 pub(crate) mod fitted;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::error::Error;
 use crate::identify::kinds::Kind;
-use crate::identify::merged::fitted::MergedFit;
+use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::found::{FoundElement, MergedFound};
 use crate::identify::merged::session::MergedSession;
 use crate::identify::results::{RowResults, SampleResults};

@@ -5,7 +5,7 @@
 //! equation: every torque has another noise.
 
 use crate::error::Error;
-use crate::identify::merged::fitted::MergedFit;
+use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::MergedSession;
 use crate::inference::constancy::NoiseFrom;
 use crate::regression::constants::Expected;

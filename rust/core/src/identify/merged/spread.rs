@@ -6,7 +6,7 @@
 use faer::Mat;
 use faer::linalg::solvers::{DenseSolveCore, Llt};
 
-use crate::identify::merged::fitted::MergedFit;
+use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::MergedSession;
 use crate::identify::merged::shown::NoiseOfRows;
 use crate::regression::predictor::without_constants;
