@@ -223,6 +223,23 @@ def test_forgetting_weighs_equations_by_their_age() -> None:
         assert np.allclose(found, expected, rtol=1e-6)
 
 
+def test_what_a_stream_gave_pickles_with_its_names() -> None:
+    more: dict[str, Any] = {"sample_rate": 1000, "method": "paper", "inertia": 0.0124, "start": 2.0}
+    out = tvident.IdentificationStream(**more).push(ANGLE[:1000], TORQUE[:1000])
+    kept = pickle.loads(pickle.dumps(out))  # noqa: S301 - our own
+    assert list(kept.values) == list(kept.stderr) == ["damping", "stiffness", "inertia"]
+    for one in (out, kept):
+        assert one.time[0] == 2.0
+        assert np.all(one.inertia == 0.0124)
+        assert np.all(one.stderr["inertia"] == 0)
+        assert one.terms == {}
+        assert one.values is one.values
+    for name in ("time", "stiffness", "residual_std", "condition", "order", "status", "trusted"):
+        assert np.array_equal(getattr(kept, name), getattr(out, name), equal_nan=name != "trusted"), name
+    assert np.array_equal(kept.stderr["damping"], out.stderr["damping"], equal_nan=True)
+    assert repr(out) == f"<StreamedIdentification of damping, stiffness at {out.time.size} samples>"
+
+
 def test_what_is_held_stays_and_what_is_reset_begins_anew() -> None:
     more: dict[str, Any] = {"sample_rate": 1000, "method": StrongForm(), **CONSTANT, "terms": (), "quantisation": 0}
     stream = tvident.IdentificationStream(**more)

@@ -10,21 +10,44 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident import _core
 from tvident._equation import COEFFICIENTS, LINEAR_UNITS, UNITS, GivenTerm, Parameter
 from tvident._identify import Method
 from tvident._pieces import Given
 from tvident._status import DOUBTFUL, Status
-from tvident._stream.asked import StreamWork, asked_of
-from tvident._stream.pieces import SampleStream
-from tvident._stream.weak import WeakStream
+from tvident._stream.asked import Equation, StreamWork, asked_of
+from tvident._stream.pieces import SampleStream, is_plain, times
+from tvident._stream.weak import BlockParameters, WeakStream
 from tvident._units import ROTARY, axis_of, factor_said, scaled
 
 Numbers = npt.NDArray[np.float64]
 
+_NOTHING = np.empty(0)
 
-@dataclass(frozen=True, eq=False, slots=True)
+
+@dataclass(frozen=True)
+class Named:
+    """What turns numbers of a stream into results: one for all that it gives.
+
+    Parameters
+    ----------
+    equation : Equation
+    period, start : float
+        Seconds from one sample to the next, and the time of the first.
+    step : int
+        Samples from one result to the next.
+    """
+
+    equation: Equation
+    period: float
+    start: float
+    step: int
+
+
 class StreamedIdentification:
     """What an :class:`IdentificationStream` gives for some samples, each with one element of every array.
+
+    Names are put on numbers once they are asked for: a sample that comes alone costs more in names than in arithmetic.
 
     Attributes
     ----------
@@ -40,13 +63,70 @@ class StreamedIdentification:
         As in :class:`tvident.Identification`.
     """
 
-    time: Numbers
-    values: Mapping[str, Numbers]
-    stderr: Mapping[str, Numbers]
-    residual_std: Numbers
-    condition: Numbers
-    order: npt.NDArray[np.uint8]
-    status: npt.NDArray[np.uint16]
+    __slots__ = ("_found", "_named", "_stderr", "_time", "_values")
+
+    def __init__(self, found: BlockParameters | _core.StreamedParameters, named: Named) -> None:
+        self._found, self._named = found, named
+        # No cached properties: Python 3.11 locks them, which takes longer than what they hold.
+        self._time: Numbers | None = None
+        self._values: dict[str, Numbers] | None = None
+        self._stderr: dict[str, Numbers] | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        found = self._found
+        kept = BlockParameters(found.first, found.numbers, found.order, found.status)
+        return type(self), (kept, self._named)
+
+    def __repr__(self) -> str:
+        return f"<StreamedIdentification of {', '.join(self._named.equation.names)} at {self.status.size} samples>"
+
+    @property
+    def time(self) -> Numbers:
+        """Times of the samples, in seconds."""
+        if self._time is None:
+            named = self._named
+            self._time = times(self._found.first, self.status.size, named.step, named.period, named.start)
+        return self._time
+
+    @property
+    def values(self) -> Mapping[str, Numbers]:
+        """Inertia, damping, stiffness and terms, by name."""
+        if self._values is None:
+            equation = self._named.equation
+            self._values = dict(zip(equation.names, self._found.numbers, strict=False))
+            for name, known in equation.held:
+                self._values[name] = np.full(self.status.size, known)
+        return self._values
+
+    @property
+    def stderr(self) -> Mapping[str, Numbers]:
+        """Standard errors of the values, by name."""
+        if self._stderr is None:
+            equation = self._named.equation
+            self._stderr = dict(zip(equation.names, self._found.numbers[len(equation.names) :], strict=False))
+            for name, _ in equation.held:
+                self._stderr[name] = np.zeros(self.status.size)
+        return self._stderr
+
+    @property
+    def residual_std(self) -> Numbers:
+        """Standard deviation of the residuals, in N m."""
+        return np.asarray(self._found.numbers[-2])
+
+    @property
+    def condition(self) -> Numbers:
+        """Condition numbers of the equations."""
+        return np.asarray(self._found.numbers[-1])
+
+    @property
+    def order(self) -> npt.NDArray[np.uint8]:
+        """Orders of the polynomials."""
+        return self._found.order
+
+    @property
+    def status(self) -> npt.NDArray[np.uint16]:
+        """Flags: bits of :class:`tvident.Status`."""
+        return self._found.status
 
     @property
     def inertia(self) -> Numbers:
@@ -232,6 +312,9 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         self._step = arguments.whole_number("step", step, least=1)
         self._start = arguments.finite_number("start", start)
         self._hold = False
+        self._named = Named(self._asked.equation, self._period, self._start, self._step)
+        # Whether an array of floats is taken as it is.
+        self._plain = self._policy != "raise" and all(self._factor(name, _NOTHING) == 1 for name in ("angle", "torque"))
         self._stream = self._begun(None)
 
     def _begun(self, state: Any) -> StreamWork:
@@ -328,13 +411,17 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         Equations (1) to (9) of docs/mathematics.md, (A) of docs/automatic.md; the delay is explained in docs/real-time.md.
         """
         self._check_open()
-        angles, torques = self._piece("angle", angle), self._piece("torque", torque)
-        if angles.size != torques.size:
+        if not (self._plain and is_plain(angle) and is_plain(torque)):
+            angle, torque = self._channel("angle", angle), self._channel("torque", torque)
+        if angle.size != torque.size:
             raise ValueError(
-                f"angle and torque must have as many samples as each other; got {angles.size} and {torques.size}; push them together"
+                f"angle and torque must have as many samples as each other; got {angle.size} and {torque.size}; push them together"
             )
-        by_angle, by_torque = self._factor("angle", angle), self._factor("torque", torque)
-        return self._given(self._stream.push(scaled(angles, by_angle), scaled(torques, by_torque)))
+        return StreamedIdentification(self._stream.push(angle, torque), self._named)
+
+    def _channel(self, name: Literal["angle", "torque"], values: Any) -> npt.NDArray[Any]:
+        """Return a piece of a channel in the units of the equation."""
+        return scaled(self._piece(name, values), self._factor(name, values))
 
     def _factor(self, name: Literal["angle", "torque"], values: Any) -> float:
         """Return what a piece is multiplied by: by the unit that was given, or else the one that it says."""
@@ -342,21 +429,7 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         return factor_said(self._axis.system, name, values) if name in self._axis.assumed else given
 
     def _given(self, found: Any) -> StreamedIdentification:
-        count = found.status.size
-        equation = self._asked.equation
-        values = dict(zip(equation.names, found.values, strict=True))
-        errors = dict(zip(equation.names, found.stderr, strict=True))
-        for name, known in equation.held:
-            values[name], errors[name] = np.full(count, known), np.zeros(count)
-        return StreamedIdentification(
-            self._times(found.first, count),
-            values,
-            errors,
-            found.residual_std,
-            found.condition,
-            found.order,
-            found.status,
-        )
+        return StreamedIdentification(found, self._named)
 
     def __repr__(self) -> str:
         names = ", ".join(self._asked.equation.names)

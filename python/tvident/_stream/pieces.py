@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeGuard, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -126,8 +126,19 @@ class SampleStream(Stream[Out]):
 
     def _times(self, first: int, count: int) -> npt.NDArray[np.float64]:
         """Return the times of some samples, every so many of them."""
-        times = np.float64(self._period) * np.arange(first, first + count * self._step, self._step)
-        return times if self._start == 0 else times + self._start
+        return times(first, count, self._step, self._period, self._start)
+
+
+def times(first: int, count: int, step: int, period: float, start: float) -> npt.NDArray[np.float64]:
+    """Return the times of some samples, every so many of them."""
+    # Numbers of samples are exact as floats, which NumPy multiplies in a third of the time that whole numbers take.
+    numbers = np.arange(float(first), float(first + count * step), float(step))
+    return numbers * period if start == 0 else numbers * period + start
+
+
+def is_plain(values: npt.ArrayLike) -> TypeGuard[npt.NDArray[np.float64]]:
+    """Return whether a piece is an array of floats along one axis, and nothing more."""
+    return type(values) is np.ndarray and values.ndim == 1 and values.dtype == _FLOAT64
 
 
 def piece(name: str, values: npt.ArrayLike) -> npt.NDArray[Any]:
@@ -135,7 +146,7 @@ def piece(name: str, values: npt.ArrayLike) -> npt.NDArray[Any]:
     # What comes a thousand times a second goes the short way.
     if type(values) is float:
         return np.array((values,))
-    if type(values) is np.ndarray and values.ndim == 1 and values.dtype == _FLOAT64:
+    if is_plain(values):
         return values
     array = arguments.any_array(name, values)
     if array.ndim > 1:

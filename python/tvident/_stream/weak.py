@@ -44,17 +44,14 @@ class BlockParameters:
     ----------
     first : int
         Number of the first sample.
-    values, stderr : ndarray, shape (unknowns, k)
-    residual_std, condition : ndarray, shape (k,)
+    numbers : ndarray, shape (2 unknowns + 2, k)
+        Values, errors, deviation of residuals and condition.
     order : ndarray of uint8, shape (k,)
     status : ndarray of uint16, shape (k,)
     """
 
     first: int
-    values: Numbers
-    stderr: Numbers
-    residual_std: Numbers
-    condition: Numbers
+    numbers: Numbers
     order: npt.NDArray[np.uint8]
     status: npt.NDArray[np.uint16]
 
@@ -275,18 +272,9 @@ class WeakStream:
 
     def _due(self, end: int) -> BlockParameters:
         """Return the results of samples before one that were not given yet."""
-        state, count = self._state, len(self._names)
+        state = self._state
         due = max(0, -(-end // self._step) - state.given)
-        numbers = state.numbers[:, :due]
-        found = BlockParameters(
-            state.given * self._step,
-            numbers[:count],
-            numbers[count : 2 * count],
-            numbers[-2],
-            numbers[-1],
-            state.order[:due],
-            state.status[:due],
-        )
+        found = BlockParameters(state.given * self._step, state.numbers[:, :due], state.order[:due], state.status[:due])
         state.numbers, state.order, state.status = state.numbers[:, due:], state.order[due:], state.status[due:]
         state.given += due
         return found

@@ -25,11 +25,9 @@ use crate::watch::exception;
 pub(crate) struct StreamedParameters {
     /// Number of the first sample.
     first: usize,
-    /// By unknown and sample.
-    values: Py<PyArrayDyn<f64>>,
-    stderr: Py<PyArrayDyn<f64>>,
-    residual_std: Py<PyArrayDyn<f64>>,
-    condition: Py<PyArrayDyn<f64>>,
+    /// By sample: values of all unknowns, their standard errors, the deviation of residuals and the condition. One array, which costs what each of
+    /// them would alone.
+    numbers: Py<PyArrayDyn<f64>>,
     status: Py<PyArrayDyn<u16>>,
     order: Py<PyArrayDyn<u8>>,
 }
@@ -236,19 +234,21 @@ fn outputs(
     fill: impl FnOnce(&mut Parameters<'_>) -> PyResult<()>,
 ) -> PyResult<StreamedParameters> {
     let (elements, count) = elements(&given, step);
-    let (values, stderr) = (zeros::<f64>(py, &[unknowns, count])?, zeros::<f64>(py, &[unknowns, count])?);
-    let (residual_std, condition) = (zeros::<f64>(py, &[count])?, zeros::<f64>(py, &[count])?);
+    let kinds = 2 * unknowns + 2;
+    let numbers = zeros::<f64>(py, &[kinds, count])?;
     let (status, order) = (zeros::<u16>(py, &[count])?, zeros::<u8>(py, &[count])?);
     {
-        let (mut values, mut stderr, mut residual_std) =
-            (values.readwrite(), stderr.readwrite(), residual_std.readwrite());
-        let (mut condition, mut status, mut order) = (condition.readwrite(), status.readwrite(), order.readwrite());
+        let (mut numbers, mut status, mut order) = (numbers.readwrite(), status.readwrite(), order.readwrite());
+        let mut parameters = rows(numbers.as_slice_mut()?, kinds, count);
+        let mut deviations = parameters.split_off(2 * unknowns);
+        let condition = deviations.pop().unwrap_or_default();
+        let errors = parameters.split_off(unknowns);
         let regressions = Regressions {
             elements,
-            parameters: rows(values.as_slice_mut()?, unknowns, count),
-            errors: rows(stderr.as_slice_mut()?, unknowns, count),
-            deviations: rows(residual_std.as_slice_mut()?, 1, count),
-            condition: condition.as_slice_mut()?,
+            parameters,
+            errors,
+            deviations,
+            condition,
             status: status.as_slice_mut()?,
             ..Regressions::default()
         };
@@ -256,10 +256,7 @@ fn outputs(
     }
     Ok(StreamedParameters {
         first: elements.first,
-        values: values.unbind(),
-        stderr: stderr.unbind(),
-        residual_std: residual_std.unbind(),
-        condition: condition.unbind(),
+        numbers: numbers.unbind(),
         status: status.unbind(),
         order: order.unbind(),
     })

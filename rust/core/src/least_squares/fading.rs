@@ -36,9 +36,9 @@ pub(crate) fn fade<S: Lanes, H: Dimensions>(
     shape: H,
     factor: &mut H::Factor<S::f64s>,
     sums: &mut H::Factor<S::f64s>,
-    part: f64,
+    part: S::f64s,
 ) {
-    let (p, part) = (shape.regressors(), simd.splat_f64s(part));
+    let p = shape.regressors();
     for i in 0..p {
         let weight = simd.mul_f64s(factor[shape.row(i)], part);
         // Something must stay, or appending a row of zeros would divide by zero.

@@ -301,3 +301,17 @@ pub(crate) fn load<S: Lanes, H: Dimensions>(simd: S, shape: H, from: &[f64], fac
         factor[i] = simd.load(from, i * S::F64_LANES);
     }
 }
+
+/// Takes some lanes of a factor into another.
+#[inline(always)]
+pub(crate) fn take<S: Lanes, H: Dimensions>(
+    simd: S,
+    shape: H,
+    lanes: S::m64s,
+    from: &H::Factor<S::f64s>,
+    into: &mut H::Factor<S::f64s>,
+) {
+    for i in 0..shape.size() {
+        into[i] = simd.select_f64s(lanes, from[i], into[i]);
+    }
+}

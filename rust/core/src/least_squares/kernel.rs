@@ -76,7 +76,8 @@ impl<H: Dimensions, const PLAIN: bool> Kernel for RollingKernel<'_, '_, '_, H, P
                 for offset in some.clone() {
                     let place = (offset - rows.start) * size;
                     suffix.load(simd, self.shape, &self.scratch.suffixes[place..place + size]);
-                    suffix.merge(simd, self.shape, self.run.plan, &prefix, offset, &mut row);
+                    let left = simd.splat_f64s(if PLAIN { 1.0 } else { self.run.plan.left_at(offset) });
+                    suffix.merge(simd, self.shape, self.run.plan, &prefix, left, &mut row);
                     suffix.store(simd, self.shape, &mut self.scratch.suffixes[place..place + size]);
                     self.append(simd, &mut prefix, offset, 1, &mut row);
                 }

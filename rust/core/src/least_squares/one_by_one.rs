@@ -1,13 +1,13 @@
 //! The same windows one by one, as their rows come.
 //!
-//! When a block of rows is complete the factors of its suffixes are built; from then on every row that comes costs one merge, one
-//! solution and one append. These are the operations of `kernel.rs` on the same rows in the same order, so the bits are the same; lanes
-//! all hold the same window.
+//! When a block of rows is complete the factors of its suffixes are built; from then on every row that comes costs one append, and every window
+//! one merge and one solution. These are the operations of `kernel.rs` on the same rows in the same order, so the bits are the same. Rows
+//! are appended to all lanes alike; windows are merged and solved together, as many as there are lanes, which hold one each.
 
 use std::ops::Range;
 
 use crate::lanes::output::Outputs;
-use crate::lanes::store::Write;
+use crate::lanes::store::write_row;
 use crate::lanes::tile::Tile;
 use crate::least_squares::givens_factor::{Dimensions, Few, Many};
 use crate::least_squares::plan::{Regressions, RollingLeastSquares, Slots};
@@ -16,7 +16,7 @@ use crate::least_squares::solutions::{Count, Solutions};
 use crate::least_squares::window_summary::WindowSummary;
 use crate::record::samples::is_usable;
 use crate::simd::aligned::Aligned;
-use crate::simd::vectors::{Kernel, Lanes, apart, dispatch, dispatch_vectors};
+use crate::simd::vectors::{Kernel, Lanes, MOST_LANES, apart, dispatch, dispatch_vectors};
 
 /// Rows by their numbers.
 pub(crate) trait RowSource {
@@ -36,8 +36,8 @@ pub(crate) struct OneByOne {
     segment: usize,
     prefix: Aligned,
     suffixes: Aligned,
-    /// The window that is solved.
-    window: Aligned,
+    /// The windows that are solved, one a lane.
+    windows: Aligned,
     checkpoints: Aligned,
     tile: Tile,
     unusable: Vec<usize>,
@@ -54,9 +54,9 @@ impl OneByOne {
             segment: usize::MAX,
             prefix: Aligned::zeros(factor),
             suffixes: Aligned::zeros(plan.window.min(SEGMENT) * factor),
-            window: Aligned::zeros(factor),
+            windows: Aligned::zeros(factor),
             checkpoints: Aligned::zeros((plan.window.div_ceil(SEGMENT) - 1) * factor),
-            tile: Tile::new(Slots::of(plan).fields(), lanes.next_multiple_of(8), lanes),
+            tile: Tile::new(Slots::of(plan).fields(), 1, lanes),
             unusable: Vec::new(),
         }
     }
@@ -121,6 +121,35 @@ struct OneByOneKernel<'a, 'b, 'c, H: Dimensions> {
     outputs: &'b mut Outputs<'c>,
 }
 
+/// Windows that are solved together, in order: one in each of the first lanes, and whatever was there in the others.
+struct Together<F> {
+    count: usize,
+    offsets: [usize; MOST_LANES],
+    suffixes: WindowSummary<F>,
+    prefixes: WindowSummary<F>,
+}
+
+impl<F> Together<F> {
+    /// Puts a window into the next lane: its suffix and its prefix, of which all lanes hold the same.
+    #[inline(always)]
+    fn put<S: Lanes, H: Dimensions<Factor<S::f64s> = F>>(
+        &mut self,
+        simd: S,
+        shape: H,
+        offset: usize,
+        (suffix, prefix): (&WindowSummary<F>, &WindowSummary<F>),
+    ) {
+        // The lanes after it hold it as well, until others are put there.
+        let mut lanes = [0.0; MOST_LANES];
+        lanes[self.count..].fill(1.0);
+        let lanes = simd.greater_than_f64s(simd.load(&lanes, 0), simd.splat_f64s(0.0));
+        self.suffixes.take(simd, shape, lanes, suffix);
+        self.prefixes.take(simd, shape, lanes, prefix);
+        self.offsets[self.count..].fill(offset);
+        self.count += 1;
+    }
+}
+
 impl<H: Dimensions> Kernel for OneByOneKernel<'_, '_, '_, H> {
     type Output = ();
 
@@ -131,38 +160,28 @@ impl<H: Dimensions> Kernel for OneByOneKernel<'_, '_, '_, H> {
         if self.state.base != Some(self.run.base) || self.state.done > offsets.start {
             self.begin(simd);
         }
-        let (shape, places) = (self.shape, self.state.tile.places());
+        let shape = self.shape;
         let size = self.run.plan.summary(shape.size() * S::F64_LANES);
         let mut row = shape.factor(simd.splat_f64s(0.0));
         let mut prefix = self.nothing(simd);
         prefix.load(simd, shape, &self.state.prefix);
-        let ahead = self.run.plan.before.cast_signed() - window.cast_signed();
+        let mut some =
+            Together { count: 0, offsets: [0; MOST_LANES], suffixes: self.nothing(simd), prefixes: self.nothing(simd) };
+        let mut suffix = self.nothing(simd);
         for offset in offsets.clone() {
             // Only now: the row after a window need not have come.
             for done in self.state.done..offset {
                 self.append(simd, &mut prefix, window + done, &mut row);
             }
             self.state.done = offset;
-            let own = ((self.run.base + offset).cast_signed() + ahead).unsigned_abs();
+            let own = self.own(offset);
             if !self.outputs.elements.of(own..own + 1).is_empty() {
                 self.hold_suffixes(simd, offset / SEGMENT, &mut row);
-                let mut summary = self.nothing(simd);
-                summary.load(simd, shape, &self.state.suffixes[offset % SEGMENT * size..][..size]);
-                summary.merge(simd, shape, self.run.plan, &prefix, offset, &mut row);
-                summary.store(simd, shape, &mut self.state.window);
-                let count = |_lane: usize, offset: usize| counted(&self.run, self.source, self.run.base + offset);
-                let OneByOne { tile, window: summaries, .. } = &mut *self.state;
-                let (plan, offsets, rows, count) =
-                    (self.run.plan, offset..offset + 1, None, Some(&count as &Count<'_>));
-                apart(simd, Solutions { shape, plan, offsets, summaries, count, rows, tile });
+                suffix.load(simd, shape, &self.state.suffixes[offset % SEGMENT * size..][..size]);
+                some.put(simd, shape, offset, (&suffix, &prefix));
             }
-            if (offset + 1) % places == 0 || offset + 1 == offsets.end {
-                let rows = offset - (offset - offsets.start).min(offset % places)..offset + 1;
-                let windows = self.run.base + rows.start..self.run.base + rows.end;
-                let (tile, base) = (&self.state.tile, self.run.base.cast_signed());
-                let outputs = &mut *self.outputs;
-                let (block, records, fixed_order) = (window, None, None);
-                apart(simd, Write { tile, rows, base, block, records, windows, ahead, fixed_order, outputs });
+            if some.count == S::F64_LANES || (some.count > 0 && offset + 1 == offsets.end) {
+                self.solve(simd, &mut some, &mut row);
             }
         }
         prefix.store(simd, shape, &mut self.state.prefix);
@@ -171,6 +190,31 @@ impl<H: Dimensions> Kernel for OneByOneKernel<'_, '_, '_, H> {
 }
 
 impl<H: Dimensions> OneByOneKernel<'_, '_, '_, H> {
+    /// The row that the window at an offset belongs to.
+    #[inline(always)]
+    fn own(&self, offset: usize) -> usize {
+        self.run.base + offset + self.run.plan.before - self.run.plan.window
+    }
+
+    /// Solves some windows and writes them out.
+    #[inline(always)]
+    fn solve<S: Lanes>(&mut self, simd: S, some: &mut Together<H::Factor<S::f64s>>, row: &mut H::Factor<S::f64s>) {
+        let Together { count, offsets, suffixes, prefixes } = some;
+        let (shape, plan) = (self.shape, self.run.plan);
+        let mut left = [1.0; MOST_LANES];
+        left.iter_mut().zip(offsets.iter()).for_each(|(left, &offset)| *left = plan.left_at(offset));
+        suffixes.merge(simd, shape, plan, prefixes, simd.load(&left, 0), row);
+        suffixes.store(simd, shape, &mut self.state.windows);
+        let counted = |lane: usize, _: usize| counted(&self.run, self.source, self.run.base + offsets[lane]);
+        let OneByOne { tile, windows: summaries, .. } = &mut *self.state;
+        let counted = Some(&counted as &Count<'_>);
+        apart(simd, Solutions { shape, plan, offsets: 0..1, summaries, count: counted, rows: None, tile });
+        let rows = self.own(offsets[0])..self.own(offsets[*count - 1]) + 1;
+        let elements = self.outputs.elements.of(rows);
+        write_row(&self.state.tile, S::F64_LANES, elements, None, self.outputs);
+        *count = 0;
+    }
+
     /// The summary of no rows.
     #[inline(always)]
     fn nothing<S: Lanes>(&self, simd: S) -> WindowSummary<H::Factor<S::f64s>> {

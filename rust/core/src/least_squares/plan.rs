@@ -218,6 +218,13 @@ impl RollingLeastSquares {
         if self.fading.is_some() { 2 * factor } else { factor }
     }
 
+    /// What is left of the part of a window that weighs less for the other, where it begins at an offset of a block.
+    #[inline(always)]
+    pub(crate) fn left_at(&self, offset: usize) -> f64 {
+        let left = |fading: &Fading| fading.left[if fading.newest_first { offset } else { self.window - offset }];
+        self.fading.as_ref().map_or(1.0, left)
+    }
+
     /// Whether rows have weights.
     pub(crate) fn is_weighted(&self, equations: &Equations<'_>) -> bool {
         equations.weights.is_some() || self.fading.is_some()

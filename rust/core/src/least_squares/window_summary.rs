@@ -1,7 +1,7 @@
 //! What the rows of a window, or of a part of one, are summarised by: their factor, and sums where they fade.
 
 use crate::least_squares::fading;
-use crate::least_squares::givens_factor::{Dimensions, append, empty, load, merge, store};
+use crate::least_squares::givens_factor::{Dimensions, append, empty, load, merge, store, take};
 use crate::least_squares::plan::RollingLeastSquares;
 use crate::simd::vectors::Lanes;
 
@@ -54,7 +54,7 @@ impl<F> WindowSummary<F> {
         if let (Some(fading), Some(sums)) = (&plan.fading, &mut self.sums) {
             // The block's rows are appended from its last to its first, those of the next block from its first to its last.
             let part = if fading.newest_first == (block == 1) {
-                fading::fade(simd, shape, &mut self.factor, sums, fading.left[1]);
+                fading::fade(simd, shape, &mut self.factor, sums, simd.splat_f64s(fading.left[1]));
                 1.0
             } else {
                 fading.left[if block == 0 { plan.window - 1 - offset } else { offset }]
@@ -65,7 +65,23 @@ impl<F> WindowSummary<F> {
         append(simd, shape, &mut self.factor, row, 0, weight);
     }
 
-    /// Merges the rows of a block from an offset on with those of the block after it up to that offset. `row` is scratch memory.
+    /// Takes some lanes of another summary.
+    #[inline(always)]
+    pub(crate) fn take<S: Lanes, H: Dimensions<Factor<S::f64s> = F>>(
+        &mut self,
+        simd: S,
+        shape: H,
+        lanes: S::m64s,
+        from: &Self,
+    ) {
+        take(simd, shape, lanes, &from.factor, &mut self.factor);
+        if let (Some(from), Some(sums)) = (&from.sums, &mut self.sums) {
+            take(simd, shape, lanes, from, sums);
+        }
+    }
+
+    /// Merges the rows of a block from an offset on with those of the block after it up to that offset, of which [`RollingLeastSquares::left_at`]
+    /// says what is left. `row` is scratch memory.
     #[inline(always)]
     pub(crate) fn merge<S: Lanes, H: Dimensions<Factor<S::f64s> = F>>(
         &mut self,
@@ -73,7 +89,7 @@ impl<F> WindowSummary<F> {
         shape: H,
         plan: &RollingLeastSquares,
         prefix: &Self,
-        offset: usize,
+        left: S::f64s,
         row: &mut F,
     ) where
         F: Clone,
@@ -83,12 +99,12 @@ impl<F> WindowSummary<F> {
             return;
         };
         if fading.newest_first {
-            fading::fade(simd, shape, &mut self.factor, sums, fading.left[offset]);
+            fading::fade(simd, shape, &mut self.factor, sums, left);
             merge(simd, shape, &mut self.factor, &prefix.factor, row);
             fading::merge(simd, shape, sums, others);
         } else {
             let (mut factor, mut others) = (prefix.factor.clone(), others.clone());
-            fading::fade(simd, shape, &mut factor, &mut others, fading.left[plan.window - offset]);
+            fading::fade(simd, shape, &mut factor, &mut others, left);
             merge(simd, shape, &mut self.factor, &factor, row);
             fading::merge(simd, shape, sums, &others);
         }
