@@ -2,9 +2,9 @@
 //!
 //! Weights `f` halve every half-life. They say how much a row counts and nothing of its noise, so least squares with them have the
 //! covariance `σ² N⁻¹ M N⁻¹` with `N = Σ f x xᵀ` and `M = Σ f² x xᵀ`, and their squared residuals add up to `σ² (Σ f - tr N⁻¹ M)` on average.
-//! `M` and `Σ f` are kept beside a window's factor, in the places of a factor: entry `(i, k)` of `M` where that of `U` would be.
+//! `M` and `Σ f` are kept beside a window's factor, in memory of its size: `M` above its diagonal row by row, then `Σ f`.
 
-use crate::least_squares::givens_factor::{Dimensions, MOST_REGRESSORS, NOTHING, covariance};
+use crate::least_squares::givens_factor::{Dimensions, MOST_REGRESSORS, NOTHING};
 use crate::simd::vectors::Lanes;
 
 /// Half-lives after which a row weighs nothing: far below rounding, and far above where doubles end.
@@ -29,34 +29,60 @@ impl Fading {
     }
 }
 
-/// Makes a factor and its sums weigh a part of what they did.
+/// Where entry `(i, k)` of `M` is, `i ≤ k`.
 #[inline(always)]
-pub(crate) fn fade<S: Lanes, H: Dimensions>(
-    simd: S,
-    shape: H,
-    factor: &mut H::Factor<S::f64s>,
-    sums: &mut H::Factor<S::f64s>,
-    part: S::f64s,
-) {
+fn place<H: Dimensions>(shape: H, i: usize, k: usize) -> usize {
+    shape.entry(i, k) - i * shape.rhs_count()
+}
+
+/// Where `Σ f` is, after `M`.
+#[inline(always)]
+fn last<H: Dimensions>(shape: H) -> usize {
+    shape.row(shape.regressors()) - shape.regressors() * shape.rhs_count()
+}
+
+/// Writes sums to memory.
+#[inline(always)]
+pub(crate) fn store<S: Lanes, H: Dimensions>(simd: S, shape: H, to: &mut [f64], sums: &H::Factor<S::f64s>) {
+    let to = &mut to[..(last(shape) + 1) * S::F64_LANES];
+    for i in 0..=last(shape) {
+        simd.store(to, i * S::F64_LANES, sums[i]);
+    }
+}
+
+/// Reads sums from memory.
+#[inline(always)]
+pub(crate) fn load<S: Lanes, H: Dimensions>(simd: S, shape: H, from: &[f64], sums: &mut H::Factor<S::f64s>) {
+    let from = &from[..(last(shape) + 1) * S::F64_LANES];
+    for i in 0..=last(shape) {
+        sums[i] = simd.load(from, i * S::F64_LANES);
+    }
+}
+
+/// Makes a factor weigh a part of what it did.
+#[inline(always)]
+pub(crate) fn fade<S: Lanes, H: Dimensions>(simd: S, shape: H, factor: &mut H::Factor<S::f64s>, part: S::f64s) {
     let p = shape.regressors();
     for i in 0..p {
-        let weight = simd.mul_f64s(factor[shape.row(i)], part);
+        let weight = &mut factor[shape.row(i)];
         // Something must stay, or appending a row of zeros would divide by zero.
-        factor[shape.row(i)] = simd.max_f64s(weight, simd.splat_f64s(NOTHING));
+        *weight = simd.mul_add_f64s(*weight, part, simd.splat_f64s(NOTHING));
     }
     for s in 0..shape.rhs_count() {
         let rss = shape.row(p) + s;
         factor[rss] = simd.mul_f64s(factor[rss], part);
     }
+}
+
+/// Makes sums weigh a part of what they did.
+#[inline(always)]
+pub(crate) fn fade_sums<S: Lanes, H: Dimensions>(simd: S, shape: H, sums: &mut H::Factor<S::f64s>, part: S::f64s) {
     let squared = simd.mul_f64s(part, part);
-    for i in 0..p {
-        for k in i..p {
-            let entry = shape.entry(i, k);
-            sums[entry] = simd.mul_f64s(sums[entry], squared);
-        }
+    let last = last(shape);
+    for sum in 0..last {
+        sums[sum] = simd.mul_f64s(sums[sum], squared);
     }
-    let count = shape.row(p);
-    sums[count] = simd.mul_f64s(sums[count], part);
+    sums[last] = simd.mul_f64s(sums[last], part);
 }
 
 /// Adds a row to the sums. `weight` is that of its noise, `part` what is left of it.
@@ -74,31 +100,38 @@ pub(crate) fn add<S: Lanes, H: Dimensions>(
     for i in 0..p {
         let weighted = simd.mul_f64s(squared, row[i]);
         for k in i..p {
-            let entry = shape.entry(i, k);
-            sums[entry] = simd.mul_add_f64s(weighted, row[k], sums[entry]);
+            let sum = place(shape, i, k);
+            sums[sum] = simd.mul_add_f64s(weighted, row[k], sums[sum]);
         }
     }
     let zero = simd.splat_f64s(0.0);
     let counts = simd.select_f64s(simd.greater_than_f64s(weight, zero), part, zero);
-    let count = shape.row(p);
-    sums[count] = simd.add_f64s(sums[count], counts);
+    let last = last(shape);
+    sums[last] = simd.add_f64s(sums[last], counts);
 }
 
-/// Adds the sums of other rows.
+/// Adds the sums of other rows. Of those that were there, or else of the others, a part is left.
 #[inline(always)]
 pub(crate) fn merge<S: Lanes, H: Dimensions>(
     simd: S,
     shape: H,
     sums: &mut H::Factor<S::f64s>,
-    other: &H::Factor<S::f64s>,
+    others: &H::Factor<S::f64s>,
+    part: S::f64s,
+    others_fade: bool,
 ) {
-    for entry in 0..=shape.row(shape.regressors()) {
-        sums[entry] = simd.add_f64s(sums[entry], other[entry]);
+    let squared = simd.mul_f64s(part, part);
+    let last = last(shape);
+    for sum in 0..last {
+        let (fades, stays) = if others_fade { (others[sum], sums[sum]) } else { (sums[sum], others[sum]) };
+        sums[sum] = simd.mul_add_f64s(fades, squared, stays);
     }
+    let (fades, stays) = if others_fade { (others[last], sums[last]) } else { (sums[last], others[last]) };
+    sums[last] = simd.mul_add_f64s(fades, part, stays);
 }
 
 /// What the squared residuals are divided by for the variance of the noise. The variances of the parameters over it are left in the places
-/// of the weights of `variances`.
+/// of the weights of `variances`, which must be zero there.
 #[inline(always)]
 pub(crate) fn freedom<S: Lanes, H: Dimensions>(
     simd: S,
@@ -108,34 +141,42 @@ pub(crate) fn freedom<S: Lanes, H: Dimensions>(
     variances: &mut H::Factor<S::f64s>,
 ) -> S::f64s {
     let p = shape.regressors();
-    let mut normal = shape.square(simd.splat_f64s(0.0));
-    let mut trace = simd.splat_f64s(0.0);
+    // Entries of the inverse times the weights of their columns, so that each of their products is one operation.
     for i in 0..p {
-        for k in i..p {
-            let one = covariance(simd, shape, inverse, i, k);
-            (normal[i * p + k], normal[k * p + i]) = (one, one);
-            let twice = simd.splat_f64s(if i == k { 1.0 } else { 2.0 });
-            trace = simd.mul_add_f64s(simd.mul_f64s(one, twice), sums[shape.entry(i, k)], trace);
+        for k in i + 1..p {
+            variances[shape.entry(i, k)] = simd.mul_f64s(inverse[shape.entry(i, k)], inverse[shape.row(k)]);
         }
     }
+    let mut normal = shape.square(simd.splat_f64s(0.0));
+    for i in 0..p {
+        for j in i..p {
+            let mut one = if i == j { inverse[shape.row(j)] } else { variances[shape.entry(i, j)] };
+            for k in j + 1..p {
+                one = simd.mul_add_f64s(variances[shape.entry(i, k)], inverse[shape.entry(j, k)], one);
+            }
+            (normal[i * p + j], normal[j * p + i]) = (one, one);
+        }
+    }
+    let mut trace = simd.splat_f64s(0.0);
     // The innermost loops run over the parameters, which do not wait for each other.
     let mut inner = [simd.splat_f64s(0.0); MOST_REGRESSORS];
     for a in 0..p {
-        inner[..p].fill(simd.splat_f64s(0.0));
+        for i in 0..p {
+            inner[i] = simd.mul_f64s(sums[place(shape, a, a)], normal[a * p + i]);
+        }
         for b in a + 1..p {
-            let sum = sums[shape.entry(a, b)];
+            // What is off the diagonal counts twice.
+            let sum = sums[place(shape, a, b)];
+            let sum = simd.add_f64s(sum, sum);
             for i in 0..p {
                 inner[i] = simd.mul_add_f64s(sum, normal[b * p + i], inner[i]);
             }
         }
-        let sum = sums[shape.entry(a, a)];
         for i in 0..p {
-            // What is off the diagonal counts twice.
-            let twice = simd.add_f64s(inner[i], inner[i]);
-            let whole = simd.mul_add_f64s(sum, normal[a * p + i], twice);
             let variance = &mut variances[shape.row(i)];
-            *variance = simd.mul_add_f64s(normal[a * p + i], whole, *variance);
+            *variance = simd.mul_add_f64s(normal[a * p + i], inner[i], *variance);
         }
+        trace = simd.add_f64s(trace, inner[a]);
     }
-    simd.sub_f64s(sums[shape.row(p)], trace)
+    simd.sub_f64s(sums[last(shape)], trace)
 }

@@ -9,7 +9,7 @@ use std::ops::Range;
 use crate::exec::pool::GoOn;
 use crate::lanes::output::Outputs;
 use crate::lanes::store::Write;
-use crate::least_squares::givens_factor::{Dimensions, append};
+use crate::least_squares::givens_factor::{Dimensions, append, merge};
 use crate::least_squares::plan::Equations;
 use crate::least_squares::side_by_side::{Load, RollingRun, RollingScratch, SEGMENT};
 use crate::least_squares::solutions::{Count, Solutions};
@@ -76,8 +76,12 @@ impl<H: Dimensions, const PLAIN: bool> Kernel for RollingKernel<'_, '_, '_, H, P
                 for offset in some.clone() {
                     let place = (offset - rows.start) * size;
                     suffix.load(simd, self.shape, &self.scratch.suffixes[place..place + size]);
-                    let left = simd.splat_f64s(if PLAIN { 1.0 } else { self.run.plan.left_at(offset) });
-                    suffix.merge(simd, self.shape, self.run.plan, &prefix, left, &mut row);
+                    if PLAIN {
+                        merge(simd, self.shape, &mut suffix.factor, &prefix.factor, &mut row);
+                    } else {
+                        let left = simd.splat_f64s(self.run.plan.left_at(offset));
+                        suffix.merge(simd, self.shape, self.run.plan, &prefix, left, &mut row);
+                    }
                     suffix.store(simd, self.shape, &mut self.scratch.suffixes[place..place + size]);
                     self.append(simd, &mut prefix, offset, 1, &mut row);
                 }

@@ -20,7 +20,7 @@ impl<F> WindowSummary<F> {
         store(simd, shape, to, &self.factor);
         if let Some(sums) = &self.sums {
             let half = to.len() / 2;
-            store(simd, shape, &mut to[half..], sums);
+            fading::store(simd, shape, &mut to[half..], sums);
         }
     }
 
@@ -29,7 +29,7 @@ impl<F> WindowSummary<F> {
     pub(crate) fn load<S: Lanes, H: Dimensions<Factor<S::f64s> = F>>(&mut self, simd: S, shape: H, from: &[f64]) {
         load(simd, shape, from, &mut self.factor);
         if let Some(sums) = &mut self.sums {
-            load(simd, shape, &from[from.len() / 2..], sums);
+            fading::load(simd, shape, &from[from.len() / 2..], sums);
         }
     }
 
@@ -54,7 +54,8 @@ impl<F> WindowSummary<F> {
         if let (Some(fading), Some(sums)) = (&plan.fading, &mut self.sums) {
             // The block's rows are appended from its last to its first, those of the next block from its first to its last.
             let part = if fading.newest_first == (block == 1) {
-                fading::fade(simd, shape, &mut self.factor, sums, simd.splat_f64s(fading.left[1]));
+                fading::fade(simd, shape, &mut self.factor, simd.splat_f64s(fading.left[1]));
+                fading::fade_sums(simd, shape, sums, simd.splat_f64s(fading.left[1]));
                 1.0
             } else {
                 fading.left[if block == 0 { plan.window - 1 - offset } else { offset }]
@@ -99,14 +100,13 @@ impl<F> WindowSummary<F> {
             return;
         };
         if fading.newest_first {
-            fading::fade(simd, shape, &mut self.factor, sums, left);
+            fading::fade(simd, shape, &mut self.factor, left);
             merge(simd, shape, &mut self.factor, &prefix.factor, row);
-            fading::merge(simd, shape, sums, others);
         } else {
-            let (mut factor, mut others) = (prefix.factor.clone(), others.clone());
-            fading::fade(simd, shape, &mut factor, &mut others, left);
+            let mut factor = prefix.factor.clone();
+            fading::fade(simd, shape, &mut factor, left);
             merge(simd, shape, &mut self.factor, &factor, row);
-            fading::merge(simd, shape, sums, &others);
         }
+        fading::merge(simd, shape, sums, others, left, !fading.newest_first);
     }
 }
