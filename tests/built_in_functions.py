@@ -13,4 +13,5 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "cubic": lambda _t, angle, _velocity: angle**3,
     "gravity": lambda _t, angle, _velocity: np.sin(angle),
     "viscous_asymmetric": lambda _t, _angle, velocity: np.abs(velocity),
+    "preload": lambda _t, angle, _velocity: np.sign(angle),
 }

@@ -310,7 +310,7 @@ def test_the_sample_period_may_come_from_times() -> None:
         (
             {"terms": ["viscous"]},
             ValueError,
-            "a term must be 'offset', 'coulomb', 'cubic', 'gravity', 'viscous_asymmetric' or 'stribeck'; got 'viscous'",
+            "a term must be 'offset', 'coulomb', 'cubic', 'preload', 'gravity', 'viscous_asymmetric' or 'stribeck'; got 'viscous'",
         ),
         ({"terms": "offset"}, TypeError, r"terms must be a sequence.*write \('offset',\)"),
         ({"terms": ["offset", "offset"]}, ValueError, "'offset' comes twice"),

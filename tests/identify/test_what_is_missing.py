@@ -23,6 +23,7 @@ RATE, FINER = 1000, 5
 INERTIA, DAMPING = 0.0123, 0.05
 
 
+# One parameter for each thing that a rig may have, or that is missing.
 def record(
     seed: int,
     *,
@@ -32,10 +33,11 @@ def record(
     seconds: int = 20,
     growth: float = 0.0,
     asymmetry: float = 0.0,
+    backlash: float = 0.0,
 ) -> tuple[Array, Array]:
     """Give angle and torque of the rig, white noise on both; the torque comes some samples late, damping grows by a part of it.
 
-    Forwards it is larger by the asymmetry, backwards smaller.
+    Forwards it is larger by the asymmetry, backwards smaller. The spring takes hold outside the backlash, an angle on either side.
     """
     generator = np.random.default_rng(seed)
     t = np.arange(seconds * RATE * FINER) / (RATE * FINER)
@@ -56,7 +58,8 @@ def record(
         def acceleration(x: float, v: float, driven: float, spring: float = spring, damping: float = damping) -> float:
             # Friction is smooth below what the noise of the angle shows.
             resisting = damping * (v + asymmetry * abs(v)) + friction * np.tanh(v / 1e-3)
-            return float((driven - resisting - spring * x - hardening * x**3) / INERTIA)
+            bent = x - min(max(x, -backlash), backlash)
+            return float((driven - resisting - spring * bent - hardening * x**3) / INERTIA)
 
         # The midpoint rule, of second order.
         middle, there = velocity + step / 2 * acceleration(place, velocity, now), place + step / 2 * velocity
@@ -284,3 +287,18 @@ def test_what_is_held_back_is_identified_once_for_all_distances(monkeypatch: pyt
     shares = [predicted_ahead(found, ahead) for ahead in (13, 20, 13)]
     assert len(asked) == 1
     assert shares[0] == shares[2] != shares[1]
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("seed", [4, *long(1, 3, 6)])
+def test_backlash_of_the_spring_is_named(seed: int) -> None:
+    """Such records heard nothing of it; stiffness and inertia are right with what is named."""
+    angle, torque = record(seed, backlash=0.02)
+    found = tvident.identify(angle, torque, sample_rate=RATE)
+    assert found.record_status & tvident.Status.TERM_SUSPECTED
+    assert "the spring seems to have backlash" in found.advice[0]
+    assert ": try terms=['offset', 'preload']" in found.advice[0]
+    better = tvident.identify(angle, torque, sample_rate=RATE, terms=["offset", "preload"])
+    # The spring's stiffness is 14 N m/rad in the middle of its course.
+    for name, true, within in (("preload", -14 * 0.02, 0.15), ("damping", DAMPING, 0.02), ("inertia", INERTIA, 0.005)):
+        assert better.value(name).value == pytest.approx(true, rel=within), name

@@ -351,7 +351,7 @@ class Explained:
                 inner = {name for name in names if any(name.startswith(f"{other}.") for other in names)}
                 terms = [name for name in names if name not in inner] + [one.name]
                 amount = f"{one.value:.3g} ± {one.stderr:.1g} {self.units[term.name]}"
-                words.append(f"{term.suspicion.format(amount=amount)}: give terms={terms}")
+                words.append(f"{term.suspected(one.value, amount)}: give terms={terms}")
         if len(words) > 1:
             words.append(_BEGIN)
         return words

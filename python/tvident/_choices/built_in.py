@@ -22,6 +22,8 @@ class BuiltIn:
         What its factor multiplies.
     suspicion : str
         What is said where it seems to be missing, with a place for the amount.
+    negative_suspicion : str, optional
+        What is said instead where its factor is negative, if that is another thing.
     function : callable
         Gives what its factor multiplies, of NumPy, which names are known without, of angle and velocity; of inner parameters, too, where it
         has some.
@@ -51,6 +53,17 @@ class BuiltIn:
     spring: Literal["beside", "instead"] | None = None
     dissipates: bool = False
     is_sought: bool = False
+    negative_suspicion: str | None = None
+
+    def suspected(self, value: float, amount: str) -> str:
+        """Return what is said where it seems to be missing with a factor, which is the amount in words."""
+        negative = self.negative_suspicion if value < 0 else None
+        return (negative or self.suspicion).format(amount=amount)
+
+    @property
+    def beginnings(self) -> tuple[str, ...]:
+        """How sentences begin that say it is missing."""
+        return tuple(words.partition("{")[0] for words in (self.suspicion, self.negative_suspicion) if words)
 
     @property
     def is_of_angle(self) -> bool:
@@ -98,6 +111,17 @@ BUILT_IN = {
             angle_period=None,
             spring="beside",
             is_sought=True,
+        ),
+        BuiltIn(
+            "preload",
+            "N m",
+            "the sign of the angle: a preload of the spring, or its backlash where it is negative",
+            "the spring seems to be preloaded by {amount}",
+            lambda numpy, angle, _: numpy.sign(angle),
+            needs_velocity=False,
+            angle_period=None,
+            spring="beside",
+            negative_suspicion="the spring seems to have backlash, which changes its torque by {amount}",
         ),
         BuiltIn(
             "gravity",

@@ -138,7 +138,7 @@ class TriedInWeakForm(_AskedOfRecord):
         remedy = next((line for line in advice if TRIED in line), None)
         if remedy is None:
             return words
-        starts = tuple(one.suspicion.partition("{")[0] for one in BUILT_IN.values() if one.suspicion)
+        starts = tuple(beginning for one in BUILT_IN.values() for beginning in one.beginnings)
         rest = [line for line in words.advice if not (line.startswith(starts) and ": give terms=" in line)]
         return replace(words, advice=(f"in weak form: {remedy}", *rest))
 

@@ -68,7 +68,7 @@ class Lacking:
         """Return what to do."""
         amount = f"{with_error(self.value, self.error)} {unit}"
         place = ", stiffness=0" if self.alone else ""
-        return f"{BUILT_IN[self.name].suspicion.format(amount=amount)}: give terms={[*terms, self.name]}{place}"
+        return f"{BUILT_IN[self.name].suspected(self.value, amount)}: give terms={[*terms, self.name]}{place}"
 
 
 def lacking_terms(

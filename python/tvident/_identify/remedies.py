@@ -399,7 +399,7 @@ class Trial:
             error = found.settings.get("lag_stderr") or 0.0
             return f"the torque is {'late' if late > 0 else 'early'} by {with_error(abs(late) * rate, error * rate)} samples"
         value, error, *_ = found.value(name)
-        return BUILT_IN[name].suspicion.format(amount=f"{with_error(value, error)} {found.units.get(name, '')}")
+        return BUILT_IN[name].suspected(value, f"{with_error(value, error)} {found.units.get(name, '')}")
 
 
 def _are_distinguished(flags: int) -> bool:

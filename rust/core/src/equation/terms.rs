@@ -34,6 +34,8 @@ pub struct BuiltInTerm {
     /// What it is called.
     pub name: &'static str,
     pub(crate) function: TermFunction,
+    /// Whether it has neither jumps nor kinks.
+    pub(crate) smooth: bool,
     /// Whether a record is searched for it where it is left out.
     pub(crate) looked_for: bool,
     /// Whether what the torque tells is told beside it: a damping that differs between directions leaves hardly anything of that where windows are short.
@@ -41,24 +43,40 @@ pub struct BuiltInTerm {
 }
 
 /// Every built-in term. A new one is a row here and nothing else in the core.
-pub static BUILT_IN_TERMS: [BuiltInTerm; 5] = [
-    BuiltInTerm { name: "offset", function: TermFunction::One, looked_for: true, beside_torque: true },
-    BuiltInTerm { name: "coulomb", function: TermFunction::Direction, looked_for: true, beside_torque: true },
+pub static BUILT_IN_TERMS: [BuiltInTerm; 6] = [
+    BuiltInTerm { name: "offset", function: TermFunction::One, smooth: true, looked_for: true, beside_torque: true },
+    BuiltInTerm {
+        name: "coulomb",
+        function: TermFunction::Direction,
+        smooth: false,
+        looked_for: true,
+        beside_torque: true,
+    },
     BuiltInTerm {
         name: "cubic",
         function: TermFunction::OfAngle(|angle| each(angle, cube)),
+        smooth: true,
+        looked_for: true,
+        beside_torque: true,
+    },
+    BuiltInTerm {
+        name: "preload",
+        function: TermFunction::OfAngle(signs),
+        smooth: false,
         looked_for: true,
         beside_torque: true,
     },
     BuiltInTerm {
         name: "gravity",
         function: TermFunction::OfAngle(|angle| each(angle, f64::sin)),
+        smooth: true,
         looked_for: false,
         beside_torque: true,
     },
     BuiltInTerm {
         name: "viscous_asymmetric",
         function: TermFunction::OfVelocity(|velocity| each(velocity, f64::abs)),
+        smooth: false,
         looked_for: true,
         beside_torque: false,
     },
@@ -85,9 +103,9 @@ fn cube(value: f64) -> f64 {
     value * value * value
 }
 
-/// The sign of every velocity.
-pub(crate) fn signs(velocity: &mut [f64]) {
-    each(velocity, sign);
+/// The sign of every angle or velocity.
+pub(crate) fn signs(motion: &mut [f64]) {
+    each(motion, sign);
 }
 
 /// Applies a function to every value.
@@ -116,6 +134,7 @@ mod tests {
         assert_eq!(at("offset", -3.0), 1.0);
         assert_eq!([at("coulomb", -3.0), at("coulomb", 0.0), at("coulomb", 0.1)], [-1.0, 0.0, 1.0]);
         assert_eq!(at("cubic", -3.0), -27.0);
+        assert_eq!([at("preload", -3.0), at("preload", 0.0), at("preload", 0.1)], [-1.0, 0.0, 1.0]);
         assert_eq!([at("viscous_asymmetric", -3.0), at("viscous_asymmetric", 2.0)], [3.0, 2.0]);
         assert!((at("gravity", std::f64::consts::FRAC_PI_6) - 0.5).abs() < f64::EPSILON);
     }

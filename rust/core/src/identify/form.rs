@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 
 use crate::equation::motion::{Coefficient, Motion, Term, unknowns};
-use crate::equation::terms::BuiltInTerm;
+use crate::equation::terms::{BUILT_IN_TERMS, TermFunction};
 use crate::error::Error;
 use crate::exec::pool::Watch;
 use crate::identify::identification::{Covariance, Identification, Unknown, WeakDetails};
@@ -225,15 +225,15 @@ pub(crate) fn regressors(motion: &Motion<'_>) -> Vec<usize> {
     unknowns(&motion.coefficients, motion.terms.len())
 }
 
-/// What cannot be missing because it is there, or is not a question that anybody asked: a cubic spring beside a known one. A lag that is found leaves
+/// What cannot be missing because it is there, or is not a question that anybody asked: what a spring does beside one that is known. A lag that is found leaves
 /// none; one that is given may be another.
 fn not_missing(task: &Task<'_>) -> Vec<Missing> {
     let built_in = task.motion.terms.iter().filter_map(|term| match term {
         Term::BuiltIn(term) => Some(Missing::Term(term)),
         Term::Record(_) => None,
     });
-    let cubic = BuiltInTerm::named("cubic").map(Missing::Term);
-    let cubic = cubic.filter(|_| !matches!(task.motion.coefficients[2], Coefficient::Unknown));
+    let is_known = !matches!(task.motion.coefficients[2], Coefficient::Unknown);
+    let of_spring = BUILT_IN_TERMS.iter().filter(|term| is_known && matches!(term.function, TermFunction::OfAngle(_)));
     let lag = task.lag.is_none().then_some(Missing::Lag);
-    built_in.chain(cubic).chain(lag).collect()
+    built_in.chain(of_spring.map(Missing::Term)).chain(lag).collect()
 }

@@ -258,9 +258,8 @@ pub(crate) fn with_record<R>(
 
 /// The samples of a term that may jump from one to the next.
 fn jumping<'a>((term, samples): (&Term<'a>, &TermSamples<'a>)) -> Option<&'a dyn Samples> {
-    let smooth = |term: &BuiltInTerm| matches!(term.function, TermFunction::One | TermFunction::OfAngle(_));
     match (term, samples) {
-        (Term::BuiltIn(term), _) if smooth(term) => None,
+        (Term::BuiltIn(term), _) if term.smooth => None,
         (_, TermSamples::Given(samples)) => Some(*samples),
         _ => None,
     }
