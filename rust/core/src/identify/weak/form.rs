@@ -19,6 +19,7 @@ use crate::identify::weak::options::WeakOptions;
 use crate::identify::weak::pulses::{add_pulses, allow_hidden, are_the_same, without_pulses};
 use crate::identify::weak::session::{Session, always_constant};
 use crate::identify::weak::torque_jumps::without_jumps;
+use crate::inference::missing_terms::Missing;
 use crate::noise::breaks::search::{Broken, breaks};
 use crate::noise::channel::{variance_after, weighted_variance};
 use crate::noise::defects::{Defect, Within, defects};
@@ -41,6 +42,10 @@ const LONG: usize = 1_000_000;
 
 /// Times that pulses are looked for, with those of the last time taken off the torque.
 const PULSE_ROUNDS: usize = 2;
+/// A lag lies so many standard errors and more on one side of a limit.
+const SURE: f64 = 4.0;
+/// Steps that a recorder makes are late by half of what they hold, those of a drive by nothing: the limit between both, of what is held.
+const BETWEEN: f64 = 0.25;
 
 /// The samples that count, and how much.
 type Counted<'a> = (Option<&'a [bool]>, Option<&'a [f64]>);
@@ -159,6 +164,7 @@ fn without_limits(
             defects.iter_mut().for_each(Defect::leave_out);
         }
         defects[0].extend((!lost.is_empty()).then_some(Defect::Broken(lost.len())));
+        defects[1].retain(|one| !acts_in_steps(one, options.lag, &found));
         // Unless something else was done to it.
         if let Some((channel, part)) = found.filtered.filter(|&(channel, _)| defects[channel].is_empty()) {
             defects[channel].push(Defect::Filtered(part));
@@ -167,6 +173,15 @@ fn without_limits(
         let suspected = if doubtful { Status::CHANNEL_SUSPECTED } else { Status::GOOD };
         WeakIdentified { record_status: found.record_status | suspected, resting, defects, lost, limits, ..found }
     })
+}
+
+/// Whether the motion says that a torque which is held acts as it is recorded: one that its recorder holds is late by half of that, and this one is not.
+fn acts_in_steps(defect: &Defect, given: Option<f64>, found: &WeakIdentified) -> bool {
+    let Defect::Held(count) = *defect else { return false };
+    let left = found.suspects.iter().find(|one| one.missing == Missing::Lag);
+    let late = found.lag.map(|lag| (lag.value, lag.error));
+    let late = late.or_else(|| left.map(|left| (given.unwrap_or(0.0) + left.value, left.error)));
+    late.is_some_and(|(late, error)| late + SURE * error < BETWEEN * (count - 1) as f64)
 }
 
 /// What was done to every channel: angle and torque, then velocity and acceleration. Limits of the torque are the recorder's or the drive's.
