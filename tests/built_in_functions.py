@@ -11,7 +11,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "offset": lambda _t, angle, _velocity: np.ones_like(angle),
     "coulomb": lambda _t, _angle, velocity: np.sign(velocity),
     "cubic": lambda _t, angle, _velocity: angle**3,
+    "preload": lambda _t, angle, _velocity: np.sign(angle),
     "gravity": lambda _t, angle, _velocity: np.sin(angle),
     "viscous_asymmetric": lambda _t, _angle, velocity: np.abs(velocity),
-    "preload": lambda _t, angle, _velocity: np.sign(angle),
 }

@@ -230,8 +230,9 @@ class WeakStream:
         if diagnose and not np.all(columns["status"] & Status.INVALID):
             state.asked_at = block
         else:
-            # What a block did not ask, or could not answer in a gap, is as the last one that did had it.
-            flags = flags & ~_OF_DIAGNOSIS | state.record_status & _OF_DIAGNOSIS
+            # What a block did not ask, or could not answer in a gap, is as the last one that did had it: a hold of the torque, too.
+            asked = state.record_status & (_OF_DIAGNOSIS | Status.CHANNEL_SUSPECTED)
+            flags = flags & ~_OF_DIAGNOSIS | asked
         state.record_status = flags
         if not all(mean.agree for mean in means.values()):
             state.record_status |= Status.KIND_CONTRADICTED

@@ -2,7 +2,7 @@
 //!
 //! Weights `f` halve every half-life. They say how much a row counts and nothing of its noise, so least squares with them have the
 //! covariance `σ² N⁻¹ M N⁻¹` with `N = Σ f x xᵀ` and `M = Σ f² x xᵀ`, and their squared residuals add up to `σ² (Σ f - tr N⁻¹ M)` on average.
-//! `M` and `Σ f` are kept beside a window's factor, in memory of its size: `M` above its diagonal row by row, then `Σ f`.
+//! `M` and `Σ f` are kept beside a window's factor, in memory of its size: `M` on and above its diagonal row by row, then `Σ f`.
 
 use crate::least_squares::givens_factor::{Dimensions, MOST_REGRESSORS, NOTHING};
 use crate::simd::vectors::Lanes;

@@ -56,7 +56,18 @@ pub enum Defect {
     Filtered(f64),
 }
 
+/// A lag lies so many standard errors and more on one side of a limit.
+const SURE: f64 = 4.0;
+/// Steps that a recorder makes are late by half of what they hold, those of a drive by nothing: the limit between both, of what is held.
+const BETWEEN: f64 = 0.25;
+
 impl Defect {
+    /// Whether the motion says that a torque which is held acts as it is recorded, with a lag in samples and its standard error: one that its
+    /// recorder holds is late by half of that, and this one is not.
+    pub(crate) fn acts_in_steps(&self, late: f64, error: f64) -> bool {
+        matches!(*self, Self::Held(count) if late + SURE * error < BETWEEN * (count - 1) as f64)
+    }
+
     /// What it is called.
     #[must_use]
     pub fn name(&self) -> &'static str {
@@ -232,6 +243,14 @@ fn wrapped(parts: &[&[f64]], range: f64) -> Option<Defect> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_hold_that_is_not_late_acts_in_steps() {
+        for (late, error, acts) in [(-0.5, 0.1, true), (2.0, 0.1, false), (0.0, 0.3, false), (0.0, f64::NAN, false)] {
+            assert_eq!(Defect::Held(5).acts_in_steps(late, error), acts, "{late}");
+            assert!(!Defect::Interpolated(5).acts_in_steps(late, error));
+        }
+    }
 
     fn wave(sample: usize) -> f64 {
         (sample as f64 * 0.02).sin() + 0.3 * (sample as f64 * 0.053).sin()

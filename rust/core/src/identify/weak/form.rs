@@ -42,10 +42,6 @@ const LONG: usize = 1_000_000;
 
 /// Times that pulses are looked for, with those of the last time taken off the torque.
 const PULSE_ROUNDS: usize = 2;
-/// A lag lies so many standard errors and more on one side of a limit.
-const SURE: f64 = 4.0;
-/// Steps that a recorder makes are late by half of what they hold, those of a drive by nothing: the limit between both, of what is held.
-const BETWEEN: f64 = 0.25;
 
 /// The samples that count, and how much.
 type Counted<'a> = (Option<&'a [bool]>, Option<&'a [f64]>);
@@ -164,7 +160,10 @@ fn without_limits(
             defects.iter_mut().for_each(Defect::leave_out);
         }
         defects[0].extend((!lost.is_empty()).then_some(Defect::Broken(lost.len())));
-        defects[1].retain(|one| !acts_in_steps(one, options.lag, &found));
+        // Whether a torque is held by its recorder the motion says, if it is asked.
+        let lag = lag_of(options.lag, &found);
+        let acts = |one: &Defect| lag.is_some_and(|(late, error)| one.acts_in_steps(late, error));
+        defects[1].retain(|one| !(acts(one) || !options.diagnose && matches!(one, Defect::Held(_))));
         // Unless something else was done to it.
         if let Some((channel, part)) = found.filtered.filter(|&(channel, _)| defects[channel].is_empty()) {
             defects[channel].push(Defect::Filtered(part));
@@ -175,13 +174,13 @@ fn without_limits(
     })
 }
 
-/// Whether the motion says that a torque which is held acts as it is recorded: one that its recorder holds is late by half of that, and this one is not.
-fn acts_in_steps(defect: &Defect, given: Option<f64>, found: &WeakIdentified) -> bool {
-    let Defect::Held(count) = *defect else { return false };
+/// The lag of the torque and its standard error, in samples: what was found, or what is suspected beside what was given. Where next to nothing is left
+/// for a lag to explain, what was given is right; nothing where nobody knows.
+fn lag_of(given: Option<f64>, found: &WeakIdentified) -> Option<(f64, f64)> {
     let left = found.suspects.iter().find(|one| one.missing == Missing::Lag);
-    let late = found.lag.map(|lag| (lag.value, lag.error));
-    let late = late.or_else(|| left.map(|left| (given.unwrap_or(0.0) + left.value, left.error)));
-    late.is_some_and(|(late, error)| late + SURE * error < BETWEEN * (count - 1) as f64)
+    let of_given = given.filter(|_| found.is_explained).map(|given| (given, 0.0));
+    let of_suspect = left.map(|left| (given.unwrap_or(0.0) + left.value, left.error));
+    found.lag.map(|lag| (lag.value, lag.error)).or(of_suspect).or(of_given)
 }
 
 /// What was done to every channel: angle and torque, then velocity and acceleration. Limits of the torque are the recorder's or the drive's.

@@ -59,6 +59,8 @@ pub(crate) struct WeakIdentified {
     pub(crate) angle_zero: Option<AngleZero>,
     /// How much better an offset would predict that is free in every window.
     pub(crate) free_offset: FreeOffset,
+    /// Whether the equations leave next to nothing of the torque.
+    pub(crate) is_explained: bool,
     /// What the rows say that the mask keeps out; nothing without a mask.
     pub(crate) outside_mask: Option<Outside>,
     /// Unknowns that change, in the order of the values at the samples.

@@ -105,7 +105,8 @@ impl Session<'_, '_, '_> {
         (found.pairs, found.in_common) = (pairs, in_common);
         let rhs = decided.rhs(&weak.rows).to_vec();
         // A term hardly matters where next to nothing is left for it to explain.
-        if errors.left > NEGLIGIBLE * weak.rows.mean_square() {
+        found.is_explained = errors.left <= NEGLIGIBLE * weak.rows.mean_square();
+        if !found.is_explained {
             found.suspects = self.suspects(&mut weak, decided, fit, (rhs, correlated), &errors)?;
         }
         let contradicted = self.is_contradicted(&weak, &found.constants);
@@ -183,6 +184,7 @@ impl Session<'_, '_, '_> {
             weakest: Vec::new(),
             mostly_noise: false,
             unexplained: false,
+            is_explained: false,
             suspects: Vec::new(),
             lag: None,
             filtered: None,
