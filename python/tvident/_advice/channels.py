@@ -13,8 +13,11 @@ _NEAR = 0.1
 """A wrapped angle jumps by its period less what it moves in one sample, which is at most this part of the period."""
 
 
-def spoilt(defect: str, amount: float) -> str:
-    """Return what was done to a channel, by what it is called and how much of it there is, and what to do; its name comes before."""
+def spoilt(defect: str, amount: float, *, alone: bool = True) -> str:
+    """Return what was done to a channel, by what it is called and how much of it there is, and what to do; its name comes before.
+
+    One mass alone can be given times of each channel, and a period.
+    """
     if defect == "clipped":
         return (
             f"is clipped: {amount:.1%} of its samples lie at its largest or smallest value: make these NaN, or record with a "
@@ -26,11 +29,16 @@ def spoilt(defect: str, amount: float) -> str:
             "larger range"
         )
     if defect == "interpolated":
+        channels = (
+            "both channels, or give what was recorded with times of its own, t=(…, …)" if alone else "all channels"
+        )
         return (
             f"lies on straight lines between every {ordinal(amount)} sample, which weakens its fast motion: keep every "
-            f"{ordinal(amount)} sample of both channels, or give what was recorded with times of its own, t=(…, …)"
+            f"{ordinal(amount)} sample of {channels}"
         )
-    return f"jumps by {amount:.4g} rad: it is wrapped, give period={_period(amount):.8g}, or the period that it has"
+    period = f"period={_period(amount):.8g}"
+    cure = f"give {period}" if alone else f"pass it through numpy.unwrap with {period}"
+    return f"jumps by {amount:.4g} rad: it is wrapped, {cure}, or the period that it has"
 
 
 def held(amount: float, channels: str) -> str:

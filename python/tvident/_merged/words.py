@@ -39,14 +39,7 @@ def words_of(result: Any, merging: Merging, scatter: Mapping[str, float]) -> Wor
         advice += [_SILENT] if one.misfit > 1 else []
         advice += _channels_of(part, merging.masses, sampling.period)
     advice += _changing(result)
-    for name, probability in result.tests.items():
-        kind = result.kinds[name]
-        if kind == "constant" and probability < _core.NO_CHANCE:
-            reasons.append(f"{name} is taken as constant, though parts of the record differ (p = {probability:.2g})")
-        elif kind == "constant":
-            reasons.append(f"{name} is constant: parts of the record differ as chance allows (p = {probability:.2g})")
-        elif kind == "windowed":
-            reasons.append(f"{name} is followed in windows, since parts of the record differ (p = {probability:.2g})")
+    reasons += _tested(result)
     for name, factor in scatter.items():
         if factor > 1:
             differences = result.trial_spread[name][0]
@@ -61,6 +54,22 @@ def words_of(result: Any, merging: Merging, scatter: Mapping[str, float]) -> Wor
     return Words(tuple(dict.fromkeys(reasons)), tuple(dict.fromkeys(advice)))
 
 
+def _tested(result: Any) -> list[str]:
+    """Return what parts of the record say of every element."""
+    words = []
+    for name, probability in result.tests.items():
+        kind = result.kinds[name]
+        if kind == "constant" and probability < _core.NO_CHANCE:
+            words.append(f"{name} is taken as constant, though parts of the record differ (p = {probability:.2g})")
+        elif kind == "constant":
+            words.append(f"{name} is constant: parts of the record differ as chance allows (p = {probability:.2g})")
+        elif kind == "windowed" and probability >= _core.NO_CHANCE:
+            words.append(f"{name} is followed in windows, since equations leave much less so")
+        elif kind == "windowed":
+            words.append(f"{name} is followed in windows, since parts of the record differ (p = {probability:.2g})")
+    return words
+
+
 def _channels_of(part: Part, masses: int, period: float) -> list[str]:
     """Return what to do about channels that a recorder spoilt, and about torques that are late."""
     numbers, found = part.equations.numbers, part.found
@@ -69,12 +78,13 @@ def _channels_of(part: Part, masses: int, period: float) -> list[str]:
     for one in found.defects:
         is_angle = one.channel < len(angles)
         number = angles[one.channel] if is_angle else numbers[one.channel - len(angles)]
-        cure = held(one.amount, "all") if one.name == "held" else spoilt(one.name, one.amount)
+        cure = held(one.amount, "all") if one.name == "held" else spoilt(one.name, one.amount, alone=False)
         words.append(f"the {'angle' if is_angle else 'torque'}{_of(number, masses)} {cure}")
     for equation, late in found.late:
-        by = f"{late.value:.3g} ± {late.stderr:.1g} samples ({late.value * period:.3g} s)"
+        by = f"{abs(late.value):.3g} ± {late.stderr:.1g} samples ({abs(late.value) * period:.3g} s)"
+        comes = "late" if late.value > 0 else "early"
         words.append(
-            f"the torque{_of(numbers[equation], masses)} seems to be late by {by}: shift it by as much, or record it with the angles"
+            f"the torque{_of(numbers[equation], masses)} seems to be {comes} by {by}: shift it by as much, or record it with the angles"
         )
     return words
 

@@ -47,15 +47,17 @@ impl MergedFit {
         self.tests.extend(found);
     }
 
-    /// Says of a constant that rows are predicted far better where windows follow it, as another fit does, unless its parts said so.
-    pub(crate) fn contradict(&mut self, one: usize, followed: &MergedFit, rows: usize) {
-        self.contradicted = true;
+    /// Says of a constant that rows are predicted far better where windows follow it, as another fit does, unless its parts said so or chance may do as
+    /// much among so many `independent` rows.
+    pub(crate) fn contradict(&mut self, one: usize, followed: &MergedFit, independent: f64) {
         let is_said = |(tested, test): &(usize, Test)| *tested == one && test.probability < constancy::NO_CHANCE;
         let place = followed.model.windowed.iter().position(|&other| other == one);
         let Some(place) = place.filter(|_| !self.tests.iter().any(is_said)) else { return };
-        let independent = rows as f64 / self.expected.variance_inflation;
         let test = Test::of_prediction(self.error / followed.error, independent, &followed.fit.values(place));
-        self.tests.retain(|(tested, _)| *tested != one);
-        self.tests.push((one, test));
+        if test.probability < constancy::NO_CHANCE {
+            self.contradicted = true;
+            self.tests.retain(|(tested, _)| *tested != one);
+            self.tests.push((one, test));
+        }
     }
 }

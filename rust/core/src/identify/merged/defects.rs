@@ -47,18 +47,20 @@ pub(crate) fn within_limits(
                 || agrees && within.prediction_error <= whole.prediction_error
         };
         if let Some(within) = within.filter(is_better) {
-            return Ok(told(within, spoilt, |_| true));
+            return Ok(told(within, spoilt, angles, |_| true));
         }
     }
-    Ok(told(whole, spoilt, |channel| channel < angles))
+    Ok(told(whole, spoilt, angles, |channel| channel < angles))
 }
 
-/// Forgets lines between readings that all channels have: these change no equation.
+/// Forgets lines between readings that all channels of a trial have alike: these change no equation.
 fn without_common_lines(spoilt: &mut OfChannels) {
-    let is_line = |one: &Defect| matches!(one, Defect::Interpolated(_));
-    let all = spoilt.iter().flatten().all(|channel| channel.iter().any(is_line));
-    if all {
-        spoilt.iter_mut().flatten().for_each(|channel| channel.retain(|one| !is_line(one)));
+    let is_line = |one: &&Defect| matches!(one, Defect::Interpolated(_));
+    for trial in spoilt {
+        let first = trial.first().and_then(|channel| channel.iter().find(is_line)).copied();
+        if let Some(line) = first.filter(|line| trial.iter().all(|channel| channel.contains(line))) {
+            trial.iter_mut().for_each(|channel| channel.retain(|one| *one != line));
+        }
     }
 }
 
@@ -75,7 +77,7 @@ fn with_limits(
     };
     let limits: Vec<Vec<[f64; 2]>> =
         spoilt.iter().map(|trial| trial.iter().enumerate().map(limits_of_channel).collect()).collect();
-    if limits.iter().flatten().all(|limits| limits[0].is_infinite()) {
+    if limits.iter().flatten().flatten().all(|limit| limit.is_infinite()) {
         return identify(merged);
     }
     let channels: Vec<Vec<Within<'_>>> =
@@ -97,13 +99,18 @@ fn read<'a>(channels: &'a [Within<'a>]) -> Vec<&'a dyn Samples> {
     channels.iter().map(|one| one as &dyn Samples).collect()
 }
 
-/// Says what was done to channels: of trials what the first one with it has. Limits count where samples at them are missing.
-fn told(mut found: MergedFound, spoilt: OfChannels, left_out: impl Fn(usize) -> bool) -> MergedFound {
+/// Says what was done to channels, of which angles come first: of trials what the first one with it has. Limits count where samples at them are
+/// missing, and holds of a torque where the motion does not say that it acts in steps.
+fn told(mut found: MergedFound, spoilt: OfChannels, angles: usize, is_left_out: impl Fn(usize) -> bool) -> MergedFound {
     for trial in spoilt {
         for (channel, defects) in trial.into_iter().enumerate() {
+            let late = found.late.iter().find(|(equation, _)| angles + equation == channel).map(|(_, late)| *late);
             for mut defect in defects {
+                if late.is_some_and(|late| defect.acts_in_steps(late.value, late.error)) {
+                    continue;
+                }
                 if limits_of(&defect).is_some() {
-                    if !left_out(channel) {
+                    if !is_left_out(channel) {
                         continue;
                     }
                     defect.leave_out();
@@ -114,6 +121,7 @@ fn told(mut found: MergedFound, spoilt: OfChannels, left_out: impl Fn(usize) -> 
             }
         }
     }
+    found.late.retain(|(_, late)| late.is_conspicuous());
     if found.defects.iter().any(|(_, defect)| defect.is_doubtful()) {
         found.record_status |= Status::CHANNEL_SUSPECTED;
     }

@@ -179,7 +179,9 @@ impl MergedSession<'_, '_, '_> {
                 (self.parameters, self.misfits) = before;
                 self.fill();
                 let mut fitted = self.told_by_what_is_left(fitted)?;
-                fitted.contradict(one, &found, self.all.rows.len());
+                let usable = self.all.rows.usable.iter().filter(|usable| **usable).count();
+                let inflation = self.noise_of_rows(&fitted)?.expected.variance_inflation;
+                fitted.contradict(one, &found, usable as f64 / inflation);
                 return Ok(Some(fitted));
             }
             // Windows were compared with weights of parameters that were wrong while this one was held constant.
@@ -208,18 +210,6 @@ impl MergedSession<'_, '_, '_> {
             tried = self.suspects(&fitted.model)?;
         }
         tried.truncate(TRIED);
-        let mut best: Option<Freed> = None;
-        for one in tried {
-            (self.parameters, self.misfits) = before.clone();
-            let freer = without(&fitted.model, one);
-            if hidden {
-                self.begin_with(&freer)?;
-            }
-            let Some(found) = self.fitted(&freer)? else { continue };
-            if best.as_ref().is_none_or(|best| found.error < best.found.error) {
-                best = Some(Freed { one, found, guess: (self.parameters.clone(), self.misfits.clone()) });
-            }
-        }
         let may_be_noise = (MORE..NO_NOISE).contains(&fitted.error);
         let most = match (hidden, may_be_noise) {
             (true, _) if fitted.error > NOISE_MODEL_FAILS => LACKING,
@@ -228,8 +218,22 @@ impl MergedSession<'_, '_, '_> {
         };
         // Where nothing but the noise of the channels is left, or what no noise is, what a test says is enough.
         let enough = fitted.model.windowed.is_empty() && !hidden && !may_be_noise;
-        let better = |best: &Freed| enough && self.is_open(best.one) || best.found.error < most * fitted.error;
-        Ok(best.filter(better))
+        let open: Vec<bool> = tried.iter().map(|&one| self.is_open(one)).collect();
+        let better = |freed: &Freed, is_open: bool| enough && is_open || freed.found.error < most * fitted.error;
+        let mut best: Option<Freed> = None;
+        for (one, is_open) in tried.into_iter().zip(open) {
+            (self.parameters, self.misfits) = before.clone();
+            let freer = without(&fitted.model, one);
+            if hidden {
+                self.begin_with(&freer)?;
+            }
+            let Some(found) = self.fitted(&freer)? else { continue };
+            let freed = Freed { one, found, guess: (self.parameters.clone(), self.misfits.clone()) };
+            if better(&freed, is_open) && best.as_ref().is_none_or(|best| freed.found.error < best.found.error) {
+                best = Some(freed);
+            }
+        }
+        Ok(best)
     }
 
     /// A fit beside which an element was set free, or one with another in its place that explains far more: parts hardly differ in what swings

@@ -13,7 +13,7 @@ use crate::regression::problem::Correlated;
 use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows};
 
 impl MergedSession<'_, '_, '_> {
-    /// By how many samples the torque of every equation seems to be late, of those where that is no chance.
+    /// By how many samples the torque of every equation seems to be late.
     pub(crate) fn late_torques(
         &mut self,
         fitted: &MergedFit,
@@ -49,7 +49,7 @@ impl MergedSession<'_, '_, '_> {
         let late = factors?.unwrap_or_default().into_iter().zip(equations).map(|((value, error), equation)| {
             (equation, Suspect { missing: Missing::Lag, value: -samples * value, error: samples * error })
         });
-        Ok(late.filter(|(_, suspect)| suspect.is_conspicuous()).collect())
+        Ok(late.collect())
     }
 
     /// The rate of the torque of an equation, in its rows.

@@ -23,6 +23,7 @@ use crate::regression::residuals::residuals;
 use crate::regression::sandwich::joint_covariance;
 use crate::regression::solved::sensitivity;
 use crate::regression::subsample::{stretches_of_rows, thinned_rows};
+use crate::regression::window_length::Scale;
 use crate::status::Status;
 
 /// Flags, standard errors of windowed elements, their covariances with others, and which those are, by row.
@@ -89,7 +90,8 @@ impl MergedSession<'_, '_, '_> {
         found.scan = std::mem::take(&mut self.scan);
         found.record_status |= found.scan.status(&found.constants_found());
         found.late = self.late_torques(fitted, &noise, &correlated)?;
-        found.record_status |= if found.late.is_empty() { Status::GOOD } else { Status::LAG_SUSPECTED };
+        let is_late = found.late.iter().any(|(_, late)| late.is_conspicuous());
+        found.record_status |= if is_late { Status::LAG_SUSPECTED } else { Status::GOOD };
         let deviation = self.deviation(fitted)?;
         let ([first, stride], period) = (self.all.samples(), self.all.rows.period);
         let results = RowResults {
@@ -133,22 +135,31 @@ impl MergedSession<'_, '_, '_> {
         let judged = (expected, fit.span, 0..rows.len());
         let instructions = self.options.instructions;
         let mut averages = average(&rest, of_thinned.as_ref(), &fitted.scales, judged, instructions, &mut self.stages)?;
-        self.forget_untold(model, &mut averages);
+        self.forget_untold(model, &fitted.scales, &mut averages);
         Ok(averages)
     }
 
-    /// Makes an element no number at times at which equations without it hold and none with it: to a solver it is zero there, without an error.
-    fn forget_untold(&self, model: &Model, averages: &mut Averages) {
+    /// Makes an element no number where equations without it hold, and none with it for as long as a window: to a solver it is zero there,
+    /// without an error. Shorter gaps are bridged by windows on either side.
+    fn forget_untold(&self, model: &Model, scales: &[Scale], averages: &mut Averages) {
         let (rows, group, equations) = (&self.all.rows, self.all.group, self.merged.equations());
         let usable = &self.whole.as_ref().unwrap_or(rows).usable;
+        let shortest = scales.iter().map(|scale| scale.one_sided()).min().unwrap_or(0);
         for (place, &element) in model.windowed.iter().enumerate() {
             let entries = &self.merged.elements[element].entries;
             let is_of = |row: usize| entries.iter().any(|entry| entry.equation == row % equations);
-            for (time, usable) in usable.chunks(group).enumerate() {
-                let is_told = (0..usable.len()).any(|row| usable[row] && is_of(row));
-                if !is_told && usable.iter().any(|usable| *usable) {
-                    (time * group..time * group + usable.len()).for_each(|row| averages.forget(place, row));
+            let is_told = |time: usize| {
+                let usable = &usable[time * group..((time + 1) * group).min(usable.len())];
+                (0..usable.len()).any(|row| usable[row] && is_of(row))
+            };
+            let (times, mut first) = (usable.len().div_ceil(group), 0);
+            while first < times {
+                let last = (first..times).find(|&time| is_told(time)).unwrap_or(times);
+                let run = first * group..(last * group).min(usable.len());
+                if run.len() >= shortest && usable[run.clone()].contains(&true) {
+                    run.for_each(|row| averages.forget(place, row));
                 }
+                first = last + 1;
             }
         }
     }
