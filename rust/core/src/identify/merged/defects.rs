@@ -59,7 +59,9 @@ fn without_common_lines(spoilt: &mut OfChannels) {
     for trial in spoilt {
         let first = trial.first().and_then(|channel| channel.iter().find(is_line)).copied();
         if let Some(line) = first.filter(|line| trial.iter().all(|channel| channel.contains(line))) {
-            trial.iter_mut().for_each(|channel| channel.retain(|one| *one != line));
+            for channel in trial.iter_mut() {
+                channel.retain(|one| *one != line);
+            }
         }
     }
 }

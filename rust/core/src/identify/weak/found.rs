@@ -16,6 +16,7 @@ use crate::weak_form::test_function::TestFunction;
 
 /// What was found in one record.
 #[derive(Clone, Debug)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a fact of its own about the record")]
 pub(crate) struct WeakIdentified {
     /// The test function.
     pub(crate) function: TestFunction,

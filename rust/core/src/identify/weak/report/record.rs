@@ -112,9 +112,7 @@ impl Session<'_, '_, '_> {
         let contradicted = self.is_contradicted(&weak, &found.constants);
         forget_what_is_said(&mut found, contradicted);
         found.record_status = errors.status | record_status(&found, decided, at_end);
-        if contradicted {
-            found.record_status |= Status::KIND_CONTRADICTED;
-        }
+        found.record_status |= if contradicted { Status::KIND_CONTRADICTED } else { Status::GOOD };
         Ok((found, Some(results)))
     }
 
