@@ -6,7 +6,7 @@
 use crate::error::Error;
 use crate::identify::merged::found::MergedFound;
 use crate::identify::merged::system::{Merged, Trial};
-use crate::identify::weak::decide::{BADLY, BETTER};
+use crate::identify::weak::decide::{is_better_within, is_odd};
 use crate::identify::weak::form::{defects_of_torque, limits_of};
 use crate::noise::defects::{Defect, Within, defects};
 use crate::record::samples::Samples;
@@ -31,23 +31,16 @@ pub(crate) fn within_limits(
     let mut spoilt: OfChannels = merged.trials.iter().map(of_channels).collect();
     without_common_lines(&mut spoilt);
     let whole = with_limits(merged, &spoilt, |channel| channel < angles, &mut identify)?;
-    let disagrees = whole.record_status.contains(Status::SCALES_DISAGREE);
-    let is_bad = whole.prediction_error >= BADLY || disagrees;
+    let predicted = |found: &MergedFound| (found.prediction_error, found.record_status);
     let at_limits = |one: &Vec<Defect>| one.iter().any(|defect| limits_of(defect).is_some());
     let has_limits = spoilt.iter().any(|trial| trial[angles..].iter().any(at_limits));
-    if is_bad && has_limits {
-        let within = match with_limits(merged, &spoilt, |_| true, &mut identify) {
+    if has_limits && is_odd(predicted(&whole)) {
+        match with_limits(merged, &spoilt, |_| true, &mut identify) {
             Err(Error::Cancelled) => return Err(Error::Cancelled),
-            Ok(within) if !within.record_status.contains(Status::RANK_DEFICIENT) => Some(within),
-            _ => None,
-        };
-        let is_better = |within: &MergedFound| {
-            let agrees = disagrees && !within.record_status.contains(Status::SCALES_DISAGREE);
-            within.prediction_error < BETTER * whole.prediction_error
-                || agrees && within.prediction_error <= whole.prediction_error
-        };
-        if let Some(within) = within.filter(is_better) {
-            return Ok(told(within, spoilt, angles, |_| true));
+            Ok(within) if is_better_within(predicted(&whole), predicted(&within)) => {
+                return Ok(told(within, spoilt, angles, |_| true));
+            }
+            _ => {}
         }
     }
     Ok(told(whole, spoilt, angles, |channel| channel < angles))

@@ -5,7 +5,8 @@ use crate::error::Error;
 use crate::identify::kinds::Kind;
 use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::MergedSession;
-use crate::identify::merged::shown::{MORE, NoiseOfRows};
+use crate::identify::merged::shown::NoiseOfRows;
+use crate::identify::weak::shown_noise::MORE;
 use crate::inference::constancy::{self, NoiseFrom, Test, TestNoise};
 use crate::inference::cross_validation::{Validated, best, validate};
 use crate::inference::jumps::jump::Jump;
@@ -218,19 +219,17 @@ impl MergedSession<'_, '_, '_> {
         };
         // Where nothing but the noise of the channels is left, or what no noise is, what a test says is enough.
         let enough = fitted.model.windowed.is_empty() && !hidden && !may_be_noise;
-        let open: Vec<bool> = tried.iter().map(|&one| self.is_open(one)).collect();
-        let better = |freed: &Freed, is_open: bool| enough && is_open || freed.found.error < most * fitted.error;
         let mut best: Option<Freed> = None;
-        for (one, is_open) in tried.into_iter().zip(open) {
+        for one in tried {
             (self.parameters, self.misfits) = before.clone();
             let freer = without(&fitted.model, one);
             if hidden {
                 self.begin_with(&freer)?;
             }
             let Some(found) = self.fitted(&freer)? else { continue };
-            let freed = Freed { one, found, guess: (self.parameters.clone(), self.misfits.clone()) };
-            if better(&freed, is_open) && best.as_ref().is_none_or(|best| freed.found.error < best.found.error) {
-                best = Some(freed);
+            let is_better = enough && self.is_open(one) || found.error < most * fitted.error;
+            if is_better && best.as_ref().is_none_or(|best| found.error < best.found.error) {
+                best = Some(Freed { one, found, guess: (self.parameters.clone(), self.misfits.clone()) });
             }
         }
         Ok(best)

@@ -7,15 +7,11 @@
 use crate::error::Error;
 use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::MergedSession;
+use crate::identify::weak::shown_noise::{MORE, REACHES};
 use crate::inference::constancy::NoiseFrom;
 use crate::regression::constants::Expected;
 use crate::regression::residuals::residuals;
 use crate::regression::row_covariance::RowCovariance;
-
-/// What is left, over the noise of the channels, from which on it is more than that.
-pub(crate) const MORE: f64 = 2.0;
-/// Times over which what is left is correlated, in reaches of a test function: noise of channels may last where two share no sample.
-const REACHES: usize = 4;
 
 /// The noise that errors and tests of constants rest on.
 pub(crate) struct NoiseOfRows {

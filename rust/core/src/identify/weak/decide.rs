@@ -18,6 +18,7 @@ use crate::regression::fit::Fit;
 use crate::regression::model::Model;
 use crate::regression::subsample::stretches_of_rows;
 use crate::regression::window_length::Scale;
+use crate::status::Status;
 
 /// The mean squared error of predicting rows, over the noise's, from which on more is tried, and the part of it that must be left to be
 /// worth it.
@@ -34,6 +35,21 @@ const SIMPLER: f64 = 0.98;
 /// Rounds of looking for jumps and fitting again with windows that end there. One is enough where even then constants seem to vary and windows are the
 /// shortest there are: these follow anything, and what they follow looks like jumps.
 const JUMP_ROUNDS: usize = 4;
+
+/// How well rows are predicted, and what holds for their record.
+pub(crate) type Predicted = (f64, Status);
+
+/// Whether rows are predicted badly, or widths disagree.
+pub(crate) fn is_odd((error, status): Predicted) -> bool {
+    error.is_nan() || error >= BADLY || status.contains(Status::SCALES_DISAGREE)
+}
+
+/// Whether rows within some limits are predicted better by far than the whole ones, or no worse while widths agree there alone.
+pub(crate) fn is_better_within(whole: Predicted, within: Predicted) -> bool {
+    let disagrees = |(_, status): Predicted| status.contains(Status::SCALES_DISAGREE);
+    let agrees = disagrees(whole) && !disagrees(within) && within.0 <= whole.0;
+    !within.1.contains(Status::RANK_DEFICIENT) && (within.0 < BETTER * whole.0 || agrees)
+}
 
 impl Session<'_, '_, '_> {
     /// Chooses the length of windows where it is not given, tests which coefficients are constant, and finds jumps of windowed ones.

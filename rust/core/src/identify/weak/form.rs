@@ -12,14 +12,13 @@ use crate::identify::scanned::Scan;
 use crate::identify::weak::angle_zero::outcome::FreeOffset;
 use crate::identify::weak::angle_zero::spring::STIFFNESS;
 use crate::identify::weak::choice::Chosen;
-use crate::identify::weak::decide::{BADLY, BETTER};
+use crate::identify::weak::decide::{is_better_within, is_odd};
 use crate::identify::weak::found::WeakIdentified;
 use crate::identify::weak::friction::FrictionDirection;
 use crate::identify::weak::options::WeakOptions;
 use crate::identify::weak::pulses::{add_pulses, allow_hidden, are_the_same, without_pulses};
 use crate::identify::weak::session::{Session, always_constant};
 use crate::identify::weak::torque_jumps::without_jumps;
-use crate::inference::missing_terms::Missing;
 use crate::noise::breaks::search::{Broken, breaks};
 use crate::noise::channel::{variance_after, weighted_variance};
 use crate::noise::defects::{Defect, Within, defects};
@@ -102,20 +101,16 @@ fn without(
     watch: &mut Watch<'_>,
 ) -> Result<WeakIdentified, Error> {
     let whole = without_limits(motion, (left_out, None), counted, options, workers, watch)?;
-    let disagrees = whole.record_status.contains(Status::SCALES_DISAGREE);
-    if whole.prediction_error < BADLY && !disagrees {
+    let predicted = |found: &WeakIdentified| (found.prediction_error, found.record_status);
+    if !is_odd(predicted(&whole)) {
         return Ok(whole);
     }
     let Some(limits) = defects(motion.torque).iter().find_map(limits_of) else { return Ok(whole) };
-    let within = without_limits(motion, (left_out, Some(limits)), counted, options, workers, watch);
-    let within = match within {
-        Ok(within) if !within.record_status.contains(Status::RANK_DEFICIENT) => within,
-        Err(Error::Cancelled) => return Err(Error::Cancelled),
-        _ => return Ok(whole),
-    };
-    let agrees = disagrees && !within.record_status.contains(Status::SCALES_DISAGREE);
-    let is_better = within.prediction_error < BETTER * whole.prediction_error;
-    Ok(if is_better || agrees && within.prediction_error <= whole.prediction_error { within } else { whole })
+    match without_limits(motion, (left_out, Some(limits)), counted, options, workers, watch) {
+        Err(Error::Cancelled) => Err(Error::Cancelled),
+        Ok(within) if is_better_within(predicted(&whole), predicted(&within)) => Ok(within),
+        _ => Ok(whole),
+    }
 }
 
 /// Identifies one record without some samples of its torque and those at its limits, where these are the recorder's, and without what a recorder spoilt.
@@ -161,8 +156,8 @@ fn without_limits(
         }
         defects[0].extend((!lost.is_empty()).then_some(Defect::Broken(lost.len())));
         // Whether a torque is held by its recorder the motion says, if it is asked.
-        let lag = lag_of(options.lag, &found);
-        let acts = |one: &Defect| lag.is_some_and(|(late, error)| one.acts_in_steps(late, error));
+        let lag = found.lag.or(found.late);
+        let acts = |one: &Defect| lag.is_some_and(|late| one.acts_in_steps(late.value, late.error));
         defects[1].retain(|one| !(acts(one) || !options.diagnose && matches!(one, Defect::Held(_))));
         // Unless something else was done to it.
         if let Some((channel, part)) = found.filtered.filter(|&(channel, _)| defects[channel].is_empty()) {
@@ -172,15 +167,6 @@ fn without_limits(
         let suspected = if doubtful { Status::CHANNEL_SUSPECTED } else { Status::GOOD };
         WeakIdentified { record_status: found.record_status | suspected, resting, defects, lost, limits, ..found }
     })
-}
-
-/// The lag of the torque and its standard error, in samples: what was found, or what is suspected beside what was given. Where next to nothing is left
-/// for a lag to explain, what was given is right; nothing where nobody knows.
-fn lag_of(given: Option<f64>, found: &WeakIdentified) -> Option<(f64, f64)> {
-    let left = found.suspects.iter().find(|one| one.missing == Missing::Lag);
-    let of_given = given.filter(|_| found.is_explained).map(|given| (given, 0.0));
-    let of_suspect = left.map(|left| (given.unwrap_or(0.0) + left.value, left.error));
-    found.lag.map(|lag| (lag.value, lag.error)).or(of_suspect).or(of_given)
 }
 
 /// What was done to every channel: angle and torque, then velocity and acceleration. Limits of the torque are the recorder's or the drive's.

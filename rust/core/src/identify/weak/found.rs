@@ -16,7 +16,6 @@ use crate::weak_form::test_function::TestFunction;
 
 /// What was found in one record.
 #[derive(Clone, Debug)]
-#[allow(clippy::struct_excessive_bools, reason = "each is a fact of its own about the record")]
 pub(crate) struct WeakIdentified {
     /// The test function.
     pub(crate) function: TestFunction,
@@ -60,8 +59,8 @@ pub(crate) struct WeakIdentified {
     pub(crate) angle_zero: Option<AngleZero>,
     /// How much better an offset would predict that is free in every window.
     pub(crate) free_offset: FreeOffset,
-    /// Whether the equations leave next to nothing of the torque.
-    pub(crate) is_explained: bool,
+    /// What the torque seems to be late by, the lag that was given with it; nothing where nobody asked.
+    pub(crate) late: Option<Lag>,
     /// What the rows say that the mask keeps out; nothing without a mask.
     pub(crate) outside_mask: Option<Outside>,
     /// Unknowns that change, in the order of the values at the samples.

@@ -27,7 +27,7 @@ use crate::regression::window_length::Scale;
 use crate::weak_form::weak_rows::WeakRows;
 
 /// What is left of the equations, over the variance that is expected, from which on it is more than the noise of the channels.
-const MORE: f64 = 2.0;
+pub(crate) const MORE: f64 = 2.0;
 /// The same from which on downwards the channels hold signal where their noise is read.
 const LESS: f64 = 0.5;
 /// Rounds of choosing the test function with the noise that the last one showed.
@@ -38,7 +38,7 @@ const SETTLED: f64 = 0.1;
 /// The part of the torque's mean square that windows hardly longer than the test function may leave: they follow anything.
 const LEFT_BY_SHORT: f64 = 1e-5;
 /// Rows over which what is left is correlated, in reaches of a test function: where two share no sample noise of the channels may last.
-const REACHES: usize = 4;
+pub(crate) const REACHES: usize = 4;
 /// Parts of a record with constants of their own: what varies over the record is not noise.
 const PARTS: usize = 64;
 /// Windows in such a part, at least, and windows among which the part's constants take next to nothing of the noise.

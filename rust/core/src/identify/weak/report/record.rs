@@ -10,6 +10,7 @@ use crate::identify::scanned::Scan;
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::found::WeakIdentified;
+use crate::identify::weak::lag::Lag;
 use crate::identify::weak::outside_mask::Inside;
 use crate::identify::weak::report::at_rows::{Fitted, OfAllRows};
 use crate::identify::weak::report::errors::Errors;
@@ -105,10 +106,11 @@ impl Session<'_, '_, '_> {
         (found.pairs, found.in_common) = (pairs, in_common);
         let rhs = decided.rhs(&weak.rows).to_vec();
         // A term hardly matters where next to nothing is left for it to explain.
-        found.is_explained = errors.left <= NEGLIGIBLE * weak.rows.mean_square();
-        if !found.is_explained {
+        let is_explained = errors.left <= NEGLIGIBLE * weak.rows.mean_square();
+        if !is_explained {
             found.suspects = self.suspects(&mut weak, decided, fit, (rhs, correlated), &errors)?;
         }
+        found.late = late(self.options.lag, &found.suspects, is_explained);
         let contradicted = self.is_contradicted(&weak, &found.constants);
         forget_what_is_said(&mut found, contradicted);
         found.record_status = errors.status | record_status(&found, decided, at_end);
@@ -182,7 +184,7 @@ impl Session<'_, '_, '_> {
             weakest: Vec::new(),
             mostly_noise: false,
             unexplained: false,
-            is_explained: false,
+            late: None,
             suspects: Vec::new(),
             lag: None,
             filtered: None,
@@ -265,6 +267,13 @@ fn constants(decided: &Decided, values: &[f64], covariance: &[f64]) -> Vec<Const
         Constant { unknown, value: values[place + slow], error: variance.sqrt(), test }
     };
     decided.model.constant.iter().enumerate().map(constant).collect()
+}
+
+/// What the torque seems to be late by: what is suspected beside the lag that was given. Where next to nothing is left to explain, that one is right.
+fn late(given: Option<f64>, suspects: &[Suspect], is_explained: bool) -> Option<Lag> {
+    let suspected = suspects.iter().find(|one| one.missing == Missing::Lag);
+    let suspected = suspected.map(|one| Lag { value: given.unwrap_or(0.0) + one.value, error: one.error });
+    suspected.or(given.filter(|_| is_explained).map(|value| Lag { value, error: 0.0 }))
 }
 
 /// Forgets suspects that only repeat what is said already: what a filter does, and, where something changes that should not, what the torque tells of it.
