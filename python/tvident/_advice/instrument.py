@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
-from tvident._results import Words
+from tvident._results import FED_BACK, Words
 from tvident._status import Status
 
 
@@ -43,7 +43,7 @@ def fed_back(coherence: float | None) -> list[str]:
     if coherence is None or coherence < _core.CORRELATED_NOISE:
         return []
     words = (
-        f"the torque holds the angle's noise (coherence {coherence:.2f} above the motion): a controller feeds it back, and "
+        f"{FED_BACK} (coherence {coherence:.2f} above the motion): a controller feeds it back, and "
         "estimates are biased: give the reference or another channel that moves the system as instrument="
     )
     return [words]

@@ -23,6 +23,7 @@ from tvident._advice.events import (
     untold_here,
 )
 from tvident._advice.instrument import fed_back
+from tvident._advice.lag import untold_lag
 from tvident._advice.lists import listed
 from tvident._advice.scales import disagreement, scales_compared
 from tvident._advice.torque import OF_TORQUE, told_by_torque
@@ -112,6 +113,7 @@ class Explained:
             return Words(reasons, tuple(self._defects()))
         advice = (
             *fed_back(self.coherence),
+            *(() if self.lag or "lag" in self.chosen else untold_lag(self.found, self.names, self.period)),
             *disagreement(self.found, self.names, self.units, flags),
             *self._misfit(flags),
             *unexplained_here(self.found, self.period, self.step),

@@ -29,14 +29,16 @@ from tvident._results.verdict import (
     verdict_of_trusted,
     why_not,
 )
-from tvident._results.words import BECOMES, TRIED, Words, of_batch
+from tvident._results.words import BECOMES, FED_BACK, TRIED, UNTOLD_LAG, Words, of_batch
 
 __all__ = [
     "BECOMES",
     "CHANGING",
     "COLUMNS",
+    "FED_BACK",
     "POOR",
     "TRIED",
+    "UNTOLD_LAG",
     "Estimates",
     "ExpandedParameter",
     "Identification",

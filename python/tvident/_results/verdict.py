@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tvident._arguments import explained_in_words, percent, percentiles, to_digits_of, told_once
-from tvident._results.words import BECOMES, OTHER_UNIT, TRIED
+from tvident._results.words import BECOMES, CONDITIONS, OTHER_UNIT, TRIED
 from tvident._status import Status
 from tvident._units import in_words_of
 
@@ -101,7 +101,7 @@ def verdict_of_trusted(result: Any, known: str, share: float | None) -> str:
         parts.append(f"model explains {percent(share)} of the torque")
     words = ", ".join(parts) or "nothing was unknown"
     is_doubtful = result.record_status & _DOUBTS and result.advice
-    if is_doubtful or any(TRIED in line for line in result.advice):
+    if is_doubtful or any(one in line for line in result.advice for one in (TRIED, *CONDITIONS)):
         return f"{words}; errors hold if the model does: see what to do"
     if any(asked in line for asked in OTHER_UNIT for line in result.advice):
         return f"{words}; all in other units if a channel is: see what to do"

@@ -14,6 +14,11 @@ BECOMES = " becomes "
 OTHER_UNIT = ("degrees?", "milliseconds?")
 """How advice asks about units, of which all numbers depend."""
 
+FED_BACK = "the torque holds the angle's noise"
+UNTOLD_LAG = "the record does not tell half a sample of lag"
+CONDITIONS = (FED_BACK, UNTOLD_LAG)
+"""How advice begins that says on what errors depend."""
+
 
 @dataclass(frozen=True)
 class Words:

@@ -197,6 +197,8 @@ pub(crate) struct Identification {
     /// Where an offset that is free in every window predicts better.
     free_offset: Option<OffsetErrors>,
     suspects: Vec<Py<Suspect>>,
+    /// What unknowns that do not belong to windows change by with every sample that the torque is later.
+    with_lag: Vec<(usize, f64)>,
     defects: Vec<ChannelDefect>,
     resting: f64,
     pulses: Vec<(usize, usize)>,
@@ -274,6 +276,7 @@ impl Identification {
                 .filter(FreeOffset::is_better)
                 .map(|offset| OffsetErrors { used: offset.error, free: offset.free }),
             suspects: weak.map_or(Ok(Vec::new()), |weak| weak.suspects.iter().map(suspect).collect::<PyResult<_>>())?,
+            with_lag: weak.map(|weak| weak.with_lag.clone()).unwrap_or_default(),
             defects: weak.map(defects).unwrap_or_default(),
             resting: weak.map_or(0.0, |weak| weak.resting),
             pulses: weak.map_or_else(Vec::new, |weak| weak.pulses.iter().map(|one| (one.start, one.end)).collect()),

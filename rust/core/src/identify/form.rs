@@ -109,10 +109,7 @@ pub(crate) fn weak(
     };
     let found = identify_weak(&task.motion, (task.mask, task.weights), &weak_options, workers, watch)?;
     let place = |number: usize| regressors.iter().position(|&one| one == number).unwrap_or(number);
-    let outside_mask = found.outside_mask.map(|outside| {
-        let differing = outside.differing.iter().map(|&(number, value, error)| (place(number), value, error)).collect();
-        Outside { differing, ..outside }
-    });
+    let outside_mask = found.outside_mask.map(|outside| placed(outside, &place));
     let details = WeakDetails {
         noise: found.noise,
         shown_noise: found.shown_noise,
@@ -131,6 +128,7 @@ pub(crate) fn weak(
         angle_zero: found.angle_zero,
         free_offset: found.free_offset,
         suspects: found.suspects,
+        with_lag: found.with_lag.iter().map(|&(one, by)| (place(one), by)).collect(),
         defects: found.defects,
         resting: found.resting,
         pulses: found.pulses,
@@ -163,6 +161,12 @@ pub(crate) fn weak(
         jumps: found.jumps,
         weak: Some(details),
     })
+}
+
+/// The same with places among the unknowns.
+fn placed(outside: Outside, place: &dyn Fn(usize) -> usize) -> Outside {
+    let differing = outside.differing.iter().map(|&(number, value, error)| (place(number), value, error)).collect();
+    Outside { differing, ..outside }
 }
 
 /// Identifies one record in strong form, whatever its kinds, mask and missing samples.

@@ -115,6 +115,8 @@ pub struct WeakDetails {
     pub free_offset: FreeOffset,
     /// What may have been left out.
     pub suspects: Vec<Suspect>,
+    /// What unknowns that do not belong to windows change by with every sample that the torque is later.
+    pub with_lag: Vec<(usize, f64)>,
     /// What was done to angle and torque, then velocity and acceleration where they were measured: clipped, held, interpolated, wrapped or filtered samples.
     pub defects: Vec<Vec<Defect>>,
     /// The part of the record that rests, where a term of friction asks for it: equations there say nothing of friction and are left out.

@@ -108,6 +108,9 @@ impl Suspect {
     }
 }
 
+/// Factors with their standard errors, and what constants change by.
+pub(crate) type FactorsAndChanges = (Vec<(f64, f64)>, Vec<f64>);
+
 /// The fit that a term is added to.
 pub(crate) struct JudgedTerm<'a> {
     pub(crate) rows: &'a Rows,
@@ -136,17 +139,29 @@ impl JudgedTerm<'_> {
         regressors: &[usize],
         stages: &mut Stages<'_, '_>,
     ) -> Result<Option<Vec<(f64, f64)>>, Error> {
+        Ok(self.factors_and_changes(regressors, stages)?.map(|(factors, _)| factors))
+    }
+
+    /// The same, and what each constant of the model changes by with every unit of the last of them.
+    pub(crate) fn factors_and_changes(
+        &self,
+        regressors: &[usize],
+        stages: &mut Stages<'_, '_>,
+    ) -> Result<Option<FactorsAndChanges>, Error> {
         let mut model = self.model.clone();
         model.constant.extend(regressors);
         let problem = model.problem(self.rows, self.rhs, self.noise, Some(self.correlated));
         let fit = self.fit.again(&problem, self.expected, self.instructions, stages)?;
         let Some(fit) = fit else { return Ok(None) };
-        let added = self.model.constant.len()..problem.layout.constant;
+        let (known, count) = (self.model.constant.len(), problem.layout.constant);
         let factor = |constant: usize| {
             let variance = self.inflation * fit.variance_of(&problem, constant, self.covariance, stages)?;
             Ok((fit.pooled.values[constant], variance.sqrt()))
         };
-        added.map(factor).collect::<Result<_, Error>>().map(Some)
+        let factors = (known..count).map(factor).collect::<Result<_, Error>>()?;
+        let with_last = &fit.pooled.inverse[(count - 1) * count..];
+        let changes = with_last[..known].iter().map(|with| with / with_last[count - 1]).collect();
+        Ok(Some((factors, changes)))
     }
 }
 

@@ -22,6 +22,13 @@ impl Varying {
         interpolate(points, (row - first) / self.spacing, self.spacing)
     }
 
+    /// The first rows of stretches, but for the first stretch.
+    pub(crate) fn breaks(&self) -> Vec<usize> {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rows")]
+        let rows = |(first, _): &(f64, usize)| *first as usize;
+        self.stretches.iter().skip(1).map(rows).collect()
+    }
+
     /// The points of the stretch that a row belongs to, and the row of the first of them.
     fn stretch<'a>(&self, points: &'a [f64], row: f64) -> (&'a [f64], f64) {
         let next = self.stretches.partition_point(|(first, _)| *first <= row).max(1);

@@ -52,6 +52,8 @@ pub(crate) struct SlowCoefficients {
     pub(crate) predicted: f64,
     /// Bandwidth: rows on either side that they are estimated from.
     pub(crate) reach: f64,
+    /// Coefficients of the polynomials in time.
+    terms: usize,
 }
 
 /// The data in which slow coefficients are estimated.
@@ -177,19 +179,20 @@ pub(crate) fn find(
             // Shorter bandwidths need shorter windows.
             most = most.min(scale.span() / 2);
         }
-        let rhs = without(rows, slow, &varying);
+        let rhs = without(rows, &rows.rhs, slow, &varying);
         let problem = rest.problem(rows, &rhs, noise, None);
         let Some((best, error)) = search.best_length(&problem, &rest, &mut few, stages)? else { return Ok(None) };
         let mut predicted = error;
         if round == ROUNDS && !rows.jumps.is_empty() {
-            let rhs = without(rows, slow, &leave_gap_out);
+            let rhs = without(rows, &rows.rhs, slow, &leave_gap_out);
             let problem = rest.problem(rows, &rhs, noise, None);
             let fit = Fit::with_leave_gap_out(&problem, best, expected, instructions, stages)?;
             let compared = ComparedRows::new(&problem, scales);
             predicted = fit.map_or(f64::INFINITY, |fit| compared.error(&problem, best, &fit, expected.variance));
         }
         let reach = reach.min(whole / 2.0);
-        found = Some(SlowCoefficients { varying, rhs, scale: best, equations_of: scale, error, predicted, reach });
+        found =
+            Some(SlowCoefficients { varying, rhs, scale: best, equations_of: scale, error, predicted, reach, terms });
         scale = shortened(best, most);
     }
     Ok(found)
@@ -213,9 +216,31 @@ fn outward(reaches: &[f64], last: Option<f64>, mut is_better: impl FnMut(f64) ->
     walk(&mut below.iter().rev());
 }
 
-/// The right-hand side without slow coefficients.
-pub(crate) fn without(rows: &Rows, slow: &[usize], varying: &Varying) -> Vec<f64> {
-    let mut rhs = rows.rhs.clone();
+/// What slow coefficients would follow of another right-hand side with the bandwidth that was found, or `None` if they are not determined.
+pub(crate) fn followed(
+    search: &SlowSearch<'_>,
+    found: &SlowCoefficients,
+    rhs: &[f64],
+    stages: &mut Stages<'_, '_>,
+) -> Result<Option<Varying>, Error> {
+    let &SlowSearch { rows, model, coefficients, noise, expected, instructions, .. } = search;
+    let scale = found.equations_of;
+    let problem = model.problem(rows, rhs, noise, None);
+    let Some(fit) = Fit::new(&problem, Some(scale), expected, instructions, stages)? else { return Ok(None) };
+    let companions =
+        model.constant[..coefficients].iter().map(|&one| rows.regressors[one].companion.as_slice()).collect();
+    let weights = vec![1.0; fit.full.len()];
+    let (rows, breaks) = (rows.len(), found.varying.breaks());
+    let equations =
+        Slow { fit: &fit, coefficients, companions, current: None, weights: &weights, rows, breaks: &breaks };
+    let hole = (scale.span() / 2 + scale.reach) as f64;
+    let fitted = equations.fit(&equations.equations(), found.terms, (found.reach, hole), instructions);
+    Ok(fitted.map(|[_, full]| full))
+}
+
+/// A right-hand side without slow coefficients.
+pub(crate) fn without(rows: &Rows, rhs: &[f64], slow: &[usize], varying: &Varying) -> Vec<f64> {
+    let mut rhs = rhs.to_vec();
     for (coefficient, &regressor) in slow.iter().enumerate() {
         let regressor = &rows.regressors[regressor];
         for (row, rhs) in rhs.iter_mut().enumerate() {
@@ -249,11 +274,10 @@ mod tests {
         rows
     }
 
-    /// What a search for one coefficient that varies finds, which begins with windows of a length.
-    fn found_from(rows: &Rows, scales: &[Scale], first: Scale) -> Option<SlowCoefficients> {
-        let search = SlowSearch {
+    fn search<'a>(rows: &'a Rows, model: &'a Model, scales: &'a [Scale]) -> SlowSearch<'a> {
+        SlowSearch {
             rows,
-            model: &model(),
+            model,
             coefficients: 1,
             noise: 0.0,
             expected: white(DEVIATION * DEVIATION),
@@ -261,8 +285,12 @@ mod tests {
             breaks: &[],
             simpler: 1.0,
             instructions: Instructions::Scalar,
-        };
-        staged(|stages| find(&search, first, stages))
+        }
+    }
+
+    /// What a search for one coefficient that varies finds, which begins with windows of a length.
+    fn found_from(rows: &Rows, scales: &[Scale], first: Scale) -> Option<SlowCoefficients> {
+        staged(|stages| find(&search(rows, &model(), scales), first, stages))
     }
 
     #[test]
@@ -313,6 +341,30 @@ mod tests {
         let variances = vec![vec![1.0; points.len()]];
         let stretches = vec![(-16.0, 0)];
         let varying = Varying { spacing: 8.0, stretches, values: vec![points], variances, constants: Vec::new() };
-        assert!(without(&rows, &[1], &varying).iter().all(|left| left.abs() < 1e-10));
+        assert!(without(&rows, &rows.rhs, &[1], &varying).iter().all(|left| left.abs() < 1e-10));
+    }
+
+    #[test]
+    fn another_column_is_followed_as_far_as_it_is_a_slow_coefficient_times_the_regressor() {
+        let (rows, scales, model) = (changing(), Scale::all(ROWS, 3), model());
+        let found = found_from(&rows, &scales, scales[2]).expect("a curve");
+        // A column that is the regressor times a factor that grows, beside the growth's companion, and a part that is no such thing.
+        let growth = 1.0 / (ROWS as f64 * PERIOD);
+        let regressor = &rows.regressors[1];
+        let other = crate::regression::simulated::random(77, ROWS);
+        let column: Vec<f64> = (0..ROWS)
+            .map(|row| {
+                let followed = row as f64 / ROWS as f64 * regressor.value[row] + growth * regressor.companion[row];
+                followed + other[row]
+            })
+            .collect();
+        let search = search(&rows, &model, &scales);
+        let varying = staged(|stages| followed(&search, &found, &column, stages)).expect("determined");
+        let left = without(&rows, &column, &[1], &varying);
+        // The part that is followed is a third of the column's mean square, and a few of so many rows are taken by the curve.
+        let off: f64 = left.iter().zip(&other).map(|(left, other)| (left - other).powi(2)).sum();
+        assert!(off < 0.05 * other.iter().map(|other| other * other).sum::<f64>(), "{off}");
+        let level: f64 = varying.values[0].iter().sum::<f64>() / varying.values[0].len() as f64;
+        assert!((level - 0.5).abs() < 0.2, "{level}");
     }
 }

@@ -61,6 +61,8 @@ pub(crate) struct WeakIdentified {
     pub(crate) free_offset: FreeOffset,
     /// What the torque seems to be late by, the lag that was given with it; nothing where nobody asked.
     pub(crate) late: Option<Lag>,
+    /// What unknowns that do not belong to windows change by with every sample that the torque is later.
+    pub(crate) with_lag: Vec<(usize, f64)>,
     /// What the rows say that the mask keeps out; nothing without a mask.
     pub(crate) outside_mask: Option<Outside>,
     /// Unknowns that change, in the order of the values at the samples.

@@ -43,7 +43,7 @@ impl Session<'_, '_, '_> {
         let rest = decided.model.without_constants(&weak.rows, &problem, &rest_rhs, constants, noise);
         let whole = whole.unwrap_or(&weak.rows);
         let rhs = match &decided.found {
-            Some(found) => slowly_varying::without(whole, &decided.slow, &found.varying),
+            Some(found) => slowly_varying::without(whole, &whole.rhs, &decided.slow, &found.varying),
             None => whole.rhs.clone(),
         };
         let whole = decided.model.problem(whole, &rhs, noise, None);

@@ -10,10 +10,13 @@ use crate::equation::rows::{Regressor, Rows};
 use crate::error::Error;
 use crate::identify::kinds::Kind;
 use crate::identify::weak::choice::Chosen;
+use crate::identify::weak::decide::BADLY;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::{CONSPICUOUS, JudgedTerm};
+use crate::inference::slowly_varying::{SlowSearch, followed, without};
+use crate::noise::median::median;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
@@ -41,6 +44,9 @@ const ABOUT: f64 = 0.1;
 const MOST_HALVES: f64 = 2.0;
 const LARGE: f64 = 0.25;
 
+/// Times that a lag is sought beside which nothing need vary.
+const TRIES: usize = 2;
+
 /// Powers of time by which what changes slowly may change once more beside a lag: what was found of it with another lag holds a part of that, since a
 /// damping that follows a sweep does what a lag does.
 const GROWTHS: i32 = 3;
@@ -52,6 +58,12 @@ pub struct Lag {
     pub value: f64,
     /// Its standard error.
     pub error: f64,
+}
+
+/// What is left of a regressor where what varies slowly follows it, and by how much each does so in the median.
+pub(crate) struct Followed {
+    pub(crate) left: Vec<f64>,
+    pub(crate) by: Vec<f64>,
 }
 
 /// What was chosen and decided, and the lag that was found on the way.
@@ -69,9 +81,12 @@ impl Session<'_, '_, '_> {
             if choice > 1 {
                 chosen = self.choose(model)?;
             }
-            let decided = self.decide(&mut chosen, model)?;
+            let mut decided = self.decide(&mut chosen, model)?;
             if self.options.lag.is_some() {
                 return Ok((chosen, decided, None));
+            }
+            if choice == 1 && !decided.slow.is_empty() {
+                (chosen, decided) = self.constant_beside_lag((chosen, decided), model)?;
             }
             let before = self.record.lag;
             lag = self.find_lag(&chosen, &decided)?;
@@ -136,6 +151,31 @@ impl Session<'_, '_, '_> {
             }
         }
         Ok(None)
+    }
+
+    /// What was decided, or, where something varies slowly that need not do so beside a lag, nothing of it beside that: of two equations that predict
+    /// alike, the one in which nothing changes.
+    fn constant_beside_lag(
+        &mut self,
+        (chosen, decided): (Chosen, Decided),
+        model: &Model,
+    ) -> Result<(Chosen, Decided), Error> {
+        let mut beside: Option<(Chosen, Decided)> = None;
+        let before = (self.scan.clone(), self.record.lag, self.noise);
+        for _ in 0..TRIES {
+            let one = beside.as_ref().map_or(&chosen, |(one, _)| one);
+            let constant = self.fit_first(one, model)?;
+            let Some(found) = self.find_lag(one, &constant)? else { break };
+            self.record.lag = found.value;
+            let mut one = self.choose(model)?;
+            let again = self.decide(&mut one, model)?;
+            if again.fit.is_some() && again.slow.is_empty() && again.error < BADLY.max(decided.error) {
+                return Ok((one, again));
+            }
+            beside = Some((one, again));
+        }
+        (self.scan, self.record.lag, self.noise) = before;
+        Ok((chosen, decided))
     }
 
     /// The lag, iterated until its correction vanishes, or `None` if the rows do not determine it.
@@ -207,6 +247,38 @@ impl Session<'_, '_, '_> {
         Ok(found.map(|(value, error)| (-value / period, error / period)))
     }
 
+    /// What is left of a regressor where what varies slowly follows it as it follows the motion, or `None` if that is not determined. A damping that
+    /// follows a sweep does what a lag does: beside it only the rest of the torque's rate tells the lag.
+    pub(crate) fn beside_slow(
+        &mut self,
+        rows: &Rows,
+        regressor: usize,
+        decided: &Decided,
+    ) -> Result<Option<Followed>, Error> {
+        let column = &rows.regressors[regressor].value;
+        let Some(found) = &decided.found else {
+            return Ok(Some(Followed { left: column.clone(), by: Vec::new() }));
+        };
+        let model = decided.ordered();
+        let search = SlowSearch {
+            rows,
+            model: &model,
+            coefficients: decided.slow.len(),
+            noise: self.noise[0],
+            expected: decided.expected,
+            scales: &decided.scales,
+            breaks: &[],
+            simpler: 1.0,
+            instructions: self.options.instructions,
+        };
+        let varying = followed(&search, found, column, &mut self.stages)?;
+        Ok(varying.map(|varying| {
+            let left = without(rows, column, &decided.slow, &varying);
+            let mut by = varying.values;
+            Followed { left, by: by.iter_mut().map(|values| median(values).unwrap_or(f64::NAN)).collect() }
+        }))
+    }
+
     /// Which of inertia and damping may change along the record.
     fn may_change(&self) -> Vec<usize> {
         let undecided = self.undecided();
@@ -234,16 +306,22 @@ impl Session<'_, '_, '_> {
         let (mut model, mut rows) = (decided.ordered(), decided.rows(&weak.rows).clone());
         let wanted = model.constant.len();
         let rhs = decided.rhs(&rows).to_vec();
-        model.constant.extend(growing(&mut rows, &decided.slow));
+        let Some(Followed { left, by }) = self.beside_slow(&rows, self.rate(), decided)? else { return Ok(None) };
+        rows.regressors[self.rate()].value = left;
         model.constant.push(self.rate());
         let problem = model.problem(&rows, &rhs, self.noise[0], problem.correlated.as_ref());
         let Some(all) = fit.again(&problem, errors.expected, self.options.instructions, &mut self.stages)? else {
             return Ok(None);
         };
         let both = all.covariance(&problem, &errors.covariance, &mut self.stages)?;
-        let count = problem.layout.constant;
-        let rows = both.chunks_exact(count).take(wanted);
-        Ok(Some(rows.flat_map(|row| row[..wanted].to_vec()).collect()))
+        // What varies slowly follows the lag, too.
+        let count = wanted + 1;
+        let follows = |one: usize| by.get(one).copied().unwrap_or(0.0);
+        let with_lag = |one: usize| both[one * count + wanted] - follows(one) * both[count * count - 1];
+        let entry = |one: usize, other: usize| {
+            both[one * count + other] - follows(one) * both[other * count + wanted] - follows(other) * with_lag(one)
+        };
+        Ok(Some((0..wanted * wanted).map(|place| entry(place / wanted, place % wanted)).collect()))
     }
 }
 

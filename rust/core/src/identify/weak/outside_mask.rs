@@ -67,7 +67,7 @@ impl Session<'_, '_, '_> {
         }
         let Inside { decided, fit, constants, variances, covariance, expected, inflation } = *inside;
         if let Some(found) = &decided.found {
-            rows.rhs = slowly_varying::without(&rows, &decided.slow, &found.varying);
+            rows.rhs = slowly_varying::without(&rows, &rows.rhs, &decided.slow, &found.varying);
         }
         if let Some(spring) = &decided.spring {
             let regressor = spring.regressor(&rows);

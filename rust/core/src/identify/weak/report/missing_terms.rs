@@ -7,15 +7,26 @@ use crate::equation::rows::Regressor;
 use crate::equation::terms::BUILT_IN_TERMS;
 use crate::error::Error;
 use crate::identify::weak::decided::Decided;
+use crate::identify::weak::lag::Followed;
 use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::session::Session;
-use crate::inference::missing_terms::{JudgedTerm, Missing, Suspect};
+use crate::inference::missing_terms::{CONSPICUOUS, JudgedTerm, Missing, Suspect};
 use crate::record::derived::Interpolated;
 use crate::regression::fit::Fit;
 use crate::regression::limits::NEGLIGIBLE;
 use crate::regression::problem::Correlated;
 use crate::regression::subsample::{holds, more_stretches_of_rows, stretches_of_rows, thinned_column, thinned_rows};
 use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows};
+
+/// Where next to nothing is left to explain, a lag is none that is below a fifth of what a drive makes that holds each torque for a sample.
+const LEAST_LAG: f64 = 0.1;
+
+/// What may have been left out, and what unknowns change by with every sample that the torque is later.
+#[derive(Default)]
+pub(crate) struct Suspected {
+    pub(crate) each: Vec<Suspect>,
+    pub(crate) with_lag: Vec<(usize, f64)>,
+}
 
 impl Session<'_, '_, '_> {
     /// Looks for what may have been left out. The right-hand side and the windowed regressors times the covariance are those of all rows.
@@ -26,26 +37,40 @@ impl Session<'_, '_, '_> {
         fit: &Fit,
         (mut rhs, correlated): (Vec<f64>, Arc<Correlated>),
         errors: &Errors,
-    ) -> Result<Vec<Suspect>, Error> {
-        if !self.options.diagnose {
-            return Ok(Vec::new());
+    ) -> Result<Suspected, Error> {
+        let mut candidates = self.candidates();
+        // A term hardly matters where next to nothing is left for it to explain. A lag does: next to nothing of the torque may be much of the damping.
+        let is_explained = errors.left <= NEGLIGIBLE * weak.rows.mean_square();
+        candidates.retain(|one| !is_explained || *one == Missing::Lag);
+        if !self.options.diagnose || candidates.is_empty() {
+            return Ok(Suspected::default());
         }
-        let candidates = self.candidates();
         let stretches = stretches_to_judge(weak, decided, fit);
         let more = self.regressors_of(&candidates, weak, stretches.as_deref())?;
+        let lag = match candidates.iter().position(|one| *one == Missing::Lag) {
+            Some(place) => self.lag_beside_slow(weak, &more[place], stretches.as_deref(), decided)?,
+            None => None,
+        };
         if let Some(stretches) = &stretches {
             (weak.rows, rhs) = (thinned_rows(&weak.rows, stretches), thinned_column(&rhs, stretches));
         }
         let first = weak.rows.regressors.len();
         weak.rows.regressors.extend(more);
+        let rate = weak.rows.regressors.len();
+        let followed = lag.map(|Followed { left, by }| {
+            weak.rows.regressors.push(Regressor { value: left, ..weak.rows.regressors[rate - 1].clone() });
+            by
+        });
         weak.rows.clear_unusable();
-        let regressors = first..weak.rows.regressors.len();
         // What the torque tells is told beside a lag that may be missing, not beside one that was found; another record's may be another.
         let found_lag = usize::from(self.options.found_lag && candidates.last() == Some(&Missing::Lag));
         let apart = candidates.iter().take_while(|missing| !missing.is_beside_torque()).count();
-        let (beside, regressors) =
-            (&candidates[apart..candidates.len() - found_lag], regressors.start + apart..regressors.end - found_lag);
-        let mut suspects = self.of_torque(weak, decided, (fit, &rhs, errors.error), regressors, beside)?;
+        let mut suspects = Vec::new();
+        if !is_explained {
+            let (beside, regressors) =
+                (&candidates[apart..candidates.len() - found_lag], first + apart..rate - found_lag);
+            suspects = self.of_torque(weak, decided, (fit, &rhs, errors.error), regressors, beside)?;
+        }
         if decided.white.is_some() {
             weak.rows = decided.as_white(std::mem::take(&mut weak.rows), &mut self.stages)?;
             rhs.clone_from(&weak.rows.rhs);
@@ -55,7 +80,13 @@ impl Session<'_, '_, '_> {
         } else {
             decided.model.correlated(&weak.rows, &errors.covariance, &mut self.stages)?
         };
+        let (mut with_lag, unknowns) = (Vec::new(), self.unknowns());
         for (place, missing) in candidates.iter().enumerate().filter(|(_, missing)| !missing.is_of_torque()) {
+            let is_lag = *missing == Missing::Lag;
+            if is_lag && followed.is_none() {
+                continue;
+            }
+            let place = if is_lag { rate } else { first + place };
             let judged = JudgedTerm {
                 rows: &weak.rows,
                 model: &decided.model,
@@ -68,17 +99,53 @@ impl Session<'_, '_, '_> {
                 inflation: errors.inflation,
                 instructions: self.options.instructions,
             };
-            if let Some((value, error)) = judged.factor(first + place, &mut self.stages)? {
-                // A term that is next to nothing of the torque need not be there; a lag is little of it, and much of the damping.
-                let share = value * value * weak.rows.mean_square_of(first + place);
-                if *missing != Missing::Lag && share < NEGLIGIBLE * weak.rows.mean_square() {
-                    continue;
-                }
-                let unit = if *missing == Missing::Lag { -1.0 / self.options.delta } else { 1.0 };
-                suspects.push(Suspect { missing: *missing, value: unit * value, error: unit.abs() * error });
+            let found = judged.factors_and_changes(&[place], &mut self.stages)?;
+            let Some((factors, changes)) = found else { continue };
+            let (value, error) = factors[0];
+            // A term that is next to nothing of the torque need not be there; a lag is little of it, and much of the damping.
+            let share = value * value * weak.rows.mean_square_of(place);
+            if !is_lag && share < NEGLIGIBLE * weak.rows.mean_square() {
+                continue;
+            }
+            let unit = if is_lag { -1.0 / self.options.delta } else { 1.0 };
+            if is_explained && (unit * value).abs() < LEAST_LAG && value.abs() > CONSPICUOUS * error {
+                // What sums over samples leave of integrals.
+                continue;
+            }
+            suspects.push(Suspect { missing: *missing, value: unit * value, error: unit.abs() * error });
+            if let (true, Some(by)) = (is_lag, &followed) {
+                // What varies slowly comes first.
+                let changes = by.iter().map(|by| -by).chain(changes.iter().copied());
+                let all = decided.ordered().constant.into_iter().zip(changes.map(|one| one / unit));
+                with_lag = all.filter(|(one, _)| unknowns.contains(one)).collect();
             }
         }
-        Ok(suspects)
+        Ok(Suspected { each: suspects, with_lag })
+    }
+
+    /// What is left of the torque's rate where what varies slowly follows it, in the rows of some stretches or in all.
+    fn lag_beside_slow(
+        &mut self,
+        weak: &WeakRows,
+        rate: &Regressor,
+        stretches: Option<&[Range<usize>]>,
+        decided: &Decided,
+    ) -> Result<Option<Followed>, Error> {
+        if decided.slow.is_empty() {
+            return Ok(Some(Followed { left: rate.value.clone(), by: Vec::new() }));
+        }
+        // Curves are over the whole record.
+        let mut rows = weak.rows.clone();
+        let whole = self.regressors_of(&[Missing::Lag], weak, None)?;
+        let rate = rows.regressors.len();
+        rows.regressors.extend(whole);
+        rows.clear_unusable();
+        let followed = self.beside_slow(&rows, rate, decided)?;
+        let thinned = |left: Vec<f64>| match stretches {
+            Some(stretches) => thinned_column(&left, stretches),
+            None => left,
+        };
+        Ok(followed.map(|Followed { left, by }| Followed { left: thinned(left), by }))
     }
 
     /// The regressors of what may be missing, in all rows or in those of some stretches.

@@ -105,11 +105,9 @@ impl Session<'_, '_, '_> {
         let (results, OfAllRows { pairs, in_common }) = self.at_rows(&fitted, tracks)?;
         (found.pairs, found.in_common) = (pairs, in_common);
         let rhs = decided.rhs(&weak.rows).to_vec();
-        // A term hardly matters where next to nothing is left for it to explain.
         let is_explained = errors.left <= NEGLIGIBLE * weak.rows.mean_square();
-        if !is_explained {
-            found.suspects = self.suspects(&mut weak, decided, fit, (rhs, correlated), &errors)?;
-        }
+        let suspected = self.suspects(&mut weak, decided, fit, (rhs, correlated), &errors)?;
+        (found.suspects, found.with_lag) = (suspected.each, suspected.with_lag);
         found.late = late(self.options.lag, &found.suspects, is_explained);
         let contradicted = self.is_contradicted(&weak, &found.constants);
         forget_what_is_said(&mut found, contradicted);
@@ -185,6 +183,7 @@ impl Session<'_, '_, '_> {
             mostly_noise: false,
             unexplained: false,
             late: None,
+            with_lag: Vec::new(),
             suspects: Vec::new(),
             lag: None,
             filtered: None,
@@ -271,9 +270,11 @@ fn constants(decided: &Decided, values: &[f64], covariance: &[f64]) -> Vec<Const
 
 /// What the torque seems to be late by: what is suspected beside the lag that was given. Where next to nothing is left to explain, that one is right.
 fn late(given: Option<f64>, suspects: &[Suspect], is_explained: bool) -> Option<Lag> {
+    if is_explained {
+        return given.map(|value| Lag { value, error: 0.0 });
+    }
     let suspected = suspects.iter().find(|one| one.missing == Missing::Lag);
-    let suspected = suspected.map(|one| Lag { value: given.unwrap_or(0.0) + one.value, error: one.error });
-    suspected.or(given.filter(|_| is_explained).map(|value| Lag { value, error: 0.0 }))
+    suspected.map(|one| Lag { value: given.unwrap_or(0.0) + one.value, error: one.error })
 }
 
 /// Forgets suspects that only repeat what is said already: what a filter does, and, where something changes that should not, what the torque tells of it.
