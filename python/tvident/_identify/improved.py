@@ -223,6 +223,7 @@ class Improvement(_AskedOfRecord):
         """Return the trial of the record, or of its busiest part where that tells as much."""
         data, length = self.data, result.settings["window_length"]
         part = max(_PART, _FUNCTIONS * length) if isinstance(length, int) else _PART
+        beyond_chance = [one.name for one in self._explained.suspects]
         if data.is_plain and data.time.size >= 2 * part:
             some = _busiest(data.torques, part)
             given = {name: kind if isinstance(kind, str) else cut(kind, some) for name, kind in self.given.items()}
@@ -233,9 +234,10 @@ class Improvement(_AskedOfRecord):
                 # So little of the part is there that nothing can be identified in it.
                 found = None
             if found is not None:
-                return Trial(identify, found, given, self.asked_terms, self._suspects, self.request.lag != "auto")
+                is_as_asked = self.request.lag != "auto"
+                return Trial(identify, found, given, self.asked_terms, self._suspects, is_as_asked, beyond_chance)
         again = partial(self._identify, data)
-        return Trial(again, result, self.given, self.asked_terms, self._suspects, self._is_as_asked)
+        return Trial(again, result, self.given, self.asked_terms, self._suspects, self._is_as_asked, beyond_chance)
 
     @property
     def _is_as_asked(self) -> bool:

@@ -136,6 +136,8 @@ class Trial:
         Terms that may be missing, and ``"lag"``.
     is_as_asked : bool
         Whether the result is what ``identify`` gives for what was asked for.
+    beyond_chance : sequence of str
+        Those of them that explain a part of what the result leaves, beside all that it found to change.
     """
 
     identify: Callable[..., Identification]
@@ -144,6 +146,7 @@ class Trial:
     terms: Sequence[Any]
     suspects: Sequence[str]
     is_as_asked: bool = False
+    beyond_chance: Sequence[str] = ()
     _now: dict[int | None, Unexplained] = field(default_factory=dict, init=False, repr=False)
     _beside: dict[int, dict[str, Identification]] = field(default_factory=dict, init=False, repr=False)
 
@@ -228,7 +231,8 @@ class Trial:
         """Yield what each suspect makes of the record: beside constants and stiffness as it was asked for, then as all was asked for.
 
         Inertia and damping that may change take the place of what is missing, so they change beside it only where they were found to,
-        and where that explains more.
+        and where that explains more. Then a term is tried only if the result says so, which changes as much, or if it is there beside
+        constants: that takes longest of all. A lag is followed by whatever changes, so it always is.
         """
         call = self._of_constants_alone
         constant = {name: call[name] if name != "stiffness" else kind for name, kind in self.given.items()}
@@ -236,7 +240,10 @@ class Trial:
         may_change = any(found[name] == "varying" and constant[name] != self.given[name] for name in COEFFICIENTS)
         for place, kinds in enumerate([constant, self.given] if may_change else [constant]):
             if place not in self._beside:
-                tried = {one: self._tried(kinds, self._with(call, one)) for one in self.suspects}
+                there = [one for one, result in self._beside.get(0, {}).items() if _is_there(one, result)]
+                worth = {"lag", *self.beyond_chance, *there}
+                suspects = [one for one in self.suspects if place == 0 or one in worth]
+                tried = {one: self._tried(kinds, self._with(call, one)) for one in suspects}
                 self._beside[place] = {one: found for one, found in tried.items() if found is not None}
             yield self._beside[place]
 

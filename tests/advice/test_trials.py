@@ -1,0 +1,39 @@
+"""What is tried beside parameters that change: what may be missing there, and nothing else, since that takes longest."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from tvident._identify.remedies import Trial
+
+AUTOMATIC = {"inertia": "auto", "damping": "auto", "stiffness": "windowed"}
+
+
+def tried(suspects: list[str], *, there: set[str], beyond_chance: list[str]) -> list[list[str]]:
+    """Return what is tried beside constants, and what beside parameters that change; some terms are there beside constants."""
+    stages: dict[str, list[str]] = {"constant": [], "auto": []}
+
+    def identify(*, lag: Any, terms: list[str], diagnose: bool, **given: Any) -> Any:
+        assert diagnose
+        change = "lag" if lag == "auto" else terms[-1]
+        stages[given["damping"]].append(change)
+        is_there = change in there and given["damping"] == "constant"
+        return SimpleNamespace(
+            settings={"lag": 1.0 if is_there else 0.0, "lag_stderr": 0.1},
+            value=lambda name: (1.0, 0.1) if name == change and is_there else (0.0, 0.1),
+        )
+
+    kinds = {"inertia": "constant", "damping": "varying", "stiffness": "windowed"}
+    result: Any = SimpleNamespace(settings={"kinds": kinds, "lag": 0.0})
+    trial = Trial(identify, result, AUTOMATIC, ["offset"], suspects, beyond_chance=beyond_chance)
+    for _ in trial._each_beside_changes():  # noqa: SLF001 - what is tried is the test
+        pass
+    return list(stages.values())
+
+
+def test_all_are_tried_beside_constants_and_few_beside_what_changes() -> None:
+    suspects = ["cubic", "lag", "coulomb", "preload"]
+    assert tried(suspects, there=set(), beyond_chance=["cubic"]) == [suspects, ["cubic", "lag"]]
+    assert tried(suspects, there={"coulomb"}, beyond_chance=[]) == [suspects, ["lag", "coulomb"]]
+    assert tried(suspects, there={"lag", "preload"}, beyond_chance=["preload"]) == [suspects, ["lag", "preload"]]
