@@ -194,8 +194,43 @@ def test_a_spring_is_known_beside_one_sample_that_was_lost() -> None:
     assert (error < np.maximum(5 * found.stderr["stiffness_base_0"], 0.3)).all()
 
 
-def test_parameters_that_are_drawn_to_zero_are_not_trusted() -> None:
-    # No noise was left of the equations without a force, whose weights were beyond doubles.
+@pytest.mark.first(2)
+@pytest.mark.parametrize("angle_noise", [1e-4, 1e-5, *long(1e-3)])
+@pytest.mark.parametrize("seed", [0, *long(1, 2)])
+def test_nothing_is_drawn_to_zero_where_a_force_acts_on_one_mass(seed: int, angle_noise: float) -> None:
+    # Equations without a force hold for any multiple of their parameters. As long as the spring was taken as constant they drew
+    # all they hold to zero: 5 of 6 records with an angle so quiet had no number or one of zero, "do not trust".
     springs = [constant(12.0), lambda t: np.where(t < 6, 18.0, 24.0), constant(16.0)]
-    found = identified(chain(springs, 12000, seed=0, driven=(0,), angle_noise=1e-4))
+    simulated = chain(springs, 12000, seed=seed, driven=(0,), angle_noise=angle_noise)
+    found = identified(simulated)
+    assert [name for name, kind in found.kinds.items() if kind == "windowed"] == ["stiffness_0_1"]
+    assert found.trusted.mean() > 0.95
+    errors = wrong(found, simulated)
+    assert max(error for name, error in errors.items() if name != "stiffness_0_1") < 4
+    error = found.elements["stiffness_0_1"] - simulated.stiffness[1]
+    assert np.sqrt(np.nanmean(error**2)) < 0.02 * 20
+
+
+@pytest.mark.parametrize(("masses", "driven", "changes"), [(2, 1, 0), (2, 1, 1), *long((3, 2, 0))])
+def test_a_chain_on_a_moving_base_holds_its_scale(masses: int, driven: int, changes: int) -> None:
+    # Of 30 such records three were 72 to 100 % off, two of them trusted in a part.
+    values = [12.0, 18.0, 16.0][:masses]
+    springs = [constant(value) for value in values]
+    springs[changes] = lambda t: np.asarray(values[changes] * (1 + 0.2 * np.sin(0.9 * t)))
+    simulated = chain(springs, 10000, seed=39, driven=(driven,), base=True, angle_noise=3e-5)
+    links: list[tuple[Any, int]] = [("base" if mass == 0 else mass - 1, mass) for mass in range(masses)]
+    structure = tvident.Chain(masses, links, base=simulated.base)
+    identify: Any = tvident.identify
+    found = identify(simulated.angle, simulated.torque, structure=structure, sample_rate=1000, dof_axis=0)
+    for name, true in truth(simulated).items():
+        bound = 0.02 if not name.startswith("damping") else 0.06
+        assert np.sqrt(np.nanmean((found.elements[name] - true) ** 2)) < bound * np.mean(true), name
+    assert found.trusted.mean() > 0.95
+    # What is asked for as constant contradicts the record, and of two masses nothing is drawn to zero beside it either.
+    found = identify(simulated.angle, simulated.torque, structure=structure, sample_rate=1000, dof_axis=0, **CONSTANTS)
     assert found.summary().startswith("do not trust")
+    if masses == 2:
+        for name, true in truth(simulated).items():
+            assert np.abs(found.elements[name] - true).max() < 0.5 * np.max(true), name
+    else:
+        assert not found.trusted.any()

@@ -97,7 +97,8 @@ class AskedTogether:
             progress=self.report,
         )
         self._check_window(asked["regression_window"], found.regression_window)
-        again = replace(self, forms=[{name: getattr(found, name) for name in asked}], report=None)
+        # Nothing was determined: no window was long enough.
+        again = replace(self, forms=[{name: getattr(found, name) or None for name in asked}], report=None)
         chosen = [name for name, value in asked.items() if value is None]
         # The colour of noise is not given, but read with its variance.
         same = noise or (None if max(found.colours, default=1.0) > 1 else found.noise)

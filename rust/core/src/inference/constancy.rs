@@ -137,7 +137,7 @@ impl Test {
     /// The test again where estimates scatter more, by a factor of the variance, than noise explains, or where that noise is known from the
     /// equations alone: it is coloured, and stronger the longer the parts that are compared.
     fn beside_scatter(&mut self, factor: f64, noise: NoiseFrom) {
-        if factor < SCATTERED && noise == NoiseFrom::Channels {
+        if factor < SCATTERED && noise == NoiseFrom::Channels || !self.squares.is_finite() {
             return;
         }
         let factor = factor.max(1.0);

@@ -26,6 +26,8 @@ pub(crate) struct Interleaved {
 /// The rows of all channels of one trial.
 pub(crate) struct Channels {
     each: Vec<WeakRows>,
+    /// Mean squares of the regressors of each.
+    squares: Vec<Vec<f64>>,
 }
 
 /// What is known of the noise: of every angle columns whose products are those of its noise in the kernels, values before slopes, and
@@ -65,7 +67,20 @@ impl Channels {
             let workers = stages.workers;
             each.push(stages.stage(|watch| WeakRows::build(&record, function, delta, None, workers, watch))?);
         }
-        Ok(Self { each })
+        let square = |regressor: &Regressor| {
+            let sum: f64 = regressor.value.iter().map(|value| value * value).sum();
+            sum / (regressor.value.len() as f64).max(1.0)
+        };
+        let squares = each.iter().map(|weak| weak.rows.regressors.iter().map(square).collect()).collect();
+        Ok(Self { each, squares })
+    }
+
+    /// The mean square of a regressor.
+    pub(crate) fn square(&self, of: Multiplied) -> f64 {
+        match of {
+            Multiplied::Motion { channel, coefficient } => self.squares[channel][coefficient],
+            Multiplied::Term(term) => self.squares[0][3 + term],
+        }
     }
 
     /// The mean square of the torque of an equation in the rows.
@@ -78,7 +93,7 @@ impl Channels {
     }
 
     /// A regressor in a row.
-    fn regressor(&self, factor: Multiplied) -> &Regressor {
+    pub(crate) fn regressor(&self, factor: Multiplied) -> &Regressor {
         match factor {
             Multiplied::Motion { channel, coefficient } => &self.each[channel].rows.regressors[coefficient],
             Multiplied::Term(term) => &self.each[0].rows.regressors[3 + term],

@@ -81,7 +81,10 @@ impl MergedSession<'_, '_, '_> {
         (found.covariance, found.pairs) = (covariance, pairs);
         for (holds, flag) in [
             (self.at_end || fitted.has_shortest_windows(), Status::WINDOW_LIMIT),
-            (found.condition > HARDLY_TOLD_APART || mostly_noise || fitted.misfit > 1.0, Status::ILL_CONDITIONED),
+            (
+                found.condition > HARDLY_TOLD_APART || mostly_noise || fitted.misfit > NOISE_MODEL_FAILS,
+                Status::ILL_CONDITIONED,
+            ),
             (fitted.error > NOISE_MODEL_FAILS, Status::NOISE_MODEL),
             (fitted.contradicted, Status::KIND_CONTRADICTED),
         ] {
@@ -270,7 +273,7 @@ impl MergedSession<'_, '_, '_> {
             regression_window: span.min(self.merged.samples),
             lengths: fitted.lengths.clone(),
             prediction_error: fitted.error,
-            misfit: fitted.misfit,
+            misfit: if fitted.misfit > NOISE_MODEL_FAILS { fitted.misfit } else { 1.0 },
             jumps: fitted.jumps.iter().map(|jump| jump.sample).collect(),
             ..self.undetermined()
         }

@@ -24,7 +24,10 @@ const PILOT_WINDOW: usize = 4;
 /// Fits with the weights that the last one gives.
 const WEIGHTINGS: usize = 3;
 /// The least noise of an equation, as a part of the torques' root mean square: no channel is known better than rounding lets it be.
-const LEAST_NOISE: f64 = 1e-6;
+pub(crate) const LEAST_NOISE: f64 = 1e-6;
+
+/// So many times the noise of torques an equation without any counts as at least before anything is known of it.
+const BEFORE: f64 = 1e4;
 
 /// Merged rows under work.
 pub(crate) struct MergedSession<'a, 'b, 'c> {
@@ -150,6 +153,14 @@ impl MergedSession<'_, '_, '_> {
 
     /// What every equation is to be divided by, and the noise of the angles.
     fn weights_now(&self) -> Weights {
+        let each = self.noise_of_equations().into_iter().enumerate();
+        let equations = each.map(|(equation, variance)| 1.0 / (variance * self.factor_of(equation)).sqrt()).collect();
+        let angles = self.colours.iter().map(|noise| self.all.columns_of(noise)).collect();
+        Weights { angles, equations }
+    }
+
+    /// The variance of the noise of every equation with the parameters at hand.
+    pub(crate) fn noise_of_equations(&self) -> Vec<f64> {
         let equations = self.merged.equations();
         let torque = products(&self.all.kernels.values[2], &self.all.kernels.values[2], 0);
         let variance = |equation: usize| {
@@ -162,25 +173,36 @@ impl MergedSession<'_, '_, '_> {
         };
         let each: Vec<f64> = (0..equations).map(variance).collect();
         let least = self.least_variance(&each);
-        let misfit = |equation: usize| self.misfits.get(equation).unwrap_or(&1.0);
-        let weight = |(equation, variance): (usize, f64)| 1.0 / (variance * misfit(equation)).max(least).sqrt();
-        let equations = each.into_iter().enumerate().map(weight).collect();
-        let angles = self.colours.iter().map(|noise| self.all.columns_of(noise)).collect();
-        Weights { angles, equations }
+        let is_unknown = self.is_unknown();
+        let bounded = |(equation, variance): (usize, &f64)| {
+            let least = self.least_of_silent(equation, least).unwrap_or(least);
+            let before = if is_unknown && self.is_homogeneous(equation) { BEFORE } else { 1.0 };
+            variance.max(least) * before
+        };
+        each.iter().enumerate().map(bounded).collect()
     }
 
-    /// The variance that no equation's noise is below, of which there are estimates.
-    fn least_variance(&self, estimates: &[f64]) -> f64 {
+    /// Whether nothing is known of the parameters yet.
+    fn is_unknown(&self) -> bool {
+        self.parameters.iter().all(|&value| value == 0.0)
+    }
+
+    /// The mean square of the largest torque in its rows.
+    pub(crate) fn most_torque(&self) -> f64 {
         let mean = |equation: usize| {
             let of = self.trials.iter().map(|trial| trial.mean_square(equation));
             of.sum::<f64>() / self.trials.len().max(1) as f64
         };
-        let most = (0..self.merged.equations()).map(mean).fold(0.0, f64::max);
+        (0..self.merged.equations()).map(mean).fold(0.0, f64::max)
+    }
+
+    /// The variance that no equation's noise is below, of which there are estimates.
+    fn least_variance(&self, estimates: &[f64]) -> f64 {
+        let most = self.most_torque();
         let noise = self.noise[1].iter().copied().fold(0.0, f64::max);
         let torque = products(&self.all.kernels.values[2], &self.all.kernels.values[2], 0);
         // Before anything is known of the motion, an equation without torque counts as the others do.
-        let unknown = self.parameters.iter().all(|&value| value == 0.0);
-        let least = (LEAST_NOISE * LEAST_NOISE * most).max(if unknown { noise * torque } else { 0.0 });
+        let least = (LEAST_NOISE * LEAST_NOISE * most).max(if self.is_unknown() { noise * torque } else { 0.0 });
         if least > 0.0 {
             return least;
         }

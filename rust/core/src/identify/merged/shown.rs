@@ -10,6 +10,7 @@ use crate::identify::merged::session::MergedSession;
 use crate::identify::weak::shown_noise::{MORE, REACHES};
 use crate::inference::constancy::NoiseFrom;
 use crate::regression::constants::Expected;
+use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::residuals::residuals;
 use crate::regression::row_covariance::RowCovariance;
 
@@ -38,7 +39,7 @@ impl MergedSession<'_, '_, '_> {
     /// The noise of the channels, or what is left where that is more.
     pub(crate) fn noise_of_rows(&mut self, fitted: &MergedFit) -> Result<NoiseOfRows, Error> {
         let known = NoiseOfRows::of_channels(fitted);
-        if fitted.error <= MORE || fitted.misfit > 1.0 {
+        if fitted.error <= MORE || fitted.misfit > NOISE_MODEL_FAILS {
             return Ok(known);
         }
         let rows = &self.all.rows;
