@@ -234,3 +234,22 @@ def test_a_chain_on_a_moving_base_holds_its_scale(masses: int, driven: int, chan
             assert np.abs(found.elements[name] - true).max() < 0.5 * np.max(true), name
     else:
         assert not found.trusted.any()
+
+
+# A base that moves as little as this, beside forces on all masses, shows three samples, not one.
+@pytest.mark.parametrize(("late", "driven"), [(1, (1,)), (3, (1,)), *long((3, None))])
+def test_a_base_that_is_late_is_named(late: int, driven: tuple[int, ...] | None) -> None:
+    simulated = chain([constant(12.0), constant(18.0)], 10000, seed=3, driven=driven, base=True)
+    base = np.asarray(simulated.base)
+    identify: Any = tvident.identify
+
+    def of(base: Array) -> Any:
+        structure = tvident.Chain(2, [("base", 0), (0, 1)], base=base)
+        return identify(simulated.angle, simulated.torque, structure=structure, sample_rate=1000, dof_axis=0)
+
+    assert not of(base).record_status & Status.LAG_SUSPECTED
+    found = of(np.concatenate([np.full(late, base[0]), base[:-late]]))
+    assert found.record_status & Status.LAG_SUSPECTED
+    (words,) = (one for one in found.advice if "seems to be" in one)
+    assert words.startswith("the angle of the base seems to be late by ")
+    assert abs(float(words.split("late by ")[1].split(" ")[0]) - late) < 0.5

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -76,17 +76,23 @@ def _channels_of(part: Part, masses: int, period: float) -> list[str]:
     angles = [*numbers, *(one for one in range(len(found.noise[0])) if one not in numbers)]
     words = []
     for one in found.defects:
-        is_angle = one.channel < len(angles)
-        number = angles[one.channel] if is_angle else numbers[one.channel - len(angles)]
         cure = held(one.amount, "all") if one.name == "held" else spoilt(one.name, one.amount, alone=False)
-        words.append(f"the {'angle' if is_angle else 'torque'}{_of(number, masses)} {cure}")
-    for equation, late in found.late:
+        words.append(f"{_named(one.channel, angles, numbers, masses)} {cure}")
+    for channel, late in found.late:
         by = f"{abs(late.value):.3g} ± {late.stderr:.1g} samples ({abs(late.value) * period:.3g} s)"
         comes = "late" if late.value > 0 else "early"
+        with_what = "the other channels" if channel < len(angles) else "the angles"
         words.append(
-            f"the torque{_of(numbers[equation], masses)} seems to be {comes} by {by}: shift it by as much, or record it with the angles"
+            f"{_named(channel, angles, numbers, masses)} seems to be {comes} by {by}: shift it by as much, or record it with {with_what}"
         )
     return words
+
+
+def _named(channel: int, angles: Sequence[int], torques: Sequence[int], masses: int) -> str:
+    """Return which channel it is, angles before torques, in words."""
+    is_angle = channel < len(angles)
+    number = angles[channel] if is_angle else torques[channel - len(angles)]
+    return f"the {'angle' if is_angle else 'torque'}{_of(number, masses)}"
 
 
 def _of(number: int, masses: int) -> str:

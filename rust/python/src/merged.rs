@@ -216,7 +216,7 @@ pub(crate) fn identify_merged<'py>(
         late: found
             .late
             .iter()
-            .map(|(equation, late)| (*equation, Estimate { value: late.value, stderr: late.error }))
+            .map(|(channel, late)| (*channel, Estimate { value: late.value, stderr: late.error }))
             .collect(),
     })
 }

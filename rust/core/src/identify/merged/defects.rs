@@ -99,7 +99,9 @@ fn read<'a>(channels: &'a [Within<'a>]) -> Vec<&'a dyn Samples> {
 fn told(mut found: MergedFound, spoilt: OfChannels, angles: usize, is_left_out: impl Fn(usize) -> bool) -> MergedFound {
     for trial in spoilt {
         for (channel, defects) in trial.into_iter().enumerate() {
-            let late = found.late.iter().find(|(equation, _)| angles + equation == channel).map(|(_, late)| *late);
+            // An angle does not move in steps.
+            let late =
+                found.late.iter().find(|(other, _)| *other == channel && channel >= angles).map(|(_, late)| *late);
             for mut defect in defects {
                 if late.is_some_and(|late| defect.acts_in_steps(late.value, late.error)) {
                     continue;

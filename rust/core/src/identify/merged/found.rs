@@ -71,7 +71,7 @@ pub struct MergedFound {
     pub scan: Scan,
     /// What was done to channels, angles before torques.
     pub defects: Vec<(usize, Defect)>,
-    /// Equations whose torque seems to be late, and by how many samples.
+    /// Channels that may be late, angles before torques, and by how many samples they seem to be.
     pub late: Vec<(usize, Suspect)>,
 }
 

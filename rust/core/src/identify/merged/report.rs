@@ -92,7 +92,7 @@ impl MergedSession<'_, '_, '_> {
         }
         found.scan = std::mem::take(&mut self.scan);
         found.record_status |= found.scan.status(&found.constants_found());
-        found.late = self.late_torques(fitted, &noise, &correlated)?;
+        found.late = self.late_channels(fitted, &noise, &correlated)?;
         let is_late = found.late.iter().any(|(_, late)| late.is_conspicuous());
         found.record_status |= if is_late { Status::LAG_SUSPECTED } else { Status::GOOD };
         let deviation = self.deviation(fitted)?;
