@@ -10,6 +10,7 @@ from tvident import _core
 from tvident._advice.lists import listed
 from tvident._equation import COEFFICIENTS
 from tvident._results import UNTOLD_LAG
+from tvident._status import Status
 
 _HALF = 0.5
 """Samples by which a torque is early that a drive holds from one sample to the next, and is recorded when it begins."""
@@ -34,6 +35,9 @@ def untold_lag(found: _core.Identification, names: Sequence[str], period: float)
     period : float
         Seconds from one sample to the next.
     """
+    if Status.SCALES_DISAGREE in Status(found.record_status):
+        # Nothing of such a record is to be believed.
+        return []
     lag = next((one for one in found.suspects if one.name == "lag"), None)
     if lag is None or lag.conspicuous or _CONSPICUOUS * lag.stderr < _HALF:
         return []
