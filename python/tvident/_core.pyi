@@ -59,6 +59,7 @@ from tvident._core_stubs.streams import (
 )
 
 __all__ = [
+    "CONSPICUOUS",
     "CORRELATED_NOISE",
     "FEWEST_SAMPLES",
     "FEWEST_WIDTHS",
@@ -129,6 +130,7 @@ __all__ = [
     "unread_counts",
 ]
 
+CONSPICUOUS: float
 CORRELATED_NOISE: float
 FEWEST_SAMPLES: int
 FEWEST_WIDTHS: int

@@ -15,9 +15,6 @@ from tvident._status import Status
 _HALF = 0.5
 """Samples by which a torque is early that a drive holds from one sample to the next, and is recorded when it begins."""
 
-_CONSPICUOUS = 5.0
-"""A lag that exceeds its standard error so many times is suspected."""
-
 _LEAST_ERRORS = 2.0
 _LEAST_PART = 0.02
 """What it changes is said from so many standard errors of a parameter and from this part of it on."""
@@ -39,7 +36,7 @@ def untold_lag(found: _core.Identification, names: Sequence[str], period: float)
         # Nothing of such a record is to be believed.
         return []
     lag = next((one for one in found.suspects if one.name == "lag"), None)
-    if lag is None or lag.conspicuous or _CONSPICUOUS * lag.stderr < _HALF:
+    if lag is None or lag.conspicuous or _core.CONSPICUOUS * lag.stderr < _HALF:
         return []
     changed = []
     for place, by_sample in found.with_lag:

@@ -27,9 +27,6 @@ _MOST = 1 << 14
 _FEWEST_BLOCKS = 12
 """Blocks of equations that tell how much a factor scatters."""
 
-_CONSPICUOUS = 5.0
-"""A term is suspected beyond so many standard errors, as in weak form."""
-
 _EXPLAINED = 0.8
 """And where it leaves at most this part of what is left without it: what biased derivatives leave any term explains a little."""
 
@@ -206,7 +203,7 @@ class _Test:
             )
             term = BUILT_IN[name]
             alone = term.spring == "instead" and bool(abs(spring) < _NO_SPRING * abs(value) / self.norms[place])
-            is_there = abs(value) > _CONSPICUOUS * error and (term.spring == "beside" or value > 0)
+            is_there = abs(value) > _core.CONSPICUOUS * error and (term.spring == "beside" or value > 0)
             if is_there and rest <= _EXPLAINED * base:
                 tried[name] = (rest, Lacking(name, value * unit, error * unit, alone))
         if not tried:

@@ -76,6 +76,9 @@ mod _core {
     /// Probability below which parts of a record differ by more than chance.
     #[pymodule_export]
     const NO_CHANCE: f64 = tvident::inference::NO_CHANCE;
+    /// A term is suspected if its coefficient exceeds its standard error so many times.
+    #[pymodule_export]
+    const CONSPICUOUS: f64 = tvident::inference::CONSPICUOUS;
     /// Error of prediction, over the noise's, above which the noise of the channels does not explain it.
     #[pymodule_export]
     const NOISE_MODEL_FAILS: f64 = tvident::regression::NOISE_MODEL_FAILS;

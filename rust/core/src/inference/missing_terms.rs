@@ -20,7 +20,7 @@ use crate::regression::row_covariance::RowCovariance;
 use crate::simd::instructions::Instructions;
 
 /// A term is suspected if its coefficient exceeds its standard error so many times.
-pub(crate) const CONSPICUOUS: f64 = 5.0;
+pub const CONSPICUOUS: f64 = 5.0;
 
 /// A term that may be missing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -20,5 +20,5 @@ pub(crate) mod window_averaging;
 pub(crate) mod windows_around;
 
 pub use constancy::{NO_CHANCE, Test};
-pub use missing_terms::{Missing, Suspect};
+pub use missing_terms::{CONSPICUOUS, Missing, Suspect};
 pub use scales::{AtScale, LEAST_PLATEAU, Plateau};

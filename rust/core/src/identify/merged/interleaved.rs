@@ -67,11 +67,10 @@ impl Channels {
             let workers = stages.workers;
             each.push(stages.stage(|watch| WeakRows::build(&record, function, delta, None, workers, watch))?);
         }
-        let square = |regressor: &Regressor| {
-            let sum: f64 = regressor.value.iter().map(|value| value * value).sum();
-            sum / (regressor.value.len() as f64).max(1.0)
+        let squares = |WeakRows { rows, .. }: &WeakRows| {
+            (0..rows.regressors.len()).map(|regressor| rows.mean_square_of(regressor)).collect()
         };
-        let squares = each.iter().map(|weak| weak.rows.regressors.iter().map(square).collect()).collect();
+        let squares = each.iter().map(squares).collect();
         Ok(Self { each, squares })
     }
 

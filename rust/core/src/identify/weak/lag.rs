@@ -247,18 +247,19 @@ impl Session<'_, '_, '_> {
         Ok(found.map(|(value, error)| (-value / period, error / period)))
     }
 
-    /// What is left of a regressor where what varies slowly follows it as it follows the motion, or `None` if that is not determined. A damping that
-    /// follows a sweep does what a lag does: beside it only the rest of the torque's rate tells the lag.
+    /// What is left of a column of a regressor where what varies slowly follows it as it follows the motion, or `None` if that is not determined. A
+    /// damping that follows a sweep does what a lag does: beside it only the rest of the torque's rate tells the lag.
     pub(crate) fn beside_slow(
         &mut self,
         rows: &Rows,
-        regressor: usize,
+        column: &[f64],
         decided: &Decided,
     ) -> Result<Option<Followed>, Error> {
-        let column = &rows.regressors[regressor].value;
         let Some(found) = &decided.found else {
-            return Ok(Some(Followed { left: column.clone(), by: Vec::new() }));
+            return Ok(Some(Followed { left: column.to_vec(), by: Vec::new() }));
         };
+        let in_equations = |(value, is_usable): (&f64, &bool)| if *is_usable { *value } else { 0.0 };
+        let column: Vec<f64> = column.iter().zip(&rows.usable).map(in_equations).collect();
         let model = decided.ordered();
         let search = SlowSearch {
             rows,
@@ -271,9 +272,9 @@ impl Session<'_, '_, '_> {
             simpler: 1.0,
             instructions: self.options.instructions,
         };
-        let varying = followed(&search, found, column, &mut self.stages)?;
+        let varying = followed(&search, found, &column, &mut self.stages)?;
         Ok(varying.map(|varying| {
-            let left = without(rows, column, &decided.slow, &varying);
+            let left = without(rows, &column, &decided.slow, &varying);
             let mut by = varying.values;
             Followed { left, by: by.iter_mut().map(|values| median(values).unwrap_or(f64::NAN)).collect() }
         }))
@@ -306,9 +307,11 @@ impl Session<'_, '_, '_> {
         let (mut model, mut rows) = (decided.ordered(), decided.rows(&weak.rows).clone());
         let wanted = model.constant.len();
         let rhs = decided.rhs(&rows).to_vec();
-        let Some(Followed { left, by }) = self.beside_slow(&rows, self.rate(), decided)? else { return Ok(None) };
-        rows.regressors[self.rate()].value = left;
-        model.constant.push(self.rate());
+        let rate = self.rate();
+        let followed = self.beside_slow(&rows, &rows.regressors[rate].value, decided)?;
+        let Some(Followed { left, by }) = followed else { return Ok(None) };
+        rows.regressors[rate].value = left;
+        model.constant.push(rate);
         let problem = model.problem(&rows, &rhs, self.noise[0], problem.correlated.as_ref());
         let Some(all) = fit.again(&problem, errors.expected, self.options.instructions, &mut self.stages)? else {
             return Ok(None);

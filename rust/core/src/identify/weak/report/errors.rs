@@ -1,5 +1,6 @@
 //! Standard errors: from the noise of the channels, or from the residuals where the equations show more than that.
 
+use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
@@ -30,6 +31,13 @@ pub(crate) struct Errors {
     pub(crate) status: Status,
 }
 
+impl Errors {
+    /// Whether next to nothing is left of the right-hand side of some rows.
+    pub(crate) fn is_explained(&self, rows: &Rows) -> bool {
+        self.left <= NEGLIGIBLE * rows.mean_square()
+    }
+}
+
 impl Session<'_, '_, '_> {
     /// The covariance that errors are made from: that of the channels' noise, or where it fails to explain the residuals, theirs.
     pub(crate) fn errors(&mut self, weak: &WeakRows, decided: &Decided, fit: &Fit) -> Result<Errors, Error> {
@@ -53,7 +61,7 @@ impl Session<'_, '_, '_> {
         let raised = self.raised(weak, decided);
         let matters = errors.left > UNEXPLAINED * weak.rows.mean_square();
         errors.over_channels = errors.error * raised;
-        if coloured && errors.left > NEGLIGIBLE * weak.rows.mean_square() {
+        if coloured && !errors.is_explained(&weak.rows) {
             errors.status |= Status::COLOURED;
         }
         if fails || matters && errors.over_channels > NOISE_MODEL_FAILS {

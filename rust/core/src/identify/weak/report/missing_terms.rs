@@ -40,7 +40,7 @@ impl Session<'_, '_, '_> {
     ) -> Result<Suspected, Error> {
         let mut candidates = self.candidates();
         // A term hardly matters where next to nothing is left for it to explain. A lag does: next to nothing of the torque may be much of the damping.
-        let is_explained = errors.left <= NEGLIGIBLE * weak.rows.mean_square();
+        let is_explained = errors.is_explained(&weak.rows);
         candidates.retain(|one| !is_explained || *one == Missing::Lag);
         if !self.options.diagnose || candidates.is_empty() {
             return Ok(Suspected::default());
@@ -131,21 +131,13 @@ impl Session<'_, '_, '_> {
         stretches: Option<&[Range<usize>]>,
         decided: &Decided,
     ) -> Result<Option<Followed>, Error> {
-        if decided.slow.is_empty() {
-            return Ok(Some(Followed { left: rate.value.clone(), by: Vec::new() }));
-        }
-        // Curves are over the whole record.
-        let mut rows = weak.rows.clone();
-        let whole = self.regressors_of(&[Missing::Lag], weak, None)?;
-        let rate = rows.regressors.len();
-        rows.regressors.extend(whole);
-        rows.clear_unusable();
-        let followed = self.beside_slow(&rows, rate, decided)?;
-        let thinned = |left: Vec<f64>| match stretches {
-            Some(stretches) => thinned_column(&left, stretches),
-            None => left,
+        let Some(stretches) = stretches.filter(|_| decided.found.is_some()) else {
+            return self.beside_slow(&weak.rows, &rate.value, decided);
         };
-        Ok(followed.map(|Followed { left, by }| Followed { left: thinned(left), by }))
+        // Curves are over the whole record.
+        let whole = self.regressors_of(&[Missing::Lag], weak, None)?;
+        let followed = self.beside_slow(&weak.rows, &whole[0].value, decided)?;
+        Ok(followed.map(|Followed { left, by }| Followed { left: thinned_column(&left, stretches), by }))
     }
 
     /// The regressors of what may be missing, in all rows or in those of some stretches.

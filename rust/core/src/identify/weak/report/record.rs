@@ -22,7 +22,7 @@ use crate::inference::identifiability::is_mostly_noise;
 use crate::inference::missing_terms::{Missing, Suspect};
 use crate::regression::constants::weakest;
 use crate::regression::fit::Fit;
-use crate::regression::limits::{HARDLY_TOLD_APART, NEGLIGIBLE, UNEXPLAINED};
+use crate::regression::limits::{HARDLY_TOLD_APART, UNEXPLAINED};
 use crate::regression::problem::Problem;
 use crate::status::Status;
 use crate::weak_form::weak_rows::WeakRows;
@@ -105,7 +105,7 @@ impl Session<'_, '_, '_> {
         let (results, OfAllRows { pairs, in_common }) = self.at_rows(&fitted, tracks)?;
         (found.pairs, found.in_common) = (pairs, in_common);
         let rhs = decided.rhs(&weak.rows).to_vec();
-        let is_explained = errors.left <= NEGLIGIBLE * weak.rows.mean_square();
+        let is_explained = errors.is_explained(&weak.rows);
         let suspected = self.suspects(&mut weak, decided, fit, (rhs, correlated), &errors)?;
         (found.suspects, found.with_lag) = (suspected.each, suspected.with_lag);
         found.late = late(self.options.lag, &found.suspects, is_explained);
