@@ -22,12 +22,42 @@ pub(crate) const OVERLAP: usize = 2;
 const FEWEST_PARTS: usize = 6;
 const WORSE: f64 = 3.0;
 
+/// Parts of the rows that tell by how much the errors of two lengths differ by chance, and standard errors up to which one predicts as well.
+const PARTS: usize = 16;
+const AS_WELL: f64 = 2.0;
+/// Constants are known far better where the variance of one falls to this part.
+const FAR_BETTER_KNOWN: f64 = 1.0 / 9.0;
+
 /// A fit in windows of one length and its cross-validation error.
 #[derive(Clone, Debug)]
 pub(crate) struct Validated {
     pub(crate) fit: Fit,
     /// Mean squared error of the rows over the noise's variance.
     pub(crate) error: f64,
+    /// The same of every part of the rows.
+    parts: Vec<f64>,
+}
+
+impl Validated {
+    /// Whether it predicts as well as another length, by what differs between parts of the rows.
+    fn predicts_as_well_as(&self, other: &Self) -> bool {
+        let pairs = self.parts.iter().zip(&other.parts);
+        let differences: Vec<f64> = pairs.map(|(one, other)| one - other).filter(|one| one.is_finite()).collect();
+        let (mean, error) = mean_and_error(&differences);
+        differences.len() >= FEWEST_PARTS && mean <= AS_WELL * error
+    }
+
+    /// Variances of the constants, over that of the noise of a row.
+    fn variances(&self) -> impl Iterator<Item = f64> {
+        let (fit, count) = (&self.fit, self.fit.pooled.values.len());
+        let overlap = fit.span as f64 / fit.step as f64;
+        (0..count).map(move |place| overlap * fit.pooled.inverse[place * (count + 1)])
+    }
+
+    /// Whether it knows some constant far better than another length does.
+    fn knows_far_better_than(&self, other: &Self) -> bool {
+        self.variances().zip(other.variances()).any(|(one, other)| one <= FAR_BETTER_KNOWN * other)
+    }
 }
 
 /// Fits a problem in windows of every length and returns their cross-validation errors, in the order of the lengths.
@@ -44,8 +74,8 @@ pub(crate) fn validate(
     for some in Scale::together(scales, problem.rows()) {
         let fits = Fit::of_lengths(problem, some, expected, instructions, stages)?;
         for (&scale, fit) in some.iter().zip(fits).filter_map(|(scale, fit)| Some((scale, fit?))) {
-            let error = compared.error(problem, scale, &fit, expected.variance);
-            validated.push(Validated { fit, error });
+            let (error, parts) = compared.errors(problem, scale, &fit, expected.variance);
+            validated.push(Validated { fit, error, parts });
         }
     }
     Ok(validated)
@@ -70,16 +100,26 @@ impl ComparedRows {
     /// Mean squared error, over the noise's variance, of predicting rows from the windows on both sides of them: of all, or of those that move, if it is
     /// larger.
     pub(crate) fn error(&self, problem: &Problem<'_>, scale: Scale, fit: &Fit, variance: f64) -> f64 {
-        let Some(squared) = squared_errors(problem, scale, fit, variance) else { return f64::NAN };
+        self.errors(problem, scale, fit, variance).0
+    }
+
+    /// That, and the mean squared error of every part of the rows.
+    fn errors(&self, problem: &Problem<'_>, scale: Scale, fit: &Fit, variance: f64) -> (f64, Vec<f64>) {
+        let Some(squared) = squared_errors(problem, scale, fit, variance) else { return (f64::NAN, Vec::new()) };
         let [mut all, mut moving] = [(0.0, 0.0_f64); 2];
+        let mut parts = [(0.0, 0.0); PARTS];
+        let length = self.rows.len().div_ceil(PARTS).max(1);
         for (row, squared) in self.rows.clone().filter_map(|row| Some((row, squared(row)?))) {
             all = (all.0 + squared, all.1 + 1.0);
             if self.moving[row] {
                 moving = (moving.0 + squared, moving.1 + 1.0);
             }
+            let part = &mut parts[(row - self.rows.start) / length];
+            *part = (part.0 + squared, part.1 + 1.0);
         }
         let mean = |(sum, count): (f64, f64)| sum / count;
-        if all.1 == 0.0 { f64::INFINITY } else { mean(all).max(mean(moving)) }
+        let error = if all.1 == 0.0 { f64::INFINITY } else { mean(all).max(mean(moving)) };
+        (error, parts.map(mean).to_vec())
     }
 }
 
@@ -134,6 +174,22 @@ pub(crate) fn best(validated: &[Validated]) -> Option<&Validated> {
     validated.iter().filter(|one| one.error.is_finite()).min_by(|a, b| a.error.total_cmp(&b.error))
 }
 
+/// The longest windows that predict as well as the best, where some constant is known far better with them. Along a sweep hardly a frequency passes
+/// through a window, and a stiffness that is followed there is told from the inertia by long windows alone, while short ones predict what is near as well.
+pub(crate) fn better_known<'a>(validated: &'a [Validated], best: &'a Validated) -> &'a Validated {
+    let is_longer = |one: &&Validated| one.fit.span > best.fit.span;
+    let is_better = |one: &&Validated| one.knows_far_better_than(best) && one.predicts_as_well_as(best);
+    validated.iter().filter(is_longer).filter(is_better).max_by_key(|one| one.fit.span).unwrap_or(best)
+}
+
+/// The mean of some numbers, and its standard error by their scatter.
+fn mean_and_error(numbers: &[f64]) -> (f64, f64) {
+    let count = numbers.len() as f64;
+    let mean = numbers.iter().sum::<f64>() / count;
+    let squared = numbers.iter().map(|one| (one - mean).powi(2)).sum::<f64>();
+    (mean, (squared / (count * (count - 1.0))).sqrt())
+}
+
 /// Which of some lengths parts of the rows do not rule out. Those are ruled out that predict worse than the best in every part, or on average by
 /// more than that differs between parts. A length that too few parts compare with the best is not ruled out.
 fn not_ruled_out(problem: &Problem<'_>, validated: &[Validated], parts: &[Range<usize>], variance: f64) -> Vec<bool> {
@@ -156,11 +212,9 @@ fn not_ruled_out(problem: &Problem<'_>, validated: &[Validated], parts: &[Range<
                 (count > 0.0).then(|| sum / count)
             })
             .collect();
-        let count = differences.len() as f64;
-        let mean = differences.iter().sum::<f64>() / count;
-        let squared = differences.iter().map(|one| (one - mean).powi(2)).sum::<f64>();
+        let (mean, error) = mean_and_error(&differences);
         let always = differences.iter().all(|one| *one > 0.0);
-        differences.len() >= FEWEST_PARTS && (always || mean > WORSE * (squared / (count * (count - 1.0))).sqrt())
+        differences.len() >= FEWEST_PARTS && (always || mean > WORSE * error)
     };
     squares.iter().map(|squares| !is_worse(squares)).collect()
 }
@@ -198,7 +252,7 @@ pub(crate) fn left_of_rows<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::regression::simulated::{model, rows, staged, white};
+    use crate::regression::simulated::{CONSTANTS, model, rows, staged, white};
 
     const ROWS: usize = 1500;
     const DEVIATION: f64 = 0.2;
@@ -232,6 +286,43 @@ mod tests {
         assert!(spans.is_sorted_by(|long, short| long > short), "{spans:?}");
         // Of long windows chance decides which is best where nothing changes.
         assert!(spans[0] > 100 && spans[3] < 40, "{spans:?}");
+    }
+
+    /// How well windows of every length predict rows as of a sweep: a constant differs from what is windowed beside it only over the record.
+    fn of_a_sweep(changing: impl Fn(f64) -> [f64; 2]) -> Vec<Validated> {
+        let mut rows = rows(ROWS, changing, DEVIATION);
+        let windowed = rows.regressors[0].value.clone();
+        let before = rows.regressors[1].value.clone();
+        let companion = rows.regressors[0].companion.clone();
+        let square = |row: usize| 4.0 * (row as f64 / ROWS as f64).powi(2);
+        for row in 0..ROWS {
+            let now = square(row) * windowed[row];
+            rows.rhs[row] += CONSTANTS[0] * (now - before[row]);
+            rows.regressors[1].value[row] = now;
+            rows.regressors[1].companion[row] = square(row) * companion[row];
+        }
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let (scales, expected) = (Scale::all(ROWS, 3), white(DEVIATION * DEVIATION));
+        staged(|stages| validate(&problem, &scales, expected, Instructions::Scalar, stages))
+    }
+
+    #[test]
+    fn longer_windows_are_taken_that_predict_as_well_and_tell_constants_far_better() {
+        let still = of_a_sweep(|_| [1.0, 0.0]);
+        let short = still.iter().find(|one| one.fit.span > 100).expect("a short one");
+        let found = better_known(&still, short);
+        assert!(found.fit.span > 3 * short.fit.span, "{} {}", short.fit.span, found.fit.span);
+        assert!(found.knows_far_better_than(short) && found.predicts_as_well_as(short));
+        let error = |one: &Validated| (one.fit.pooled.values[0] - CONSTANTS[0]).abs();
+        assert!(error(found) < 0.3 * error(short), "{} {}", error(short), error(found));
+        // Not where long windows do not follow what changes.
+        let moving = of_a_sweep(|time| [(time / 12.0).sin(), (time / 12.0).cos() / 12.0]);
+        let first = best(&moving).expect("one");
+        assert_eq!(better_known(&moving, first).fit.span, first.fit.span);
+        // Nor where they tell constants no better.
+        let rich = validated(1e9, &[]);
+        let short = rich.iter().find(|one| one.fit.span > 100).expect("a short one");
+        assert_eq!(better_known(&rich, short).fit.span, short.fit.span);
     }
 
     #[test]

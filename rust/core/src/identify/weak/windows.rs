@@ -3,9 +3,10 @@
 use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::identify::kinds::Kind;
+use crate::identify::weak::decide::BADLY;
 use crate::identify::weak::decided::{Decided, rows_of};
 use crate::identify::weak::session::Session;
-use crate::inference::cross_validation::{OVERLAP, RuledOut, Validated, best, rule_out, validate};
+use crate::inference::cross_validation::{OVERLAP, RuledOut, Validated, best, better_known, rule_out, validate};
 use crate::regression::constants::misfits;
 use crate::regression::fit::Fit;
 use crate::regression::subsample::{are_many, few_stretches, holds, places_of, stretches_of_rows, thinned_rows};
@@ -78,6 +79,8 @@ impl Session<'_, '_, '_> {
         decided.lengths.sort_unstable_by_key(|(length, _)| *length);
         // Where no row can be predicted any length is as good, and the longest tells most.
         let Some(best) = best(&validated).or(validated.last()) else { return Ok(()) };
+        // Windows that predict badly follow what is missing, and long ones tell nothing better.
+        let best = if best.error < BADLY { better_known(&validated, best) } else { best };
         decided.error = if best.error.is_finite() { best.error } else { 1.0 };
         (decided.covariance, decided.expected) = self.covariance(weak, self.parameters(&model, &best.fit));
         let scale = best.fit.scale;
