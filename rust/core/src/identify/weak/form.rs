@@ -12,9 +12,10 @@ use crate::identify::scanned::Scan;
 use crate::identify::weak::angle_zero::outcome::FreeOffset;
 use crate::identify::weak::angle_zero::spring::STIFFNESS;
 use crate::identify::weak::choice::Chosen;
-use crate::identify::weak::decide::{is_better_within, is_odd};
+use crate::identify::weak::decide::{BADLY, is_better_within, is_odd};
 use crate::identify::weak::found::WeakIdentified;
 use crate::identify::weak::friction::FrictionDirection;
+use crate::identify::weak::lag::Settled;
 use crate::identify::weak::options::WeakOptions;
 use crate::identify::weak::pulses::{add_pulses, allow_hidden, are_the_same, without_pulses};
 use crate::identify::weak::session::{Session, always_constant};
@@ -317,6 +318,7 @@ fn settled(
             scan: Scan::default(),
             free_offset: FreeOffset::default(),
             windowed_offset: None,
+            followed: None,
             best_before: None,
             is_rough: false,
             stages,
@@ -348,12 +350,29 @@ fn settled(
 }
 
 impl Session<'_, '_, '_> {
+    /// Decides, and once more where something changes beside constants alone: the test function was chosen, and its widths were compared, as if it did not.
+    /// Returns also what widths beside constants found.
+    fn settled_with_followed(&mut self, chosen: Chosen, model: &Model) -> Result<(Settled, Option<Scan>), Error> {
+        let settled = self.settle(model, chosen)?;
+        self.followed = settled.1.model.windowed.first().copied().filter(|_| self.model().windowed.is_empty());
+        if self.followed.is_none() {
+            return Ok((settled, None));
+        }
+        drop(settled);
+        let before = std::mem::take(&mut self.scan);
+        let model = self.model();
+        let chosen = self.choose(&model)?;
+        Ok((self.settle(&model, chosen)?, Some(before)))
+    }
+
     /// Decides with a test function that was chosen, and reports.
     fn finished(&mut self, chosen: Chosen, model: &Model) -> Result<WeakIdentified, Error> {
         let samples = self.record.angle.len();
-        let (chosen, decided, lag) = self.settle(model, chosen)?;
+        let ((chosen, decided, lag), before) = self.settled_with_followed(chosen, model)?;
+        // What is followed explains that widths disagreed beside constants only where nothing is left.
+        let before = before.filter(|_| decided.error >= BADLY);
         let (mut found, at_rows) = self.report(chosen, &decided)?;
-        found.scan = std::mem::take(&mut self.scan);
+        found.scan = before.unwrap_or_else(|| std::mem::take(&mut self.scan));
         found.free_offset = self.free_offset;
         found.angle_zero = self.take_angle_zero(&mut found, &decided);
         let status = found.scan.status(&found.constants);

@@ -35,6 +35,8 @@ pub(crate) struct Session<'a, 'b, 'c> {
     pub(crate) free_offset: FreeOffset,
     /// The offset that the record was to decide upon and that is free in every window.
     pub(crate) windowed_offset: Option<usize>,
+    /// What was found to change beside constants alone, and is followed in windows.
+    pub(crate) followed: Option<usize>,
     /// Samples of the windows that were best a step before, where little changed since: the best ones are near.
     pub(crate) best_before: Option<usize>,
     /// Whether few rows of many compare lengths of windows.
@@ -65,7 +67,8 @@ impl Session<'_, '_, '_> {
     /// The kinds of the unknowns, as far as they are known by now.
     fn kinds(&self) -> Vec<Kind> {
         let of = |(unknown, &kind): (usize, &Kind)| {
-            if self.windowed_offset == Some(unknown) { Kind::Windowed } else { kind }
+            let is_windowed = [self.windowed_offset, self.followed].contains(&Some(unknown));
+            if is_windowed { Kind::Windowed } else { kind }
         };
         self.unknowns().into_iter().zip(&self.options.kinds).map(of).collect()
     }
