@@ -15,8 +15,10 @@ from tvident._arguments import percent
 from tvident._equation import BUILT_IN, COEFFICIENTS, FRICTION, OFFSET, Unknown
 from tvident._identify.data import Data, cut
 from tvident._identify.free_offset import without_worse_offset
+from tvident._identify.left_over import unexplained
 from tvident._identify.methods import StrongForm, WeakForm
-from tvident._identify.remedies import BEYOND_CHANCE, NEXT_TO_NOTHING, Trial, unexplained
+from tvident._identify.offered import BEYOND_CHANCE, NEXT_TO_NOTHING
+from tvident._identify.remedies import Trial
 from tvident._identify.settings import Request, resolve
 from tvident._identify.used import as_used
 from tvident._results import TRIED, Identification, Words

@@ -5,14 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from tvident._arguments import percent, with_error
 from tvident._equation import BUILT_IN, COEFFICIENTS
 from tvident._identify.growths import GROWTHS
-from tvident._results import BECOMES, TRIED, Identification, median_of, predicted_ahead
+from tvident._identify.left_over import AS_GOOD, Left, Unexplained, unexplained
+from tvident._identify.offered import (
+    BEYOND_CHANCE,
+    are_distinguished,
+    feeds_energy,
+    holds,
+    is_there,
+)
+from tvident._results import BECOMES, Identification, median_of
 from tvident._status import DOUBTFUL_RECORD, Status
 
 _WORTH = 0.9
@@ -24,17 +32,14 @@ _NOTHING = 1.05
 _BETTER = 0.8
 """What is advised leaves at most this part of what the model at hand leaves unexplained of parts that are held back."""
 
+_BETTER_BY_FAR = 0.5
+"""The same where nothing contradicts the model at hand: then only a simpler one needs no more than that."""
+
 _NEARLY_ALL = 0.1
 """What explains nearly all that was left leaves at most this part of it."""
 
-_AS_GOOD = 1.25
-"""Constants are advised where they leave at most so many times what changing parameters leave."""
-
-NEXT_TO_NOTHING = 0.01
-"""A share of the angle's variance that may stay unexplained whatever else is said."""
-
-BEYOND_CHANCE = 4.0
-"""Standard errors that a term must be away from nothing."""
+_FAR_SMALLER = 1 / 3
+"""What predicts as much is advised where an error falls to this part or below."""
 
 _ELSEWHERE = 3.0
 """Standard errors from which on a better equation finds a parameter elsewhere."""
@@ -52,44 +57,7 @@ _LEFT_OVER = (
 )
 """Flags of a record whose equations leave something over, or tell nothing apart."""
 
-_AGAINST = 0.1
-"""A share of a weight that a negative stiffness beside it may have: with more the two are distinguished by nothing."""
-
 Call = dict[str, Any]
-
-
-class Unexplained(NamedTuple):
-    """Shares of the angle's variance that are not predicted of what is held back; infinite where that is not known.
-
-    Parameters
-    ----------
-    share : float
-        Of all parts.
-    steady : float
-        Without the parts that are predicted worst: where something changes suddenly nothing is foreseen, whatever the equation is.
-    """
-
-    share: float
-    steady: float
-
-
-@dataclass(frozen=True)
-class _Left:
-    """What a model leaves unexplained of what is held back, and what the model at hand does, predicted equally far ahead."""
-
-    least: Unexplained
-    now: Unexplained
-
-    @property
-    def ratio(self) -> float:
-        """The first over the second, or over all where the model at hand predicts nothing; infinite if it is the worse one of all parts."""
-        if not 0 < self.now.steady < np.inf:
-            return self.least.share
-        return self.least.steady / self.now.steady if self.least.share <= self.now.share else np.inf
-
-    def __str__(self) -> str:
-        before = f", not {percent(1 - self.now.share)}" if self.now.share < 1 else ""
-        return f"then {percent(1 - self.least.share)} {TRIED}{before}"
 
 
 @dataclass(frozen=True)
@@ -162,9 +130,17 @@ class Trial:
         # What constants explain down to the noise needs nothing that changes.
         is_settled = of_constants is not None and of_constants.is_settled
         beside = self._beside_changes() if is_changing and not is_settled else None
-        if of_constants is None or (beside is not None and of_constants.ratio > _AS_GOOD * beside.ratio):
-            return beside
-        return of_constants
+        steady = self._beside_constant_stiffness() if is_changing and not is_settled else None
+        # The simpler ones come first.
+        tried = [one for one in (steady, of_constants, beside) if one is not None]
+        least = min((one.ratio for one in tried), default=np.inf)
+        return next((one for one in tried if one.ratio <= AS_GOOD * least), None)
+
+    @property
+    def _worth(self) -> float:
+        """What a model that is no simpler leaves at most of what the one at hand does not explain, to be advised."""
+        is_contradicted = self.result.record_status & (_LEFT_OVER | Status.SCALES_DISAGREE | Status.KIND_CONTRADICTED)
+        return _BETTER if is_contradicted else _BETTER_BY_FAR
 
     @property
     def _of_constants_alone(self) -> Call:
@@ -194,17 +170,47 @@ class Trial:
         Each gets lengths of its own: those that were chosen follow what is missing.
         """
         for found in self._each_beside_changes():
-            left_of = {one: self._left_of(result) for one, result in found.items() if _is_there(one, result)}
+            left_of = {one: self._left_of(result) for one, result in found.items() if self._may_be(one, result)}
             best = min(left_of, key=lambda one: left_of[one].ratio, default=None)
-            if best is not None and left_of[best].ratio <= _BETTER:
+            if best is not None and left_of[best].ratio <= self._worth:
                 break
         else:
             return None
         left, result = left_of[best], found[best]
-        if not _holds(left.least.share, result.record_status):
+        if not holds(left.least.share, result.record_status):
             return None
         words = f"{self._suspicion(best, result)}: try {self._change(best, result)}; {left}{self._moved(result)}"
-        return Remedy(left.ratio, words, _are_distinguished(result.record_status))
+        return Remedy(left.ratio, words, are_distinguished(result.record_status))
+
+    def _beside_constant_stiffness(self) -> Remedy | None:
+        """Return that the stiffness need not change beside what does, where that predicts more, or as much with far smaller errors.
+
+        Where the motion is fast windows tell little of a stiffness: along a sweep they may tell it from an inertia nowhere.
+        """
+        if "varying" not in (self.result.settings["kinds"][name] for name in ("inertia", "damping")):
+            return None
+        found = self._tried({**self.given, "stiffness": "constant"}, self._of_constants_alone)
+        if found is None or found.record_status & (_LEFT_OVER | DOUBTFUL_RECORD | Status.KIND_CONTRADICTED):
+            return None
+        left, known = self._left_of(found), self._better_known(found)
+        is_worth_it = left.ratio <= _BETTER or (left.is_as_much and known)
+        if not is_worth_it or self._feeds_energy(found):
+            return None
+        words = f"stiffness need not change: try stiffness='constant'; {left}{known}{self._moved(found)}"
+        return Remedy(min(left.ratio, AS_GOOD), words, distinguishes=False, is_settled=True)
+
+    def _better_known(self, found: Identification) -> str:
+        """Return which constant another result knows far better, in words."""
+        errors = {}
+        for name in ("inertia", "damping"):
+            results = (self.result, found)
+            if all(one.settings["kinds"][name] == "constant" for one in results):
+                errors[name] = [one.value(name).stderr / abs(one.value(name).value) for one in results]
+        best = max(errors, key=lambda one: errors[one][0] / errors[one][1], default=None)
+        if best is None or not errors[best][1] <= _FAR_SMALLER * errors[best][0]:
+            return ""
+        before, after = errors[best]
+        return f", and the error of {best} falls from {percent(before)} to {percent(after)}"
 
     def undoubted(self, suspects: Sequence[str]) -> tuple[str, str] | None:
         """Return the first suspect with which nothing else is suspected, if parameters are elsewhere then, and what to do in words.
@@ -216,7 +222,7 @@ class Trial:
         for found in self._each_beside_changes():
             for one in suspects:
                 result = found.get(one)
-                if result is None or result.record_status & _LEFT_OVER or not _is_there(one, result):
+                if result is None or result.record_status & _LEFT_OVER or not self._may_be(one, result):
                     continue
                 moved = self._moved(result)
                 if moved:
@@ -240,7 +246,7 @@ class Trial:
         may_change = any(found[name] == "varying" and constant[name] != self.given[name] for name in COEFFICIENTS)
         for place, kinds in enumerate([constant, self.given] if may_change else [constant]):
             if place not in self._beside:
-                there = [one for one, result in self._beside.get(0, {}).items() if _is_there(one, result)]
+                there = [one for one, result in self._beside.get(0, {}).items() if is_there(one, result)]
                 worth = {"lag", *self.beyond_chance, *there}
                 suspects = [one for one in self.suspects if place == 0 or one in worth]
                 tried = {one: self._tried(kinds, self._with(call, one)) for one in suspects}
@@ -273,6 +279,14 @@ class Trial:
                 return suspects, given
         return suspects, []
 
+    def _may_be(self, one: str, found: Identification) -> bool:
+        """Return whether a suspect is beyond chance, can be what it is called, and leaves a machine that can be."""
+        return is_there(one, found) and not self._feeds_energy(found)
+
+    def _feeds_energy(self, found: Identification) -> bool:
+        """Return whether a machine has a negative inertia or damping with another equation only."""
+        return feeds_energy(found) and not feeds_energy(self.result)
+
     def _with(self, call: Call, change: str) -> Call:
         return call | ({"lag": "auto"} if change == "lag" else {"terms": [*call["terms"], change]})
 
@@ -302,12 +316,12 @@ class Trial:
             found = self._identified(call)
         except ValueError:
             return np.inf
-        if not all(_is_there(one, found) for one in self.suspects if one in found.terms):
+        if not all(is_there(one, found) for one in self.suspects if one in found.terms):
             return np.inf
         spread = found.residual_std[np.isfinite(found.residual_std)]
         return float(np.median(spread)) ** 2 if spread.size else np.inf
 
-    def _left_of(self, found: Identification) -> _Left:
+    def _left_of(self, found: Identification) -> Left:
         """Return what a result leaves unexplained, as far ahead as the longer of both test functions.
 
         One test function ahead is another distance for each, and what is near is predicted by anything.
@@ -317,7 +331,7 @@ class Trial:
         if ahead not in self._now:
             self._now[ahead] = unexplained(self.result, ahead)
         now = self._now[ahead]
-        return _Left(now if found is self.result else unexplained(found, ahead), now)
+        return Left(now if found is self.result else unexplained(found, ahead), now)
 
     def _compared(self, before: Call, call: Call, chosen: Sequence[str]) -> Remedy | None:
         """Return the advice in words, if it explains more of what is held back than the model at hand."""
@@ -330,15 +344,15 @@ class Trial:
         free = self.result if is_at_hand else self.identify(**kept, terms=call["terms"], lag=call["lag"])
         left, left_free = self._left_of(found), self._left_of(free)
         changing = [name for name in COEFFICIENTS if free.settings["kinds"][name] in {"windowed", "varying"}]
-        is_as_good = bool(changing) and left.ratio <= _AS_GOOD * left_free.ratio
+        is_as_good = bool(changing) and left.ratio <= AS_GOOD * left_free.ratio
         is_simple = is_as_good and not self._follows_time(call, changing)
         best, of_best = (left, found) if is_simple else (left_free, free)
         if not (is_simple or chosen or is_none):
             return None
-        if not best.ratio <= _BETTER:
+        if not best.ratio <= (_BETTER if is_simple else self._worth) or self._feeds_energy(of_best):
             return None
         flags = self._identified(call, diagnose=True).record_status
-        if not _holds(best.least.share, flags):
+        if not holds(best.least.share, flags):
             return None
         words = []
         if is_none:
@@ -359,7 +373,7 @@ class Trial:
         is_settled = is_simple and not flags & DOUBTFUL_RECORD
         # With an unknown less the others are told apart whatever the truth is.
         is_more = bool(chosen) and not is_none
-        distinguishes = is_more and _are_distinguished(flags if is_simple else free.record_status)
+        distinguishes = is_more and are_distinguished(flags if is_simple else free.record_status)
         return Remedy(best.ratio, said, distinguishes, is_settled=is_settled)
 
     def _follows_time(self, call: Call, names: Sequence[str]) -> bool:
@@ -407,40 +421,3 @@ class Trial:
             return f"the torque is {'late' if late > 0 else 'early'} by {with_error(abs(late) * rate, error * rate)} samples"
         value, error, *_ = found.value(name)
         return BUILT_IN[name].suspected(value, f"{with_error(value, error)} {found.units.get(name, '')}")
-
-
-def _are_distinguished(flags: int) -> bool:
-    """Return whether unknowns can be distinguished."""
-    return not flags & (Status.ILL_CONDITIONED | Status.RANK_DEFICIENT)
-
-
-def _is_there(name: str, found: Identification) -> bool:
-    """Return whether a term or a lag is beyond chance, and can be what it is called."""
-    if name == "lag":
-        value, error = found.settings["lag"], found.settings.get("lag_stderr") or 0.0
-    else:
-        value, error, *_ = found.value(name)
-    return bool(abs(value) > BEYOND_CHANCE * error and _is_physical(name, value, found))
-
-
-def _is_physical(name: str, value: float, found: Identification) -> bool:
-    """Return whether friction resists the motion, and a weight pulls without a negative spring beside it."""
-    term = BUILT_IN.get(name)
-    if term is None:
-        return True
-    if term.spring == "instead":
-        return value > 0 and found.value("stiffness").value >= -_AGAINST * value
-    return value > 0 or not term.dissipates
-
-
-def _holds(share: float, flags: int) -> bool:
-    """Return whether what is to be advised predicts next to everything, or nothing says that it cannot be trusted either."""
-    if flags & Status.RANK_DEFICIENT:
-        return False
-    return share <= NEXT_TO_NOTHING or not flags & DOUBTFUL_RECORD
-
-
-def unexplained(result: Identification, ahead: int | None = None) -> Unexplained:
-    """Return what is not predicted so many samples ahead, by default one test function ahead."""
-    shares = [1 - predicted / 100 for predicted in predicted_ahead(result, ahead)]
-    return Unexplained(*(share if np.isfinite(share) else np.inf for share in shares))
