@@ -236,6 +236,29 @@ def test_a_chain_on_a_moving_base_holds_its_scale(masses: int, driven: int, chan
         assert not found.trusted.any()
 
 
+@pytest.mark.parametrize(
+    ("masses", "driven", "changes", "seed"),
+    [(3, 2, 0, 39), (2, 0, 0, 39), *long((3, 2, 1, 40), (3, 0, 2, 39), (3, 0, 2, 40))],
+)
+def test_what_is_asked_for_as_constant_is_not_drawn_to_zero_by_equations_far_from_a_force(
+    masses: int, driven: int, changes: int, seed: int
+) -> None:
+    # Springs and inertias of all equations but one were zero: of two equations without a force the farther drew what they share, and
+    # with two masses the widest test functions of the scan did, whose numbers the others began with.
+    values = [12.0, 18.0, 16.0][:masses]
+    springs = [constant(value) for value in values]
+    springs[changes] = lambda t: np.asarray(values[changes] * (1 + 0.2 * np.sin(0.9 * t)))
+    simulated = chain(springs, 10000, seed=seed, driven=(driven,), angle_noise=3e-5)
+    found = identified(simulated, **CONSTANTS)
+    for name, true in truth(simulated).items():
+        if not name.startswith("damping"):
+            assert 0.85 < found.value(name).value / np.mean(true) < 1.02, name
+    changing = "stiffness_base_0" if changes == 0 else f"stiffness_{changes - 1}_{changes}"
+    assert found.record_status & Status.KIND_CONTRADICTED
+    assert found.tests[changing] < 5e-4
+    assert sum(found.tests[name] < 5e-4 for name in found.tests) == 1
+
+
 # A base that moves as little as this, beside forces on all masses, shows three samples, not one.
 @pytest.mark.parametrize(("late", "driven"), [(1, (1,)), (3, (1,)), *long((3, None))])
 def test_a_base_that_is_late_is_named(late: int, driven: tuple[int, ...] | None) -> None:

@@ -32,6 +32,7 @@ impl MergedSession<'_, '_, '_> {
 
     /// Moves to the plateau where the test function that spectra suggest is off it, or they suggest none.
     pub(crate) fn onto_plateau(&mut self, suggested: Option<TestFunction>) -> Result<(), Error> {
+        let before = (self.parameters.clone(), self.misfits.clone());
         let scans = self.scan()?;
         let half = suggested.map(|one| one.half_width());
         let moved = half.map_or_else(|| scans.best.inside(), |half| scans.accepted(half));
@@ -39,6 +40,8 @@ impl MergedSession<'_, '_, '_> {
         let half = moved.or(half).or(widest).ok_or(self.too_short())?;
         let exponent = suggested.map_or(self.exponent(), |one| one.exponent());
         self.build(TestFunction::new(half, exponent, self.options.delta)?)?;
+        // The widest may have drawn to zero what no torque holds.
+        (self.parameters, self.misfits) = before;
         self.pilot()?;
         self.scan = scans.best.clone();
         self.scan.moved = suggested.is_some_and(|one| one.half_width() != half);

@@ -7,7 +7,8 @@
 //! That alone does not hold them. Let the equations with a torque hold a factor `s` on these parameters with a ratio `r` of signal to noise. The
 //! next factor is `r / (r + 1 / s²)`, which ends at `(1 + √(1 - 4 / r)) / 2`: 15 % too low where the ratio is 8, and at zero below 4. Where one is
 //! wrong, all therefore count a hundred times less in addition: then equations with a torque say what they share with them, and they say only
-//! what no other equation holds, for which their weight does not matter. All alike, since one may be held by another alone.
+//! what no other equation holds, for which their weight does not matter. All alike, since one may be held by another alone, but for every step
+//! away from a torque a hundred times less again: of two without one, the farther would draw to zero what they share.
 
 use crate::error::Error;
 use crate::identify::merged::session::{LEAST_NOISE, MergedSession};
@@ -19,8 +20,9 @@ use crate::regression::residuals::{residuals, usual_variance};
 
 /// What is left of an equation, over the variance of its noise, from which on it is wrong.
 const WRONG: f64 = 1.5;
-/// So many times less it counts then.
+/// So many times less it counts then, for every step to an equation with a torque, and after how many steps it is no less.
 const LESS: f64 = 100.0;
+const FARTHEST: i32 = 4;
 /// The misfit of an equation of which nothing is left: beyond that of any other.
 const DRAWN_TO_ZERO: f64 = 1e12;
 /// A part of other torques, squared, that no variance is below: weights stay numbers.
@@ -56,8 +58,8 @@ impl MergedSession<'_, '_, '_> {
         self.is_silent(equation) && entries.all(|entry| entry.equation != equation)
     }
 
-    /// By how much the variance of an equation counts as more than that of its noise: alike for all that are homogeneous, since one may be held by
-    /// another alone.
+    /// By how much the variance of an equation counts as more than that of its noise: alike for all that are homogeneous and as near to a torque, since
+    /// one may be held by another alone.
     pub(crate) fn factor_of(&self, equation: usize) -> f64 {
         let misfit = |equation: usize| self.misfits.get(equation).copied().unwrap_or(1.0);
         if !self.is_homogeneous(equation) {
@@ -65,7 +67,24 @@ impl MergedSession<'_, '_, '_> {
         }
         let homogeneous = (0..self.merged.equations()).filter(|&other| self.is_homogeneous(other));
         let most = homogeneous.map(misfit).fold(1.0, f64::max);
-        if most > 1.0 { LESS * most } else { 1.0 }
+        if most > 1.0 { LESS.powi(self.steps_to_a_torque(equation).min(FARTHEST)) * most } else { 1.0 }
+    }
+
+    /// How many equations stand between a homogeneous one and one with a torque, with this one: those that share an unknown are neighbours.
+    fn steps_to_a_torque(&self, equation: usize) -> i32 {
+        let share = |one: usize, other: usize| {
+            let unknown = self.merged.elements.iter().filter(|element| element.known.is_none());
+            unknown.map(|element| &element.entries).any(|entries| {
+                [one, other].iter().all(|&equation| entries.iter().any(|entry| entry.equation == equation))
+            })
+        };
+        let (mut reached, mut steps) = (vec![equation], 0);
+        while steps < FARTHEST && reached.iter().all(|&one| self.is_homogeneous(one)) {
+            let is_next = |other: &usize| reached.contains(other) || reached.iter().any(|&one| share(one, *other));
+            reached = (0..self.merged.equations()).filter(is_next).collect();
+            steps += 1;
+        }
+        steps
     }
 
     /// The mean square of a regressor in the rows of all trials.
