@@ -137,13 +137,16 @@ def test_a_window_that_there_is_not_is_refused(given: int, bound: str) -> None:
         )
 
 
-@pytest.mark.parametrize("seed", long(1, 2, 3))
-def test_steps_of_a_full_endpoint_stiffness_are_followed(seed: int) -> None:
-    # kg, N s/m, N/m: an arm that holds a handle stiffens in every direction.
+@pytest.mark.parametrize(
+    ("seed", "at"), [(3025, 3.117), *long((1, 2.5), (2, 2.5), (3, 2.5), (3008, 3.166), (3027, 1.821))]
+)
+def test_steps_of_a_full_endpoint_stiffness_are_followed(seed: int, at: float) -> None:
+    # kg, N s/m, N/m: an arm that holds a handle stiffens in every direction. Windows that only the longer side of the step held
+    # predicted that side best, and the other side spoke against none: one element of three stayed constant, 7.7 % off.
     at_rest, step = np.array([[300.0, -80.0], [-80.0, 220.0]]), np.array([[40.0, -40.0], [-40.0, 40.0]])
 
     def stiffness(t: Array) -> Array:
-        return np.asarray(at_rest[:, :, np.newaxis] + step[:, :, np.newaxis] * (t > 2.5))
+        return np.asarray(at_rest[:, :, np.newaxis] + step[:, :, np.newaxis] * (t > at))
 
     inertia, damping = np.array([[1.5, 0.2], [0.2, 1.1]]), np.array([[15.0, 3.0], [3.0, 12.0]])
     trials = coupled(stiffness, inertia, damping, 5000, seed=seed, trials=10)
@@ -155,7 +158,8 @@ def test_steps_of_a_full_endpoint_stiffness_are_followed(seed: int) -> None:
     for place in ((0, 0), (0, 1), (1, 1)):
         off = np.sqrt(np.mean((found.stiffness[place] - trials.stiffness[place]) ** 2))
         assert off < 0.03 * np.abs(trials.stiffness[place].mean()), place
-    np.testing.assert_allclose(found.jumps, [2.5], atol=0.01)
+    np.testing.assert_allclose(found.jumps, [at], atol=0.01)
+    assert not found.record_status
     assert all(found.identifiable.values())
 
 

@@ -58,7 +58,7 @@ impl MergedSession<'_, '_, '_> {
         let wanted = wanted.map(|rows| Scale::nearest(&all, rows.round().max(1.0) as usize).ok_or(self.too_short()));
         let tried = match wanted.transpose()? {
             Some(one) => vec![all[one]],
-            None => all.clone(),
+            None => self.covering(&all),
         };
         if tried.is_empty() && !model.windowed.is_empty() {
             return Err(self.too_short());

@@ -15,6 +15,8 @@ use crate::regression::window_length::Scale;
 
 /// Lengths of windows, from the best one on and each twice the last, that jumps are looked for with.
 const JUMP_SCALES: usize = 3;
+/// The part of the rows in windows that lengths must hold to be compared, of what the shortest hold.
+const COVERED: f64 = 0.9;
 /// Regressor of a stiffness, which jumps without a derivative.
 const STIFFNESS: usize = 2;
 
@@ -28,9 +30,29 @@ impl MergedSession<'_, '_, '_> {
         let (first, stride, group) = (self.all.function.half_width(), self.all.function.stride(), self.all.group);
         let function = &self.all.kernels.values[STIFFNESS];
         self.all.rows.exclude(rows_over(&self.jumps, function, (first, stride, group), whole.len()));
-        let row = |jump: &Jump| jump.sample.saturating_sub(first).div_ceil(stride) * group;
-        self.all.rows.jumps = self.jumps.iter().map(row).collect();
+        self.all.rows.jumps = self.rows_of_jumps();
         Some(whole)
+    }
+
+    /// The rows that jumps lie before.
+    fn rows_of_jumps(&self) -> Vec<usize> {
+        let (first, stride, group) = (self.all.function.half_width(), self.all.function.stride(), self.all.group);
+        let row = |jump: &Jump| jump.sample.saturating_sub(first).div_ceil(stride) * group;
+        self.jumps.iter().map(row).collect()
+    }
+
+    /// Lengths of windows that parts between jumps hold, short parts but for: what no window holds is not predicted, and speaks against no length.
+    pub(crate) fn covering(&self, scales: &[Scale]) -> Vec<Scale> {
+        let rows = self.all.rows.len();
+        let mut ends = self.rows_of_jumps();
+        ends.extend([0, rows]);
+        ends.sort_unstable();
+        let covered = |scale: &Scale| {
+            let parts = ends.windows(2).map(|ends| ends[1].min(rows).saturating_sub(ends[0]));
+            parts.filter(|part| *part >= scale.span()).sum::<usize>() as f64
+        };
+        let most = scales.iter().map(covered).fold(0.0, f64::max);
+        scales.iter().copied().filter(|scale| covered(scale) >= COVERED * most).collect()
     }
 
     /// Finds jumps of windowed elements, those that are known again.
