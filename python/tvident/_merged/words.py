@@ -71,7 +71,7 @@ def _tested(result: Any) -> list[str]:
 
 
 def _channels_of(part: Part, masses: int, period: float) -> list[str]:
-    """Return what to do about channels that a recorder spoilt, and about torques that are late."""
+    """Return what to do about channels that a recorder spoilt, that are late, or whose gain is wrong."""
     numbers, found = part.equations.numbers, part.found
     angles = [*numbers, *(one for one in range(len(found.noise[0])) if one not in numbers)]
     words = []
@@ -84,6 +84,12 @@ def _channels_of(part: Part, masses: int, period: float) -> list[str]:
         with_what = "the other channels" if channel < len(angles) else "the angles"
         words.append(
             f"{_named(channel, angles, numbers, masses)} seems to be {comes} by {by}: shift it by as much, or record it with {with_what}"
+        )
+    for channel, lacking in found.lacking:
+        times = 1 / (1 + lacking.value)
+        by = f"{times:.4g} ± {lacking.stderr * times**2:.1g} times what the other channels say"
+        words.append(
+            f"{_named(channel, angles, numbers, masses)} seems to be {by}: divide it by as much, or look for another unit or a filter"
         )
     return words
 

@@ -12,6 +12,7 @@ use tvident::identify::{
     Element, Entry, FoundElement as Found, Merged, MergedFound, MergedOptions, Multiplied, Trial,
     identify_merged as run,
 };
+use tvident::inference::Suspect;
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
@@ -54,6 +55,7 @@ pub(crate) struct MergedIdentification {
     scan: Py<Scan>,
     defects: Vec<ChannelDefect>,
     late: Vec<(usize, Estimate)>,
+    lacking: Vec<(usize, Estimate)>,
 }
 
 /// One trial: angles, torques and terms, one of each a row, a mask, positions in the result, and weights.
@@ -213,10 +215,12 @@ pub(crate) fn identify_merged<'py>(
         jumps: found.jumps,
         scan: Scan::new(py, &found.scan)?,
         defects: found.defects.iter().map(|(channel, defect)| ChannelDefect::new(*channel, defect)).collect(),
-        late: found
-            .late
-            .iter()
-            .map(|(channel, late)| (*channel, Estimate { value: late.value, stderr: late.error }))
-            .collect(),
+        late: suspects(&found.late),
+        lacking: suspects(&found.lacking),
     })
+}
+
+/// What channels are suspected of, with standard errors.
+fn suspects(found: &[(usize, Suspect)]) -> Vec<(usize, Estimate)> {
+    found.iter().map(|(channel, one)| (*channel, Estimate { value: one.value, stderr: one.error })).collect()
 }

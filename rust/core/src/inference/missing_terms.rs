@@ -29,6 +29,8 @@ pub enum Missing {
     Term(&'static BuiltInTerm),
     /// The torque lags behind.
     Lag,
+    /// A channel beside those of the masses has a part of itself too little.
+    Gain,
     /// The torque has a part of its own second derivative: something between its sensor and that of the angle bends.
     Resonance,
     /// It has a part of its own square: what its sensor shows is not symmetric.
@@ -55,6 +57,7 @@ impl Missing {
         match self {
             Self::Term(term) => term.name,
             Self::Lag => "lag",
+            Self::Gain => "gain",
             Self::Resonance => "resonance",
             Self::TorqueSquare => "torque_square",
             Self::TorqueCube => "torque_cube",
@@ -83,7 +86,7 @@ impl Missing {
             Self::Term(term) => term.function.samples(angle, velocity),
             Self::TorqueSquare => Some(Mapped { channel: torque, function: squares }),
             Self::TorqueCube => Some(Mapped { channel: torque, function: cubes }),
-            Self::Lag | Self::Resonance => None,
+            Self::Lag | Self::Gain | Self::Resonance => None,
         }
     }
 }

@@ -73,6 +73,8 @@ pub struct MergedFound {
     pub defects: Vec<(usize, Defect)>,
     /// Channels that may be late, angles before torques, and by how many samples they seem to be.
     pub late: Vec<(usize, Suspect)>,
+    /// Angles that no equation is of whose gain seems to be wrong, and the part of themselves that they lack.
+    pub lacking: Vec<(usize, Suspect)>,
 }
 
 impl MergedFound {

@@ -1,5 +1,5 @@
 //! Torques that are late, and what else moves, such as a base: each with its own rate as one more constant, beside everything that was
-//! estimated.
+//! estimated, and what else moves with itself as another, since its gain may be wrong.
 
 use std::sync::Arc;
 
@@ -16,9 +16,12 @@ use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows};
 
 /// A lag of an angle, in samples, up to which it is none: windows that are too long for what they follow leave as much.
 const LEAST_LAG: f64 = 0.05;
+/// A part that such an angle lacks up to which it lacks none.
+const LEAST_GAIN: f64 = 0.005;
 
 impl MergedSession<'_, '_, '_> {
-    /// By how many samples the torque of every equation seems to be late, and every angle that no equation is of: angles before torques.
+    /// By how many samples the torque of every equation seems to be late, and every angle that no equation is of, and the part of itself that such an angle
+    /// seems to lack: angles before torques.
     pub(crate) fn late_channels(
         &mut self,
         fitted: &MergedFit,
@@ -36,9 +39,11 @@ impl MergedSession<'_, '_, '_> {
             let rate = self.rate_of_torque(equation)?;
             self.all.rows.regressors.push(rate);
         }
-        for &angle in &angles {
-            let rate = self.rate_of_angle(angle);
-            self.all.rows.regressors.push(rate);
+        for derivative in [1, 0] {
+            for &angle in &angles {
+                let rate = self.derivative_of_angle(angle, derivative);
+                self.all.rows.regressors.push(rate);
+            }
         }
         let rows = &self.all.rows;
         let judged = JudgedTerm {
@@ -53,19 +58,28 @@ impl MergedSession<'_, '_, '_> {
             inflation: noise.inflation,
             instructions: self.options.instructions,
         };
-        let rates: Vec<usize> = (first..rows.regressors.len()).collect();
-        let factors = judged.factors(&rates, &mut self.stages);
+        let each: Vec<usize> = (first..rows.regressors.len()).collect();
+        let factors = match judged.factors(&each, &mut self.stages) {
+            // Rates alone may be determined.
+            Ok(None) => judged.factors(&each[..equations.len() + angles.len()], &mut self.stages),
+            found => found,
+        };
         self.all.rows.regressors.truncate(first);
-        let samples = 1.0 / self.options.delta;
+        let (samples, torques) = (1.0 / self.options.delta, self.merged.channels());
         // A torque stands on the other side of the equation.
-        let of_torques = equations.into_iter().map(|equation| (self.merged.channels() + equation, -samples));
-        let channels = of_torques.chain(angles.into_iter().map(|angle| (angle, samples)));
-        let late =
-            factors?.unwrap_or_default().into_iter().zip(channels).map(|((value, error), (channel, samples))| {
-                (channel, Suspect { missing: Missing::Lag, value: samples * value, error: samples.abs() * error })
-            });
-        let torques = self.merged.channels();
-        Ok(late.filter(|(channel, late)| *channel >= torques || late.value.abs() > LEAST_LAG).collect())
+        let of_torques = equations.into_iter().map(|equation| (torques + equation, Missing::Lag, -samples));
+        let late = angles.iter().map(|&angle| (angle, Missing::Lag, samples));
+        let lacking = angles.iter().map(|&angle| (angle, Missing::Gain, 1.0));
+        let channels = of_torques.chain(late).chain(lacking);
+        let found = factors?.unwrap_or_default().into_iter().zip(channels);
+        let found = found.map(|((value, error), (channel, missing, unit))| {
+            (channel, Suspect { missing, value: unit * value, error: unit.abs() * error })
+        });
+        let is_told = |(channel, suspect): &(usize, Suspect)| {
+            let least = if suspect.missing == Missing::Gain { LEAST_GAIN } else { LEAST_LAG };
+            *channel >= torques || suspect.value.abs() > least
+        };
+        Ok(found.filter(is_told).collect())
     }
 
     /// What an angle is multiplied with: elements, where they appear, and their values about.
@@ -85,8 +99,8 @@ impl MergedSession<'_, '_, '_> {
         coefficients.contains(&2) && !coefficients.contains(&0)
     }
 
-    /// What an angle adds to the equations with its rate in its place.
-    fn rate_of_angle(&self, angle: usize) -> Regressor {
+    /// What an angle adds to the equations with a derivative of it in its place: 0 itself, 1 its rate.
+    fn derivative_of_angle(&self, angle: usize, derivative: usize) -> Regressor {
         let rows = &self.all.rows;
         let (equations, group, length) = (self.merged.equations(), self.all.group, self.all.kernels.values[0].len());
         let mut value = vec![0.0; rows.len()];
@@ -94,7 +108,7 @@ impl MergedSession<'_, '_, '_> {
         let share = 1.0 / (equations as f64).sqrt();
         for (Entry { equation, factor, .. }, coefficient, parameter) in self.entries_of(angle) {
             let factor = self.weights.equations[equation] * factor * parameter;
-            let rate = Multiplied::Motion { channel: angle, coefficient: coefficient - 1 };
+            let rate = Multiplied::Motion { channel: angle, coefficient: coefficient - derivative };
             for (number, trial) in self.trials.iter().enumerate() {
                 let inner = number * equations + equation;
                 for (time, rate) in trial.regressor(rate).value.iter().enumerate() {
@@ -106,7 +120,7 @@ impl MergedSession<'_, '_, '_> {
             }
             let first = (equation * self.weights.angles.len() + angle) * length;
             for (noise, columns) in noise.iter_mut().zip(&self.weights.angles[angle]) {
-                let column = &columns[coefficient - 1];
+                let column = &columns[coefficient - derivative];
                 noise[first..first + length].iter_mut().zip(column).for_each(|(sum, k)| *sum += share * factor * k);
             }
         }

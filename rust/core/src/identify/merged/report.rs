@@ -12,6 +12,7 @@ use crate::identify::results::{RowResults, SampleResults};
 use crate::identify::scanned::Scan;
 use crate::inference::constancy::NoiseFrom;
 use crate::inference::identifiability::is_mostly_noise;
+use crate::inference::missing_terms::Missing;
 use crate::inference::window_averaging::{Averages, average};
 use crate::regression::constants::{Expected, weakest};
 use crate::regression::limits::{HARDLY_TOLD_APART, NOISE_MODEL_FAILS};
@@ -92,9 +93,12 @@ impl MergedSession<'_, '_, '_> {
         }
         found.scan = std::mem::take(&mut self.scan);
         found.record_status |= found.scan.status(&found.constants_found());
-        found.late = self.late_channels(fitted, &noise, &correlated)?;
+        let suspects = self.late_channels(fitted, &noise, &correlated)?;
+        (found.late, found.lacking) = suspects.into_iter().partition(|(_, suspect)| suspect.missing == Missing::Lag);
+        found.lacking.retain(|(_, suspect)| suspect.is_conspicuous());
         let is_late = found.late.iter().any(|(_, late)| late.is_conspicuous());
         found.record_status |= if is_late { Status::LAG_SUSPECTED } else { Status::GOOD };
+        found.record_status |= if found.lacking.is_empty() { Status::GOOD } else { Status::CHANNEL_SUSPECTED };
         let deviation = self.deviation(fitted)?;
         let ([first, stride], period) = (self.all.samples(), self.all.rows.period);
         let results = RowResults {
@@ -312,6 +316,7 @@ impl MergedSession<'_, '_, '_> {
             scan: Scan::default(),
             defects: Vec::new(),
             late: Vec::new(),
+            lacking: Vec::new(),
         }
     }
 

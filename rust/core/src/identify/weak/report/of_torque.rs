@@ -160,7 +160,7 @@ fn shared(weak: &WeakRows, regressors: &Range<usize>, candidates: &[Missing], to
         // The slopes of both powers, in the mean.
         Missing::TorqueSquare => 2.0 * mean(&weak.rows.rhs) * torque,
         Missing::TorqueCube => 3.0 * squares * torque,
-        Missing::Term(_) | Missing::Lag => 0.0,
+        Missing::Term(_) | Missing::Lag | Missing::Gain => 0.0,
     };
     candidates.iter().map(of).collect()
 }

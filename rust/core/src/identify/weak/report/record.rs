@@ -297,7 +297,7 @@ fn record_status(found: &WeakIdentified, decided: &Decided, at_end: bool) -> Sta
         status |= match suspect.missing {
             Missing::Lag => Status::LAG_SUSPECTED,
             Missing::Term(_) | Missing::Resonance => Status::TERM_SUSPECTED,
-            Missing::TorqueSquare | Missing::TorqueCube => Status::CHANNEL_SUSPECTED,
+            Missing::Gain | Missing::TorqueSquare | Missing::TorqueCube => Status::CHANNEL_SUSPECTED,
         };
     }
     status
