@@ -8,7 +8,8 @@
 //! next factor is `r / (r + 1 / s²)`, which ends at `(1 + √(1 - 4 / r)) / 2`: 15 % too low where the ratio is 8, and at zero below 4. Where one is
 //! wrong, all therefore count a hundred times less in addition: then equations with a torque say what they share with them, and they say only
 //! what no other equation holds, for which their weight does not matter. All alike, since one may be held by another alone, but for every step
-//! away from a torque a hundred times less again: of two without one, the farther would draw to zero what they share.
+//! away from a torque a hundred times less again where only constants are asked for: of two without one, the farther would draw to zero what
+//! they share.
 
 use crate::error::Error;
 use crate::identify::merged::session::{LEAST_NOISE, MergedSession};
@@ -67,7 +68,9 @@ impl MergedSession<'_, '_, '_> {
         }
         let homogeneous = (0..self.merged.equations()).filter(|&other| self.is_homogeneous(other));
         let most = homogeneous.map(misfit).fold(1.0, f64::max);
-        if most > 1.0 { LESS.powi(self.steps_to_a_torque(equation).min(FARTHEST)) * most } else { 1.0 }
+        // Where something may be set free, windows are compared on these rows before their equation is explained: they must count.
+        let steps = if self.asks_for_constants() { self.steps_to_a_torque(equation) } else { 1 };
+        if most > 1.0 { LESS.powi(steps) * most } else { 1.0 }
     }
 
     /// How many equations stand between a homogeneous one and one with a torque, with this one: those that share an unknown are neighbours.
